@@ -1,0 +1,38 @@
+/* Renders one scene of the suite with one reference engine: K replicates with seeds of their own,
+ * folded into moments (unit "replicate"), and a manifest that says how to do it again. */
+#ifndef ASSAY_REFERENCE_H
+#define ASSAY_REFERENCE_H
+
+#include "../renderer/moments.h"
+#include "suite.h"
+
+struct reference_options {
+    uint32_t seed;        /* replicate k's own seed is a hash of (seed, k) */
+    int threads;
+    double timeout_s;     /* of one engine process; it is killed (whole process group) after that */
+    const char *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
+    const char *share_dir; /* where cycles.py is */
+};
+
+/* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds: scene name
+ * and sha256, engine, its version line, sha256 of its binary, command lines, settings, seeds,
+ * replicates, spp, width, height, depth, date (UTC), CPU and wall seconds. Fails (with the engine's
+ * own last lines) when the engine is absent, dies, hangs, writes something unreadable or two
+ * replicates that are the same, and when it cannot express the scene. "truth" has no seeds. */
+bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                      const struct reference_options *opt, struct moments *out, json_t **manifest,
+                      struct err *e) __attribute__((warn_unused_result));
+
+/* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json (an object with one member per
+ * engine; the others are kept). Both appear by rename. */
+bool golden_write(const char *golden_dir, const char *scene, const char *engine,
+                  const struct moments *m, json_t *manifest, struct err *e)
+    __attribute__((warn_unused_result));
+/* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the EXR's
+ * hash differs from the manifest's, or if size, depth, spp, replicates are not those of the suite.
+ * *manifest is a new reference. */
+bool golden_read(const char *golden_dir, const struct suite_scene *scene,
+                 const struct suite_reference *ref, struct moments *out, json_t **manifest,
+                 struct err *e) __attribute__((warn_unused_result));
+
+#endif

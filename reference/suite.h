@@ -1,0 +1,77 @@
+/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which
+ * references, inside which margins, what must come out) and NN_name.md (what it can detect, what it
+ * is blind to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF,
+ * 3x light, 4x whole scene, 9x must differ.
+ *
+ *   {
+ *     "title": "Cornell box with two diffuse spheres",
+ *     "detects": "one line", "blind_to": "one line",
+ *     "width": 128, "height": 128, "depth": 5, "spp": 2048, "tile": 16,
+ *     "expect": "EQUIVALENT",
+ *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
+ *     "references": {
+ *       "cycles": {"class": "exact", "margin_global": 0.005, "margin_tile": 0.02,
+ *                  "replicates": 16, "spp": 256},
+ *       "povray": {"class": "limit", ..., "replicates": 16, "subgrid": 4},
+ *       "truth":  {"class": "exact", ..., "kind": "point_over_plane", "values": {...}}
+ *     }
+ *   }
+ *
+ * An unknown key, a missing key, a value out of range is an error with file and reason. */
+#ifndef ASSAY_SUITE_H
+#define ASSAY_SUITE_H
+
+#include "../renderer/err.h"
+
+#include <jansson.h>
+
+enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
+
+struct suite_reference {
+    char engine[16];     /* "cycles", "povray" or "truth" */
+    char fidelity[16];   /* "class" in the file: "exact", "limit" (exact in the limit of its own
+                            settings) or "approximate" */
+    double margin_global; /* largest relative difference of the image mean that counts as equal */
+    double margin_tile;   /* the same for one tile */
+    int replicates;       /* engines: images with a seed of their own */
+    int spp;              /* cycles: samples per pixel of one replicate */
+    int subgrid;          /* povray: one replicate is a box-averaged (k W) x (k H) picture */
+    char kind[32];        /* truth: which closed form (truth.h) */
+    json_t *values;       /* truth: its numbers; borrowed from the suite */
+};
+
+struct suite_scene {
+    char name[64];        /* "41_cornell" */
+    char dae[4096];       /* path of the .dae */
+    char sha256[65];      /* of the .dae, lower-case hex */
+    char title[128], detects[512], blind_to[512];
+    int width, height;
+    int depth;            /* -m: largest number of bounces */
+    int spp;              /* of our render */
+    int tile;             /* side of a reporting tile, pixels; divides width and height */
+    enum verdict expect;
+    char references_of[64]; /* name of the scene whose references are used; its own name by default */
+    struct suite_reference reference[3];
+    int num_references;
+    json_t *json;         /* owned */
+};
+
+struct suite {
+    struct suite_scene *scene; /* sorted by name */
+    int num_scenes;
+};
+
+/* Loads all scenes of a directory. A 9x scene inherits the `references` object of the scene it names.
+ * Fails on an empty directory, a .dae without .json and the reverse. */
+bool suite_load(const char *dir, struct suite *out, struct err *e) __attribute__((warn_unused_result));
+void suite_free(struct suite *s);
+/* NULL if there is none of that name. */
+const struct suite_scene *suite_find(const struct suite *s, const char *name);
+
+const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
+bool verdict_parse(const char *name, enum verdict *out);
+
+/* Lower-case hex SHA-256 of a file (nettle). */
+bool sha256_file(const char *path, char hex[65], struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,34 @@
+/* From pixels to rays: pinhole or thin lens, box filter of one pixel. */
+#ifndef ASSAY_CAMERA_H
+#define ASSAY_CAMERA_H
+
+#include "scene.h"
+
+/* The camera of one picture. Row 0 is the top row. Image-plane point (sx, sy), both in [-1,1] with
+ * sy up, lies in direction sx*tan_h*right + sy*tan_v*up - backward. */
+struct camera {
+    vec3 eye, right, up, backward; /* unit, orthogonal */
+    float tan_h, tan_v;            /* tangents of the half angles of view */
+    float near, far;               /* measured along the ray, as the assignment does */
+    int width, height;             /* of the full picture, pixels */
+    float lens_radius;             /* 0: pinhole */
+    float focal_distance;          /* of the plane in focus, along the axis */
+};
+
+/* Frames the scene for a width x height picture by the scene's dialect: COLLADA keeps the file's
+ * pose and horizontal angle (or, if it has only a vertical one, that) with square pixels; CGL
+ * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle at
+ * 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
+ * COLLADA file has no camera. */
+bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Replaces pose and angles by those of a camera file of the assignment (its key D writes them).
+ * The picture's size stays. */
+bool camera_read_file(struct camera *c, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* The ray through (x, y) in pixels, origin at the top left corner, lens point (u, v) in [0,1)^2. */
+ray camera_ray(const struct camera *c, float x, float y, float u, float v);
+
+#endif

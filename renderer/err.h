@@ -1,0 +1,23 @@
+/* The caller-owned error line.
+ *
+ * Library functions return bool (or NULL) and, on failure only, fill a struct err with one line
+ * that says where and what: "scene.dae:123: unknown material tag 'toon'". The line has no newline
+ * and no program name; only main() prints it and chooses the exit code. */
+#ifndef ASSAY_ERR_H
+#define ASSAY_ERR_H
+
+#include <stdbool.h>
+
+struct err {
+    char msg[1024];
+};
+
+/* Formats the line into e (truncating quietly at its size; e may be NULL). Always returns false, so
+ * that a failing function can `return err_set(e, "...")`. */
+bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+/* Puts "prefix: " in front of a line that is already set: who was doing what when it failed. Always
+ * returns false. */
+bool err_prefix(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+#endif

@@ -1,0 +1,103 @@
+#define _GNU_SOURCE
+#include "fs.h"
+
+#include <errno.h>
+#include <ftw.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+bool out_open(struct out_file *o, const char *path, struct err *e)
+{
+    if (strlen(path) >= sizeof o->path)
+        return err_set(e, "%.64s...: path too long", path);
+    strcpy(o->path, path);
+    snprintf(o->temp, sizeof o->temp, "%s.tmp%ld", path, (long)getpid());
+    o->f = fopen(o->temp, "wb");
+    if (o->f == NULL)
+        return err_set(e, "%s: cannot write: %s", path, strerror(errno));
+    return true;
+}
+
+bool out_commit(struct out_file *o, struct err *e)
+{
+    bool ok = fflush(o->f) == 0 && !ferror(o->f) && fsync(fileno(o->f)) == 0;
+    int saved = errno;
+    if (fclose(o->f) != 0 && ok) {
+        ok = false;
+        saved = errno;
+    }
+    o->f = NULL;
+    if (ok && rename(o->temp, o->path) != 0) {
+        ok = false;
+        saved = errno;
+    }
+    if (!ok) {
+        unlink(o->temp);
+        return err_set(e, "%s: cannot write: %s", o->path, strerror(saved));
+    }
+    return true;
+}
+
+void out_abandon(struct out_file *o)
+{
+    if (o->f != NULL)
+        fclose(o->f);
+    o->f = NULL;
+    unlink(o->temp);
+}
+
+bool make_dirs(const char *path, struct err *e)
+{
+    char p[4096];
+    if (strlen(path) >= sizeof p)
+        return err_set(e, "%.64s...: path too long", path);
+    strcpy(p, path);
+    for (char *s = p + 1;; s++) {
+        if (*s != '/' && *s != '\0')
+            continue;
+        char c = *s;
+        *s = '\0';
+        if (mkdir(p, 0777) != 0 && errno != EEXIST)
+            return err_set(e, "%s: cannot make directory: %s", p, strerror(errno));
+        *s = c;
+        if (c == '\0')
+            break;
+    }
+    struct stat st;
+    if (stat(path, &st) != 0 || !S_ISDIR(st.st_mode))
+        return err_set(e, "%s: not a directory", path);
+    return true;
+}
+
+bool make_parent_dirs(const char *path, struct err *e)
+{
+    const char *slash = strrchr(path, '/');
+    if (slash == NULL || slash == path)
+        return true;
+    char dir[4096];
+    size_t n = (size_t)(slash - path);
+    if (n >= sizeof dir)
+        return err_set(e, "%.64s...: path too long", path);
+    memcpy(dir, path, n);
+    dir[n] = '\0';
+    return make_dirs(dir, e);
+}
+
+static int remove_one(const char *path, const struct stat *st, int flag, struct FTW *ftw)
+{
+    (void)st;
+    (void)flag;
+    (void)ftw;
+    return remove(path);
+}
+
+bool remove_tree(const char *path, struct err *e)
+{
+    struct stat st;
+    if (lstat(path, &st) != 0)
+        return errno == ENOENT ? true : err_set(e, "%s: %s", path, strerror(errno));
+    if (nftw(path, remove_one, 16, FTW_DEPTH | FTW_PHYS) != 0)
+        return err_set(e, "%s: cannot remove: %s", path, strerror(errno));
+    return true;
+}

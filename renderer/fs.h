@@ -1,0 +1,31 @@
+/* Files that appear whole or not at all, and the few path helpers the programs share. */
+#ifndef ASSAY_FS_H
+#define ASSAY_FS_H
+
+#include "err.h"
+
+#include <stdio.h>
+
+/* A file under construction: written beside its final place, renamed by out_commit(). */
+struct out_file {
+    FILE *f;
+    char path[4096];
+    char temp[4096 + 32];
+};
+
+/* Opens path's temporary sibling for writing (binary). */
+bool out_open(struct out_file *o, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+/* Flushes, syncs, closes and renames; on failure the temporary is gone and the old file untouched. */
+bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_result));
+/* Closes and removes the temporary. */
+void out_abandon(struct out_file *o);
+
+/* mkdir -p. */
+bool make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+/* mkdir -p of the directory part of path. */
+bool make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+/* rm -r of a directory that we made; missing is fine. */
+bool remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,111 @@
+/* A scene as plain data, in world space: right-handed, Y up, lengths as in the file times its unit,
+ * radiance in W sr^-1 m^-2 (linear Rec. 709). Filled by collada_load(); const for every thread
+ * afterwards. Arrays belong to the scene and go with scene_free().
+ *
+ * Primitives are numbered: 0 .. num_triangles-1 are triangles, then come the spheres. */
+#ifndef ASSAY_SCENE_H
+#define ASSAY_SCENE_H
+
+#include "err.h"
+#include "vec.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Whose conventions a file follows (notes in renderer/README.md, "Two dialects"). */
+enum dialect {
+    DIALECT_AUTO,    /* as an option only: CGL if the file has a profile="CGL" technique */
+    DIALECT_COLLADA, /* the file is taken at its word */
+    DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
+};
+
+enum material_kind { MATERIAL_DIFFUSE };
+
+/* Emission and reflection are independent: an emitter may reflect too. */
+struct material {
+    char name[64];
+    enum material_kind kind;
+    rgb reflectance;          /* diffuse: albedo in [0,1] */
+    rgb radiance;             /* emitted radiance; zero for most */
+    bool radiance_both_sides; /* else only from the side the geometric normal points to */
+};
+
+/* normal_out: +1, the geometric normal points away from the centre; -1, towards it (an interior). */
+struct sphere {
+    vec3 centre;
+    float radius;
+    float normal_out;
+};
+
+enum light_kind {
+    LIGHT_POINT,       /* radiant intensity value / (att[0] + att[1] d + att[2] d^2); att = {0,0,1} is
+                          physical and value is then W sr^-1 */
+    LIGHT_DIRECTIONAL, /* value: irradiance on a plane facing it, W m^-2 */
+    LIGHT_TRIANGLES,   /* emissive triangles, all of one object */
+    LIGHT_SPHERE       /* one emissive sphere */
+};
+
+struct light {
+    enum light_kind kind;
+    rgb value;          /* point, directional */
+    vec3 position;      /* point */
+    vec3 to_light;      /* directional: unit, from the scene towards the light */
+    float attenuation[3];
+    uint32_t first;     /* triangles: first triangle; sphere: index of the sphere */
+    uint32_t count;     /* triangles: they are contiguous, first .. first+count-1 */
+    float area;         /* triangles, sphere: total, one side */
+};
+
+/* One named node instance of the file; the unit of object-id pictures and of the exporters. */
+struct object {
+    char name[64];
+    uint32_t first_triangle, num_triangles;
+    uint32_t first_sphere, num_spheres;
+    uint32_t material;
+};
+
+/* The camera as the file has it, after transforms; camera_init() makes the picture's camera of it.
+ * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles are
+ * full angles in radians; 0 where the file is silent. */
+struct scene_camera {
+    bool present;
+    vec3 right, up, backward, eye;
+    float hfov, vfov, aspect;
+    float near, far;
+};
+
+struct scene {
+    enum dialect dialect; /* COLLADA or CGL, never AUTO */
+    uint32_t num_triangles, num_spheres, num_materials, num_lights, num_objects;
+    vec3 *position;        /* 3 per triangle; counter-clockwise seen from the front */
+    vec3 *normal;          /* 3 per triangle, unit shading normals (geometric where file has none) */
+    uint32_t *tri_material; /* per triangle */
+    uint32_t *tri_object;
+    int32_t *tri_light;    /* per triangle: index into lights, -1 if it does not emit */
+    struct sphere *spheres;
+    uint32_t *sphere_material, *sphere_object;
+    int32_t *sphere_light;
+    struct material *materials;
+    struct light *lights;
+    struct object *objects;
+    struct scene_camera camera;
+    vec3 bounds_min, bounds_max; /* of all primitives */
+    unsigned num_degenerate;     /* triangles without area that were dropped at loading */
+};
+
+/* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
+void scene_free(struct scene *s);
+
+/* Completes a scene whose triangles, spheres, materials, objects, camera and delta lights are in
+ * place: drops nothing, appends one area light for each emissive object (in object order), fills
+ * tri_light, sphere_light, areas and bounds. Fails on an index out of range, a value that is not
+ * finite, a negative reflectance or radiance, a reflectance above 1, or a scene without primitives;
+ * `where` starts the line. */
+bool scene_finish(struct scene *s, const char *where, struct err *e);
+
+static inline uint32_t scene_num_primitives(const struct scene *s)
+{
+    return s->num_triangles + s->num_spheres;
+}
+
+#endif

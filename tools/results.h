@@ -1,0 +1,57 @@
+/* results.json: the record of one `assay validate` or `assay compare`, from which junit.xml and
+ * report.html are made and nothing else.
+ *
+ *   { "assay": 1,                       schema version
+ *     "command": "assay validate ...", "version": "0.1 (commit)", "date": "2026-..Z",
+ *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
+ *     "seconds": 98.1,
+ *     "claims": [ {
+ *         "scene": "41_cornell", "title": "...", "detects": "...", "blind_to": "...",
+ *         "quantity": "mean", "a": "pathtracer", "b": "cycles", "class": "exact",
+ *         "alpha": 6.7e-5, "margin_global": .005, "margin_tile": .02, "tile": 16,
+ *         "expected": "EQUIVALENT", "verdict": "EQUIVALENT", "passed": true, "reason": "...",
+ *         "difference": .0003, "ci": [-.001, .002], "channel_difference": [r, g, b],
+ *         "log10_p": -0.3, "mdb_global": .004, "mdb_tile": .03, "num_tests": 123,
+ *         "worst_tile": {"x":, "y":, "difference":, "ci":, "t":}, "worst": {...same, "width":, "height":, "channel":},
+ *         "rms_bias": .., "extra_factor": 1, "skew_limited": false,
+ *         "tile_log10_p": [...], "tile_t": [...], "tiles_x": 8, "tiles_y": 8,
+ *         "n_a": 2048, "n_b": 16, "unit_b": "replicate", "spp_b": 256,
+ *         "seconds_a": 12.3, "seconds_b": 120.0 (of the reference, from its manifest),
+ *         "seed_a": 1, "seeds_b": [...], "version_b": "Blender 3.4.1",
+ *         "files": {"a": "data/41_cornell/pathtracer.exr", "b": "data/41_cornell/cycles.exr",
+ *                   "z": "data/41_cornell/z_cycles.exr", "relative": "data/41_cornell/rel_cycles.exr"},
+ *         "rerun": "assay validate --only 41_cornell ..."
+ *       } | { "scene":, "a":, "b":, "title":, "expected":, "passed": false, "error": "one line" } ] }
+ *
+ * Paths in "files" are relative to the directory of results.json. A claim with "error" could not be
+ * judged: it never counts as passed and makes the exit code 3. */
+#ifndef ASSAY_RESULTS_H
+#define ASSAY_RESULTS_H
+
+#include "../renderer/err.h"
+
+#include <jansson.h>
+
+/* Exit codes of every verb. */
+enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_JUDGED = 3 };
+
+/* Writes by rename, indented, with a final newline. */
+bool json_write(const char *path, const json_t *root, struct err *e)
+    __attribute__((warn_unused_result));
+/* Reads results.json and checks all that report and junit rely on. New reference in *out. */
+bool results_read(const char *path, json_t **out, struct err *e) __attribute__((warn_unused_result));
+
+/* 0 if every claim passed; else 3 if any could not be judged, else 1 if any verdict was the opposite
+ * of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
+int results_exit_code(const json_t *results);
+
+/* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown. */
+bool results_print_table(const json_t *results, bool markdown, char **text, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* JUnit XML: one testsuite, one testcase per claim; failure for a wrong verdict, error for one that
+ * could not be judged. Appears by rename. */
+bool results_write_junit(const char *path, const json_t *results, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif
