@@ -91,6 +91,7 @@ struct scene {
     struct scene_camera camera;
     vec3 bounds_min, bounds_max; /* of all primitives */
     unsigned num_degenerate;     /* triangles without area that were dropped at loading */
+    char note[256];              /* what the dialect merged, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
