@@ -7,10 +7,11 @@
 #include "suite.h"
 
 struct reference_options {
-    uint32_t seed;        /* replicate k's own seed is a hash of (seed, k) */
+    uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
     int threads;
-    double timeout_s;     /* of one engine process; it is killed (whole process group) after that */
-    const char *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
+    double timeout_s; /* of one engine process; it is killed (whole process group) after that */
+    const char
+        *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
     const char *share_dir; /* where cycles.py is */
 };
 
@@ -28,9 +29,9 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
-/* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the EXR's
- * hash differs from the manifest's, or if size, depth, spp, replicates are not those of the suite.
- * *manifest is a new reference. */
+/* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the
+ * EXR's hash differs from the manifest's, or if size, depth, spp, replicates are not those of the
+ * suite. *manifest is a new reference. */
 bool golden_read(const char *golden_dir, const struct suite_scene *scene,
                  const struct suite_reference *ref, struct moments *out, json_t **manifest,
                  struct err *e) __attribute__((warn_unused_result));

@@ -1,7 +1,7 @@
-/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which
- * references, inside which margins, what must come out) and NN_name.md (what it can detect, what it
- * is blind to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF,
- * 3x light, 4x whole scene, 9x must differ.
+/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against
+ * which references, inside which margins, what must come out) and NN_name.md (what it can detect,
+ * what it is blind to, and, for closed forms, the derivation). Families by number: 1x closed form,
+ * 2x BSDF, 3x light, 4x whole scene, 9x must differ.
  *
  *   {
  *     "title": "Cornell box with two diffuse spheres",
@@ -28,9 +28,9 @@
 enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
 
 struct suite_reference {
-    char engine[16];     /* "cycles", "povray" or "truth" */
-    char fidelity[16];   /* "class" in the file: "exact", "limit" (exact in the limit of its own
-                            settings) or "approximate" */
+    char engine[16];      /* "cycles", "povray" or "truth" */
+    char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
+                             settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
     int replicates;       /* engines: images with a seed of their own */
@@ -41,19 +41,20 @@ struct suite_reference {
 };
 
 struct suite_scene {
-    char name[64];        /* "41_cornell" */
-    char dae[4096];       /* path of the .dae */
-    char sha256[65];      /* of the .dae, lower-case hex */
+    char name[64];   /* "41_cornell" */
+    char dae[4096];  /* path of the .dae */
+    char sha256[65]; /* of the .dae, lower-case hex */
     char title[128], detects[512], blind_to[512];
     int width, height;
-    int depth;            /* -m: largest number of bounces */
-    int spp;              /* of our render */
-    int tile;             /* side of a reporting tile, pixels; divides width and height */
+    int depth; /* -m: largest number of bounces */
+    int spp;   /* of our render */
+    int tile;  /* side of a reporting tile, pixels; divides width and height */
     enum verdict expect;
-    char references_of[64]; /* name of the scene whose references are used; its own name by default */
+    char references_of[64]; /* name of the scene whose references are used; its own name by default
+                             */
     struct suite_reference reference[3];
     int num_references;
-    json_t *json;         /* owned */
+    json_t *json; /* owned */
 };
 
 struct suite {
@@ -61,9 +62,10 @@ struct suite {
     int num_scenes;
 };
 
-/* Loads all scenes of a directory. A 9x scene inherits the `references` object of the scene it names.
- * Fails on an empty directory, a .dae without .json and the reverse. */
-bool suite_load(const char *dir, struct suite *out, struct err *e) __attribute__((warn_unused_result));
+/* Loads all scenes of a directory. A 9x scene inherits the `references` object of the scene it
+ * names. Fails on an empty directory, a .dae without .json and the reverse. */
+bool suite_load(const char *dir, struct suite *out, struct err *e)
+    __attribute__((warn_unused_result));
 void suite_free(struct suite *s);
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);

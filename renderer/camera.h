@@ -17,8 +17,8 @@ struct camera {
 
 /* Frames the scene for a width x height picture by the scene's dialect: COLLADA keeps the file's
  * pose and horizontal angle (or, if it has only a vertical one, that) with square pixels; CGL
- * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle at
- * 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
+ * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle
+ * at 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
  * COLLADA file has no camera. */
 bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
     __attribute__((warn_unused_result));

@@ -16,7 +16,8 @@ struct out_file {
 /* Opens path's temporary sibling for writing (binary). */
 bool out_open(struct out_file *o, const char *path, struct err *e)
     __attribute__((warn_unused_result));
-/* Flushes, syncs, closes and renames; on failure the temporary is gone and the old file untouched. */
+/* Flushes, syncs, closes and renames; on failure the temporary is gone and the old file untouched.
+ */
 bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_result));
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);

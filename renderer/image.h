@@ -1,5 +1,5 @@
-/* The C face of image files (OpenImageIO behind it, image_oiio.cc). Pixels are float32, interleaved,
- * row 0 at the top. No C++ exception crosses this line. */
+/* The C face of image files (OpenImageIO behind it, image_oiio.cc). Pixels are float32,
+ * interleaved, row 0 at the top. No C++ exception crosses this line. */
 #ifndef ASSAY_IMAGE_H
 #define ASSAY_IMAGE_H
 

@@ -1,6 +1,7 @@
-/* Per pixel and channel moments over independent observations, the currency of the project: n, mean,
- * M2 = sum (x-mean)^2 and M3 = sum (x-mean)^3, in double, mergeable [Pebay08]. An observation is a
- * sample (of our renderer) or a replicate (a whole image of an engine, with a seed of its own). */
+/* Per pixel and channel moments over independent observations, the currency of the project: n,
+ * mean, M2 = sum (x-mean)^2 and M3 = sum (x-mean)^3, in double, mergeable [Pebay08]. An observation
+ * is a sample (of our renderer) or a replicate (a whole image of an engine, with a seed of its
+ * own). */
 #ifndef ASSAY_MOMENTS_H
 #define ASSAY_MOMENTS_H
 
@@ -13,8 +14,8 @@ struct moments {
     double *mean; /* 3 per pixel, RGB, linear radiance */
     double *m2;   /* 3 per pixel */
     double *m3;   /* 3 per pixel */
-    /* What one observation is: "sample", "replicate", or "exact" (a closed form: n = 1, M2 = M3 = 0,
-     * no uncertainty). */
+    /* What one observation is: "sample", "replicate", or "exact" (a closed form: n = 1, M2 = M3 =
+     * 0, no uncertainty). */
     char unit[16];
     double spp; /* paths per pixel in one observation; 0 where that has no meaning */
 };
@@ -27,7 +28,7 @@ void moments_free(struct moments *m);
 /* One more observation of one pixel. */
 void moments_add(struct moments *m, size_t pixel, const double x[3]);
 /* One more observation of every pixel: a whole replicate (RGB, 3 floats a pixel). */
-void moments_add_image(struct moments *m, const float *rgb);
+void moments_add_image(struct moments *m, const float *pixels_rgb);
 /* dst += src, as if all observations had been added to one [Pebay08 eq. 2.1]. Same sizes, or fails
  * (as it does on different units or spp). */
 bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
@@ -41,8 +42,8 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
                    int num_attrs, struct err *e) __attribute__((warn_unused_result));
 /* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
- * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or n,
- * n not a whole number, or no pixel. */
+ * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
+ * n, n not a whole number, or no pixel. */
 bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -30,7 +30,8 @@ struct material {
     bool radiance_both_sides; /* else only from the side the geometric normal points to */
 };
 
-/* normal_out: +1, the geometric normal points away from the centre; -1, towards it (an interior). */
+/* normal_out: +1, the geometric normal points away from the centre; -1, towards it (an interior).
+ */
 struct sphere {
     vec3 centre;
     float radius;
@@ -38,8 +39,8 @@ struct sphere {
 };
 
 enum light_kind {
-    LIGHT_POINT,       /* radiant intensity value / (att[0] + att[1] d + att[2] d^2); att = {0,0,1} is
-                          physical and value is then W sr^-1 */
+    LIGHT_POINT, /* radiant intensity value / (att[0] + att[1] d + att[2] d^2); att = {0,0,1} is
+                    physical and value is then W sr^-1 */
     LIGHT_DIRECTIONAL, /* value: irradiance on a plane facing it, W m^-2 */
     LIGHT_TRIANGLES,   /* emissive triangles, all of one object */
     LIGHT_SPHERE       /* one emissive sphere */
@@ -47,13 +48,13 @@ enum light_kind {
 
 struct light {
     enum light_kind kind;
-    rgb value;          /* point, directional */
-    vec3 position;      /* point */
-    vec3 to_light;      /* directional: unit, from the scene towards the light */
+    rgb value;     /* point, directional */
+    vec3 position; /* point */
+    vec3 to_light; /* directional: unit, from the scene towards the light */
     float attenuation[3];
-    uint32_t first;     /* triangles: first triangle; sphere: index of the sphere */
-    uint32_t count;     /* triangles: they are contiguous, first .. first+count-1 */
-    float area;         /* triangles, sphere: total, one side */
+    uint32_t first; /* triangles: first triangle; sphere: index of the sphere */
+    uint32_t count; /* triangles: they are contiguous, first .. first+count-1 */
+    float area;     /* triangles, sphere: total, one side */
 };
 
 /* One named node instance of the file; the unit of object-id pictures and of the exporters. */
@@ -65,8 +66,8 @@ struct object {
 };
 
 /* The camera as the file has it, after transforms; camera_init() makes the picture's camera of it.
- * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles are
- * full angles in radians; 0 where the file is silent. */
+ * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles
+ * are full angles in radians; 0 where the file is silent. */
 struct scene_camera {
     bool present;
     vec3 right, up, backward, eye;
@@ -77,11 +78,11 @@ struct scene_camera {
 struct scene {
     enum dialect dialect; /* COLLADA or CGL, never AUTO */
     uint32_t num_triangles, num_spheres, num_materials, num_lights, num_objects;
-    vec3 *position;        /* 3 per triangle; counter-clockwise seen from the front */
-    vec3 *normal;          /* 3 per triangle, unit shading normals (geometric where file has none) */
+    vec3 *position; /* 3 per triangle; counter-clockwise seen from the front */
+    vec3 *normal;   /* 3 per triangle, unit shading normals (geometric where file has none) */
     uint32_t *tri_material; /* per triangle */
     uint32_t *tri_object;
-    int32_t *tri_light;    /* per triangle: index into lights, -1 if it does not emit */
+    int32_t *tri_light; /* per triangle: index into lights, -1 if it does not emit */
     struct sphere *spheres;
     uint32_t *sphere_material, *sphere_object;
     int32_t *sphere_light;

@@ -1,5 +1,6 @@
 /* Value types of the renderer and their inline arithmetic: points and directions (vec3), linear
- * Rec. 709 radiometric triples (rgb), rays and orthonormal frames. All float32, right-handed, Y up. */
+ * Rec. 709 radiometric triples (rgb), rays and orthonormal frames. All float32, right-handed, Y up.
+ */
 #ifndef ASSAY_VEC_H
 #define ASSAY_VEC_H
 

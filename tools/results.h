@@ -12,16 +12,15 @@
  *         "expected": "EQUIVALENT", "verdict": "EQUIVALENT", "passed": true, "reason": "...",
  *         "difference": .0003, "ci": [-.001, .002], "channel_difference": [r, g, b],
  *         "log10_p": -0.3, "mdb_global": .004, "mdb_tile": .03, "num_tests": 123,
- *         "worst_tile": {"x":, "y":, "difference":, "ci":, "t":}, "worst": {...same, "width":, "height":, "channel":},
- *         "rms_bias": .., "extra_factor": 1, "skew_limited": false,
- *         "tile_log10_p": [...], "tile_t": [...], "tiles_x": 8, "tiles_y": 8,
- *         "n_a": 2048, "n_b": 16, "unit_b": "replicate", "spp_b": 256,
- *         "seconds_a": 12.3, "seconds_b": 120.0 (of the reference, from its manifest),
- *         "seed_a": 1, "seeds_b": [...], "version_b": "Blender 3.4.1",
- *         "files": {"a": "data/41_cornell/pathtracer.exr", "b": "data/41_cornell/cycles.exr",
- *                   "z": "data/41_cornell/z_cycles.exr", "relative": "data/41_cornell/rel_cycles.exr"},
- *         "rerun": "assay validate --only 41_cornell ..."
- *       } | { "scene":, "a":, "b":, "title":, "expected":, "passed": false, "error": "one line" } ] }
+ *         "worst_tile": {"x":, "y":, "difference":, "ci":, "t":}, "worst": {...same, "width":,
+ * "height":, "channel":}, "rms_bias": .., "extra_factor": 1, "skew_limited": false, "tile_log10_p":
+ * [...], "tile_t": [...], "tiles_x": 8, "tiles_y": 8, "n_a": 2048, "n_b": 16, "unit_b":
+ * "replicate", "spp_b": 256, "seconds_a": 12.3, "seconds_b": 120.0 (of the reference, from its
+ * manifest), "seed_a": 1, "seeds_b": [...], "version_b": "Blender 3.4.1", "files": {"a":
+ * "data/41_cornell/pathtracer.exr", "b": "data/41_cornell/cycles.exr", "z":
+ * "data/41_cornell/z_cycles.exr", "relative": "data/41_cornell/rel_cycles.exr"}, "rerun": "assay
+ * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
+ * false, "error": "one line" } ] }
  *
  * Paths in "files" are relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3. */
@@ -39,10 +38,11 @@ enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_
 bool json_write(const char *path, const json_t *root, struct err *e)
     __attribute__((warn_unused_result));
 /* Reads results.json and checks all that report and junit rely on. New reference in *out. */
-bool results_read(const char *path, json_t **out, struct err *e) __attribute__((warn_unused_result));
+bool results_read(const char *path, json_t **out, struct err *e)
+    __attribute__((warn_unused_result));
 
-/* 0 if every claim passed; else 3 if any could not be judged, else 1 if any verdict was the opposite
- * of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
+/* 0 if every claim passed; else 3 if any could not be judged, else 1 if any verdict was the
+ * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
 int results_exit_code(const json_t *results);
 
 /* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown. */

@@ -1,0 +1,188 @@
+#include "moments.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool moments_alloc(struct moments *m, int width, int height, struct err *e)
+{
+    *m = (struct moments){.width = width, .height = height, .unit = "sample", .spp = 1};
+    if (width < 1 || height < 1)
+        return err_set(e, "cannot make moments of %d x %d pixels", width, height);
+    size_t pixels = (size_t)width * (size_t)height;
+    m->n = calloc(pixels, sizeof *m->n);
+    m->mean = calloc(3 * pixels, sizeof *m->mean);
+    m->m2 = calloc(3 * pixels, sizeof *m->m2);
+    m->m3 = calloc(3 * pixels, sizeof *m->m3);
+    if (m->n == NULL || m->mean == NULL || m->m2 == NULL || m->m3 == NULL) {
+        moments_free(m);
+        return err_set(e, "out of memory for moments of %d x %d pixels", width, height);
+    }
+    return true;
+}
+
+void moments_free(struct moments *m)
+{
+    free(m->n);
+    free(m->mean);
+    free(m->m2);
+    free(m->m3);
+    *m = (struct moments){0};
+}
+
+/* One-observation case of [Pebay08 eq. 2.1-2.2], M3 before M2 because it needs the old M2. */
+void moments_add(struct moments *m, size_t pixel, const double x[3])
+{
+    double n = ++m->n[pixel];
+    for (int c = 0; c < 3; c++) {
+        size_t i = 3 * pixel + (size_t)c;
+        double d = x[c] - m->mean[i], dn = d / n, term = d * dn * (n - 1);
+        m->mean[i] += dn;
+        m->m3[i] += term * dn * (n - 2) - 3 * dn * m->m2[i];
+        m->m2[i] += term;
+    }
+}
+
+void moments_add_image(struct moments *m, const float *pixels_rgb)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    for (size_t p = 0; p < pixels; p++)
+        moments_add(m, p,
+                    (double[3]){pixels_rgb[3 * p], pixels_rgb[3 * p + 1], pixels_rgb[3 * p + 2]});
+}
+
+bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
+{
+    if (dst->width != src->width || dst->height != src->height)
+        return err_set(e, "cannot merge moments of %d x %d and %d x %d pixels", dst->width,
+                       dst->height, src->width, src->height);
+    if (strcmp(dst->unit, src->unit) != 0 || dst->spp != src->spp)
+        return err_set(e, "cannot merge moments over a %s of %g spp and a %s of %g spp", dst->unit,
+                       dst->spp, src->unit, src->spp);
+    size_t pixels = (size_t)dst->width * (size_t)dst->height;
+    for (size_t p = 0; p < pixels; p++) {
+        double na = dst->n[p], nb = src->n[p], n = na + nb;
+        if (nb == 0)
+            continue;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+            double d = src->mean[i] - dst->mean[i], dn = d / n;
+            dst->m3[i] += src->m3[i] + d * dn * dn * na * nb * (na - nb) +
+                          3 * dn * (na * src->m2[i] - nb * dst->m2[i]);
+            dst->m2[i] += src->m2[i] + d * dn * na * nb;
+            dst->mean[i] += dn * nb;
+        }
+        dst->n[p] = n;
+    }
+    return true;
+}
+
+double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
+{
+    double n = m->n[pixel];
+    if (strcmp(m->unit, "exact") == 0)
+        return 0;
+    return n < 2 ? NAN : m->m2[3 * pixel + (size_t)channel] / (n * (n - 1));
+}
+
+static const char *const channel_names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
+                                              "M2.B", "M3.R", "M3.G", "M3.B", "n"};
+
+bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
+                   int num_attrs, struct err *e)
+{
+    struct image im;
+    if (!image_alloc(&im, m->width, m->height, 10, channel_names, e))
+        return false;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    for (size_t p = 0; p < pixels; p++) {
+        float *px = im.data + 10 * p;
+        for (size_t c = 0; c < 3; c++) {
+            px[c] = (float)m->mean[3 * p + c];
+            px[3 + c] = (float)m->m2[3 * p + c];
+            px[6 + c] = (float)m->m3[3 * p + c];
+        }
+        px[9] = (float)m->n[p];
+    }
+    char spp[32];
+    snprintf(spp, sizeof spp, "%.17g", m->spp);
+    bool ok =
+        image_set_attr(&im, "assay:unit", m->unit, e) && image_set_attr(&im, "assay:spp", spp, e);
+    for (int i = 0; ok && i < num_attrs; i++)
+        ok = image_set_attr(&im, attrs[i].name, attrs[i].value, e);
+    ok = ok && image_write_exr(path, &im, e);
+    image_free(&im);
+    return ok;
+}
+
+/* One pixel of a moments EXR: finite, M2 >= 0, n a whole number >= 0. */
+static bool pixel_is_valid(const float *px, const int at[10])
+{
+    for (int c = 0; c < 10; c++)
+        if (!isfinite(px[at[c]]))
+            return false;
+    float n = px[at[9]];
+    return px[at[3]] >= 0 && px[at[4]] >= 0 && px[at[5]] >= 0 && n >= 0 && n == floorf(n);
+}
+
+bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
+{
+    struct image im = {0};
+    struct moments m = {0};
+    bool half;
+    if (!image_read(path, &im, &half, e))
+        return false;
+    const char *unit = image_get_attr(&im, "assay:unit");
+    const char *spp = image_get_attr(&im, "assay:spp");
+    int at[10];
+    bool has_all = unit != NULL && spp != NULL && strlen(unit) < sizeof m.unit;
+    for (int c = 0; c < 10; c++) {
+        at[c] = image_channel(&im, channel_names[c]);
+        has_all = has_all && at[c] >= 0;
+    }
+    if (!has_all) {
+        err_set(e,
+                "%s: not a moments EXR (channels R G B M2.* M3.* n, attributes assay:unit, "
+                "assay:spp)",
+                path);
+        goto fail;
+    }
+    if (half) {
+        err_set(e, "%s: moments need 32-bit floats, this file has fewer bits", path);
+        goto fail;
+    }
+    if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
+        strcmp(unit, "exact") != 0) {
+        err_set(e, "%s: unknown unit of observation '%s'", path, unit);
+        goto fail;
+    }
+    if (!moments_alloc(&m, im.width, im.height, e))
+        goto fail;
+    strcpy(m.unit, unit);
+    m.spp = strtod(spp, NULL);
+    size_t pixels = (size_t)m.width * (size_t)m.height;
+    for (size_t p = 0; p < pixels; p++) {
+        const float *px = im.data + (size_t)im.channels * p;
+        if (!pixel_is_valid(px, at)) {
+            err_set(e, "%s: pixel (%zu, %zu) is not finite or has a negative M2 or count", path,
+                    p % (size_t)m.width, p / (size_t)m.width);
+            goto fail;
+        }
+        for (size_t c = 0; c < 3; c++) {
+            m.mean[3 * p + c] = px[at[c]];
+            m.m2[3 * p + c] = px[at[3 + c]];
+            m.m3[3 * p + c] = px[at[6 + c]];
+        }
+        m.n[p] = px[at[9]];
+    }
+    *out = m;
+    if (image != NULL)
+        *image = im;
+    else
+        image_free(&im);
+    return true;
+fail:
+    moments_free(&m);
+    image_free(&im);
+    return false;
+}
