@@ -24,6 +24,16 @@ typedef struct {
     float tmin, tmax;
 } ray;
 
+/* One instruction each, unlike fminf and fmaxf; if either is NaN the second wins. */
+static inline float minf(float a, float b)
+{
+    return a < b ? a : b;
+}
+static inline float maxf(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 static inline vec3 v3(float x, float y, float z)
 {
     return (vec3){x, y, z};
@@ -68,11 +78,11 @@ static inline vec3 normalize(vec3 a)
 }
 static inline vec3 vmin(vec3 a, vec3 b)
 {
-    return (vec3){fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)};
+    return (vec3){minf(a.x, b.x), minf(a.y, b.y), minf(a.z, b.z)};
 }
 static inline vec3 vmax(vec3 a, vec3 b)
 {
-    return (vec3){fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)};
+    return (vec3){maxf(a.x, b.x), maxf(a.y, b.y), maxf(a.z, b.z)};
 }
 
 static inline rgb grey(float v)
@@ -93,7 +103,7 @@ static inline rgb rgb_scale(rgb a, float s)
 }
 static inline float rgb_max(rgb a)
 {
-    return fmaxf(a.r, fmaxf(a.g, a.b));
+    return maxf(a.r, maxf(a.g, a.b));
 }
 static inline bool rgb_is_zero(rgb a)
 {

@@ -1,0 +1,70 @@
+/* Batches of paths as structures of arrays: one lane is one path. The stages of the integrator
+ * (generate, intersect, shade, connect) each run over a list of lanes. */
+#ifndef ASSAY_BATCH_H
+#define ASSAY_BATCH_H
+
+#include "vec.h"
+
+#include <stdint.h>
+
+enum { BATCH_LANES = 256 };
+
+#define NO_HIT UINT32_MAX
+
+struct vec3s {
+    float x[BATCH_LANES], y[BATCH_LANES], z[BATCH_LANES];
+};
+
+struct rgbs {
+    float r[BATCH_LANES], g[BATCH_LANES], b[BATCH_LANES];
+};
+
+struct rays {
+    struct vec3s o, d;
+    float tmin[BATCH_LANES], tmax[BATCH_LANES];
+};
+
+struct hits {
+    float t[BATCH_LANES], u[BATCH_LANES], v[BATCH_LANES];
+    uint32_t prim[BATCH_LANES];
+};
+
+static inline vec3 vec3s_get(const struct vec3s *a, int i)
+{
+    return (vec3){a->x[i], a->y[i], a->z[i]};
+}
+static inline void vec3s_set(struct vec3s *a, int i, vec3 v)
+{
+    a->x[i] = v.x;
+    a->y[i] = v.y;
+    a->z[i] = v.z;
+}
+static inline rgb rgbs_get(const struct rgbs *a, int i)
+{
+    return (rgb){a->r[i], a->g[i], a->b[i]};
+}
+static inline void rgbs_set(struct rgbs *a, int i, rgb v)
+{
+    a->r[i] = v.r;
+    a->g[i] = v.g;
+    a->b[i] = v.b;
+}
+static inline void rgbs_add(struct rgbs *a, int i, rgb v)
+{
+    a->r[i] += v.r;
+    a->g[i] += v.g;
+    a->b[i] += v.b;
+}
+static inline ray rays_get(const struct rays *a, int i)
+{
+    return (ray){vec3s_get(&a->o, i), vec3s_get(&a->d, i), a->tmin[i], a->tmax[i]};
+}
+static inline void rays_set(struct rays *a, int i, ray r)
+{
+    vec3s_set(&a->o, i, r.o);
+    vec3s_set(&a->d, i, r.d);
+    a->tmin[i] = r.tmin;
+    a->tmax[i] = r.tmax;
+}
+
+#endif

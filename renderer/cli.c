@@ -1,0 +1,138 @@
+#include "cli.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int find_long(const struct cli_option *options, const char *name, size_t length)
+{
+    for (int i = 0; options[i].long_name != NULL; i++)
+        if (strlen(options[i].long_name) == length &&
+            strncmp(options[i].long_name, name, length) == 0)
+            return i;
+    return CLI_ERROR;
+}
+
+static int find_short(const struct cli_option *options, char name)
+{
+    for (int i = 0; options[i].long_name != NULL; i++)
+        if (options[i].short_name == name)
+            return i;
+    return CLI_ERROR;
+}
+
+int cli_next(struct cli *c, struct err *e)
+{
+    if (c->next < c->argc && !c->only_positional && strcmp(c->argv[c->next], "--") == 0) {
+        c->only_positional = true;
+        c->next++;
+    }
+    if (c->next >= c->argc)
+        return CLI_END;
+    const char *arg = c->argv[c->next++];
+    c->name = arg;
+    if (c->only_positional || arg[0] != '-' || arg[1] == '\0') {
+        c->value[0] = arg;
+        return CLI_POSITIONAL;
+    }
+    const char *equals = NULL;
+    int i;
+    if (arg[1] == '-') {
+        equals = strchr(arg, '=');
+        i = find_long(c->options, arg + 2, equals ? (size_t)(equals - arg - 2) : strlen(arg + 2));
+    } else {
+        i = arg[2] == '\0' ? find_short(c->options, arg[1]) : CLI_ERROR;
+    }
+    if (i == CLI_ERROR) {
+        err_set(e, "unknown option '%s' (see --help)", arg);
+        return CLI_ERROR;
+    }
+    const struct cli_option *o = &c->options[i];
+    if (equals != NULL) {
+        if (o->num_args != 1) {
+            err_set(e, "option --%s takes %d arguments, not '='", o->long_name, o->num_args);
+            return CLI_ERROR;
+        }
+        c->value[0] = equals + 1;
+        return i;
+    }
+    if (c->argc - c->next < o->num_args) {
+        err_set(e, "option '%s' needs %s", arg, o->args);
+        return CLI_ERROR;
+    }
+    for (int k = 0; k < o->num_args; k++)
+        c->value[k] = c->argv[c->next++];
+    return i;
+}
+
+void cli_print_options(FILE *f, const struct cli_option *options)
+{
+    for (const struct cli_option *o = options; o->long_name != NULL; o++) {
+        char left[64];
+        int n = o->short_name
+                    ? snprintf(left, sizeof left, "  -%c, --%s", o->short_name, o->long_name)
+                    : snprintf(left, sizeof left, "      --%s", o->long_name);
+        if (o->num_args > 0)
+            snprintf(left + n, sizeof left - (size_t)n, " %s", o->args);
+        const char *help = o->help;
+        while (true) {
+            const char *end = strchr(help, '\n');
+            int length = end ? (int)(end - help) : (int)strlen(help);
+            fprintf(f, "%-30s %.*s\n", left, length, help);
+            if (end == NULL)
+                break;
+            help = end + 1;
+            left[0] = '\0';
+        }
+    }
+}
+
+bool cli_int(const char *what, const char *text, long lo, long hi, int *out, struct err *e)
+{
+    char *end;
+    errno = 0;
+    long v = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || errno != 0 || v < lo || v > hi)
+        return err_set(e, "%s: '%s' is not a whole number from %ld to %ld", what, text, lo, hi);
+    *out = (int)v;
+    return true;
+}
+
+bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
+{
+    char *end;
+    errno = 0;
+    unsigned long long v = strtoull(text, &end, 0);
+    if (end == text || *end != '\0' || errno != 0 || strchr(text, '-') != NULL)
+        return err_set(e, "%s: '%s' is not a whole number from 0 to 2^64-1", what, text);
+    *out = v;
+    return true;
+}
+
+bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
+                struct err *e)
+{
+    char *end;
+    double v = strtod(text, &end);
+    if (end == text || *end != '\0' || !isfinite(v) || v < lo || v > hi)
+        return err_set(e, "%s: '%s' is not a number from %g to %g", what, text, lo, hi);
+    *out = v;
+    return true;
+}
+
+bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
+                struct err *e)
+{
+    char list[256] = "";
+    size_t n = 0;
+    for (int i = 0; words[i] != NULL; i++) {
+        if (strcmp(words[i], text) == 0) {
+            *out = i;
+            return true;
+        }
+        int added = snprintf(list + n, sizeof list - n, "%s%s", i ? ", " : "", words[i]);
+        n = added < 0 || n + (size_t)added >= sizeof list ? sizeof list - 1 : n + (size_t)added;
+    }
+    return err_set(e, "%s: '%s' is none of: %s", what, text, list);
+}

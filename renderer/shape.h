@@ -1,0 +1,36 @@
+/* Ray against triangle and sphere. */
+#ifndef ASSAY_SHAPE_H
+#define ASSAY_SHAPE_H
+
+#include "scene.h"
+
+/* Vertex and edges, as the intersection wants them. */
+struct triangle {
+    vec3 p, e1, e2;
+};
+
+/* [Moller97]. If r meets the triangle inside (tmin, tmax): true, with distance t and barycentric
+ * coordinates (u, v) of the second and third vertex. Both sides are hit. */
+bool triangle_intersect(const struct triangle *tri, const ray *r, float *t, float *u, float *v);
+
+/* Nearest root inside (tmin, tmax), from outside or inside. The quadratic is solved without
+ * cancellation [Haines19, "Precision improvements for ray/sphere intersection"]. */
+bool sphere_intersect(const struct sphere *s, const ray *r, float *t);
+
+/* Geometry of a hit. */
+struct surface {
+    vec3 p;    /* on the primitive */
+    vec3 ng;   /* geometric normal, unit, to the front (emitting) side */
+    vec3 ns;   /* shading normal, unit, on the side of ng */
+    float eps; /* how far p may be off the primitive: a few float steps of its coordinates */
+};
+
+/* prim, t, (u, v) as returned by the intersection. */
+struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, float t, float u,
+                          float v);
+
+/* p moved off its surface by eps to the side that direction w (any length) leaves to, so that a ray
+ * from there does not meet the same flat primitive again. */
+vec3 surface_origin(const struct surface *s, vec3 w);
+
+#endif
