@@ -1,0 +1,357 @@
+#define _GNU_SOURCE
+#include "process.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum {
+    POLL_MS = 100,       /* longest sleep between two looks at the child */
+    GRACE_S = 2,         /* from SIGTERM to SIGKILL */
+    LAST_LINES = 6,      /* quoted in the error line */
+    LAST_CHARS = 640,    /* of it at most */
+    LOG_MAX = 64 << 20,  /* bytes; a flood must not fill the disk */
+    TAIL_SIZE = 16 << 10 /* of output kept in memory */
+};
+
+/* The last bytes a program printed. */
+struct tail {
+    char data[TAIL_SIZE];
+    size_t size;
+};
+
+static double now_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+bool process_find(const char *argv0, char *path, size_t size)
+{
+    const char *dirs = getenv("PATH");
+    if (strchr(argv0, '/') != NULL || dirs == NULL)
+        dirs = "";
+    while (*argv0 != '\0') {
+        size_t n = strcspn(dirs, ":");
+        char cwd[4096] = "", relative[4096];
+        int len = strchr(argv0, '/') != NULL || n == 0
+                      ? snprintf(relative, sizeof relative, "%s", argv0)
+                      : snprintf(relative, sizeof relative, "%.*s/%s", (int)n, dirs, argv0);
+        if (len < 0 || (size_t)len >= sizeof relative)
+            return false;
+        if (relative[0] != '/' && getcwd(cwd, sizeof cwd) == NULL)
+            return false;
+        len = snprintf(path, size, "%s%s%s", cwd, relative[0] == '/' ? "" : "/", relative);
+        struct stat st;
+        if (len > 0 && (size_t)len < size && stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
+            access(path, X_OK) == 0)
+            return true;
+        if (dirs[n] == '\0')
+            return false;
+        dirs += n + 1;
+    }
+    return false;
+}
+
+/* The guard leads the process group and outlives nothing: when the process that runs us dies, of
+ * whatever, even SIGKILL, the kernel sends the guard SIGUSR1 and it takes the group with it. It
+ * also keeps the group's number from being reused until we have killed the group. Only
+ * async-signal-safe calls, since the parent may have threads. */
+static _Noreturn void guard_main(pid_t parent)
+{
+    sigset_t all, wake;
+    sigfillset(&all);
+    sigprocmask(SIG_SETMASK, &all, NULL);
+    if (setpgid(0, 0) != 0)
+        _exit(1);
+    close_range(0, ~0U, 0);
+    prctl(PR_SET_PDEATHSIG, SIGUSR1);
+    sigemptyset(&wake);
+    sigaddset(&wake, SIGUSR1);
+    int sig;
+    if (getppid() == parent)
+        sigwait(&wake, &sig);
+    kill(0, SIGKILL);
+    _exit(1);
+}
+
+/* From fork to exec; `status` receives errno if that fails. */
+static _Noreturn void child_main(const struct process *p, const char *path, pid_t group, int out,
+                                 int status)
+{
+    static const int reset[] = {SIGINT, SIGQUIT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD, SIGUSR1};
+    for (size_t i = 0; i < sizeof reset / sizeof *reset; i++)
+        signal(reset[i], SIG_DFL);
+    sigset_t none;
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, NULL);
+    /* Above 2 first: the parent may have been started with closed standard files. */
+    status = fcntl(status, F_DUPFD_CLOEXEC, 3);
+    out = fcntl(out, F_DUPFD_CLOEXEC, 3);
+    int null = fcntl(open("/dev/null", O_RDONLY | O_CLOEXEC), F_DUPFD_CLOEXEC, 3);
+    if (setpgid(0, group) == 0 && dup2(null, 0) >= 0 && dup2(out, 1) >= 0 && dup2(out, 2) >= 0 &&
+        (p->cwd == NULL || chdir(p->cwd) == 0))
+        execv(path, (char *const *)p->argv);
+    int saved = errno;
+    ssize_t ignored = write(status, &saved, sizeof saved);
+    (void)ignored;
+    _exit(127);
+}
+
+/* fork() that does not let a signal handler of ours run in the child. */
+static pid_t fork_blocked(void)
+{
+    sigset_t all, old;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
+    pid_t pid = fork();
+    if (pid != 0)
+        pthread_sigmask(SIG_SETMASK, &old, NULL);
+    return pid;
+}
+
+static void close_if_open(int *fd)
+{
+    if (*fd >= 0)
+        close(*fd);
+    *fd = -1;
+}
+
+static pid_t wait_for(pid_t pid, int *status, int flags, struct rusage *usage)
+{
+    pid_t r;
+    do
+        r = wait4(pid, status, flags, usage);
+    while (r < 0 && errno == EINTR);
+    return r;
+}
+
+static void tail_add(struct tail *t, const char *data, size_t n)
+{
+    if (n > TAIL_SIZE) {
+        data += n - TAIL_SIZE;
+        n = TAIL_SIZE;
+    }
+    size_t keep = t->size + n > TAIL_SIZE ? TAIL_SIZE - n : t->size;
+    memmove(t->data, t->data + t->size - keep, keep);
+    memcpy(t->data + keep, data, n);
+    t->size = keep + n;
+}
+
+/* The last non-empty lines joined by " | ", at most LAST_CHARS of them, in printable ASCII: the
+ * line goes to terminals, JSON and XML. */
+static void tail_quote(const struct tail *t, char out[LAST_CHARS + 8])
+{
+    size_t begin = t->size;
+    for (int lines = 0; begin > 0; begin--) {
+        bool ends = t->data[begin - 1] == '\n';
+        if (ends && begin < t->size && t->data[begin] != '\n' && ++lines == LAST_LINES)
+            break;
+    }
+    char joined[3 * TAIL_SIZE + 1];
+    size_t n = 0;
+    bool fresh = false;
+    for (size_t i = begin; i < t->size; i++) {
+        char c = t->data[i];
+        if (c == '\n') {
+            fresh = n > 0;
+            continue;
+        }
+        if (fresh) {
+            memcpy(joined + n, " | ", 3);
+            n += 3;
+            fresh = false;
+        }
+        joined[n++] = c >= ' ' && c <= '~' ? c : c == '\t' || c == '\r' ? ' ' : '?';
+    }
+    joined[n] = '\0';
+    size_t skip = n > LAST_CHARS ? n - LAST_CHARS : 0, dots = skip > 0 ? 3 : 0;
+    memcpy(out, "...", dots);
+    memcpy(out + dots, joined + skip, n - skip + 1);
+}
+
+/* A running program as the loop below sees it. */
+struct run {
+    pid_t guard, child;
+    int out, log; /* -1: closed */
+    size_t logged;
+    int log_errno; /* of the first failed write */
+    struct tail tail;
+};
+
+static void log_write(struct run *r, const char *data, size_t n)
+{
+    if (r->log < 0 || r->log_errno != 0)
+        return;
+    static const char full[] = "\n[more output than this log may hold]\n";
+    if (r->logged + n > LOG_MAX) {
+        data = full;
+        n = r->logged <= LOG_MAX ? sizeof full - 1 : 0;
+        r->logged = (size_t)LOG_MAX + 1;
+    } else {
+        r->logged += n;
+    }
+    while (n > 0) {
+        ssize_t w = write(r->log, data, n);
+        if (w < 0 && errno != EINTR) {
+            r->log_errno = errno;
+            return;
+        }
+        if (w > 0) {
+            data += w;
+            n -= (size_t)w;
+        }
+    }
+}
+
+/* Takes what the pipe holds, at most about 1 MiB at a time so that a flood cannot hide the clock.
+ */
+static void drain(struct run *r)
+{
+    char buffer[1 << 16];
+    for (int i = 0; i < 16 && r->out >= 0; i++) {
+        ssize_t n = read(r->out, buffer, sizeof buffer);
+        if (n > 0) {
+            tail_add(&r->tail, buffer, (size_t)n);
+            log_write(r, buffer, (size_t)n);
+        } else if (n == 0) {
+            close_if_open(&r->out);
+        } else if (errno != EINTR) {
+            return;
+        }
+    }
+}
+
+/* Guard first, so that there is no moment without one. */
+static bool start(const struct process *p, const char *path, struct run *r, struct err *e)
+{
+    int out[2] = {-1, -1}, status[2] = {-1, -1};
+    pid_t parent = getpid();
+    r->guard = fork_blocked();
+    if (r->guard == 0)
+        guard_main(parent);
+    if (r->guard < 0)
+        return err_set(e, "%s: cannot fork: %s", p->argv[0], strerror(errno));
+    setpgid(r->guard, r->guard);
+    if (pipe2(out, O_CLOEXEC) != 0 || pipe2(status, O_CLOEXEC) != 0) {
+        err_set(e, "%s: cannot make a pipe: %s", p->argv[0], strerror(errno));
+        goto fail;
+    }
+    r->child = fork_blocked();
+    if (r->child == 0)
+        child_main(p, path, r->guard, out[1], status[1]);
+    if (r->child < 0) {
+        err_set(e, "%s: cannot fork: %s", p->argv[0], strerror(errno));
+        goto fail;
+    }
+    close_if_open(&out[1]);
+    close_if_open(&status[1]);
+    int failure = 0;
+    ssize_t n;
+    do
+        n = read(status[0], &failure, sizeof failure);
+    while (n < 0 && errno == EINTR);
+    if (n != 0) {
+        wait_for(r->child, &(int){0}, 0, NULL);
+        err_set(e, "%s: cannot run: %s", p->argv[0], strerror(failure));
+        goto fail;
+    }
+    close_if_open(&status[0]);
+    r->out = out[0];
+    fcntl(r->out, F_SETFL, O_NONBLOCK);
+    return true;
+fail:
+    for (int i = 0; i < 2; i++) {
+        close_if_open(&out[i]);
+        close_if_open(&status[i]);
+    }
+    kill(-r->guard, SIGKILL);
+    wait_for(r->guard, &(int){0}, 0, NULL);
+    return false;
+}
+
+/* Runs the clock until the child has ended; true if it had to be stopped. */
+static bool watch(const struct process *p, struct run *r, double t0, int *status,
+                  struct rusage *usage)
+{
+    bool late = false;
+    double kill_at = 0, ticked = t0;
+    for (;;) {
+        struct pollfd pfd = {.fd = r->out, .events = POLLIN};
+        poll(&pfd, 1, r->out >= 0 ? POLL_MS : POLL_MS / 10);
+        drain(r);
+        if (wait_for(r->child, status, WNOHANG, usage) == r->child)
+            return late;
+        double t = now_s();
+        if (!late && p->timeout_s > 0 && t - t0 >= p->timeout_s) {
+            late = true;
+            kill_at = t + GRACE_S;
+            kill(-r->guard, SIGTERM);
+        } else if (late && t >= kill_at) {
+            kill(-r->guard, SIGKILL);
+        }
+        if (p->tick != NULL && t - ticked >= 1e-3 * POLL_MS) {
+            ticked = t;
+            p->tick(p->tick_ctx);
+        }
+    }
+}
+
+bool process_run(const struct process *p, struct process_usage *usage, struct err *e)
+{
+    assert(p->argv != NULL && p->argv[0] != NULL && p->timeout_s >= 0);
+    char path[4096];
+    if (!process_find(p->argv[0], path, sizeof path))
+        return err_set(e, "%s: no such program%s", p->argv[0],
+                       strchr(p->argv[0], '/') != NULL ? "" : " in PATH");
+    struct run r = {.out = -1, .log = -1};
+    if (p->log != NULL &&
+        (r.log = open(p->log, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666)) < 0)
+        return err_set(e, "%s: cannot write: %s", p->log, strerror(errno));
+    double t0 = now_s();
+    if (!start(p, path, &r, e)) {
+        close_if_open(&r.log);
+        return false;
+    }
+    int status = 0;
+    struct rusage ru = {0};
+    bool late = watch(p, &r, t0, &status, &ru);
+    kill(-r.guard, SIGKILL);
+    wait_for(r.guard, &(int){0}, 0, NULL);
+    drain(&r);
+    close_if_open(&r.out);
+    if (r.log >= 0 && close(r.log) != 0 && r.log_errno == 0)
+        r.log_errno = errno;
+    double wall = now_s() - t0;
+    if (usage != NULL)
+        *usage = (struct process_usage){
+            .wall_s = wall,
+            .cpu_s = (double)(ru.ru_utime.tv_sec + ru.ru_stime.tv_sec) +
+                     1e-6 * (double)(ru.ru_utime.tv_usec + ru.ru_stime.tv_usec)};
+
+    char last[LAST_CHARS + 8];
+    tail_quote(&r.tail, last);
+    const char *sep = last[0] != '\0' ? ": " : "";
+    if (late)
+        return err_set(e, "%s: no end after %g s%s%s", p->argv[0], p->timeout_s, sep, last);
+    if (WIFSIGNALED(status))
+        return err_set(e, "%s: killed by signal %d (%s)%s%s", p->argv[0], WTERMSIG(status),
+                       strsignal(WTERMSIG(status)), sep, last);
+    if (WEXITSTATUS(status) != 0)
+        return err_set(e, "%s: exit status %d%s%s", p->argv[0], WEXITSTATUS(status), sep, last);
+    if (r.log_errno != 0)
+        return err_set(e, "%s: cannot write: %s", p->log, strerror(r.log_errno));
+    return true;
+}
