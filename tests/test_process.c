@@ -171,7 +171,7 @@ static void a_program_that_cannot_be_executed_says_why(void **state)
 static void a_hang_is_killed_with_its_grandchild(void **state)
 {
     (void)state;
-    char dir[64], file[128], script[512];
+    char dir[64], file[96], script[512];
     temp_dir(dir);
     snprintf(file, sizeof file, "%s/pid", dir);
     snprintf(script, sizeof script,
@@ -193,7 +193,7 @@ static void a_hang_is_killed_with_its_grandchild(void **state)
 static void what_a_finished_program_leaves_behind_is_killed(void **state)
 {
     (void)state;
-    char dir[64], file[128], script[256];
+    char dir[64], file[96], script[512];
     temp_dir(dir);
     snprintf(file, sizeof file, "%s/pid", dir);
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s", file);
@@ -210,7 +210,7 @@ static void what_a_finished_program_leaves_behind_is_killed(void **state)
 static void the_death_of_the_caller_ends_the_group(void **state)
 {
     (void)state;
-    char dir[64], file[128], script[256];
+    char dir[64], file[96], script[512];
     temp_dir(dir);
     snprintf(file, sizeof file, "%s/pid", dir);
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s.new; mv %s.new %s; wait", file, file,
