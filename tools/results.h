@@ -23,7 +23,14 @@
  * false, "error": "one line" } ] }
  *
  * Paths in "files" are relative to the directory of results.json. A claim with "error" could not be
- * judged: it never counts as passed and makes the exit code 3. */
+ * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where
+ * "verdict" equals "expected". An element of tile_log10_p and tile_t is null where a tile has no
+ * noise at all and so no test.
+ *
+ * A reader may rely on: assay, command, version, date, alpha, claims (at least one); of each claim
+ * scene, a, b, expected, passed; of each judged claim everything above except title, detects,
+ * blind_to, class, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, seed_a, seeds_b, version_b and
+ * rerun, which are provenance and absent where the claim has none (two files compared). */
 #ifndef ASSAY_RESULTS_H
 #define ASSAY_RESULTS_H
 
@@ -37,15 +44,22 @@ enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_
 /* Writes by rename, indented, with a final newline. */
 bool json_write(const char *path, const json_t *root, struct err *e)
     __attribute__((warn_unused_result));
-/* Reads results.json and checks all that report and junit rely on. New reference in *out. */
+/* Reads results.json and checks all that report and junit rely on (see above), each failure a line
+ * with file, claim and member. New reference in *out. */
 bool results_read(const char *path, json_t **out, struct err *e)
     __attribute__((warn_unused_result));
+
+/* How a claim came out, worst first. OPPOSITE: DIFFERENT for EQUIVALENT or the reverse. UNDECIDED: any
+ * other verdict that was not expected. */
+enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
+enum outcome claim_outcome(const json_t *claim);
 
 /* 0 if every claim passed; else 3 if any could not be judged, else 1 if any verdict was the
  * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
 int results_exit_code(const json_t *results);
 
-/* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown. */
+/* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown, and below it
+ * the error line of each claim that could not be judged. *text belongs to the caller (free()). */
 bool results_print_table(const json_t *results, bool markdown, char **text, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -1,0 +1,272 @@
+#include "results.h"
+
+#include "../reference/suite.h"
+#include "../renderer/fs.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+bool json_write(const char *path, const json_t *root, struct err *e)
+{
+    struct out_file out;
+    if (!make_parent_dirs(path, e) || !out_open(&out, path, e))
+        return false;
+    /* 12 digits: more than any estimate here holds, and a file that a person can read. */
+    if (json_dumpf(root, out.f, JSON_INDENT(1) | JSON_REAL_PRECISION(12)) != 0 ||
+        fputc('\n', out.f) == EOF) {
+        out_abandon(&out);
+        return err_set(e, "%s: cannot write JSON", path);
+    }
+    return out_commit(&out, e);
+}
+
+enum member_type { STRING, NUMBER, COUNT, BOOLEAN, INTERVAL, TRIPLE, COUNTS, OBJECT };
+
+struct member {
+    const char *name;
+    enum member_type type;
+    bool required;
+};
+
+static const struct member root_members[] = {{"command", STRING, true},  {"version", STRING, true},
+                                             {"date", STRING, true},     {"alpha", NUMBER, true},
+                                             {"machine", STRING, false}, {"mode", STRING, false},
+                                             {"seconds", NUMBER, false}};
+
+/* A claim that could not be judged has these and no more. */
+static const struct member any_claim_members[] = {
+    {"scene", STRING, true},     {"a", STRING, true},         {"b", STRING, true},
+    {"expected", STRING, true},  {"passed", BOOLEAN, true},   {"title", STRING, false},
+    {"detects", STRING, false},  {"blind_to", STRING, false}, {"error", STRING, false},
+    {"quantity", STRING, false}, {"rerun", STRING, false}};
+
+static const struct member judged_members[] = {
+    {"quantity", STRING, true},      {"verdict", STRING, true},
+    {"reason", STRING, true},        {"alpha", NUMBER, true},
+    {"margin_global", NUMBER, true}, {"margin_tile", NUMBER, true},
+    {"tile", COUNT, true},           {"difference", NUMBER, true},
+    {"ci", INTERVAL, true},          {"channel_difference", TRIPLE, true},
+    {"log10_p", NUMBER, true},       {"mdb_global", NUMBER, true},
+    {"mdb_tile", NUMBER, true},      {"num_tests", COUNT, true},
+    {"worst_tile", OBJECT, true},    {"worst", OBJECT, true},
+    {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
+    {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
+    {"tiles_y", COUNT, true},        {"files", OBJECT, true},
+    {"class", STRING, false},        {"n_a", NUMBER, false},
+    {"n_b", NUMBER, false},          {"unit_b", STRING, false},
+    {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
+    {"seconds_b", NUMBER, false},    {"seed_a", COUNT, false},
+    {"seeds_b", COUNTS, false},      {"version_b", STRING, false}};
+
+static const struct member worst_tile_members[] = {{"x", COUNT, true},
+                                                   {"y", COUNT, true},
+                                                   {"difference", NUMBER, true},
+                                                   {"ci", INTERVAL, true},
+                                                   {"t", NUMBER, true}};
+
+static const struct member worst_members[] = {
+    {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},
+    {"height", COUNT, true}, {"channel", COUNT, true}, {"difference", NUMBER, true},
+    {"ci", INTERVAL, true},  {"t", NUMBER, true}};
+
+static const struct member file_members[] = {
+    {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
+
+#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
+
+static bool is_count(const json_t *v)
+{
+    return json_is_integer(v) && json_integer_value(v) >= 0;
+}
+
+static bool are_numbers(const json_t *v, size_t size)
+{
+    if (!json_is_array(v) || json_array_size(v) != size)
+        return false;
+    for (size_t i = 0; i < size; i++)
+        if (!json_is_number(json_array_get(v, i)))
+            return false;
+    return true;
+}
+
+/* NULL if v is of that type, else what it should be, in words. */
+static const char *type_error(const json_t *v, enum member_type type)
+{
+    switch (type) {
+    case STRING: return json_is_string(v) ? NULL : "a string";
+    case NUMBER: return json_is_number(v) ? NULL : "a number";
+    case COUNT: return is_count(v) ? NULL : "a whole number of 0 or more";
+    case BOOLEAN: return json_is_boolean(v) ? NULL : "true or false";
+    case INTERVAL:
+        return are_numbers(v, 2) && json_number_value(json_array_get(v, 0)) <=
+                                        json_number_value(json_array_get(v, 1))
+                   ? NULL
+                   : "an array of two numbers, the lower first";
+    case TRIPLE: return are_numbers(v, 3) ? NULL : "an array of three numbers";
+    case COUNTS:
+        if (!json_is_array(v))
+            return "an array of whole numbers";
+        for (size_t i = 0; i < json_array_size(v); i++)
+            if (!is_count(json_array_get(v, i)))
+                return "an array of whole numbers";
+        return NULL;
+    case OBJECT: return json_is_object(v) ? NULL : "an object";
+    }
+    assert(!"unknown member type");
+    return "known";
+}
+
+/* The line begins with where (the file and claim) and within (the object's name and a dot, or "").
+ */
+static bool check_members(const json_t *object, const struct member *member, size_t num,
+                          const char *where, const char *within, struct err *e)
+{
+    for (size_t i = 0; i < num; i++) {
+        const json_t *v = json_object_get(object, member[i].name);
+        if (v == NULL && !member[i].required)
+            continue;
+        if (v == NULL)
+            return err_set(e, "%s: '%s%s' is missing", where, within, member[i].name);
+        const char *wanted = type_error(v, member[i].type);
+        if (wanted != NULL)
+            return err_set(e, "%s: '%s%s' is not %s", where, within, member[i].name, wanted);
+    }
+    return true;
+}
+
+/* One number, or null where a tile has no noise and so no test, for each tile. */
+static bool check_tiles(const json_t *claim, const char *name, size_t num, const char *where,
+                        struct err *e)
+{
+    const json_t *v = json_object_get(claim, name);
+    if (v == NULL)
+        return err_set(e, "%s: '%s' is missing", where, name);
+    if (!json_is_array(v) || json_array_size(v) != num)
+        return err_set(e, "%s: '%s' is not an array of tiles_x * tiles_y = %zu numbers", where,
+                       name, num);
+    for (size_t i = 0; i < num; i++) {
+        const json_t *x = json_array_get(v, i);
+        if (!json_is_number(x) && !json_is_null(x))
+            return err_set(e, "%s: '%s' has an element %zu that is not a number", where, name, i);
+    }
+    return true;
+}
+
+static bool check_judged(const json_t *claim, const char *where, struct err *e)
+{
+    if (!check_members(claim, judged_members, LENGTH(judged_members), where, "", e) ||
+        !check_members(json_object_get(claim, "worst_tile"), worst_tile_members,
+                       LENGTH(worst_tile_members), where, "worst_tile.", e) ||
+        !check_members(json_object_get(claim, "worst"), worst_members, LENGTH(worst_members), where,
+                       "worst.", e) ||
+        !check_members(json_object_get(claim, "files"), file_members, LENGTH(file_members), where,
+                       "files.", e))
+        return false;
+
+    json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));
+    json_int_t tiles_y = json_integer_value(json_object_get(claim, "tiles_y"));
+    if (tiles_x < 1 || tiles_y < 1 || tiles_x > 65536 || tiles_y > 65536)
+        return err_set(e, "%s: 'tiles_x' or 'tiles_y' is not from 1 to 65536", where);
+    size_t num_tiles = (size_t)tiles_x * (size_t)tiles_y;
+    if (!check_tiles(claim, "tile_log10_p", num_tiles, where, e) ||
+        !check_tiles(claim, "tile_t", num_tiles, where, e))
+        return false;
+    if (json_integer_value(json_object_get(json_object_get(claim, "worst"), "channel")) > 3)
+        return err_set(e, "%s: 'worst.channel' is not from 0 to 3", where);
+
+    enum verdict verdict, expected;
+    const char *name = json_string_value(json_object_get(claim, "verdict"));
+    if (!verdict_parse(name, &verdict))
+        return err_set(e, "%s: 'verdict' is unknown: '%s'", where, name);
+    if (!verdict_parse(json_string_value(json_object_get(claim, "expected")), &expected))
+        return err_set(e, "%s: 'expected' is unknown", where);
+    if (json_is_true(json_object_get(claim, "passed")) != (verdict == expected))
+        return err_set(e, "%s: 'passed' contradicts 'verdict' and 'expected'", where);
+    return true;
+}
+
+static bool check_claim(const json_t *claim, const char *where, struct err *e)
+{
+    if (!json_is_object(claim))
+        return err_set(e, "%s: not an object", where);
+    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e))
+        return false;
+    enum verdict expected;
+    const char *name = json_string_value(json_object_get(claim, "expected"));
+    if (!verdict_parse(name, &expected))
+        return err_set(e, "%s: 'expected' is unknown: '%s'", where, name);
+    if (json_object_get(claim, "error") == NULL)
+        return check_judged(claim, where, e);
+    if (json_is_true(json_object_get(claim, "passed")))
+        return err_set(e, "%s: has an 'error' and yet 'passed'", where);
+    return true;
+}
+
+static bool check_results(const json_t *root, const char *path, struct err *e)
+{
+    if (!json_is_object(root))
+        return err_set(e, "%s: not an object", path);
+    const json_t *schema = json_object_get(root, "assay");
+    if (!json_is_integer(schema) || json_integer_value(schema) != 1)
+        return err_set(e, "%s: 'assay' is not 1: not results of this version's schema", path);
+    if (!check_members(root, root_members, LENGTH(root_members), path, "", e))
+        return false;
+    const json_t *claims = json_object_get(root, "claims");
+    if (!json_is_array(claims) || json_array_size(claims) == 0)
+        return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const json_t *claim = json_array_get(claims, i);
+        const char *scene = json_string_value(json_object_get(claim, "scene"));
+        const char *b = json_string_value(json_object_get(claim, "b"));
+        char where[512];
+        snprintf(where, sizeof where, "%.300s: claim %zu (%.60s against %.60s)", path, i + 1,
+                 scene != NULL ? scene : "?", b != NULL ? b : "?");
+        if (!check_claim(claim, where, e))
+            return false;
+    }
+    return true;
+}
+
+bool results_read(const char *path, json_t **out, struct err *e)
+{
+    json_error_t parse;
+    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &parse);
+    if (root == NULL)
+        return parse.line > 0 ? err_set(e, "%s:%d: %s", path, parse.line, parse.text)
+                              : err_set(e, "%s: %s", path, parse.text);
+    if (!check_results(root, path, e)) {
+        json_decref(root);
+        return false;
+    }
+    *out = root;
+    return true;
+}
+
+enum outcome claim_outcome(const json_t *claim)
+{
+    if (json_object_get(claim, "error") != NULL)
+        return OUTCOME_NOT_JUDGED;
+    if (json_is_true(json_object_get(claim, "passed")))
+        return OUTCOME_AS_EXPECTED;
+    enum verdict verdict, expected;
+    if (!verdict_parse(json_string_value(json_object_get(claim, "verdict")), &verdict) ||
+        !verdict_parse(json_string_value(json_object_get(claim, "expected")), &expected))
+        return OUTCOME_NOT_JUDGED;
+    if (verdict != VERDICT_INCONCLUSIVE && expected != VERDICT_INCONCLUSIVE)
+        return OUTCOME_OPPOSITE;
+    return OUTCOME_UNDECIDED;
+}
+
+int results_exit_code(const json_t *results)
+{
+    const json_t *claims = json_object_get(results, "claims");
+    size_t count[4] = {0};
+    for (size_t i = 0; i < json_array_size(claims); i++)
+        count[claim_outcome(json_array_get(claims, i))]++;
+    if (json_array_size(claims) == 0 || count[OUTCOME_NOT_JUDGED] > 0)
+        return EXIT_NOT_JUDGED;
+    if (count[OUTCOME_OPPOSITE] > 0)
+        return EXIT_DIFFERENT;
+    return count[OUTCOME_UNDECIDED] > 0 ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
+}

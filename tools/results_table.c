@@ -1,0 +1,182 @@
+#include "results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NUM_COLUMNS = 8 };
+
+static const char *const heading[NUM_COLUMNS] = {"scene",    "against",  "difference % [interval]",
+                                                 "MDB %",    "margin %", "verdict",
+                                                 "expected", "ok"};
+static const bool right_aligned[NUM_COLUMNS] = {false, false, true,  true,
+                                                true,  false, false, false};
+
+struct row {
+    const char
+        *cell[NUM_COLUMNS]; /* borrowed from the claim, a literal, or one of the three below */
+    char difference[96], mdb[32], margin[32];
+};
+
+/* What rounds to zero is printed as zero, never as -0.000. */
+static double percent(const json_t *fraction)
+{
+    double v = 100 * json_number_value(fraction);
+    return fabs(v) < 0.0005 ? 0 : v;
+}
+
+static void fill_row(struct row *r, const json_t *claim, bool markdown)
+{
+    static const char *const mark[2][4] = {
+        [false] = {"ERROR", "WRONG", "WRONG", "ok"},
+        [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
+    };
+    enum outcome outcome = claim_outcome(claim);
+    r->cell[0] = json_string_value(json_object_get(claim, "scene"));
+    r->cell[1] = json_string_value(json_object_get(claim, "b"));
+    r->cell[6] = json_string_value(json_object_get(claim, "expected"));
+    r->cell[7] = mark[markdown][outcome];
+    if (outcome == OUTCOME_NOT_JUDGED) {
+        r->cell[2] = r->cell[3] = r->cell[4] = "-";
+        r->cell[5] = "NOT JUDGED";
+        return;
+    }
+    const json_t *ci = json_object_get(claim, "ci");
+    snprintf(r->difference, sizeof r->difference, "%+.3f [%+.3f, %+.3f]",
+             percent(json_object_get(claim, "difference")), percent(json_array_get(ci, 0)),
+             percent(json_array_get(ci, 1)));
+    snprintf(r->mdb, sizeof r->mdb, "%.3f", percent(json_object_get(claim, "mdb_global")));
+    snprintf(r->margin, sizeof r->margin, "%.3f", percent(json_object_get(claim, "margin_global")));
+    r->cell[2] = r->difference;
+    r->cell[3] = r->mdb;
+    r->cell[4] = r->margin;
+    r->cell[5] = json_string_value(json_object_get(claim, "verdict"));
+}
+
+/* Columns that UTF-8 text fills, taking each code point as one column wide. */
+static size_t text_columns(const char *s)
+{
+    size_t n = 0;
+    for (; *s != '\0'; s++)
+        n += ((unsigned char)*s & 0xc0) != 0x80;
+    return n;
+}
+
+static void print_padded(FILE *f, const char *s, size_t width, bool right)
+{
+    int gap = (int)(width - text_columns(s));
+    fprintf(f, "%*s%s%*s", right ? gap : 0, "", s, right ? 0 : gap, "");
+}
+
+static void print_terminal(FILE *f, const struct row *row, size_t num_rows)
+{
+    size_t width[NUM_COLUMNS] = {0};
+    for (size_t c = 0; c < NUM_COLUMNS; c++)
+        for (size_t r = 0; r <= num_rows; r++) {
+            size_t w = text_columns(r < num_rows ? row[r].cell[c] : heading[c]);
+            width[c] = w > width[c] ? w : width[c];
+        }
+    for (size_t r = 0; r <= num_rows; r++) {
+        const char *const *cell = r == 0 ? heading : row[r - 1].cell;
+        for (size_t c = 0; c + 1 < NUM_COLUMNS; c++) {
+            print_padded(f, cell[c], width[c], right_aligned[c]);
+            fputs("  ", f);
+        }
+        fprintf(f, "%s\n", cell[NUM_COLUMNS - 1]);
+    }
+}
+
+/* A backslash or a character reference for what would end the cell or start markup. */
+static void print_markdown_text(FILE *f, const char *s)
+{
+    for (; *s != '\0'; s++) {
+        if (*s == '\n' || *s == '\r')
+            fputc(' ', f);
+        else if (*s == '<')
+            fputs("&lt;", f);
+        else if (*s == '&')
+            fputs("&amp;", f);
+        else if (strchr("|\\`*_[]", *s) != NULL)
+            fprintf(f, "\\%c", *s);
+        else
+            fputc(*s, f);
+    }
+}
+
+static void print_markdown(FILE *f, const struct row *row, size_t num_rows)
+{
+    for (size_t c = 0; c < NUM_COLUMNS; c++)
+        fprintf(f, "| %s ", heading[c]);
+    fputs("|\n", f);
+    for (size_t c = 0; c < NUM_COLUMNS; c++)
+        fputs(right_aligned[c] ? "|--:" : "|---", f);
+    fputs("|\n", f);
+    for (size_t r = 0; r < num_rows; r++) {
+        for (size_t c = 0; c < NUM_COLUMNS; c++) {
+            fputs("| ", f);
+            /* Only the first two hold text that is not ours. */
+            if (c < 2)
+                print_markdown_text(f, row[r].cell[c]);
+            else
+                fputs(row[r].cell[c], f);
+            fputc(' ', f);
+        }
+        fputs("|\n", f);
+    }
+}
+
+static void print_errors(FILE *f, const json_t *claims, bool markdown)
+{
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const json_t *claim = json_array_get(claims, i);
+        const char *error = json_string_value(json_object_get(claim, "error"));
+        if (error == NULL)
+            continue;
+        const char *scene = json_string_value(json_object_get(claim, "scene"));
+        const char *b = json_string_value(json_object_get(claim, "b"));
+        if (!markdown) {
+            fprintf(f, "%s against %s: %s\n", scene, b, error);
+            continue;
+        }
+        fputs("\n- ", f);
+        print_markdown_text(f, scene);
+        fputs(" against ", f);
+        print_markdown_text(f, b);
+        fputs(": ", f);
+        print_markdown_text(f, error);
+        fputc('\n', f);
+    }
+}
+
+bool results_print_table(const json_t *results, bool markdown, char **text, struct err *e)
+{
+    const json_t *claims = json_object_get(results, "claims");
+    size_t num_rows = json_array_size(claims), size;
+    char *buffer = NULL;
+    struct row *row = calloc(num_rows + 1, sizeof *row);
+    FILE *f = open_memstream(&buffer, &size);
+    if (row == NULL || f == NULL)
+        goto fail;
+    for (size_t i = 0; i < num_rows; i++)
+        fill_row(&row[i], json_array_get(claims, i), markdown);
+    if (markdown)
+        print_markdown(f, row, num_rows);
+    else
+        print_terminal(f, row, num_rows);
+    print_errors(f, claims, markdown);
+    int failed = ferror(f);
+    failed |= fclose(f);
+    f = NULL;
+    if (failed)
+        goto fail;
+    free(row);
+    *text = buffer;
+    return true;
+fail:
+    if (f != NULL)
+        fclose(f);
+    free(buffer);
+    free(row);
+    return err_set(e, "out of memory for the verdict table");
+}
