@@ -371,18 +371,15 @@ static json_t *table_results(void)
 static void table_for_a_terminal(void **state)
 {
     (void)state;
+    /* clang-format off */
     static const char wanted[] =
-        "scene       against     difference % [interval]    MDB %  margin %  verdict       "
-        "expected    ok\n"
-        "41_cornell  cycles      +0.030 [-0.100, +0.200]    0.400     "
-        "0.500  EQUIVALENT    EQUIVALENT  ok\n"
-        "91_l\xc3\xa4ngs    truth   -25.000 [-26.000, -23.990]    1.230   "
-        "  2.000  DIFFERENT     DIFFERENT   ok\n"
-        "a|b         cycles    +0.000 [-50.000, +50.000]  125.000     "
-        "0.500  INCONCLUSIVE  EQUIVALENT  WRONG\n"
-        "12_furnace  povray                            -        -         "
-        "-  NOT JUDGED    EQUIVALENT  ERROR\n"
+        "scene       against     difference % [interval]    MDB %  margin %  verdict       expected    ok\n"
+        "41_cornell  cycles      +0.030 [-0.100, +0.200]    0.400     0.500  EQUIVALENT    EQUIVALENT  ok\n"
+        "91_l\xc3\xa4ngs    truth    -25.000 [-26.000, -23.990]    1.230     2.000  DIFFERENT     DIFFERENT   ok\n"
+        "a|b         cycles    +0.000 [-50.000, +50.000]  125.000     0.500  INCONCLUSIVE  EQUIVALENT  WRONG\n"
+        "12_furnace  povray                            -        -         -  NOT JUDGED    EQUIVALENT  ERROR\n"
         "12_furnace against povray: povray: not installed\n";
+    /* clang-format on */
     json_t *root = table_results();
     char *text = NULL;
     struct err e = {""};
