@@ -1,0 +1,139 @@
+#include "pyramid.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
+
+static struct estimate estimate(double mean, double v, double k3, double n)
+{
+    struct estimate est = {.mean = mean, .v = v, .k3 = k3};
+    if (v > 0) {
+        est.var_v = fmax(2 * v * v / (n - 1), k3 * k3 / v);
+        est.var_k3 = 6 * v * v * v / ((n - 1) * (n - 2));
+    }
+    return est;
+}
+
+struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channel)
+{
+    double n = m->n[pixel];
+    bool exact = strcmp(m->unit, "exact") == 0;
+    assert(exact || n >= 3);
+    double v_scale = exact ? 0 : 1 / (n * (n - 1));
+    double k_scale = exact ? 0 : v_scale / (n - 2);
+    const double *mean = m->mean + 3 * pixel, *m2 = m->m2 + 3 * pixel, *m3 = m->m3 + 3 * pixel;
+    if (channel < CHANNEL_LUMINANCE)
+        return estimate(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
+    double sum = 0, deviation = 0, root = 0;
+    for (int c = 0; c < 3; c++) {
+        sum += luminance_weight[c] * mean[c];
+        deviation += luminance_weight[c] * sqrt(m2[c] * v_scale);
+        root += luminance_weight[c] * cbrt(m3[c] * k_scale);
+    }
+    return estimate(sum, deviation * deviation, root * root * root, n);
+}
+
+static void add_cell(struct cell *dst, const struct cell *src)
+{
+    dst->a += src->a;
+    dst->b += src->b;
+    dst->va += src->va;
+    dst->vb += src->vb;
+    dst->k3 += src->k3;
+    dst->var_v += src->var_v;
+    dst->var_k3 += src->var_k3;
+}
+
+static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
+                        struct pyramid_level *level)
+{
+    size_t pixels = (size_t)level->nx * (size_t)level->ny;
+    for (size_t p = 0; p < pixels; p++) {
+        struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
+        level->cell[p] = (struct cell){
+            .a = ea.mean,
+            .b = eb.mean,
+            .va = ea.v,
+            .vb = eb.v,
+            .k3 = ea.k3 - eb.k3,
+            .var_v = ea.var_v + eb.var_v,
+            .var_k3 = ea.var_k3 + eb.var_k3,
+        };
+    }
+}
+
+/* Every region of `dst` is the sum of the regions of `src` that lie in it; src's side divides
+ * dst's. */
+static void fill_from(const struct pyramid_level *src, struct pyramid_level *dst)
+{
+    int factor = dst->side / src->side;
+    for (int y = 0; y < src->ny; y++)
+        for (int x = 0; x < src->nx; x++)
+            add_cell(&dst->cell[(size_t)(y / factor) * (size_t)dst->nx + (size_t)(x / factor)],
+                     &src->cell[(size_t)y * (size_t)src->nx + (size_t)x]);
+}
+
+static void add_level(struct pyramid *p, int side)
+{
+    struct pyramid_level *level = &p->level[p->num_levels++];
+    level->side = side;
+    level->nx = (p->width - 1) / side + 1;
+    level->ny = (p->height - 1) / side + 1;
+}
+
+bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
+                   struct pyramid *out, struct err *e)
+{
+    assert(a->width == b->width && a->height == b->height && tile >= 1);
+    *out = (struct pyramid){.width = a->width, .height = a->height};
+    for (int side = 1; side < tile; side *= 2)
+        add_level(out, side);
+    out->tile_level = out->num_levels;
+    int longest = a->width > a->height ? a->width : a->height;
+    add_level(out, tile);
+    while (out->level[out->num_levels - 1].side < longest)
+        add_level(out, 2 * out->level[out->num_levels - 1].side);
+    out->cells = calloc(pyramid_regions(out), sizeof *out->cells);
+    if (out->cells == NULL)
+        return err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
+    struct cell *next = out->cells;
+    for (int i = 0; i < out->num_levels; i++) {
+        struct pyramid_level *level = &out->level[i];
+        level->cell = next;
+        next += (size_t)level->nx * (size_t)level->ny;
+    }
+    for (int i = 0; i < out->num_levels; i++) {
+        struct pyramid_level *level = &out->level[i];
+        if (level->side == 1)
+            fill_pixels(a, b, channel, level);
+        else /* a tile that is no power of two is not made of the level below it */
+            fill_from(&out->level[i == out->tile_level ? 0 : i - 1], level);
+    }
+    return true;
+}
+
+void pyramid_free(struct pyramid *p)
+{
+    free(p->cells);
+    *p = (struct pyramid){0};
+}
+
+size_t pyramid_regions(const struct pyramid *p)
+{
+    size_t regions = 0;
+    for (int i = 0; i < p->num_levels; i++)
+        regions += (size_t)p->level[i].nx * (size_t)p->level[i].ny;
+    return regions;
+}
+
+struct rect pyramid_rect(const struct pyramid *p, int level, size_t i)
+{
+    const struct pyramid_level *l = &p->level[level];
+    int x = (int)(i % (size_t)l->nx) * l->side, y = (int)(i / (size_t)l->nx) * l->side;
+    int width = p->width - x, height = p->height - y;
+    return (struct rect){x, y, width < l->side ? width : l->side,
+                         height < l->side ? height : l->side};
+}
