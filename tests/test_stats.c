@@ -156,12 +156,11 @@ static void test_normal_equivalent(void **state)
 {
     (void)state;
     for (double nu = 3; nu < 1e6; nu *= 3)
-        for (double t = 0.5; t < 40; t *= 1.4) {
+        for (double t = 0.5; t < 30; t *= 1.4) {
             double z = stats_z_of_t(t, nu);
             assert_close(stats_t_of_z(z, nu), t, 1e-9);
             double p = gsl_sf_beta_inc(nu / 2, 0.5, nu / (nu + t * t));
-            if (p > 1e-280)
-                assert_close(z, stats_normal_quantile(p / 2), 0.03);
+            assert_close(z, stats_normal_quantile(p / 2), 0.03);
         }
 }
 
