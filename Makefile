@@ -47,7 +47,14 @@ $(BUILD)/libassay.a: $(call obj,$(HARNESS) $(RENDERER))
 
 $(BUILD)/%.c.o: %.c
 	$(call say,CC,$<)
-	$(Q)mkdir -p $(@D) && $(CC) $(CFLAGS_ALL) -MMD -MP -DASSAY_VERSION='"$(VERSION)"' -c -o $@ $<
+	$(Q)mkdir -p $(@D) && $(CC) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+
+# Only version.c knows the commit, and is built again when that changes.
+$(BUILD)/renderer/version.c.o: CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
+$(BUILD)/renderer/version.c.o: $(BUILD)/commit
+$(BUILD)/commit: FORCE
+	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
+FORCE:
 
 $(BUILD)/%.cc.o: %.cc
 	$(call say,CXX,$<)
@@ -56,6 +63,6 @@ $(BUILD)/%.cc.o: %.cc
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all clean
+.PHONY: all clean FORCE
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -1,0 +1,290 @@
+#include "integrator.h"
+
+#include "bsdf.h"
+#include "sampler.h"
+#include "warp.h"
+
+const char *const integrator_kind_names[] = {"path", "normals", NULL};
+const char *const direct_kind_names[] = {"hemisphere", "light", "bsdf", "mis", NULL};
+
+enum { ROULETTE_FROM_VERTEX = 2 };
+
+/* A shadow ray ends this part of its length before the light, so that it does not meet the light.
+ */
+#define SHADOW_SHORTENING 1e-4f
+
+static float power_heuristic(float a, float b)
+{
+    return a * a / (a * a + b * b);
+}
+
+static bool counts(const struct integrator *it, int bounces)
+{
+    return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
+}
+
+/* Camera rays for all lanes. */
+static int generate(const struct integrator *it, struct batch *b, int num_lanes)
+{
+    uint32_t width = (uint32_t)it->camera->width;
+    for (int i = 0; i < num_lanes; i++) {
+        struct sample4 s = sampler_get(it->opt.seed, b->pixel[i], b->sample[i], 0, PURPOSE_CAMERA);
+        float x = (float)(b->pixel[i] % width) + s.u[0], y = (float)(b->pixel[i] / width) + s.u[1];
+        rays_set(&b->ray, i, camera_ray(it->camera, x, y, s.u[2], s.u[3]));
+        rgbs_set(&b->throughput, i, grey(1));
+        rgbs_set(&b->radiance, i, grey(0));
+        b->pdf_w[i] = 0;
+        b->active[i] = (uint16_t)i;
+    }
+    return num_lanes;
+}
+
+static int32_t light_of(const struct scene *s, uint32_t prim)
+{
+    return prim < s->num_triangles ? s->tri_light[prim] : s->sphere_light[prim - s->num_triangles];
+}
+
+static uint32_t material_of(const struct scene *s, uint32_t prim)
+{
+    return prim < s->num_triangles ? s->tri_material[prim]
+                                   : s->sphere_material[prim - s->num_triangles];
+}
+
+/* Weight of emission that the path ran into at vertex `vertex`. */
+static float emission_weight(const struct integrator *it, const struct batch *b, int i, int vertex,
+                             const struct surface *s)
+{
+    if (vertex == 0 || it->opt.direct == DIRECT_BSDF)
+        return 1;
+    if (it->opt.direct != DIRECT_MIS)
+        return 0;
+    int32_t l = light_of(it->scene, b->hit.prim[i]);
+    float pdf_light = light_pdf_w(it->lights, (uint32_t)l, vec3s_get(&b->ray.o, i),
+                                  vec3s_get(&b->ray.d, i), b->hit.t[i], s);
+    return power_heuristic(b->pdf_w[i], (float)it->opt.light_samples * pdf_light);
+}
+
+/* Adds emission, sets up the surfaces, drops lanes whose path has ended. */
+static int shade_hits(const struct integrator *it, struct batch *b, int num_active, int vertex)
+{
+    int kept = 0;
+    for (int k = 0; k < num_active; k++) {
+        int i = b->active[k];
+        uint32_t prim = b->hit.prim[i];
+        if (prim == NO_HIT)
+            continue;
+        ray r = rays_get(&b->ray, i);
+        struct surface s = surface_at(it->scene, prim, &r, b->hit.t[i], b->hit.u[i], b->hit.v[i]);
+        vec3 wo = neg(r.d);
+        b->material[i] = material_of(it->scene, prim);
+        const struct material *m = &it->scene->materials[b->material[i]];
+        if (light_of(it->scene, prim) >= 0 && counts(it, vertex)) {
+            rgb le = emitted_radiance(m, s.ng, wo);
+            if (!rgb_is_zero(le)) {
+                float w = emission_weight(it, b, i, vertex, &s);
+                rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
+            }
+        }
+        if (vertex == it->opt.max_bounces || rgb_is_zero(m->reflectance))
+            continue;
+        if (dot(s.ng, wo) < 0) {
+            s.ng = neg(s.ng);
+            s.ns = neg(s.ns);
+        }
+        /* An interpolated normal that looks away from the viewer has no hemisphere to share. */
+        if (dot(s.ns, wo) <= 0)
+            s.ns = s.ng;
+        vec3s_set(&b->p, i, s.p);
+        vec3s_set(&b->ng, i, s.ng);
+        vec3s_set(&b->ns, i, s.ns);
+        vec3s_set(&b->wo, i, wo);
+        b->eps[i] = s.eps;
+        b->active[kept++] = (uint16_t)i;
+    }
+    return kept;
+}
+
+static vec3 to_local(const frame *f, vec3 w)
+{
+    return v3(dot(w, f->s), dot(w, f->t), dot(w, f->n));
+}
+
+/* f(wo, wi) cos(theta_i) and, if pdf_w is not NULL, the BSDF's own density of wi; 0 unless wi
+ * leaves on wo's side of the true surface. */
+static rgb scatter_towards(const struct integrator *it, const struct batch *b, int i, vec3 wi,
+                           float *pdf_w)
+{
+    vec3 ns = vec3s_get(&b->ns, i);
+    float cos_i = dot(ns, wi);
+    if (pdf_w != NULL)
+        *pdf_w = 0;
+    if (cos_i <= 0 || dot(vec3s_get(&b->ng, i), wi) <= 0)
+        return grey(0);
+    frame f = frame_from_normal(ns);
+    const struct material *m = &it->scene->materials[b->material[i]];
+    vec3 wo_local = to_local(&f, vec3s_get(&b->wo, i)), wi_local = to_local(&f, wi);
+    if (pdf_w != NULL)
+        *pdf_w = bsdf_pdf_w(m, wo_local, wi_local);
+    return rgb_scale(bsdf_eval(m, wo_local, wi_local), cos_i);
+}
+
+static ray leaving(const struct batch *b, int i, vec3 wi, float tmax)
+{
+    struct surface s = {.p = vec3s_get(&b->p, i), .ng = vec3s_get(&b->ng, i), .eps = b->eps[i]};
+    return (ray){.o = surface_origin(&s, wi), .d = wi, .tmin = 0, .tmax = tmax};
+}
+
+/* One sample of light l from every active lane, as one of `count` per lane. */
+static void connect_light(const struct integrator *it, struct batch *b, int num_active, int vertex,
+                          uint32_t l, uint32_t purpose, int count)
+{
+    int n = 0;
+    for (int k = 0; k < num_active; k++) {
+        int i = b->active[k];
+        struct sample4 u =
+            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        struct light_sample ls = light_sample_direction(it->lights, l, vec3s_get(&b->p, i), u.u);
+        if (ls.pdf_w <= 0)
+            continue;
+        float pdf_bsdf;
+        rgb f = scatter_towards(it, b, i, ls.wi, &pdf_bsdf);
+        if (rgb_is_zero(f))
+            continue;
+        float w = 1;
+        if (it->opt.direct == DIRECT_MIS && !ls.delta)
+            w = power_heuristic((float)count * ls.pdf_w, pdf_bsdf);
+        rgb light = rgb_mul(rgb_mul(rgbs_get(&b->throughput, i), f), ls.radiance);
+        rgbs_set(&b->shadow_light, i, rgb_scale(light, w / ((float)count * ls.pdf_w)));
+        rays_set(&b->shadow, i, leaving(b, i, ls.wi, ls.distance * (1 - SHADOW_SHORTENING)));
+        b->shadow_lane[n++] = (uint16_t)i;
+    }
+    bvh_occluded(it->bvh, &b->shadow, b->shadow_lane, n, b->occluded, &b->stats);
+    for (int k = 0; k < n; k++) {
+        int i = b->shadow_lane[k];
+        if (!b->occluded[i])
+            rgbs_add(&b->radiance, i, rgbs_get(&b->shadow_light, i));
+    }
+}
+
+/* One uniform direction of the hemisphere from every active lane, as one of `count` per lane;
+ * counts if it meets an emitter. */
+static void connect_hemisphere(const struct integrator *it, struct batch *b, int num_active,
+                               int vertex, uint32_t purpose, int count)
+{
+    int n = 0;
+    for (int k = 0; k < num_active; k++) {
+        int i = b->active[k];
+        struct sample4 u =
+            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        vec3 local = warp_uniform_hemisphere(u.u[0], u.u[1]);
+        frame f = frame_from_normal(vec3s_get(&b->ns, i));
+        vec3 wi = frame_to_world(&f, local);
+        rgb scattered = scatter_towards(it, b, i, wi, NULL);
+        if (rgb_is_zero(scattered))
+            continue;
+        float pdf_w = warp_uniform_hemisphere_pdf_w(local);
+        rgbs_set(
+            &b->shadow_light, i,
+            rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), scattered), 1 / ((float)count * pdf_w)));
+        rays_set(&b->shadow, i, leaving(b, i, wi, INFINITY));
+        b->shadow_lane[n++] = (uint16_t)i;
+    }
+    bvh_closest(it->bvh, &b->shadow, b->shadow_lane, n, &b->shadow_hit, &b->stats);
+    for (int k = 0; k < n; k++) {
+        int i = b->shadow_lane[k];
+        uint32_t prim = b->shadow_hit.prim[i];
+        if (prim == NO_HIT || light_of(it->scene, prim) < 0)
+            continue;
+        ray r = rays_get(&b->shadow, i);
+        struct surface s = surface_at(it->scene, prim, &r, b->shadow_hit.t[i], b->shadow_hit.u[i],
+                                      b->shadow_hit.v[i]);
+        const struct material *m = &it->scene->materials[material_of(it->scene, prim)];
+        rgbs_add(&b->radiance, i,
+                 rgb_mul(rgbs_get(&b->shadow_light, i), emitted_radiance(m, s.ng, neg(r.d))));
+    }
+}
+
+static void connect(const struct integrator *it, struct batch *b, int num_active, int vertex)
+{
+    const struct scene *s = it->scene;
+    uint32_t purpose = PURPOSE_LIGHT;
+    int area_lights = 0;
+    for (uint32_t l = 0; l < s->num_lights; l++) {
+        bool delta = light_is_delta(&s->lights[l]);
+        area_lights += !delta;
+        if (!delta && it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS)
+            continue;
+        int count = delta ? 1 : it->opt.light_samples;
+        for (int k = 0; k < count; k++)
+            connect_light(it, b, num_active, vertex, l, purpose++, count);
+    }
+    if (it->opt.direct == DIRECT_HEMISPHERE) {
+        int count = area_lights * it->opt.light_samples;
+        for (int k = 0; k < count; k++)
+            connect_hemisphere(it, b, num_active, vertex, purpose++, count);
+    }
+}
+
+/* Sets up the next ray of every active lane that goes on. */
+static int scatter(const struct integrator *it, struct batch *b, int num_active, int vertex)
+{
+    int kept = 0;
+    for (int k = 0; k < num_active; k++) {
+        int i = b->active[k];
+        struct sample4 u = sampler_get(it->opt.seed, b->pixel[i], b->sample[i],
+                                       (uint32_t)vertex + 1, PURPOSE_BSDF);
+        frame f = frame_from_normal(vec3s_get(&b->ns, i));
+        struct bsdf_sample s =
+            bsdf_sample_direction(&it->scene->materials[b->material[i]],
+                                  to_local(&f, vec3s_get(&b->wo, i)), u.u[0], u.u[1]);
+        vec3 wi = frame_to_world(&f, s.wi);
+        if (s.pdf_w <= 0 || dot(vec3s_get(&b->ng, i), wi) <= 0)
+            continue;
+        rgb throughput = rgb_mul(rgbs_get(&b->throughput, i), s.weight);
+        if (it->opt.roulette && vertex >= ROULETTE_FROM_VERTEX) {
+            float survival = minf(1, rgb_max(throughput));
+            if (u.u[3] >= survival)
+                continue;
+            throughput = rgb_scale(throughput, 1 / survival);
+        }
+        rgbs_set(&b->throughput, i, throughput);
+        b->pdf_w[i] = s.pdf_w;
+        rays_set(&b->ray, i, leaving(b, i, wi, INFINITY));
+        b->active[kept++] = (uint16_t)i;
+    }
+    return kept;
+}
+
+static void integrate_normals(const struct integrator *it, struct batch *b, int num_active)
+{
+    bvh_closest(it->bvh, &b->ray, b->active, num_active, &b->hit, &b->stats);
+    for (int k = 0; k < num_active; k++) {
+        int i = b->active[k];
+        if (b->hit.prim[i] == NO_HIT)
+            continue;
+        ray r = rays_get(&b->ray, i);
+        vec3 n =
+            surface_at(it->scene, b->hit.prim[i], &r, b->hit.t[i], b->hit.u[i], b->hit.v[i]).ns;
+        rgbs_set(&b->radiance, i, (rgb){0.5f + 0.5f * n.x, 0.5f + 0.5f * n.y, 0.5f + 0.5f * n.z});
+    }
+}
+
+void integrate(const struct integrator *it, struct batch *b, int num_lanes)
+{
+    int active = generate(it, b, num_lanes);
+    if (it->opt.kind == INTEGRATE_NORMALS) {
+        integrate_normals(it, b, active);
+        return;
+    }
+    /* The last ray of a path only looks for emitters that light sampling has not dealt with. */
+    bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
+    for (int vertex = 0; active > 0; vertex++) {
+        bvh_closest(it->bvh, &b->ray, b->active, active, &b->hit, &b->stats);
+        active = shade_hits(it, b, active, vertex);
+        if (counts(it, vertex + 1))
+            connect(it, b, active, vertex);
+        if (vertex + 1 == it->opt.max_bounces && !last_ray)
+            break;
+        active = scatter(it, b, active, vertex);
+    }
+}

@@ -1,0 +1,173 @@
+#include "light.h"
+
+#include "warp.h"
+
+#include <assert.h>
+#include <stdlib.h>
+
+struct light_table {
+    const struct scene *scene;
+    float *cdf; /* per triangle: area up to and including it, from its light's first one */
+};
+
+struct light_table *light_table_build(const struct scene *s, struct err *e)
+{
+    struct light_table *t = calloc(1, sizeof *t);
+    if (t != NULL)
+        t->cdf = calloc((size_t)s->num_triangles + 1, sizeof *t->cdf);
+    if (t == NULL || t->cdf == NULL) {
+        light_table_free(t);
+        err_set(e, "out of memory for the lights");
+        return NULL;
+    }
+    t->scene = s;
+    for (uint32_t l = 0; l < s->num_lights; l++) {
+        const struct light *light = &s->lights[l];
+        if (light->kind != LIGHT_TRIANGLES)
+            continue;
+        double sum = 0;
+        for (uint32_t i = light->first; i < light->first + light->count; i++) {
+            const vec3 *p = s->position + 3 * (size_t)i;
+            sum += 0.5 * (double)length(cross(sub(p[1], p[0]), sub(p[2], p[0])));
+            t->cdf[i] = (float)sum;
+        }
+    }
+    return t;
+}
+
+void light_table_free(struct light_table *t)
+{
+    if (t == NULL)
+        return;
+    free(t->cdf);
+    free(t);
+}
+
+/* pdf_w and direction for a place on an area light of density pdf_a there. */
+static void finish_area_sample(struct light_sample *s, const struct material *m, vec3 from, vec3 to,
+                               vec3 normal, float pdf_a)
+{
+    vec3 w = sub(to, from);
+    float d2 = dot(w, w);
+    if (d2 == 0)
+        return;
+    s->distance = sqrtf(d2);
+    s->wi = scale(w, 1 / s->distance);
+    float cos_l = fabsf(dot(normal, s->wi));
+    s->radiance = emitted_radiance(m, normal, neg(s->wi));
+    if (cos_l > 0 && !rgb_is_zero(s->radiance))
+        s->pdf_w = pdf_a * d2 / cos_l;
+}
+
+static struct light_sample sample_triangles(const struct light_table *t, const struct light *light,
+                                            vec3 p, const float u[3])
+{
+    const struct scene *s = t->scene;
+    float target = u[2] * t->cdf[light->first + light->count - 1];
+    uint32_t lo = light->first, hi = light->first + light->count - 1;
+    while (lo < hi) {
+        uint32_t mid = lo + (hi - lo) / 2;
+        if (t->cdf[mid] > target)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    float b1, b2;
+    warp_triangle(u[0], u[1], &b1, &b2);
+    const vec3 *q = s->position + 3 * (size_t)lo;
+    vec3 e1 = sub(q[1], q[0]), e2 = sub(q[2], q[0]);
+    struct light_sample out = {0};
+    finish_area_sample(&out, &s->materials[s->tri_material[lo]], p, mad(mad(q[0], b1, e1), b2, e2),
+                       normalize(cross(e1, e2)), 1 / light->area);
+    return out;
+}
+
+/* 1 - cos of the half angle that the sphere subtends at squared distance d2 > r2, without the
+ * cancellation of forming the cosine. */
+static float cone_one_minus_cos(float r2, float d2)
+{
+    float sin2 = r2 / d2;
+    return sin2 / (1 + sqrtf(maxf(0, 1 - sin2)));
+}
+
+/* Outside and not so near that the cone is a half space: there the cone, else the area. */
+static bool uses_cone(const struct sphere *sp, float d2)
+{
+    return sp->normal_out > 0 && d2 > 1.0001f * sp->radius * sp->radius;
+}
+
+static struct light_sample sample_sphere(const struct light_table *t, const struct light *light,
+                                         vec3 p, const float u[3])
+{
+    const struct scene *s = t->scene;
+    const struct sphere *sp = &s->spheres[light->first];
+    const struct material *m = &s->materials[s->sphere_material[light->first]];
+    struct light_sample out = {0};
+    vec3 to_centre = sub(sp->centre, p);
+    float d2 = dot(to_centre, to_centre), r2 = sp->radius * sp->radius;
+    if (!uses_cone(sp, d2)) {
+        vec3 n = warp_uniform_sphere(u[0], u[1]);
+        finish_area_sample(&out, m, p, mad(sp->centre, sp->radius, n), scale(n, sp->normal_out),
+                           1 / light->area);
+        return out;
+    }
+    float one_minus_cos = cone_one_minus_cos(r2, d2);
+    frame f = frame_from_normal(normalize(to_centre));
+    vec3 local = warp_uniform_cone(u[0], u[1], one_minus_cos);
+    out.wi = frame_to_world(&f, local);
+    /* Distance to the near side; at the rim rounding may make the root negative. */
+    float along = sqrtf(d2) * local.z;
+    out.distance = along - sqrtf(maxf(0, r2 - d2 * (1 - local.z * local.z)));
+    out.radiance = m->radiance;
+    out.pdf_w = warp_uniform_cone_pdf_w(one_minus_cos);
+    return out;
+}
+
+struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
+                                           const float u[3])
+{
+    const struct light *light = &t->scene->lights[l];
+    struct light_sample out = {0};
+    switch (light->kind) {
+    case LIGHT_POINT: {
+        vec3 w = sub(light->position, p);
+        float d = length(w);
+        if (d == 0)
+            break;
+        const float *a = light->attenuation;
+        out = (struct light_sample){.wi = scale(w, 1 / d),
+                                    .distance = d,
+                                    .radiance =
+                                        rgb_scale(light->value, 1 / (a[0] + d * (a[1] + d * a[2]))),
+                                    .pdf_w = 1,
+                                    .delta = true};
+        break;
+    }
+    case LIGHT_DIRECTIONAL:
+        out = (struct light_sample){.wi = light->to_light,
+                                    .distance = INFINITY,
+                                    .radiance = light->value,
+                                    .pdf_w = 1,
+                                    .delta = true};
+        break;
+    case LIGHT_TRIANGLES: out = sample_triangles(t, light, p, u); break;
+    case LIGHT_SPHERE: out = sample_sphere(t, light, p, u); break;
+    }
+    return out;
+}
+
+float light_pdf_w(const struct light_table *t, uint32_t l, vec3 p, vec3 wi, float d,
+                  const struct surface *hit)
+{
+    const struct light *light = &t->scene->lights[l];
+    assert(!light_is_delta(light));
+    if (light->kind == LIGHT_SPHERE) {
+        const struct sphere *sp = &t->scene->spheres[light->first];
+        vec3 to_centre = sub(sp->centre, p);
+        float d2 = dot(to_centre, to_centre);
+        if (uses_cone(sp, d2))
+            return warp_uniform_cone_pdf_w(cone_one_minus_cos(sp->radius * sp->radius, d2));
+    }
+    float cos_l = fabsf(dot(hit->ng, wi));
+    return cos_l > 0 ? d * d / (cos_l * light->area) : 0;
+}
