@@ -1,0 +1,402 @@
+/* Loading of the suite: the shipped one, and every way in which a suite can be wrong. */
+#include "../reference/suite.h"
+#include "../renderer/fs.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define COUNT(a) (sizeof(a) / sizeof *(a))
+
+static const char shipped[] = "reference/scenes";
+
+/* Writes dir/name. */
+static void put(const char *dir, const char *name, const char *text)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fputs(text, f) >= 0, 1);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* An empty directory; the caller removes it with drop_dir(). */
+static void make_dir(char dir[64])
+{
+    snprintf(dir, 64, "/tmp/test_suite.XXXXXX");
+    assert_non_null(mkdtemp(dir));
+}
+
+static void drop_dir(const char *dir)
+{
+    struct err e;
+    if (!remove_tree(dir, &e))
+        fail_msg("%s", e.msg);
+}
+
+static void load_shipped(struct suite *s)
+{
+    struct err e;
+    if (!suite_load(shipped, s, &e))
+        fail_msg("%s", e.msg);
+}
+
+static const struct suite_reference *reference_of(const struct suite_scene *s, const char *engine)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return &s->reference[i];
+    return NULL;
+}
+
+/* What the families promise: closed forms in 1x, both engines everywhere, a page for each scene. */
+static void shipped_suite_loads(void **state)
+{
+    (void)state;
+    struct suite s;
+    load_shipped(&s);
+    int closed_forms = 0, must_differ = 0;
+    for (int i = 0; i < s.num_scenes; i++) {
+        const struct suite_scene *scene = &s.scene[i];
+        char path[4096];
+        snprintf(path, sizeof path, "%s/%s.md", shipped, scene->name);
+        if (access(path, R_OK) != 0)
+            fail_msg("%s is missing", path);
+        assert_int_equal(access(scene->dae, R_OK), 0);
+        assert_non_null(reference_of(scene, "cycles"));
+        assert_non_null(reference_of(scene, "povray"));
+        assert_int_equal(reference_of(scene, "truth") != NULL, scene->name[0] == '1');
+        if (i > 0)
+            assert_true(strcmp(s.scene[i - 1].name, scene->name) < 0);
+        assert_ptr_equal(suite_find(&s, scene->name), scene);
+        closed_forms += scene->name[0] == '1';
+        must_differ += scene->name[0] == '9';
+    }
+    assert_true(closed_forms > 0 && must_differ > 0);
+    assert_null(suite_find(&s, "41_corne"));
+    suite_free(&s);
+}
+
+static void fields_are_those_of_the_file(void **state)
+{
+    (void)state;
+    struct suite s;
+    load_shipped(&s);
+    const struct suite_scene *c = suite_find(&s, "41_cornell");
+    assert_non_null(c);
+    assert_string_equal(c->dae, "reference/scenes/41_cornell.dae");
+    assert_string_equal(c->references_of, "41_cornell");
+    assert_int_equal(c->width, 128);
+    assert_int_equal(c->height, 128);
+    assert_int_equal(c->depth, 5);
+    assert_int_equal(c->spp, 2048);
+    assert_int_equal(c->tile, 16);
+    assert_int_equal(c->expect, VERDICT_EQUIVALENT);
+    const struct suite_reference *povray = reference_of(c, "povray");
+    assert_string_equal(povray->fidelity, "limit");
+    assert_true(povray->margin_global == 0.005 && povray->margin_tile == 0.02);
+    assert_int_equal(povray->replicates, 16);
+    assert_int_equal(povray->subgrid, 4);
+    assert_int_equal(reference_of(c, "cycles")->spp, 256);
+
+    const struct suite_scene *f = suite_find(&s, "11_furnace");
+    assert_string_equal(reference_of(f, "truth")->kind, "furnace");
+    assert_non_null(json_object_get(reference_of(f, "truth")->values, "albedo"));
+
+    const struct suite_scene *d = suite_find(&s, "92_half_pixel");
+    assert_int_equal(d->expect, VERDICT_DIFFERENT);
+    assert_string_equal(d->references_of, "41_cornell");
+    assert_int_equal(d->num_references, c->num_references);
+    assert_memory_equal(d->reference, c->reference, sizeof c->reference);
+    assert_string_not_equal(d->sha256, c->sha256);
+    suite_free(&s);
+}
+
+/* Lines in which two files differ, the comment at the top aside; calls back with both. */
+static int differing_lines(const char *a, const char *b,
+                           void (*check)(const char *line_a, const char *line_b))
+{
+    char path[2][4096], line[2][1024];
+    FILE *f[2];
+    for (int i = 0; i < 2; i++) {
+        snprintf(path[i], sizeof path[i], "%s/%s.dae", shipped, i == 0 ? a : b);
+        f[i] = fopen(path[i], "r");
+        assert_non_null(f[i]);
+    }
+    int differing = 0;
+    for (int n = 1;; n++) {
+        char *got[2] = {fgets(line[0], sizeof line[0], f[0]), fgets(line[1], sizeof line[1], f[1])};
+        assert_true((got[0] == NULL) == (got[1] == NULL));
+        if (got[0] == NULL)
+            break;
+        if (n == 2 || strcmp(line[0], line[1]) == 0)
+            continue;
+        differing++;
+        check(line[0], line[1]);
+    }
+    fclose(f[0]);
+    fclose(f[1]);
+    return differing;
+}
+
+static void albedos_are_2_percent_apart(const char *line_a, const char *line_b)
+{
+    static const char format[] = " <diffuse><color>%lf %lf %lf 1</color></diffuse>";
+    double a[3], b[3];
+    assert_int_equal(sscanf(line_a, format, &a[0], &a[1], &a[2]), 3);
+    assert_int_equal(sscanf(line_b, format, &b[0], &b[1], &b[2]), 3);
+    for (int c = 0; c < 3; c++)
+        assert_true(b[c] > 1.0199999 * a[c] && b[c] < 1.0200001 * a[c]);
+}
+
+/* Half a pixel at the picture's centre: atan(tan(49.13434 deg / 2) / 128) = 0.20462690 deg. */
+static void turn_is_half_a_pixel(const char *line_a, const char *line_b)
+{
+    double a, b;
+    assert_int_equal(sscanf(line_a, " <rotate>0 1 0 %lf</rotate>", &a), 1);
+    assert_int_equal(sscanf(line_b, " <rotate>0 1 0 %lf</rotate>", &b), 1);
+    assert_true(a == 0 && b > 0.2046 && b < 0.2047);
+}
+
+/* A 9x scene must be the named scene but for the stated change, or its verdict says nothing. */
+static void scenes_that_differ_differ_as_stated(void **state)
+{
+    (void)state;
+    assert_int_equal(
+        differing_lines("41_cornell", "91_albedo_2_percent", albedos_are_2_percent_apart), 4);
+    assert_int_equal(differing_lines("41_cornell", "92_half_pixel", turn_is_half_a_pixel), 1);
+}
+
+/* Test vectors of FIPS 180-2, appendix B.1 and B.3, and of the empty message. */
+static void sha256_matches_the_standard(void **state)
+{
+    (void)state;
+    char dir[64], path[128], hex[65];
+    struct err e;
+    make_dir(dir);
+    snprintf(path, sizeof path, "%s/message", dir);
+    put(dir, "message", "");
+    assert_true(sha256_file(path, hex, &e));
+    assert_string_equal(hex, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+    put(dir, "message", "abc");
+    assert_true(sha256_file(path, hex, &e));
+    assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    char *million = malloc(1000001);
+    assert_non_null(million);
+    memset(million, 'a', 1000000);
+    million[1000000] = '\0';
+    put(dir, "message", million);
+    free(million);
+    assert_true(sha256_file(path, hex, &e));
+    assert_string_equal(hex, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+    assert_false(sha256_file(dir, hex, &e));
+    snprintf(path, sizeof path, "%s/absent", dir);
+    assert_false(sha256_file(path, hex, &e));
+    assert_non_null(strstr(e.msg, "absent: No such file"));
+    drop_dir(dir);
+}
+
+static void verdicts_have_names(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"EQUIVALENT", "DIFFERENT", "INCONCLUSIVE"};
+    for (size_t i = 0; i < COUNT(names); i++) {
+        enum verdict v;
+        assert_true(verdict_parse(names[i], &v));
+        assert_string_equal(verdict_name(v), names[i]);
+    }
+    enum verdict v;
+    assert_false(verdict_parse("equivalent", &v));
+    assert_false(verdict_parse("", &v));
+}
+
+static const char good[] =
+    "{\n"
+    "  \"title\": \"A title\", \"detects\": \"this\", \"blind_to\": \"that\",\n"
+    "  \"width\": 64, \"height\": 32, \"depth\": 1, \"spp\": 16, \"tile\": 16,\n"
+    "  \"expect\": \"EQUIVALENT\",\n"
+    "  \"references\": {\n"
+    "    \"cycles\": {\"class\": \"exact\", \"margin_global\": 0.004, \"margin_tile\": 0.02,\n"
+    "               \"replicates\": 8, \"spp\": 64},\n"
+    "    \"povray\": {\"class\": \"limit\", \"margin_global\": 0.005, \"margin_tile\": 0.03,\n"
+    "               \"replicates\": 9, \"subgrid\": 3},\n"
+    "    \"truth\": {\"class\": \"approximate\", \"margin_global\": 0.002, \"margin_tile\": 0.01,\n"
+    "              \"kind\": \"furnace\", \"values\": {}}\n"
+    "  }\n"
+    "}\n";
+
+static const char good_9x[] =
+    "{\"title\": \"A title\", \"detects\": \"this\", \"blind_to\": \"that\",\n"
+    " \"width\": 64, \"height\": 32, \"depth\": 1, \"spp\": 16, \"tile\": 16,\n"
+    " \"expect\": \"DIFFERENT\", \"references_of\": \"42_good\"}\n";
+
+/* Edits to one of the two files above: `from` becomes `to`; `message` is a part of the line that
+ * must come out, file name first. */
+static const struct fault {
+    bool in_9x;
+    const char *from, *to, *message;
+} faults[] = {
+    {false, "\"title\": \"A title\"", "\"titel\": \"A title\"",
+     "42_good.json: unknown key 'titel'"},
+    {false, "\"title\": \"A title\",", "", "42_good.json: missing key 'title'"},
+    {false, "\"A title\"", "7", "42_good.json: 'title' is not a text"},
+    {false, "\"A title\"", "\"\"", "42_good.json: 'title' is empty"},
+    {false, "\"A title\"", "\"two\\nlines\"", "42_good.json: 'title' is not one line"},
+    {false, "\"A title\"",
+     "\"0123456789012345678901234567890123456789012345678901234567890123"
+     "0123456789012345678901234567890123456789012345678901234567890123\"",
+     "42_good.json: 'title' is longer than 127 bytes"},
+    {false, "\"blind_to\": \"that\",", "", "42_good.json: missing key 'blind_to'"},
+    {false, "\"width\": 64", "\"width\": 64.0", "42_good.json: 'width' is not a whole number"},
+    {false, "\"width\": 64", "\"width\": \"64\"", "42_good.json: 'width' is not a whole number"},
+    {false, "\"width\": 64", "\"width\": 0", "42_good.json: 'width' is 0, not in 1..16384"},
+    {false, "\"width\": 64", "\"width\": 4294967360",
+     "42_good.json: 'width' is 4294967360, not in"},
+    {false, "\"height\": 32", "\"height\": -32", "42_good.json: 'height' is -32, not in"},
+    {false, "\"height\": 32", "\"height\": 40", "42_good.json: tile 16 does not divide 64 x 40"},
+    {false, "\"width\": 64", "\"width\": 72", "42_good.json: tile 16 does not divide 72 x 32"},
+    {false, "\"tile\": 16", "\"tile\": 0", "42_good.json: 'tile' is 0"},
+    {false, "\"depth\": 1", "\"depth\": -1", "42_good.json: 'depth' is -1"},
+    {false, "\"spp\": 16", "\"spp\": 1", "42_good.json: 'spp' is 1, not in 2.."},
+    {false, "EQUIVALENT", "DIFFERENT", "but scenes of family 4 must be"},
+    {false, "EQUIVALENT", "EQUAL", "42_good.json: 'expect' is 'EQUAL'"},
+    {false, "EQUIVALENT", "INCONCLUSIVE", "42_good.json: 'expect' is 'INCONCLUSIVE'"},
+    {false, "\"references\"", "\"references_of\": \"42_good\", \"references\"",
+     "42_good.json: unknown key 'references_of'"},
+    {false, "\"cycles\"", "\"arnold\"", "42_good.json: unknown engine 'references.arnold'"},
+    {false, "\"cycles\"", "\"povray\"", "42_good.json:8: duplicate object key"},
+    {false, "\"spp\": 64", "\"subgrid\": 64",
+     "42_good.json: unknown key 'references.cycles.subgrid'"},
+    {false, ", \"spp\": 64", "", "42_good.json: missing key 'references.cycles.spp'"},
+    {false, "\"spp\": 64", "\"spp\": 0", "42_good.json: 'references.cycles.spp' is 0"},
+    {false, "\"replicates\": 8", "\"replicates\": 1",
+     "42_good.json: 'references.cycles.replicates' is 1, not in 2.."},
+    {false, "\"class\": \"exact\"", "\"class\": \"good\"",
+     "42_good.json: 'references.cycles.class' is 'good'"},
+    {false, "\"class\": \"exact\", ", "", "42_good.json: missing key 'references.cycles.class'"},
+    {false, "0.004", "0", "42_good.json: 'references.cycles.margin_global' is 0, not between"},
+    {false, "0.004", "1", "42_good.json: 'references.cycles.margin_global' is 1, not between"},
+    {false, "0.004", "-0.1", "42_good.json: 'references.cycles.margin_global' is -0.1"},
+    {false, "0.03", "\"3 %\"", "42_good.json: 'references.povray.margin_tile' is not a number"},
+    {false, "\"subgrid\": 3", "\"subgrid\": 65", "'references.povray.subgrid' is 65, not in 1..64"},
+    {false, "\"subgrid\": 3", "\"spp\": 3", "unknown key 'references.povray.spp'"},
+    {false, "\"kind\": \"furnace\", ", "", "missing key 'references.truth.kind'"},
+    {false, "\"values\": {}", "\"values\": []", "'references.truth.values' is not an object"},
+    {false, "\"kind\"", "\"replicates\": 8, \"kind\"", "unknown key 'references.truth.replicates'"},
+    {false, "  }\n}", "  }\n", "42_good.json:14: '}' expected near end of file"},
+    {true, "DIFFERENT", "EQUIVALENT", "93_good.json: 'expect' is 'EQUIVALENT', but scenes of"},
+    {true, ", \"references_of\": \"42_good\"", "", "93_good.json: missing key 'references_of'"},
+    {true, "\"references_of\": \"42_good\"", "\"references\": {}",
+     "93_good.json: unknown key 'references'"},
+    {true, "42_good", "42_best", "93_good.json: 'references_of' names no scene: '42_best'"},
+    {true, "42_good", "93_good", "93_good.json: 'references_of' names '93_good', which has none"},
+    {true, "\"height\": 32", "\"height\": 64", "93_good.json: 64 x 64 pixels, but '42_good' has"},
+};
+
+/* `text` with the first `from` replaced; the caller frees. */
+static char *edited(const char *text, const char *from, const char *to)
+{
+    const char *at = strstr(text, from);
+    assert_non_null(at);
+    size_t size = strlen(text) + strlen(to) + 1;
+    char *out = malloc(size);
+    assert_non_null(out);
+    snprintf(out, size, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+    return out;
+}
+
+static void faults_are_named(void **state)
+{
+    (void)state;
+    char dir[64];
+    make_dir(dir);
+    struct suite s;
+    struct err e;
+    put(dir, "42_good.dae", "geometry");
+    put(dir, "93_good.dae", "geometry");
+    put(dir, "42_good.json", good);
+    put(dir, "93_good.json", good_9x);
+    put(dir, "README.md", "ignored");
+    put(dir, ".hidden.json", "ignored");
+    if (!suite_load(dir, &s, &e))
+        fail_msg("%s", e.msg);
+    assert_int_equal(s.num_scenes, 2);
+    assert_int_equal(s.scene[1].num_references, 3);
+    suite_free(&s);
+
+    for (size_t i = 0; i < COUNT(faults); i++) {
+        const struct fault *f = &faults[i];
+        char *text = edited(f->in_9x ? good_9x : good, f->from, f->to);
+        put(dir, "42_good.json", f->in_9x ? good : text);
+        put(dir, "93_good.json", f->in_9x ? text : good_9x);
+        free(text);
+        if (suite_load(dir, &s, &e)) {
+            suite_free(&s);
+            fail_msg("row %zu accepted, wanted: %s", i, f->message);
+        }
+        assert_ptr_equal(strstr(e.msg, dir), e.msg);
+        if (strstr(e.msg, f->message) == NULL)
+            fail_msg("row %zu: no '%s' in: %s", i, f->message, e.msg);
+        assert_null(strchr(e.msg, '\n'));
+    }
+    drop_dir(dir);
+}
+
+/* One directory after the other: its files, and what must be said of it. */
+static const struct listing {
+    const char *files[3];
+    const char *message;
+} listings[] = {
+    {{NULL}, ": no scenes"},
+    {{"README.md"}, ": no scenes"},
+    {{"42_good.dae"}, "/42_good.dae: no 42_good.json beside it"},
+    {{"42_good.json"}, "/42_good.json: no 42_good.dae beside it"},
+    {{"42_good.json", "42_good.dae", "43_more.dae"}, "/43_more.dae: no 43_more.json"},
+    {{"good.dae"}, "/good.dae: not named NN_name"},
+    {{"52_good.dae"}, "/52_good.dae: not named NN_name"},
+    {{"4_good.dae"}, "/4_good.dae: not named NN_name"},
+    {{"42_Good.dae"}, "/42_Good.dae: not named NN_name"},
+    {{"42_.json"}, "/42_.json: not named NN_name"},
+    {{"42_234567890123456789012345678901234567890123456789012345678901234.dae"}, "not named"},
+};
+
+static void wrong_directories_are_named(void **state)
+{
+    (void)state;
+    struct suite s;
+    struct err e;
+    assert_false(suite_load("tests/no such directory", &s, &e));
+    assert_string_equal(e.msg, "tests/no such directory: No such file or directory");
+    for (size_t i = 0; i < COUNT(listings); i++) {
+        char dir[64];
+        make_dir(dir);
+        for (size_t j = 0; j < COUNT(listings[i].files) && listings[i].files[j] != NULL; j++)
+            put(dir, listings[i].files[j], good);
+        bool ok = suite_load(dir, &s, &e);
+        drop_dir(dir);
+        if (ok || strstr(e.msg, listings[i].message) == NULL)
+            fail_msg("row %zu: %s", i, ok ? "accepted" : e.msg);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shipped_suite_loads),
+        cmocka_unit_test(fields_are_those_of_the_file),
+        cmocka_unit_test(scenes_that_differ_differ_as_stated),
+        cmocka_unit_test(sha256_matches_the_standard),
+        cmocka_unit_test(verdicts_have_names),
+        cmocka_unit_test(faults_are_named),
+        cmocka_unit_test(wrong_directories_are_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
