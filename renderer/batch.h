@@ -22,6 +22,9 @@ struct rgbs {
 struct rays {
     struct vec3s o, d;
     float tmin[BATCH_LANES], tmax[BATCH_LANES];
+    /* Occlusion only: a sphere (primitive number) that does not count, or NO_HIT. A shadow ray that
+     * ends at the rim of a spherical light cannot tell by distance that it has arrived. */
+    uint32_t ignore[BATCH_LANES];
 };
 
 struct hits {

@@ -364,14 +364,14 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
     *d = r.tmax;
 }
 
-static bool is_occluded(const struct bvh *t, const ray *r, struct bvh_stats *stats)
+static bool is_occluded(const struct bvh *t, const ray *r, uint32_t ignore, struct bvh_stats *stats)
 {
     float d, u, v;
     stats->rays++;
     if (t->nodes == NULL) {
         for (uint32_t i = 0; i < t->num_primitives; i++) {
             stats->primitive_tests++;
-            if (primitive_hit(t, i, r, &d, &u, &v))
+            if (t->order[i] != ignore && primitive_hit(t, i, r, &d, &u, &v))
                 return true;
         }
         return false;
@@ -392,7 +392,7 @@ static bool is_occluded(const struct bvh *t, const ray *r, struct bvh_stats *sta
         }
         for (uint32_t i = n->first; i < n->first + n->count; i++) {
             stats->primitive_tests++;
-            if (primitive_hit(t, i, r, &d, &u, &v))
+            if (t->order[i] != ignore && primitive_hit(t, i, r, &d, &u, &v))
                 return true;
         }
     }
@@ -413,6 +413,6 @@ void bvh_occluded(const struct bvh *t, const struct rays *r, const uint16_t *lan
 {
     for (int k = 0; k < num_lanes; k++) {
         ray one = rays_get(r, lane[k]);
-        occluded[lane[k]] = is_occluded(t, &one, stats);
+        occluded[lane[k]] = is_occluded(t, &one, r->ignore[lane[k]], stats);
     }
 }

@@ -156,6 +156,7 @@ static void connect_light(const struct integrator *it, struct batch *b, int num_
         rgb light = rgb_mul(rgb_mul(rgbs_get(&b->throughput, i), f), ls.radiance);
         rgbs_set(&b->shadow_light, i, rgb_scale(light, w / ((float)count * ls.pdf_w)));
         rays_set(&b->shadow, i, leaving(b, i, ls.wi, ls.distance * (1 - SHADOW_SHORTENING)));
+        b->shadow.ignore[i] = ls.sphere;
         b->shadow_lane[n++] = (uint16_t)i;
     }
     bvh_occluded(it->bvh, &b->shadow, b->shadow_lane, n, b->occluded, &b->stats);

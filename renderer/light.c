@@ -76,7 +76,7 @@ static struct light_sample sample_triangles(const struct light_table *t, const s
     warp_triangle(u[0], u[1], &b1, &b2);
     const vec3 *q = s->position + 3 * (size_t)lo;
     vec3 e1 = sub(q[1], q[0]), e2 = sub(q[2], q[0]);
-    struct light_sample out = {0};
+    struct light_sample out = {.sphere = NO_HIT};
     finish_area_sample(&out, &s->materials[s->tri_material[lo]], p, mad(mad(q[0], b1, e1), b2, e2),
                        normalize(cross(e1, e2)), 1 / light->area);
     return out;
@@ -102,7 +102,7 @@ static struct light_sample sample_sphere(const struct light_table *t, const stru
     const struct scene *s = t->scene;
     const struct sphere *sp = &s->spheres[light->first];
     const struct material *m = &s->materials[s->sphere_material[light->first]];
-    struct light_sample out = {0};
+    struct light_sample out = {.sphere = NO_HIT};
     vec3 to_centre = sub(sp->centre, p);
     float d2 = dot(to_centre, to_centre), r2 = sp->radius * sp->radius;
     if (!uses_cone(sp, d2)) {
@@ -119,6 +119,7 @@ static struct light_sample sample_sphere(const struct light_table *t, const stru
     float along = sqrtf(d2) * local.z;
     out.distance = along - sqrtf(maxf(0, r2 - d2 * (1 - local.z * local.z)));
     out.radiance = m->radiance;
+    out.sphere = s->num_triangles + light->first;
     out.pdf_w = warp_uniform_cone_pdf_w(one_minus_cos);
     return out;
 }
@@ -127,7 +128,7 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
                                            const float u[3])
 {
     const struct light *light = &t->scene->lights[l];
-    struct light_sample out = {0};
+    struct light_sample out = {.sphere = NO_HIT};
     switch (light->kind) {
     case LIGHT_POINT: {
         vec3 w = sub(light->position, p);
@@ -135,7 +136,8 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
         if (d == 0)
             break;
         const float *a = light->attenuation;
-        out = (struct light_sample){.wi = scale(w, 1 / d),
+        out = (struct light_sample){.sphere = NO_HIT,
+                                    .wi = scale(w, 1 / d),
                                     .distance = d,
                                     .radiance =
                                         rgb_scale(light->value, 1 / (a[0] + d * (a[1] + d * a[2]))),
@@ -144,7 +146,8 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
         break;
     }
     case LIGHT_DIRECTIONAL:
-        out = (struct light_sample){.wi = light->to_light,
+        out = (struct light_sample){.sphere = NO_HIT,
+                                    .wi = light->to_light,
                                     .distance = INFINITY,
                                     .radiance = light->value,
                                     .pdf_w = 1,

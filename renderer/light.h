@@ -4,6 +4,7 @@
 #ifndef ASSAY_LIGHT_H
 #define ASSAY_LIGHT_H
 
+#include "batch.h"
 #include "scene.h"
 #include "shape.h"
 
@@ -15,11 +16,13 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
 void light_table_free(struct light_table *t);
 
 struct light_sample {
-    vec3 wi;        /* unit, from the point to the light */
-    float distance; /* to the sampled place; INFINITY for directional lights */
-    rgb radiance;   /* arriving along wi; for delta lights irradiance on a plane facing wi */
-    float pdf_w;    /* per steradian; 0: this sample brings no light */
-    bool delta;     /* pdf_w is then 1 and no BSDF sample can find the light */
+    vec3 wi;         /* unit, from the point to the light */
+    float distance;  /* to the sampled place; INFINITY for directional lights */
+    rgb radiance;    /* arriving along wi; for delta lights irradiance on a plane facing wi */
+    uint32_t sphere; /* primitive number of the light if it is a sphere seen from outside, which a
+                        shadow ray then has to ignore; else NO_HIT */
+    float pdf_w;     /* per steradian; 0: this sample brings no light */
+    bool delta;      /* pdf_w is then 1 and no BSDF sample can find the light */
 };
 
 /* One sample of light number l as seen from p. u in [0,1)^3. */

@@ -1,0 +1,107 @@
+#include "build_scene.h"
+
+#include <assert.h>
+#include <stdlib.h>
+
+enum { ROOM = 4096 };
+
+static void *array(size_t size)
+{
+    void *p = calloc(ROOM, size);
+    assert(p != NULL);
+    return p;
+}
+
+struct scene scene_new(void)
+{
+    struct scene s = {.dialect = DIALECT_COLLADA};
+    s.position = array(3 * sizeof *s.position);
+    s.normal = array(3 * sizeof *s.normal);
+    s.tri_material = array(sizeof *s.tri_material);
+    s.tri_object = array(sizeof *s.tri_object);
+    s.spheres = array(sizeof *s.spheres);
+    s.sphere_material = array(sizeof *s.sphere_material);
+    s.sphere_object = array(sizeof *s.sphere_object);
+    s.materials = array(sizeof *s.materials);
+    s.lights = array(sizeof *s.lights);
+    s.objects = array(sizeof *s.objects);
+    return s;
+}
+
+uint32_t add_material(struct scene *s, rgb reflectance, rgb radiance)
+{
+    assert(s->num_materials < ROOM);
+    s->materials[s->num_materials] = (struct material){
+        .name = "m", .kind = MATERIAL_DIFFUSE, .reflectance = reflectance, .radiance = radiance};
+    return s->num_materials++;
+}
+
+static struct object *new_object(struct scene *s, uint32_t material)
+{
+    assert(s->num_objects < ROOM);
+    struct object *o = &s->objects[s->num_objects++];
+    *o = (struct object){.name = "o",
+                         .first_triangle = s->num_triangles,
+                         .first_sphere = s->num_spheres,
+                         .material = material};
+    return o;
+}
+
+static void put_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material)
+{
+    assert(s->num_triangles < ROOM);
+    uint32_t i = s->num_triangles++;
+    vec3 n = normalize(cross(sub(b, a), sub(c, a)));
+    vec3 *p = s->position + 3 * (size_t)i;
+    p[0] = a;
+    p[1] = b;
+    p[2] = c;
+    for (int k = 0; k < 3; k++)
+        s->normal[3 * i + (uint32_t)k] = n;
+    s->tri_material[i] = material;
+    s->tri_object[i] = s->num_objects - 1;
+}
+
+void add_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
+{
+    struct object *o = new_object(s, material);
+    put_triangle(s, p, add(p, u), add(add(p, u), v), material);
+    put_triangle(s, p, add(add(p, u), v), add(p, v), material);
+    o->num_triangles = 2;
+}
+
+void add_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material)
+{
+    struct object *o = new_object(s, material);
+    put_triangle(s, a, b, c, material);
+    o->num_triangles = 1;
+}
+
+void add_sphere(struct scene *s, vec3 centre, float radius, float normal_out, uint32_t material)
+{
+    assert(s->num_spheres < ROOM);
+    struct object *o = new_object(s, material);
+    o->num_spheres = 1;
+    s->sphere_material[s->num_spheres] = material;
+    s->sphere_object[s->num_spheres] = s->num_objects - 1;
+    s->spheres[s->num_spheres++] =
+        (struct sphere){.centre = centre, .radius = radius, .normal_out = normal_out};
+}
+
+void add_light(struct scene *s, struct light light)
+{
+    assert(s->num_lights < ROOM);
+    s->lights[s->num_lights++] = light;
+}
+
+void set_camera(struct scene *s, vec3 eye, float hfov_degrees)
+{
+    s->camera = (struct scene_camera){.present = true,
+                                      .right = {1, 0, 0},
+                                      .up = {0, 1, 0},
+                                      .backward = {0, 0, 1},
+                                      .eye = eye,
+                                      .hfov = hfov_degrees * PI_F / 180,
+                                      .near = 1e-3f,
+                                      .far = 1e6f};
+}
