@@ -159,7 +159,12 @@ bool moments_read(const char *path, struct moments *out, struct image *image, st
     if (!moments_alloc(&m, im.width, im.height, e))
         goto fail;
     strcpy(m.unit, unit);
-    m.spp = strtod(spp, NULL);
+    char *end;
+    m.spp = strtod(spp, &end);
+    if (end == spp || *end != '\0' || !(m.spp >= 0 && m.spp < 1e15)) {
+        err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
+        goto fail;
+    }
     size_t pixels = (size_t)m.width * (size_t)m.height;
     for (size_t p = 0; p < pixels; p++) {
         const float *px = im.data + (size_t)im.channels * p;
