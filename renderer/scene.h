@@ -67,7 +67,9 @@ struct object {
 
 /* The camera as the file has it, after transforms; camera_init() makes the picture's camera of it.
  * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles
- * are full angles in radians; 0 where the file is silent. */
+ * are full angles in radians; 0 where the file is silent. In the CGL dialect all fields are filled
+ * even if not present (by the assignment's defaults), backward is the assignment's direction from
+ * the scene to the eye, and right and up follow from it and world +Y. */
 struct scene_camera {
     bool present;
     vec3 right, up, backward, eye;
@@ -79,7 +81,8 @@ struct scene {
     enum dialect dialect; /* COLLADA or CGL, never AUTO */
     uint32_t num_triangles, num_spheres, num_materials, num_lights, num_objects;
     vec3 *position; /* 3 per triangle; counter-clockwise seen from the front */
-    vec3 *normal;   /* 3 per triangle, unit shading normals (geometric where file has none) */
+    vec3 *normal;   /* 3 per triangle, unit shading normals (geometric where the file has none);
+                       the sum of the three is on the front side */
     uint32_t *tri_material; /* per triangle */
     uint32_t *tri_object;
     int32_t *tri_light; /* per triangle: index into lights, -1 if it does not emit */
@@ -91,19 +94,25 @@ struct scene {
     struct object *objects;
     struct scene_camera camera;
     vec3 bounds_min, bounds_max; /* of all primitives */
-    unsigned num_degenerate;     /* triangles without area that were dropped at loading */
-    char note[256];              /* what the dialect merged, one line for the user; else empty */
+    /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
+     * lights, with the meshes that gave way to them; else the bounds. */
+    vec3 frame_min, frame_max;
+    unsigned num_degenerate; /* triangles without area that were dropped at loading */
+    char note[256];          /* what the dialect merged, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
 void scene_free(struct scene *s);
 
 /* Completes a scene whose triangles, spheres, materials, objects, camera and delta lights are in
- * place: drops nothing, appends one area light for each emissive object (in object order), fills
- * tri_light, sphere_light, areas and bounds. Fails on an index out of range, a value that is not
- * finite, a negative reflectance or radiance, a reflectance above 1, or a scene without primitives;
- * `where` starts the line. */
-bool scene_finish(struct scene *s, const char *where, struct err *e);
+ * place: drops nothing, appends one area light for the triangles and one for each sphere of each
+ * emissive object (in object order), allocates and fills tri_light and sphere_light, fills areas
+ * and bounds. `lights` must come from malloc() or be NULL. Fails on an index out of range, objects
+ * that are not contiguous, a value that is not finite, a normal not of unit length, a negative
+ * reflectance or radiance, a reflectance above 1, or a scene without primitives; `where` starts the
+ * line. */
+bool scene_finish(struct scene *s, const char *where, struct err *e)
+    __attribute__((warn_unused_result));
 
 static inline uint32_t scene_num_primitives(const struct scene *s)
 {

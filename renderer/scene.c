@@ -1,0 +1,229 @@
+#include "scene.h"
+
+#include <assert.h>
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+void scene_free(struct scene *s)
+{
+    free(s->position);
+    free(s->normal);
+    free(s->tri_material);
+    free(s->tri_object);
+    free(s->tri_light);
+    free(s->spheres);
+    free(s->sphere_material);
+    free(s->sphere_object);
+    free(s->sphere_light);
+    free(s->materials);
+    free(s->lights);
+    free(s->objects);
+    memset(s, 0, sizeof *s);
+}
+
+static bool finite3(vec3 v)
+{
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+static bool is_unit(vec3 v)
+{
+    return fabsf(length(v) - 1) < 1e-3f;
+}
+
+/* Finite and not negative. */
+static bool is_radiometric(rgb c)
+{
+    return c.r >= 0 && c.g >= 0 && c.b >= 0 && isfinite(c.r) && isfinite(c.g) && isfinite(c.b);
+}
+
+static bool check_materials(const struct scene *s, const char *where, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_materials; i++) {
+        const struct material *m = &s->materials[i];
+        if (!is_radiometric(m->reflectance) || rgb_max(m->reflectance) > 1)
+            return err_set(e, "%s: material '%s': reflectance outside [0,1]", where, m->name);
+        if (!is_radiometric(m->radiance))
+            return err_set(e, "%s: material '%s': radiance negative or not finite", where, m->name);
+    }
+    return true;
+}
+
+static bool check_delta_lights(const struct scene *s, const char *where, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_lights; i++) {
+        const struct light *l = &s->lights[i];
+        assert(l->kind == LIGHT_POINT || l->kind == LIGHT_DIRECTIONAL);
+        if (!is_radiometric(l->value))
+            return err_set(e, "%s: light %u: value negative or not finite", where, i);
+        if (l->kind == LIGHT_DIRECTIONAL) {
+            if (!is_unit(l->to_light))
+                return err_set(e, "%s: light %u: direction not of unit length", where, i);
+            continue;
+        }
+        const float *a = l->attenuation;
+        if (!finite3(l->position))
+            return err_set(e, "%s: light %u: position not finite", where, i);
+        if (!(a[0] >= 0 && a[1] >= 0 && a[2] >= 0 && a[0] + a[1] + a[2] > 0 &&
+              isfinite(a[0] + a[1] + a[2])))
+            return err_set(e, "%s: light %u: attenuation negative, zero or not finite", where, i);
+    }
+    return true;
+}
+
+/* Objects own contiguous runs of primitives, in order and without gaps. */
+static bool check_objects(const struct scene *s, const char *where, struct err *e)
+{
+    uint64_t triangles = 0, spheres = 0;
+    for (uint32_t i = 0; i < s->num_objects; i++) {
+        const struct object *o = &s->objects[i];
+        if (o->material >= s->num_materials)
+            return err_set(e, "%s: object '%s': no material %u", where, o->name, o->material);
+        if (o->first_triangle != triangles || o->first_sphere != spheres)
+            return err_set(e, "%s: object '%s': its primitives do not follow the last object's",
+                           where, o->name);
+        triangles += o->num_triangles;
+        spheres += o->num_spheres;
+    }
+    if (triangles != s->num_triangles || spheres != s->num_spheres)
+        return err_set(e, "%s: objects and primitives differ in number", where);
+    return true;
+}
+
+static bool check_owner(const struct scene *s, uint32_t object, uint32_t material, bool in_run,
+                        const char *what, uint32_t i, const char *where, struct err *e)
+{
+    if (object >= s->num_objects || !in_run)
+        return err_set(e, "%s: %s %u: not of object %u", where, what, i, object);
+    if (material != s->objects[object].material)
+        return err_set(e, "%s: %s %u: not the material of its object", where, what, i);
+    return true;
+}
+
+static bool check_primitives(const struct scene *s, const char *where, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        uint32_t id = s->tri_object[i];
+        const struct object *o = &s->objects[id < s->num_objects ? id : 0];
+        bool in_run = i - o->first_triangle < o->num_triangles;
+        if (!check_owner(s, id, s->tri_material[i], in_run, "triangle", i, where, e))
+            return false;
+        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++) {
+            if (!finite3(s->position[k]))
+                return err_set(e, "%s: triangle %u: position not finite", where, i);
+            if (!is_unit(s->normal[k]))
+                return err_set(e, "%s: triangle %u: normal not of unit length", where, i);
+        }
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++) {
+        uint32_t id = s->sphere_object[i];
+        const struct object *o = &s->objects[id < s->num_objects ? id : 0];
+        bool in_run = i - o->first_sphere < o->num_spheres;
+        if (!check_owner(s, id, s->sphere_material[i], in_run, "sphere", i, where, e))
+            return false;
+        const struct sphere *sp = &s->spheres[i];
+        if (!finite3(sp->centre) || !(sp->radius > 0) || !isfinite(sp->radius))
+            return err_set(e, "%s: sphere %u: centre or radius not finite, or radius not positive",
+                           where, i);
+        if (fabsf(sp->normal_out) != 1)
+            return err_set(e, "%s: sphere %u: normal_out is not +1 or -1", where, i);
+    }
+    return true;
+}
+
+static void find_bounds(struct scene *s)
+{
+    vec3 lo = v3(FLT_MAX, FLT_MAX, FLT_MAX), hi = neg(lo);
+    for (size_t k = 0; k < 3 * (size_t)s->num_triangles; k++) {
+        lo = vmin(lo, s->position[k]);
+        hi = vmax(hi, s->position[k]);
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++) {
+        float r = s->spheres[i].radius;
+        lo = vmin(lo, sub(s->spheres[i].centre, v3(r, r, r)));
+        hi = vmax(hi, add(s->spheres[i].centre, v3(r, r, r)));
+    }
+    s->bounds_min = s->frame_min = lo;
+    s->bounds_max = s->frame_max = hi;
+}
+
+static double triangle_area(const vec3 *p)
+{
+    double ax = (double)p[1].x - p[0].x, ay = (double)p[1].y - p[0].y, az = (double)p[1].z - p[0].z;
+    double bx = (double)p[2].x - p[0].x, by = (double)p[2].y - p[0].y, bz = (double)p[2].z - p[0].z;
+    double x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx;
+    return 0.5 * sqrt(x * x + y * y + z * z);
+}
+
+/* All lights of all emissive objects; the array has room for them. */
+static bool append_area_lights(struct scene *s, const char *where, struct err *e)
+{
+    const double pi = 3.14159265358979323846;
+    for (uint32_t i = 0; i < s->num_objects; i++) {
+        const struct object *o = &s->objects[i];
+        if (rgb_is_zero(s->materials[o->material].radiance))
+            continue;
+        double area = 0;
+        for (uint32_t t = o->first_triangle; t < o->first_triangle + o->num_triangles; t++) {
+            area += triangle_area(s->position + 3 * (size_t)t);
+            s->tri_light[t] = (int32_t)s->num_lights;
+        }
+        if (o->num_triangles > 0) {
+            if (!(area > 0) || !(area <= FLT_MAX))
+                return err_set(e, "%s: object '%s': emits, but its area is %g", where, o->name,
+                               area);
+            s->lights[s->num_lights++] = (struct light){.kind = LIGHT_TRIANGLES,
+                                                        .first = o->first_triangle,
+                                                        .count = o->num_triangles,
+                                                        .area = (float)area};
+        }
+        for (uint32_t k = o->first_sphere; k < o->first_sphere + o->num_spheres; k++) {
+            double r = s->spheres[k].radius;
+            s->sphere_light[k] = (int32_t)s->num_lights;
+            if (!(4 * pi * r * r <= FLT_MAX))
+                return err_set(e, "%s: object '%s': emits, but its area is out of range", where,
+                               o->name);
+            s->lights[s->num_lights++] = (struct light){
+                .kind = LIGHT_SPHERE, .first = k, .count = 1, .area = (float)(4 * pi * r * r)};
+        }
+    }
+    return true;
+}
+
+/* tri_light, sphere_light and room in lights for all that may come. */
+static bool make_room(struct scene *s)
+{
+    size_t most_lights = (size_t)s->num_lights + s->num_objects + s->num_spheres;
+    struct light *lights = realloc(s->lights, (most_lights + 1) * sizeof *lights);
+    if (lights == NULL)
+        return false;
+    s->lights = lights;
+    free(s->tri_light);
+    free(s->sphere_light);
+    s->tri_light = malloc(((size_t)s->num_triangles + 1) * sizeof *s->tri_light);
+    s->sphere_light = malloc(((size_t)s->num_spheres + 1) * sizeof *s->sphere_light);
+    return s->tri_light != NULL && s->sphere_light != NULL;
+}
+
+bool scene_finish(struct scene *s, const char *where, struct err *e)
+{
+    if (s->num_triangles == 0 && s->num_spheres == 0)
+        return err_set(e, "%s: nothing to render: no triangles, no spheres", where);
+    if (s->num_objects > INT32_MAX / 2 || s->num_spheres > INT32_MAX / 2 ||
+        s->num_lights > INT32_MAX / 2 || s->num_triangles > UINT32_MAX / 4)
+        return err_set(e, "%s: too many primitives", where);
+    if (!check_materials(s, where, e) || !check_delta_lights(s, where, e) ||
+        !check_objects(s, where, e) || !check_primitives(s, where, e))
+        return false;
+    if (!make_room(s))
+        return err_set(e, "%s: out of memory", where);
+    for (uint32_t i = 0; i < s->num_triangles; i++)
+        s->tri_light[i] = -1;
+    for (uint32_t i = 0; i < s->num_spheres; i++)
+        s->sphere_light[i] = -1;
+    if (!append_area_lights(s, where, e))
+        return false;
+    find_bounds(s);
+    return true;
+}
