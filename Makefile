@@ -15,7 +15,7 @@ COMMIT := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 
 WARN := -Wall -Wextra -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla $(if $(WERROR),-Werror)
 OPT  := $(if $(SAN),-O1 -g -fno-omit-frame-pointer -fsanitize=$(SAN) -fno-sanitize-recover=all,-O3 -g -fno-math-errno -fno-trapping-math)
-CFLAGS_ALL   = -std=c17 $(OPT) -ffp-contract=off $(WARN) -D_POSIX_C_SOURCE=200809L -pthread $(CFLAGS) $(shell pkg-config --cflags $(PKGS) 2>/dev/null | sed 's/-I/-isystem /g')
+CFLAGS_ALL   = -std=c17 $(OPT) -ffp-contract=off $(WARN) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(shell pkg-config --cflags $(PKGS) 2>/dev/null | sed 's/-I/-isystem /g')
 CXXFLAGS_ALL = -std=c++17 $(OPT) -Wall -Wextra $(if $(WERROR),-Werror) $(CXXFLAGS) $(shell pkg-config --cflags OpenImageIO 2>/dev/null | sed 's/-I/-isystem /g')
 LIBS = $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm -pthread
 

@@ -1,0 +1,62 @@
+/* assay: one program, several verbs. */
+#include "../renderer/image.h"
+#include "../renderer/version.h"
+#include "results.h"
+#include "verbs.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char **argv, struct err *e);
+    const char *help;
+} verbs[] = {
+    {"validate", verb_validate, "render the suite and judge it against its references"},
+    {"compare", verb_compare, "judge two moments images"},
+    {"report", verb_report, "make the HTML page of a results.json"},
+    {"reference", verb_reference, "render references with Cycles and POV-Ray into golden/"},
+    {"export", verb_export, "write a scene for Cycles or POV-Ray"},
+};
+
+static void print_help(void)
+{
+    puts("usage: assay VERB [options]\n");
+    for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++)
+        printf("  %-10s %s\n", verbs[i].name, verbs[i].help);
+    puts("\n`assay VERB --help` lists its options.\n"
+         "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive,\n"
+         "3 could not judge, with one line on stderr.");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
+        print_help();
+        return 0;
+    }
+    if (argc > 1 && strcmp(argv[1], "--version") == 0) {
+        printf("assay %s, %s, jansson %s\n", assay_version, image_library_version(),
+               JANSSON_VERSION);
+        return 0;
+    }
+    struct err e = {0};
+    int code = EXIT_NOT_JUDGED;
+    bool found = false;
+    for (size_t i = 0; argc > 1 && i < sizeof verbs / sizeof verbs[0]; i++)
+        if (strcmp(argv[1], verbs[i].name) == 0) {
+            found = true;
+            code = verbs[i].run(argc - 1, argv + 1, &e);
+        }
+    if (argc < 2)
+        err_set(&e, "no verb given (see --help)");
+    else if (!found)
+        err_set(&e, "unknown verb '%s' (see --help)", argv[1]);
+    if (fflush(stdout) != 0 && e.msg[0] == '\0') {
+        err_set(&e, "cannot write to standard output");
+        code = EXIT_NOT_JUDGED;
+    }
+    if (e.msg[0] != '\0')
+        fprintf(stderr, "assay: %s\n", e.msg);
+    return code;
+}

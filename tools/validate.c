@@ -1,0 +1,301 @@
+#include "validate.h"
+
+#include "../reference/process.h"
+#include "../reference/reference.h"
+#include "../reference/truth.h"
+#include "../renderer/fs.h"
+#include "../renderer/progress.h"
+#include "claim.h"
+#include "results.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_PATH = 8192 };
+
+enum { MAX_REFERENCES = 3 };
+
+/* One side of a claim: an image, how it came to be, or why there is none. */
+struct side {
+    struct moments m;
+    json_t *manifest; /* of a reference; NULL for ours */
+    double seconds;
+    bool tried, present;
+    struct err e;
+};
+
+struct validation {
+    const struct validate_options *opt;
+    struct suite suite;
+    struct side (*reference)[MAX_REFERENCES]; /* per scene: 9x scenes share those of another */
+    json_t *claims;
+    double alpha; /* of one claim */
+    int num_claims, done;
+};
+
+static void side_free(struct side *s)
+{
+    moments_free(&s->m);
+    json_decref(s->manifest);
+    *s = (struct side){0};
+}
+
+static bool is_selected(const struct validate_options *o, const char *name)
+{
+    for (int i = 0; i < o->num_only; i++)
+        if (strcmp(o->only[i], name) == 0)
+            return true;
+    return o->num_only == 0;
+}
+
+static const struct suite_reference *find_reference(const struct suite_scene *s, const char *engine)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return &s->reference[i];
+    return NULL;
+}
+
+/* Ours against each reference; and each engine against the closed form, where there is one: the
+ * probes that show the engine to be set up right. */
+static int count_claims(const struct suite_scene *s)
+{
+    bool has_truth = find_reference(s, "truth") != NULL;
+    return s->num_references + (has_truth ? s->num_references - 1 : 0);
+}
+
+static void data_path(const struct validation *v, char *path, const char *scene, const char *file)
+{
+    snprintf(path, MAX_PATH, "%s/data/%s/%s", v->opt->out_dir, scene, file);
+}
+
+static void say(const struct validation *v, const char *scene, const char *what)
+{
+    if (!v->opt->quiet)
+        fprintf(stderr, "[%2d/%d] %s: %s\n", v->done, v->num_claims, scene, what);
+}
+
+static void render_ours(const struct validation *v, const struct suite_scene *s, struct side *out)
+{
+    char path[MAX_PATH], log[MAX_PATH], width[16], height[16], spp[16], depth[16], threads[16];
+    char seed[32];
+    data_path(v, path, s->name, "pathtracer.exr");
+    data_path(v, log, s->name, "pathtracer.log");
+    snprintf(width, sizeof width, "%d", s->width);
+    snprintf(height, sizeof height, "%d", s->height);
+    snprintf(spp, sizeof spp, "%d", s->spp);
+    snprintf(depth, sizeof depth, "%d", s->depth);
+    snprintf(threads, sizeof threads, "%d", v->opt->threads);
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)v->opt->seed);
+    const char *argv[] = {
+        v->opt->pathtracer, "-r", width, height, "-s",   spp, "-m", depth, "-t", threads,
+        "--seed",           seed, "-f",  path,   s->dae, NULL};
+    const struct process p = {.argv = argv, .log = log, .timeout_s = v->opt->timeout_s};
+    struct process_usage usage;
+    say(v, s->name, "rendering with pathtracer");
+    *out = (struct side){0};
+    out->present = make_parent_dirs(path, &out->e) && process_run(&p, &usage, &out->e) &&
+                   moments_read(path, &out->m, NULL, &out->e);
+    if (!out->present)
+        return;
+    out->seconds = usage.cpu_s;
+    if (out->m.width != s->width || out->m.height != s->height) {
+        out->present = err_set(&out->e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d",
+                               s->name, out->m.width, out->m.height, s->width, s->height);
+        moments_free(&out->m);
+    }
+}
+
+static bool load_reference(const struct validation *v, const struct suite_scene *s,
+                           const struct suite_reference *ref, struct side *out)
+{
+    const struct validate_options *o = v->opt;
+    if (strcmp(ref->engine, "truth") == 0)
+        return truth_render(s, ref, &out->m, &out->e);
+    if (!o->live)
+        return golden_read(o->golden_dir, s, ref, &out->m, &out->manifest, &out->e);
+    const struct reference_options ro = {.seed = o->reference_seed,
+                                         .threads = o->threads,
+                                         .timeout_s = o->timeout_s,
+                                         .work_dir = o->out_dir,
+                                         .share_dir = o->share_dir};
+    char note[64];
+    snprintf(note, sizeof note, "rendering with %s", ref->engine);
+    say(v, s->name, note);
+    return reference_render(s, ref, &ro, &out->m, &out->manifest, &out->e);
+}
+
+/* The image of one reference of scene s, also as a file for the report. Each is made once a run. */
+static const struct side *get_reference(struct validation *v, const struct suite_scene *s, int i)
+{
+    const struct suite_reference *ref = &s->reference[i];
+    struct side *out = &v->reference[s - v->suite.scene][i];
+    if (out->tried)
+        return out;
+    char path[MAX_PATH], file[64];
+    out->tried = true;
+    snprintf(file, sizeof file, "%s.exr", ref->engine);
+    data_path(v, path, s->name, file);
+    if (!load_reference(v, s, ref, out))
+        return out;
+    out->seconds = json_number_value(json_object_get(out->manifest, "cpu_seconds"));
+    out->present =
+        make_parent_dirs(path, &out->e) && moments_write(path, &out->m, NULL, 0, &out->e);
+    return out;
+}
+
+static bool write_maps(const struct validation *v, const char *scene, const char *a, const char *b,
+                       const struct comparison *r, json_t *files, struct err *e)
+{
+    static const char *const kind[2] = {"z", "rel"};
+    const struct image *map[2] = {&r->z, &r->relative};
+    for (int k = 0; k < 2; k++) {
+        char path[MAX_PATH], file[128], relative[256];
+        snprintf(file, sizeof file, "%s_%s_%s.exr", kind[k], a, b);
+        data_path(v, path, scene, file);
+        if (!image_write_exr(path, map[k], e))
+            return false;
+        snprintf(relative, sizeof relative, "data/%s/%s", scene, file);
+        json_object_set_new(files, k == 0 ? "z" : "relative", json_string(relative));
+    }
+    return true;
+}
+
+static json_t *files_of(const char *scene_a, const char *a, const char *scene_b, const char *b)
+{
+    char path_a[256], path_b[256];
+    snprintf(path_a, sizeof path_a, "data/%s/%s.exr", scene_a, a);
+    snprintf(path_b, sizeof path_b, "data/%s/%s.exr", scene_b, b);
+    return json_pack("{s:s, s:s}", "a", path_a, "b", path_b);
+}
+
+static void add_provenance(json_t *claim, const struct validation *v, const struct side *a,
+                           const struct side *b)
+{
+    claim_add_observations(claim, "a", &a->m);
+    claim_add_observations(claim, "b", &b->m);
+    json_object_set_new(claim, "seconds_a", json_real(a->seconds));
+    json_object_set_new(claim, "seconds_b", json_real(b->seconds));
+    if (a->manifest == NULL)
+        json_object_set_new(claim, "seed_a", json_integer((json_int_t)v->opt->seed));
+    json_t *version = json_object_get(b->manifest, "version");
+    json_t *seeds = json_object_get(b->manifest, "seeds");
+    if (version != NULL)
+        json_object_set(claim, "version_b", version);
+    if (seeds != NULL)
+        json_object_set(claim, "seeds_b", seeds);
+}
+
+/* Judges a (of scene s) against b (of scene `from`) and appends the claim. */
+static void judge(struct validation *v, const struct suite_scene *s, const struct suite_scene *from,
+                  const char *a_name, const struct side *a, const struct suite_reference *ref,
+                  const struct side *b)
+{
+    char rerun[512];
+    snprintf(rerun, sizeof rerun, "assay validate --only %s --seed %llu%s", s->name,
+             (unsigned long long)v->opt->seed, v->opt->live ? " --live" : "");
+    struct claim_context c = {.scene = s,
+                              .a = a_name,
+                              .b = ref->engine,
+                              .fidelity = ref->fidelity,
+                              .expected = s->expect,
+                              .rerun = rerun,
+                              .opt = {.alpha = v->alpha,
+                                      .margin_global = ref->margin_global,
+                                      .margin_tile = ref->margin_tile,
+                                      .tile = s->tile}};
+    struct comparison r;
+    struct err e = {0};
+    json_t *claim = NULL;
+    v->done++;
+    if (!a->present || !b->present) {
+        e = a->present ? b->e : a->e;
+    } else if (compare_moments(&a->m, &b->m, &c.opt, &r, &e)) {
+        json_t *files = files_of(s->name, a_name, from->name, ref->engine);
+        if (files != NULL && write_maps(v, s->name, a_name, ref->engine, &r, files, &e))
+            claim = claim_judged(&c, &r);
+        if (claim != NULL) {
+            json_object_set(claim, "files", files);
+            add_provenance(claim, v, a, b);
+        }
+        json_decref(files);
+        comparison_free(&r);
+    }
+    if (claim == NULL)
+        claim = claim_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
+    say(v, s->name,
+        json_string_value(json_object_get(claim, "verdict"))
+            ? json_string_value(json_object_get(claim, "verdict"))
+            : e.msg);
+    json_array_append_new(v->claims, claim);
+}
+
+static void validate_scene(struct validation *v, const struct suite_scene *s)
+{
+    const struct suite_scene *from = suite_find(&v->suite, s->references_of);
+    const struct side *truth_side = NULL;
+    const struct suite_reference *truth = find_reference(s, "truth");
+    struct side ours;
+    render_ours(v, s, &ours);
+    for (int i = 0; i < s->num_references; i++) {
+        const struct side *reference = get_reference(v, from, i);
+        if (&s->reference[i] == truth)
+            truth_side = reference;
+        judge(v, s, from, "pathtracer", &ours, &s->reference[i], reference);
+    }
+    for (int i = 0; truth != NULL && i < s->num_references; i++)
+        if (&s->reference[i] != truth)
+            judge(v, s, from, s->reference[i].engine, get_reference(v, from, i), truth, truth_side);
+    side_free(&ours);
+}
+
+static bool check_selection(const struct validation *v, struct err *e)
+{
+    for (int i = 0; i < v->opt->num_only; i++)
+        if (suite_find(&v->suite, v->opt->only[i]) == NULL)
+            return err_set(e, "no scene '%s' in %s", v->opt->only[i], v->opt->suite_dir);
+    return true;
+}
+
+bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
+              struct err *e)
+{
+    struct validation v = {.opt = opt};
+    json_t *root = NULL;
+    double start = now_seconds();
+    if (!suite_load(opt->suite_dir, &v.suite, e))
+        return false;
+    bool ok = check_selection(&v, e) && make_dirs(opt->out_dir, e);
+    if (!ok)
+        goto done;
+    v.reference = calloc((size_t)v.suite.num_scenes, sizeof *v.reference);
+    for (int i = 0; i < v.suite.num_scenes; i++)
+        if (is_selected(opt, v.suite.scene[i].name))
+            v.num_claims += count_claims(&v.suite.scene[i]);
+    /* Bonferroni over the claims of this run: one alpha for the whole family. */
+    v.alpha = opt->alpha / v.num_claims;
+    root = results_new(argc, argv, opt->alpha);
+    if (root == NULL || v.reference == NULL) {
+        ok = err_set(e, "out of memory");
+        goto done;
+    }
+    v.claims = json_object_get(root, "claims");
+    json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
+    if (opt->live)
+        json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
+    for (int i = 0; i < v.suite.num_scenes; i++)
+        if (is_selected(opt, v.suite.scene[i].name))
+            validate_scene(&v, &v.suite.scene[i]);
+    json_object_set_new(root, "seconds", json_real(now_seconds() - start));
+    *results = root;
+    root = NULL;
+done:
+    json_decref(root);
+    for (int i = 0; v.reference != NULL && i < v.suite.num_scenes; i++)
+        for (int k = 0; k < MAX_REFERENCES; k++)
+            side_free(&v.reference[i][k]);
+    free(v.reference);
+    suite_free(&v.suite);
+    return ok;
+}

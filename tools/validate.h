@@ -1,0 +1,32 @@
+/* The main job: render the suite with our program, hold every scene against its references, judge. */
+#ifndef ASSAY_VALIDATE_H
+#define ASSAY_VALIDATE_H
+
+#include "../renderer/err.h"
+
+#include <jansson.h>
+#include <stdint.h>
+
+enum { MAX_ONLY = 64 };
+
+struct validate_options {
+    const char *suite_dir, *golden_dir, *out_dir, *share_dir;
+    const char *pathtracer;     /* the program under test */
+    const char *only[MAX_ONLY]; /* scene names; none: all */
+    int num_only;
+    bool live;               /* render the references now instead of reading the goldens */
+    double alpha;            /* of the whole family of claims */
+    uint64_t seed;           /* of our render */
+    uint32_t reference_seed; /* live: of the references */
+    int threads;
+    double timeout_s; /* of one program */
+    bool quiet;
+};
+
+/* Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr,
+ * z_<engine>.exr and rel_<engine>.exr. A claim that cannot be judged is in the results with its error;
+ * false only if nothing could be judged at all (no suite, no output directory). */
+bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
+              struct err *e) __attribute__((warn_unused_result));
+
+#endif

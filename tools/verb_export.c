@@ -1,0 +1,104 @@
+#include "../reference/export_cycles.h"
+#include "../reference/export_povray.h"
+#include "../renderer/cli.h"
+#include "../renderer/collada.h"
+#include "../renderer/fs.h"
+#include "results.h"
+#include "verbs.h"
+
+#include <string.h>
+
+enum option { OPT_OUT, OPT_ENGINE, OPT_RESOLUTION, OPT_BOUNCES, OPT_HELP };
+
+static const struct cli_option options[] = {
+    [OPT_OUT] = {'o', "out", 1, "FILE", "required; .json: for cycles.py, .pov: for POV-Ray"},
+    [OPT_ENGINE] = {0, "engine", 1, "NAME", "cycles or povray (by the ending of --out)"},
+    [OPT_RESOLUTION] = {'r', "resolution", 2, "W H", "pixels (480 360)"},
+    [OPT_BOUNCES] = {'m', "max-bounces", 1, "N", "as pathtracer counts them (5)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+static const char *const engine_names[] = {"cycles", "povray", NULL};
+
+struct settings {
+    const char *scene, *out;
+    int engine, width, height, depth;
+    bool done;
+};
+
+static bool parse(int argc, char **argv, struct settings *s, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true;
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        const char *v = c.value[0];
+        if (i == CLI_POSITIONAL) {
+            if (s->scene != NULL)
+                return err_set(e, "export takes one scene, '%s' is one more", v);
+            s->scene = v;
+            continue;
+        }
+        switch ((enum option)i) {
+        case OPT_OUT: s->out = v; break;
+        case OPT_ENGINE: ok = cli_choice("--engine", v, engine_names, &s->engine, e); break;
+        case OPT_RESOLUTION:
+            ok = cli_int("--resolution", v, 1, 65535, &s->width, e) &&
+                 cli_int("--resolution", c.value[1], 1, 65535, &s->height, e);
+            break;
+        case OPT_BOUNCES: ok = cli_int("--max-bounces", v, 0, 10000, &s->depth, e); break;
+        case OPT_HELP:
+            puts("usage: assay export [options] -o OUT SCENE.dae\n");
+            cli_print_options(stdout, options);
+            s->done = true;
+            return true;
+        }
+    }
+    if (!ok)
+        return false;
+    if (s->scene == NULL || s->out == NULL)
+        return err_set(e, "export needs a scene and --out (see --help)");
+    const char *dot = strrchr(s->out, '.');
+    if (s->engine < 0 && dot != NULL && strcmp(dot, ".json") == 0)
+        s->engine = 0;
+    else if (s->engine < 0 && dot != NULL && strcmp(dot, ".pov") == 0)
+        s->engine = 1;
+    else if (s->engine < 0)
+        return err_set(e, "--out: '%s' ends neither in .json nor in .pov; give --engine", s->out);
+    return true;
+}
+
+static bool write_povray(const struct settings *s, const struct scene *scene,
+                         const struct camera *camera, struct err *e)
+{
+    struct out_file out;
+    if (!out_open(&out, s->out, e))
+        return false;
+    struct povray_variant plain = povray_variant_plain();
+    if (!export_povray(scene, camera, s->depth, &plain, out.f, e)) {
+        out_abandon(&out);
+        return false;
+    }
+    return out_commit(&out, e);
+}
+
+int verb_export(int argc, char **argv, struct err *e)
+{
+    struct settings s = {.engine = -1, .width = 480, .height = 360, .depth = 5};
+    struct scene scene = {0};
+    struct camera camera;
+    if (!parse(argc, argv, &s, e))
+        return EXIT_NOT_JUDGED;
+    if (s.done)
+        return 0;
+    bool ok = make_parent_dirs(s.out, e) && collada_load(s.scene, DIALECT_AUTO, &scene, e);
+    if (ok && !camera_init(&camera, &scene, s.width, s.height, e))
+        ok = err_prefix(e, "%s", s.scene);
+    ok = ok && (s.engine == 0 ? export_cycles(&scene, &camera, s.depth, s.out, e)
+                              : write_povray(&s, &scene, &camera, e));
+    scene_free(&scene);
+    if (ok)
+        printf("%s\n", s.out);
+    return ok ? 0 : EXIT_NOT_JUDGED;
+}

@@ -1,0 +1,137 @@
+#include "../reference/reference.h"
+#include "../renderer/cli.h"
+#include "../renderer/fs.h"
+#include "../renderer/progress.h"
+#include "results.h"
+#include "verbs.h"
+
+#include <string.h>
+#include <unistd.h>
+
+enum option {
+    OPT_ONLY,
+    OPT_ENGINE,
+    OPT_OUT,
+    OPT_SUITE,
+    OPT_SHARE,
+    OPT_WORK,
+    OPT_SEED,
+    OPT_THREADS,
+    OPT_TIMEOUT,
+    OPT_HELP
+};
+
+static const struct cli_option options[] = {
+    [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene"},
+    [OPT_ENGINE] = {0, "engine", 1, "NAME", "only cycles, or only povray"},
+    [OPT_OUT] = {'o', "out", 1, "DIR", "where the goldens go (golden)"},
+    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
+    [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
+    [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/reference)"},
+    [OPT_SEED] = {0, "seed", 1, "N", "seed of all replicates (1)"},
+    [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
+    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for one engine and scene (7200)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+struct settings {
+    const char *only, *engine, *out, *suite, *work;
+    struct reference_options opt;
+    bool done;
+};
+
+static bool parse(int argc, char **argv, struct settings *s, struct err *e)
+{
+    static const char *const engines[] = {"cycles", "povray", NULL};
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true;
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        if (i == CLI_POSITIONAL)
+            return err_set(e, "reference takes no argument '%s'", c.value[0]);
+        const char *v = c.value[0];
+        int n;
+        switch ((enum option)i) {
+        case OPT_ONLY: s->only = v; break;
+        case OPT_ENGINE:
+            ok = cli_choice("--engine", v, engines, &n, e);
+            s->engine = v;
+            break;
+        case OPT_OUT: s->out = v; break;
+        case OPT_SUITE: s->suite = v; break;
+        case OPT_SHARE: s->opt.share_dir = v; break;
+        case OPT_WORK: s->work = v; break;
+        case OPT_SEED:
+            ok = cli_int("--seed", v, 0, INT32_MAX, &n, e);
+            s->opt.seed = ok ? (uint32_t)n : 0;
+            break;
+        case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &s->opt.threads, e); break;
+        case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &s->opt.timeout_s, e); break;
+        case OPT_HELP:
+            puts("usage: assay reference [options]\n");
+            cli_print_options(stdout, options);
+            s->done = true;
+            return true;
+        }
+    }
+    return ok;
+}
+
+static bool make_golden(const struct settings *s, const struct suite_scene *scene,
+                        const struct suite_reference *ref, struct err *e)
+{
+    struct moments m;
+    json_t *manifest;
+    double start = now_seconds();
+    fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
+    if (!reference_render(scene, ref, &s->opt, &m, &manifest, e))
+        return false;
+    bool ok = golden_write(s->out, scene->name, ref->engine, &m, manifest, e);
+    if (ok)
+        printf("%s/%s/%s.exr: %d x %d, %g %ss, %.0f s\n", s->out, scene->name, ref->engine, m.width,
+               m.height, m.n[0], m.unit, now_seconds() - start);
+    moments_free(&m);
+    json_decref(manifest);
+    return ok;
+}
+
+int verb_reference(int argc, char **argv, struct err *e)
+{
+    struct settings s = {.out = "golden",
+                         .suite = "reference/scenes",
+                         .work = "build/reference",
+                         .opt = {.seed = 1, .timeout_s = 7200, .share_dir = "reference"}};
+    struct suite suite;
+    if (!parse(argc, argv, &s, e))
+        return EXIT_NOT_JUDGED;
+    if (s.done)
+        return 0;
+    if (s.opt.threads == 0) {
+        long n = sysconf(_SC_NPROCESSORS_ONLN);
+        s.opt.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
+    }
+    s.opt.work_dir = s.work;
+    if (!make_dirs(s.work, e) || !suite_load(s.suite, &suite, e))
+        return EXIT_NOT_JUDGED;
+    bool ok = true;
+    int made = 0;
+    for (int i = 0; ok && i < suite.num_scenes; i++) {
+        const struct suite_scene *scene = &suite.scene[i];
+        if ((s.only != NULL && strcmp(s.only, scene->name) != 0) ||
+            strcmp(scene->references_of, scene->name) != 0)
+            continue;
+        for (int k = 0; ok && k < scene->num_references; k++) {
+            const struct suite_reference *ref = &scene->reference[k];
+            if (strcmp(ref->engine, "truth") == 0 ||
+                (s.engine != NULL && strcmp(s.engine, ref->engine) != 0))
+                continue;
+            ok = make_golden(&s, scene, ref, e);
+            made++;
+        }
+    }
+    if (ok && made == 0)
+        ok = err_set(e, "no scene of %s has such a reference", s.suite);
+    suite_free(&suite);
+    return ok ? 0 : EXIT_NOT_JUDGED;
+}

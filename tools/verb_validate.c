@@ -1,0 +1,170 @@
+#include "../renderer/cli.h"
+#include "../renderer/fs.h"
+#include "report.h"
+#include "results.h"
+#include "validate.h"
+#include "verbs.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+enum option {
+    OPT_LIVE,
+    OPT_ONLY,
+    OPT_ALPHA,
+    OPT_OUT,
+    OPT_SUITE,
+    OPT_GOLDEN,
+    OPT_SHARE,
+    OPT_PATHTRACER,
+    OPT_SEED,
+    OPT_REFERENCE_SEED,
+    OPT_THREADS,
+    OPT_TIMEOUT,
+    OPT_MARKDOWN,
+    OPT_QUIET,
+    OPT_HELP
+};
+
+static const struct cli_option options[] = {
+    [OPT_LIVE] = {0, "live", 0, "", "render the references now instead of reading the goldens"},
+    [OPT_ONLY] = {0, "only", 1, "SCENE", "judge only this scene; may be given again"},
+    [OPT_ALPHA] = {0, "alpha", 1, "A",
+                   "chance of any wrong verdict in the whole run, for wrong\n"
+                   "DIFFERENT and for wrong EQUIVALENT each (1e-3)"},
+    [OPT_OUT] = {'o', "out", 1, "DIR", "report, results and images (build/report)"},
+    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
+    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
+    [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
+    [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the program under test (beside this one)"},
+    [OPT_SEED] = {0, "seed", 1, "N", "seed of our render (1)"},
+    [OPT_REFERENCE_SEED] = {0, "reference-seed", 1, "N", "with --live (a fresh one)"},
+    [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
+    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
+    [OPT_MARKDOWN] = {0, "markdown", 0, "", "print the table as Markdown"},
+    [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+/* A file beside this program, or below the installation's share directory. */
+static void beside_program(char *path, size_t size, const char *name)
+{
+    char self[3072];
+    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
+    self[n > 0 ? n : 0] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash != NULL)
+        *slash = '\0';
+    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
+}
+
+/* The checkout's directory if we stand in one, else the installed one. */
+static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
+{
+    if (access(checkout, R_OK) == 0)
+        return checkout;
+    beside_program(path, size, installed);
+    return access(path, R_OK) == 0 ? path : checkout;
+}
+
+static bool fresh_seed(uint32_t *seed, struct err *e)
+{
+    if (getrandom(seed, sizeof *seed, 0) != (ssize_t)sizeof *seed)
+        return err_set(e, "no random numbers from the system; give --reference-seed");
+    return true;
+}
+
+/* Sets *done where only the help was asked for. */
+static bool parse(int argc, char **argv, struct validate_options *o, bool *markdown, bool *done,
+                  struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true, has_seed = false;
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        if (i == CLI_POSITIONAL)
+            return err_set(e, "validate takes no argument '%s'", c.value[0]);
+        const char *v = c.value[0];
+        uint64_t seed;
+        switch ((enum option)i) {
+        case OPT_LIVE: o->live = true; break;
+        case OPT_ONLY:
+            if (o->num_only == MAX_ONLY)
+                return err_set(e, "--only: at most %d scenes", MAX_ONLY);
+            o->only[o->num_only++] = v;
+            break;
+        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &o->alpha, e); break;
+        case OPT_OUT: o->out_dir = v; break;
+        case OPT_SUITE: o->suite_dir = v; break;
+        case OPT_GOLDEN: o->golden_dir = v; break;
+        case OPT_SHARE: o->share_dir = v; break;
+        case OPT_PATHTRACER: o->pathtracer = v; break;
+        case OPT_SEED: ok = cli_uint64("--seed", v, &o->seed, e); break;
+        case OPT_REFERENCE_SEED:
+            ok = cli_uint64("--reference-seed", v, &seed, e);
+            if (ok && seed > UINT32_MAX)
+                return err_set(e, "--reference-seed: '%s' is above 2^32-1", v);
+            o->reference_seed = ok ? (uint32_t)seed : 0;
+            has_seed = true;
+            break;
+        case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
+        case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
+        case OPT_MARKDOWN: *markdown = true; break;
+        case OPT_QUIET: o->quiet = true; break;
+        case OPT_HELP:
+            puts("usage: assay validate [options]\n");
+            cli_print_options(stdout, options);
+            *done = true;
+            return true;
+        }
+    }
+    return ok && (has_seed || !o->live || fresh_seed(&o->reference_seed, e));
+}
+
+static bool write_all(const json_t *results, const char *out_dir, bool markdown, struct err *e)
+{
+    char json[4096], junit[4096], html[4096], *table;
+    snprintf(json, sizeof json, "%s/results.json", out_dir);
+    snprintf(junit, sizeof junit, "%s/junit.xml", out_dir);
+    snprintf(html, sizeof html, "%s/index.html", out_dir);
+    if (!json_write(json, results, e) || !results_write_junit(junit, results, e) ||
+        !report_write(json, html, e) || !results_print_table(results, markdown, &table, e))
+        return false;
+    fputs(table, stdout);
+    free(table);
+    printf("\n%s\n", html);
+    return true;
+}
+
+int verb_validate(int argc, char **argv, struct err *e)
+{
+    char pathtracer[4096], suite[4096], golden[4096], share[4096];
+    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    struct validate_options o = {
+        .out_dir = "build/report",
+        .pathtracer = pathtracer,
+        .alpha = 1e-3,
+        .seed = 1,
+        .timeout_s = 3600,
+        .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
+        .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
+        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
+    bool markdown = false, done = false;
+    json_t *results = NULL;
+    if (!parse(argc, argv, &o, &markdown, &done, e))
+        return EXIT_NOT_JUDGED;
+    if (done)
+        return 0;
+    if (o.threads == 0) {
+        long n = sysconf(_SC_NPROCESSORS_ONLN);
+        o.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
+    }
+    int code = EXIT_NOT_JUDGED;
+    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, markdown, e))
+        code = results_exit_code(results);
+    json_decref(results);
+    return code;
+}

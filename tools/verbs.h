@@ -1,0 +1,14 @@
+/* The verbs of the assay program: each reads its own options, does its job and returns the exit
+ * code (results.h); with EXIT_NOT_JUDGED, e has the line. argv[0] is the verb. */
+#ifndef ASSAY_VERBS_H
+#define ASSAY_VERBS_H
+
+#include "../renderer/err.h"
+
+int verb_validate(int argc, char **argv, struct err *e);
+int verb_compare(int argc, char **argv, struct err *e);
+int verb_reference(int argc, char **argv, struct err *e);
+int verb_export(int argc, char **argv, struct err *e);
+int verb_report(int argc, char **argv, struct err *e);
+
+#endif
