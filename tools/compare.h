@@ -1,5 +1,5 @@
 /* Two moments images -> a verdict with its error rates and what it could have missed.
- * Procedure and sources: tools/README.md. */
+ * Procedure, formulas, sources and limits: tools/README.md. */
 #ifndef ASSAY_COMPARE_H
 #define ASSAY_COMPARE_H
 
@@ -7,25 +7,27 @@
 #include "../renderer/moments.h"
 
 struct compare_options {
-    double alpha;         /* bounds the chance of a wrong DIFFERENT and of a wrong EQUIVALENT, each,
-                             over all regions and channels of this one claim */
-    double margin_global; /* relative; 0: any difference counts (a regression test) */
-    double margin_tile;
-    int tile; /* side of a reporting tile, pixels; divides width and height */
+    double alpha;         /* in (0, 0.5): bounds the chance of a wrong DIFFERENT and of a wrong
+                             EQUIVALENT, each, over all regions and channels of this one claim */
+    double margin_global; /* relative, in [0, 1); 0: any difference counts (a regression test) */
+    double margin_tile;   /* at least margin_global; both are 0 or none is */
+    int tile;             /* side of a reporting tile, pixels; divides width and height */
 };
 
 /* A square region (or the image) in one channel (0..2 RGB, 3 luminance .2126 .7152 .0722). Relative
- * quantities are in units of max(|B|, floor), see floor_fraction. */
+ * quantities are in units of the larger of mean_b and 5 % of the mean luminance of the image B.
+ * Every number is finite: t is within +-1e9, log10_p at least -1e6, mdb at most 1e6. */
 struct region {
     int x, y, width, height;
     int channel;
     double mean_a, mean_b; /* mean radiance of the region */
     double difference;     /* (A-B) relative */
     double std_error;      /* of `difference` */
-    double dof;            /* Welch-Satterthwaite */
+    double dof;            /* Welch-Satterthwaite; 0 if there is no noise */
     double t;              /* difference / std_error; 0 if both are 0 */
     double log10_p;        /* two-sided p of "no difference beyond the margin" */
-    double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference` */
+    double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference`, widened for skew */
+    bool ci_valid;         /* false: too skewed for an interval; ci_lo, ci_hi only a hint */
     double mdb;            /* the smallest true |difference| that comes out DIFFERENT with 95 % */
     double margin;
 };
@@ -36,21 +38,27 @@ struct comparison {
     int num_tests;            /* over which alpha is divided (Bonferroni) */
     struct region global[4];  /* per channel and luminance */
     struct region worst;      /* smallest p of the whole pyramid */
-    struct region worst_tile; /* reporting tile whose interval reaches furthest out */
+    struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
     double mdb_global;        /* of luminance */
     double mdb_tile;          /* largest over the reporting tiles, luminance */
-    double rms_bias;     /* debiased relative RMS error over pixels, luminance: sqrt(max(0, ..)) */
+    double rms_bias;          /* debiased RMS error over pixels and RGB (weighted as luminance) in
+                                 units of the mean luminance of B: sqrt(max(0, ..)) */
     double extra_factor; /* INCONCLUSIVE: about how many times the samples would decide; else 1 */
-    bool skew_limited;   /* some small regions were too skewed for their t and were merged upward */
+    bool skew_limited;   /* some regions of a tile's size or larger were too skewed for their t and
+                            were judged only as part of larger ones */
+    int finest_side; /* smallest side of which at least half the luminance regions were tested */
     int tiles_x, tiles_y; /* of reporting tiles */
     double *tile_log10_p; /* luminance, no margin (H0: equal), tiles_x*tiles_y; for the histogram */
     double *tile_t;
-    struct image z;        /* per pixel luminance z (difference / standard error), 1 channel "z" */
+    struct image z;        /* per pixel luminance z (difference / standard error), 1 channel "z",
+                              within +-1e4 */
     struct image relative; /* per pixel signed relative difference of luminance, 1 channel "rel" */
 };
 
-/* Hygiene first (sizes, NaN, infinity, negative radiance, n < 2 where not exact, replicates without
- * any variance), each a line in e and false: could not judge. The caller frees with
+/* Hygiene first, each a line in e and false (could not judge): sizes differ, NaN, infinity,
+ * negative radiance, negative M2, n < 3 where not exact (skewness is unknown then), an unknown
+ * unit, noise in an exact side, replicates without any variance (the seed was ignored), a black
+ * reference, options out of range. A is the tested side, B the reference. The caller frees with
  * comparison_free(). */
 bool compare_moments(const struct moments *a, const struct moments *b,
                      const struct compare_options *opt, struct comparison *out, struct err *e)

@@ -1,0 +1,152 @@
+#include "region.h"
+
+#include "stats.h"
+
+#include <math.h>
+
+static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
+static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
+static const double float_tolerance = 1e-5; /* relative: two engines' float32 arithmetic */
+static const double smallest_log10_p = -1e6;
+static const double largest_t = 1e9;
+const double region_mdb_none = 1e6;
+
+/* margin_global for the image, margin_tile up to a tile, between them linear in the logarithm of
+ * the side (of the square of the same area). */
+static double margin_of(const struct judge *j, struct rect r)
+{
+    const struct compare_options *opt = &j->opt;
+    if (r.width == j->width && r.height == j->height)
+        return opt->margin_global;
+    if (r.width <= opt->tile && r.height <= opt->tile)
+        return opt->margin_tile;
+    double side = 0.5 * log((double)r.width * r.height), tile = log(opt->tile);
+    double image = 0.5 * log((double)j->width * j->height);
+    double f = fmin(1, fmax(0, (side - tile) / (image - tile)));
+    return opt->margin_tile + f * (opt->margin_global - opt->margin_tile);
+}
+
+struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
+{
+    struct measured m = {.d = cell->a - cell->b, .margin = margin_of(j, r)};
+    m.unit = fmax(cell->b, j->floor * r.width * r.height);
+    m.tolerance = float_tolerance * fmax(cell->a, cell->b);
+    m.v = cell->va + cell->vb;
+    m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
+    m.noise_free = m.v <= m.tolerance * m.tolerance;
+    if (!m.noise_free) {
+        m.dof = stats_dof(m.v, cell->var_v);
+        m.skew = (fabs(cell->k3) + sqrt(cell->var_k3)) / (m.v * sqrt(m.v));
+    }
+    return m;
+}
+
+/* ln of the factor by which a tail probability at x may be off [Shao99]. */
+static double skew_factor(const struct measured *m, double x)
+{
+    return m->skew * x * x * x / 3;
+}
+
+bool region_testable(const struct judge *j, const struct measured *m)
+{
+    return m->noise_free || skew_factor(m, stats_t_of_z(j->z_guard, m->dof)) <= skew_limit;
+}
+
+double region_excess_t(const struct measured *m)
+{
+    return (fabs(m->d) - m->margin * m->unit - m->tolerance) / sqrt(m->v_margin);
+}
+
+/* log10 of the chance that observations as bright as any seen would all have been missed, if they
+ * were just frequent enough to make up for the excess: each adds event/n, so excess n/event are
+ * expected. */
+static double log10_p_missed(const struct judge *j, double excess, int channel)
+{
+    if (excess <= 0)
+        return 0;
+    return fmax(smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
+}
+
+double region_log10_p(const struct judge *j, const struct measured *m, int channel)
+{
+    if (m->noise_free)
+        return log10_p_missed(j, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
+    return fmax(smallest_log10_p, stats_t_log10_p(fmax(0, region_excess_t(m)), m->dof));
+}
+
+double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel)
+{
+    double excess = fmax(0, fabs(m->d) - m->tolerance);
+    if (m->noise_free)
+        return log10_p_missed(j, excess, channel);
+    double t = excess / sqrt(m->v);
+    /* Beyond x = 1/g the expansion behind the factor has turned round. */
+    double factor = skew_factor(m, fmin(t, 1 / m->skew)) / log(10);
+    return fmin(0, fmax(smallest_log10_p, stats_t_log10_p(t, m->dof) + factor));
+}
+
+double region_t(const struct measured *m)
+{
+    if (m->noise_free)
+        return fabs(m->d) <= m->tolerance ? 0 : copysign(largest_t, m->d);
+    return fmin(largest_t, fmax(-largest_t, m->d / sqrt(m->v)));
+}
+
+double region_mdb(const struct judge *j, const struct measured *m, int channel)
+{
+    double tests = (double)j->num_tests, reach;
+    if (m->noise_free)
+        reach = j->event[channel] / j->n_min * log(tests / j->opt.alpha);
+    else
+        reach = sqrt(m->v_margin) * (stats_t_quantile(j->opt.alpha / (2 * tests), m->dof) +
+                                     stats_t_quantile(0.05, m->dof));
+    return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
+}
+
+double region_reach(const struct region *r)
+{
+    return fmax(fabs(r->ci_lo), fabs(r->ci_hi));
+}
+
+/* Half the width of the 1 - 2 alpha interval, in standard errors. alpha is first divided by the
+ * factor that skewness may put on it; false if that factor is too large to be trusted. */
+static bool half_width(const struct judge *j, const struct measured *m, double *x)
+{
+    double factor = 0;
+    for (int i = 0; i < 4; i++) {
+        *x = stats_t_quantile(j->opt.alpha * exp(-factor), m->dof);
+        factor = fmin(skew_limit_widened, skew_factor(m, *x));
+    }
+    return factor < skew_limit_widened;
+}
+
+struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,
+                          int channel)
+{
+    struct measured m = region_measure(j, cell, r);
+    double pixels = (double)r.width * r.height, half = m.tolerance;
+    struct region out = {
+        .x = r.x,
+        .y = r.y,
+        .width = r.width,
+        .height = r.height,
+        .channel = channel,
+        .mean_a = cell->a / pixels,
+        .mean_b = cell->b / pixels,
+        .difference = m.d / m.unit,
+        .std_error = sqrt(m.v) / m.unit,
+        .dof = isinf(m.dof) ? 0 : m.dof,
+        .t = region_t(&m),
+        .log10_p = region_log10_p(j, &m, channel),
+        .ci_valid = true,
+        .margin = m.margin,
+    };
+    if (!m.noise_free) {
+        double x;
+        out.ci_valid = half_width(j, &m, &x);
+        half += x * sqrt(m.v_margin);
+    }
+    out.ci_lo = (m.d - half) / m.unit;
+    out.ci_hi = (m.d + half) / m.unit;
+    return out;
+}

@@ -1,0 +1,62 @@
+/* The test of one region of a claim (tools/README.md, "One region"). Used by compare.c only. */
+#ifndef ASSAY_REGION_H
+#define ASSAY_REGION_H
+
+#include "compare.h"
+#include "pyramid.h"
+
+/* What all regions of one claim share. */
+struct judge {
+    struct compare_options opt;
+    int width, height;
+    double floor;               /* lower bound of the unit of relative quantities, radiance */
+    double event[NUM_CHANNELS]; /* brightness of the brightest kind of single observation seen */
+    double n_min;               /* fewest observations of any pixel; INFINITY if both are exact */
+    double z_guard;             /* normal critical value at which skewness is judged */
+    size_t num_tests;           /* set once known: for mdb */
+};
+
+/* A region's sums in the form the test needs. Sums over pixels, not means. */
+struct measured {
+    double d;         /* A - B */
+    double unit;      /* of relative quantities */
+    double margin;    /* relative */
+    double tolerance; /* what float32 arithmetic may do to d */
+    double v;         /* variance of d */
+    double v_margin; /* variance of A - (1 + margin) B: for every test and interval with a margin */
+    double dof;
+    double skew;     /* of d: |g| plus one standard error */
+    bool noise_free; /* the standard error is within the tolerance */
+};
+
+struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
+
+/* Skew guard: |g| x^3 / 3 <= 0.2 at the critical x. */
+bool region_testable(const struct judge *j, const struct measured *m);
+
+/* How far |d| lies beyond margin and tolerance, in standard errors; at most 0 if it does not. */
+double region_excess_t(const struct measured *m);
+
+/* Two-sided log10 p of "|bias| <= margin". */
+double region_log10_p(const struct judge *j, const struct measured *m, int channel);
+
+/* Two-sided log10 p of "no bias", raised by the skew factor: for the histogram of tiles. */
+double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel);
+
+/* difference / std_error, within +-1e9 where there is no noise. */
+double region_t(const struct measured *m);
+
+/* Relative bias that is found with 95 %, at most region_mdb_none; for a region that is tested. */
+double region_mdb(const struct judge *j, const struct measured *m, int channel);
+
+/* The mdb of a region that no test covers: 1e6. */
+extern const double region_mdb_none;
+
+/* The end of the interval that is further from 0. */
+double region_reach(const struct region *r);
+
+/* All of a struct region but mdb, which is 0. */
+struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,
+                          int channel);
+
+#endif
