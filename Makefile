@@ -1,68 +1,181 @@
 # Assay. `make validate` and `make check` are the two commands; `make help` lists the rest.
-# Everything is built under $(BUILD); nothing is written beside the sources except by `make golden`.
+# Everything is built below $(BUILD); only `make golden` writes beside the sources.
 
-BUILD   ?= build
-CC      ?= gcc
-CXX     ?= g++
-PREFIX  ?= /usr/local
-SAN     ?=
-WERROR  ?=
-V       ?=
+BUILD  ?= build
+CC     ?= gcc
+CXX    ?= g++
+PREFIX ?= /usr/local
+LIVE   ?=
+ONLY   ?=
+ALPHA  ?= 1e-3
+V      ?=
 
-PKGS := libxml-2.0 OpenImageIO jansson gsl nettle
+# Debian packages: to build and validate, to check, to render the references.
+DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
+DEPS_TEST := libcmocka-dev clang libxml2-utils
+DEPS_LIVE := blender povray python3-numpy
+
 VERSION := 0.1
-COMMIT := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
+COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
+PKGS    := libxml-2.0 OpenImageIO jansson gsl nettle
 
-WARN := -Wall -Wextra -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla $(if $(WERROR),-Werror)
-OPT  := $(if $(SAN),-O1 -g -fno-omit-frame-pointer -fsanitize=$(SAN) -fno-sanitize-recover=all,-O3 -g -fno-math-errno -fno-trapping-math)
-CFLAGS_ALL   = -std=c17 $(OPT) -ffp-contract=off $(WARN) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(shell pkg-config --cflags $(PKGS) 2>/dev/null | sed 's/-I/-isystem /g')
-CXXFLAGS_ALL = -std=c++17 $(OPT) -Wall -Wextra $(if $(WERROR),-Werror) $(CXXFLAGS) $(shell pkg-config --cflags OpenImageIO 2>/dev/null | sed 's/-I/-isystem /g')
-LIBS = $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm -pthread
+# Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
+pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
+LIBS       = $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
-Q := $(if $(V),,@)
+SANITIZE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+OPT      := -O3 -g -fno-math-errno -fno-trapping-math
+WARN     := -Wall -Wextra $(if $(WERROR),-Werror)
+WARN_C   := $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
+# -ffp-contract=off: the same bits whether or not a processor can multiply and add in one step.
+cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(pkg_cflags)
+cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
+
+RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
+HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
+TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c),$(wildcard tests/*.c))
+obj       = $(patsubst %,$(1)/%.o,$(2))
+
+Q  := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
-
-RENDERER  := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
-HARNESS   := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
-TESTS     := $(wildcard tests/test_*.c)
-obj        = $(patsubst %,$(BUILD)/%.o,$(1))
 
 all: $(BUILD)/pathtracer $(BUILD)/assay
 
-$(BUILD)/pathtracer: $(call obj,renderer/main.c $(RENDERER))
-	$(call say,LINK,$@)
-	$(Q)$(CXX) $(OPT) -o $@ $^ $(LIBS)
+validate: all $(if $(LIVE),$(BUILD)/deps-live)
+	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
+	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-$(BUILD)/assay: $(call obj,tools/main.c $(HARNESS) $(RENDERER))
-	$(call say,LINK,$@)
-	$(Q)$(CXX) $(OPT) -o $@ $^ $(LIBS)
+check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%)
+	tests/run.sh $(BUILD)
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
-	$(call say,LINK,$@)
-	$(Q)$(CXX) $(OPT) -o $@ $< $(BUILD)/libassay.a $(LIBS) -lcmocka $(TEST_LIBS)
+golden: all $(BUILD)/deps-live
+	$(BUILD)/assay reference --out golden --work $(BUILD)/reference $(addprefix --only ,$(ONLY))
 
-$(BUILD)/libassay.a: $(call obj,$(HARNESS) $(RENDERER))
-	$(call say,AR,$@)
-	$(Q)rm -f $@ && ar rcs $@ $^
+report: all
+	$(BUILD)/assay report $(BUILD)/report/results.json
 
-$(BUILD)/%.c.o: %.c
-	$(call say,CC,$<)
-	$(Q)mkdir -p $(@D) && $(CC) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+deps: $(BUILD)/deps
+deps-live: $(BUILD)/deps-live
 
-# Only version.c knows the commit, and is built again when that changes.
-$(BUILD)/renderer/version.c.o: CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
-$(BUILD)/renderer/version.c.o: $(BUILD)/commit
-$(BUILD)/commit: FORCE
-	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
-FORCE:
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay
+	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
+	install -m 644 reference/cycles.py $(DESTDIR)$(PREFIX)/share/assay
+	cp -R reference/scenes golden $(DESTDIR)$(PREFIX)/share/assay
 
-$(BUILD)/%.cc.o: %.cc
-	$(call say,CXX,$<)
-	$(Q)mkdir -p $(@D) && $(CXX) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
+format:
+	clang-format -i $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])
 
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all clean FORCE
+help:
+	@echo 'make            build pathtracer and assay'
+	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
+	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
+	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make golden     render the stored references again (ONLY=SCENE: of one scene)'
+	@echo 'make report     make the page of the last validation again'
+	@echo 'make deps       install the Debian packages that building needs'
+	@echo 'make install    into PREFIX=$(PREFIX)'
+
+# Three builds of everything: the programs, the same under sanitizers, and all of it by clang only to
+# see that it compiles without a warning there too.
+$(BUILD)/san/%: OPT := $(SANITIZE)
+$(BUILD)/san/%: WERROR := 1
+$(BUILD)/clang/%: CC := clang
+$(BUILD)/clang/%: CXX := clang++
+$(BUILD)/clang/%: WERROR := 1
+
+define compile_c
+	$(call say,CC,$@)
+	$(Q)mkdir -p $(@D) && $(CC) $(cflags) -MMD -MP -c -o $@ $<
+endef
+define compile_cxx
+	$(call say,CXX,$@)
+	$(Q)mkdir -p $(@D) && $(CXX) $(cxxflags) -MMD -MP -c -o $@ $<
+endef
+define link
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D) && $(CXX) $(OPT) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS) $(TEST_LIBS)
+endef
+define archive
+	$(call say,AR,$@)
+	$(Q)rm -f $@ && ar rcs $@ $^
+endef
+
+$(BUILD)/%.c.o: %.c | $(BUILD)/deps
+	$(compile_c)
+$(BUILD)/san/%.c.o: %.c | $(BUILD)/deps
+	$(compile_c)
+$(BUILD)/clang/%.c.o: %.c | $(BUILD)/deps-test
+	$(compile_c)
+$(BUILD)/%.cc.o: %.cc | $(BUILD)/deps
+	$(compile_cxx)
+$(BUILD)/san/%.cc.o: %.cc | $(BUILD)/deps
+	$(compile_cxx)
+$(BUILD)/clang/%.cc.o: %.cc | $(BUILD)/deps-test
+	$(compile_cxx)
+
+$(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
+	$(link)
+$(BUILD)/assay: $(call obj,$(BUILD),tools/main.c $(HARNESS) $(RENDERER))
+	$(link)
+$(BUILD)/san/pathtracer: $(call obj,$(BUILD)/san,renderer/main.c $(RENDERER))
+	$(link)
+$(BUILD)/san/assay: $(call obj,$(BUILD)/san,tools/main.c $(HARNESS) $(RENDERER))
+	$(link)
+$(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT)) $(BUILD)/san/libassay.a
+	$(link)
+$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
+$(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
+$(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
+	$(archive)
+$(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
+	$(archive)
+programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
+programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c))
+
+# What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
+# only version.c knows the commit.
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css tools/page.js
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): $(BUILD)/commit
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): \
+  CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
+$(BUILD)/commit: FORCE
+	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
+FORCE:
+
+# Asks dpkg what is missing and apt for just that, as root or through sudo. Where there is no dpkg the
+# packages are taken to be there, under whatever names.
+define install_missing
+	$(Q)mkdir -p $(@D); \
+	if command -v dpkg-query >/dev/null; then \
+	  missing=; \
+	  for p in $(1); do \
+	    dpkg-query -W -f '$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; \
+	  done; \
+	  if [ -n "$$missing" ]; then \
+	    echo "installing:$$missing"; \
+	    [ "$$(id -u)" = 0 ] && sudo= || sudo=sudo; \
+	    $$sudo apt-get update -qq && \
+	    $$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >$@.log 2>&1 \
+	      || { tail -n 5 $@.log; echo "cannot install:$$missing" >&2; exit 1; }; \
+	  fi; \
+	fi; touch $@
+endef
+$(BUILD)/deps:
+	$(call install_missing,$(DEPS))
+$(BUILD)/deps-test: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_TEST))
+$(BUILD)/deps-live: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_LIVE))
+
+.PHONY: all validate check golden report deps deps-live install format clean help FORCE \
+  programs-san programs-clang
 .SECONDARY:
+.DELETE_ON_ERROR:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

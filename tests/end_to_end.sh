@@ -1,0 +1,153 @@
+#!/bin/bash
+# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME" or "not ok NAME".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end.sh BUILD}")
+pathtracer=$build/pathtracer assay=$build/assay
+# Where bad input is fed in, the sanitized builds run.
+san_pathtracer=$build/san/pathtracer san_assay=$build/san/assay
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+
+ok() { echo "ok $1"; }
+not_ok() {
+    echo "not ok $1: $2"
+    failures=$((failures + 1))
+}
+
+# expect NAME STATUS PATTERN COMMAND...: exit status, and a pattern in what it printed. A status of 3
+# has to come with exactly one line on stderr.
+expect() {
+    local name=$1 status=$2 pattern=$3
+    shift 3
+    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+    local got=$?
+    if [ $got -ne "$status" ]; then
+        not_ok "$name" "exit status $got instead of $status: $(head -c 2000 "$tmp/err")"
+    elif ! cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern"; then
+        not_ok "$name" "no '$pattern' in: $(head -c 2000 "$tmp/out" "$tmp/err")"
+    elif [ "$status" -eq 3 ] && [ "$(wc -l <"$tmp/err")" -ne 1 ]; then
+        not_ok "$name" "$(wc -l <"$tmp/err") lines on stderr: $(head -c 2000 "$tmp/err")"
+    else
+        ok "$name"
+    fi
+}
+
+scene=reference/scenes/41_cornell.dae
+small="-r 32 32 -s 16 -t 2 -q"
+
+# The command line of pathtracer.
+for option in --spp --light-samples --max-bounces --hemisphere --adaptive --resolution --cell --seed; do
+    expect "help names $option" 0 "$option" "$san_pathtracer" --help
+done
+expect "version" 0 "pathtracer 0" "$san_pathtracer" --version
+expect "no scene" 3 "no scene" "$san_pathtracer" -f "$tmp/x.exr"
+expect "no output" 3 "no output" "$san_pathtracer" $scene
+expect "unknown option" 3 "unknown option '--sppp'" "$san_pathtracer" --sppp 4 -f "$tmp/x.exr" $scene
+expect "missing argument" 3 "needs W H" "$san_pathtracer" $scene -r 4
+expect "not a number" 3 "'1x'" "$san_pathtracer" -s 1x -f "$tmp/x.exr" $scene
+expect "negative samples" 3 "not a whole number" "$san_pathtracer" -s -1 -f "$tmp/x.exr" $scene
+expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $scene $scene
+expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
+expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
+expect "environment map" 3 "not supported" "$san_pathtracer" -e x.exr -f "$tmp/x.exr" $scene
+expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
+expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
+expect "unwritable output" 3 "/nonexistent/x.exr" \
+    "$san_pathtracer" $small -f /nonexistent/x.exr $scene
+for bad in tests/bad/*.dae; do
+    expect "bad scene $(basename "$bad")" 3 "$bad" "$san_pathtracer" $small -f "$tmp/bad.exr" "$bad"
+done
+if [ -n "$(ls "$tmp" | grep -v '^out$\|^err$')" ]; then
+    not_ok "failures leave no files" "$(ls "$tmp")"
+else
+    ok "failures leave no files"
+fi
+
+# Pictures.
+expect "render" 0 "mean radiance" \
+    "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
+"$pathtracer" $small -t 1 --seed 1 -f "$tmp/a1.png" $scene >/dev/null
+"$pathtracer" $small -t 2 --seed 1 -f "$tmp/a2.png" $scene >/dev/null
+if cmp -s "$tmp/a1.png" "$tmp/a2.png"; then ok "1 and 2 threads, same bytes"; else
+    not_ok "1 and 2 threads, same bytes" "PNG files differ"
+fi
+"$pathtracer" $small -t 2 --seed 2 -f "$tmp/a3.png" $scene >/dev/null
+if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
+    not_ok "another seed, another picture" "PNG files are the same"
+else ok "another seed, another picture"; fi
+
+# compare: two seeds of a correct renderer; a render that lacks a bounce; too few samples; no file.
+render() { "$pathtracer" -q -r 64 64 "$@" $scene >/dev/null || not_ok "render $*" "failed"; }
+render -s 256 --seed 3 -f "$tmp/one.exr"
+render -s 256 --seed 4 -f "$tmp/two.exr"
+render -s 256 --seed 5 -m 4 -f "$tmp/shallow.exr"
+render -s 8 --seed 6 -f "$tmp/few.exr"
+expect "compare: equivalent" 0 "^EQUIVALENT" \
+    "$san_assay" compare --margin 0.02 --margin-tile 0.08 "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: different" 1 "^DIFFERENT" \
+    "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
+    "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/few.exr" "$tmp/two.exr"
+expect "compare: missing file" 3 "gone.exr" "$san_assay" compare "$tmp/gone.exr" "$tmp/two.exr"
+expect "compare: not moments" 3 "not a moments EXR" "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
+expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
+expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
+    --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
+expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+expect "unknown verb" 3 "unknown verb" "$san_assay" assay
+expect "report: no file" 3 "none.json" "$san_assay" report none.json
+
+# export.
+expect "export to POV-Ray" 0 "c.pov" "$san_assay" export -o "$tmp/c.pov" $scene
+expect "export to Cycles" 0 "c.json" "$san_assay" export -o "$tmp/c.json" $scene
+expect "export: unknown kind" 3 "neither" "$san_assay" export -o "$tmp/c.txt" $scene
+
+# validate, against the goldens.
+out=$tmp/report
+validate="$assay validate -q --out $out"
+expect "validate a closed form" 0 "EQUIVALENT" $validate --only 11_furnace
+for file in index.html results.json junit.xml; do
+    if [ -s "$out/$file" ]; then ok "validate writes $file"; else not_ok "validate writes $file" "no"; fi
+done
+if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "junit.xml is XML" "no"; fi
+expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
+expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
+
+# Negative controls: wrong programs under test.
+wrong() {
+    printf '#!/bin/sh\n%s\n' "$1" >"$tmp/wrong"
+    chmod +x "$tmp/wrong"
+}
+wrong "exec $pathtracer \"\$@\" -m 4"
+expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+wrong "exit 5"
+expect "a program that dies is not judged" 3 "exit status 5" \
+    $validate --only 11_furnace --pathtracer "$tmp/wrong"
+wrong "sleep 60"
+expect "a program that hangs is not judged" 3 "no end after" \
+    $validate --only 11_furnace --timeout 1 --pathtracer "$tmp/wrong"
+wrong "exit 0"
+expect "a program that writes nothing is not judged" 3 "pathtracer.exr" \
+    $validate --only 12_point_plane --pathtracer "$tmp/wrong"
+expect "a missing program is not judged" 3 "nothing-here" \
+    $validate --only 11_furnace --pathtracer "$tmp/nothing-here"
+
+# Missing, stale and damaged goldens are never a pass.
+expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
+cp -R golden "$tmp/golden"
+printf 'x' >>"$tmp/golden/11_furnace/cycles.exr"
+expect "a damaged golden is not judged" 3 "cycles" $validate --only 11_furnace --golden "$tmp/golden"
+cp -R reference/scenes "$tmp/scenes"
+echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
+expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace --suite "$tmp/scenes"
+
+# Installed elsewhere, it needs nothing of the checkout.
+if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
+    not_ok "make install" "$(cat "$tmp/out")"
+fi
+cd "$tmp" || exit 1
+expect "the installed programs work" 0 "EQUIVALENT" \
+    "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace
+
+[ $failures -eq 0 ]
