@@ -25,7 +25,12 @@ bool err_prefix(struct err *e, const char *fmt, ...)
     va_start(ap, fmt);
     int n = vsnprintf(e->msg, sizeof e->msg, fmt, ap);
     va_end(ap);
-    if (n >= 0 && (size_t)n < sizeof e->msg)
-        snprintf(e->msg + n, sizeof e->msg - (size_t)n, ": %s", old);
+    if (n < 0 || (size_t)n + 2 >= sizeof e->msg)
+        return false;
+    memcpy(e->msg + n, ": ", 2);
+    size_t room = sizeof e->msg - (size_t)n - 3, length = strlen(old);
+    length = length < room ? length : room;
+    memcpy(e->msg + n + 2, old, length);
+    e->msg[(size_t)n + 2 + length] = '\0';
     return false;
 }

@@ -12,7 +12,7 @@ static void *array(size_t size)
     return p;
 }
 
-struct scene scene_new(void)
+struct scene build_scene(void)
 {
     struct scene s = {.dialect = DIALECT_COLLADA};
     s.position = array(3 * sizeof *s.position);
@@ -28,7 +28,7 @@ struct scene scene_new(void)
     return s;
 }
 
-uint32_t add_material(struct scene *s, rgb reflectance, rgb radiance)
+uint32_t build_material(struct scene *s, rgb reflectance, rgb radiance)
 {
     assert(s->num_materials < ROOM);
     s->materials[s->num_materials] = (struct material){
@@ -62,7 +62,7 @@ static void put_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t mater
     s->tri_object[i] = s->num_objects - 1;
 }
 
-void add_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
+void build_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
 {
     struct object *o = new_object(s, material);
     put_triangle(s, p, add(p, u), add(add(p, u), v), material);
@@ -70,14 +70,14 @@ void add_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
     o->num_triangles = 2;
 }
 
-void add_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material)
+void build_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material)
 {
     struct object *o = new_object(s, material);
     put_triangle(s, a, b, c, material);
     o->num_triangles = 1;
 }
 
-void add_sphere(struct scene *s, vec3 centre, float radius, float normal_out, uint32_t material)
+void build_sphere(struct scene *s, vec3 centre, float radius, float normal_out, uint32_t material)
 {
     assert(s->num_spheres < ROOM);
     struct object *o = new_object(s, material);
@@ -88,13 +88,13 @@ void add_sphere(struct scene *s, vec3 centre, float radius, float normal_out, ui
         (struct sphere){.centre = centre, .radius = radius, .normal_out = normal_out};
 }
 
-void add_light(struct scene *s, struct light light)
+void build_light(struct scene *s, struct light light)
 {
     assert(s->num_lights < ROOM);
     s->lights[s->num_lights++] = light;
 }
 
-void set_camera(struct scene *s, vec3 eye, float hfov_degrees)
+void build_camera(struct scene *s, vec3 eye, float hfov_degrees)
 {
     s->camera = (struct scene_camera){.present = true,
                                       .right = {1, 0, 0},

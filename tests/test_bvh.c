@@ -22,8 +22,8 @@ static vec3 random_point(uint32_t i, uint32_t k)
 
 static struct scene make_scene(enum layout layout)
 {
-    struct scene s = scene_new();
-    uint32_t m = add_material(&s, grey(0.5f), grey(0));
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
     uint32_t n = layout == ONE ? 1 : 700;
     for (uint32_t i = 0; i < n; i++) {
         vec3 c = random_point(i, 0), d = scale(random_point(i, 1), 0.2f);
@@ -35,11 +35,11 @@ static struct scene make_scene(enum layout layout)
         if (layout == WIDE_RANGE)
             c = scale(c, exp2f((float)(i % 40) - 20));
         if (layout != FLAT && i % 3 == 0)
-            add_sphere(&s, c, layout == ONE ? 0.7f : 0.02f + 0.05f * fabsf(d.x), 1, m);
+            build_sphere(&s, c, layout == ONE ? 0.7f : 0.02f + 0.05f * fabsf(d.x), 1, m);
         else
-            add_triangle(&s, c, add(c, d), add(c, f), m);
+            build_triangle(&s, c, add(c, d), add(c, f), m);
         if (layout == COINCIDENT)
-            add_triangle(&s, neg(c), neg(d), neg(f), m);
+            build_triangle(&s, neg(c), neg(d), neg(f), m);
     }
     struct err e = {0};
     if (!scene_finish(&s, "test", &e))
@@ -169,10 +169,10 @@ static void sphere_closed_form(void **state)
 static void no_self_intersection(void **state)
 {
     (void)state;
-    struct scene s = scene_new();
-    uint32_t m = add_material(&s, grey(0.5f), grey(0));
-    add_triangle(&s, v3(100, 3, -50), v3(103, 7, -48), v3(99, 8, -53), m);
-    add_sphere(&s, v3(5, 6, 7), 0.3f, 1, m);
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
+    build_triangle(&s, v3(100, 3, -50), v3(103, 7, -48), v3(99, 8, -53), m);
+    build_sphere(&s, v3(5, 6, 7), 0.3f, 1, m);
     struct err e = {0};
     assert_true(scene_finish(&s, "test", &e));
     struct bvh *bvh = bvh_build(&s, BVH_BRUTE_FORCE, &e);

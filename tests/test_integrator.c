@@ -85,10 +85,10 @@ static void furnace_at_every_depth(void **state)
 {
     (void)state;
     const double rho[3] = {0.8, 0.5, 0.2}, emitted[3] = {1, 2, 4};
-    struct scene s = scene_new();
-    uint32_t m = add_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
-    add_sphere(&s, v3(0.1f, -0.2f, 0.3f), 1, -1, m);
-    set_camera(&s, v3(0.3f, 0, 0.5f), 60);
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
+    build_sphere(&s, v3(0.1f, -0.2f, 0.3f), 1, -1, m);
+    build_camera(&s, v3(0.3f, 0, 0.5f), 60);
     finish(&s);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int depth = 0; depth <= 6; depth += depth < 2 ? 1 : 4) {
@@ -131,10 +131,10 @@ static double polygon_irradiance(const double (*v)[3], int n)
  * constant over the picture. */
 static struct scene floor_scene(float albedo)
 {
-    struct scene s = scene_new();
-    uint32_t m = add_material(&s, grey(albedo), grey(0));
-    add_quad(&s, v3(-3, 0, 3), v3(6, 0, 0), v3(0, 0, -6), m);
-    set_camera(&s, v3(0, 0, 0), 0.02f);
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(albedo), grey(0));
+    build_quad(&s, v3(-3, 0, 3), v3(6, 0, 0), v3(0, 0, -6), m);
+    build_camera(&s, v3(0, 0, 0), 0.02f);
     /* From (0, 2, 2) towards the origin. */
     const float h = 0.70710678f;
     s.camera.eye = v3(0, 2, 2);
@@ -151,14 +151,14 @@ static void rectangle_light(void **state)
                                       {0.3f, 0.05f, 0.5f, 0, 0, -1, 0, 0.8f, 0}};
     for (int q = 0; q < 2; q++) {
         struct scene s = floor_scene(0.6f);
-        uint32_t lamp = add_material(&s, grey(0), grey(5));
+        uint32_t lamp = build_material(&s, grey(0), grey(5));
         const float *f = quads[q];
         vec3 p = v3(f[0], f[1], f[2]), u = v3(f[3], f[4], f[5]), v = v3(f[6], f[7], f[8]);
         /* The front has to see the origin. */
         if (dot(cross(u, v), neg(p)) < 0)
-            add_quad(&s, p, v, u, lamp);
+            build_quad(&s, p, v, u, lamp);
         else
-            add_quad(&s, p, u, v, lamp);
+            build_quad(&s, p, u, v, lamp);
         finish(&s);
         double corner[4][3] = {{p.x, p.y, p.z},
                                {p.x + u.x, p.y + u.y, p.z + u.z},
@@ -189,9 +189,9 @@ static void sphere_light(void **state)
     static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
     for (int q = 0; q < 3; q++) {
         struct scene s = floor_scene(0.5f);
-        uint32_t lamp = add_material(&s, grey(0), grey(3));
+        uint32_t lamp = build_material(&s, grey(0), grey(3));
         vec3 c = v3(centre[q][0], centre[q][1], centre[q][2]);
-        add_sphere(&s, c, 0.25f, 1, lamp);
+        build_sphere(&s, c, 0.25f, 1, lamp);
         finish(&s);
         double d2 = (double)dot(c, c), cos_theta = c.y / sqrt(d2);
         double expected = 0.5 / M_PI * (M_PI * 3 * 0.0625 / d2 * cos_theta);
@@ -212,13 +212,13 @@ static void delta_lights(void **state)
 {
     (void)state;
     struct scene s = floor_scene(0.7f);
-    add_light(&s, (struct light){.kind = LIGHT_POINT,
-                                 .value = {2, 3, 4},
-                                 .position = {0.6f, 0.8f, -0.5f},
-                                 .attenuation = {0, 0, 1}});
+    build_light(&s, (struct light){.kind = LIGHT_POINT,
+                                   .value = {2, 3, 4},
+                                   .position = {0.6f, 0.8f, -0.5f},
+                                   .attenuation = {0, 0, 1}});
     vec3 sun = normalize(v3(-1, 2, 0.5f));
-    add_light(&s,
-              (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
+    build_light(&s,
+                (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
     finish(&s);
     struct moments film = render_scene(&s, path_options, 4, 4, 64, 1, BVH_SAH);
     double d2 = 0.36 + 0.64 + 0.25, cos_point = 0.8 / sqrt(d2);
@@ -239,13 +239,13 @@ static void shadow(void **state)
     (void)state;
     for (int blocked = 0; blocked < 2; blocked++) {
         struct scene s = floor_scene(0.7f);
-        uint32_t black = add_material(&s, grey(0), grey(0));
-        add_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
-                 black);
-        add_light(&s, (struct light){.kind = LIGHT_POINT,
-                                     .value = {1, 1, 1},
-                                     .position = {0, 1, 0},
-                                     .attenuation = {0, 0, 1}});
+        uint32_t black = build_material(&s, grey(0), grey(0));
+        build_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
+                   black);
+        build_light(&s, (struct light){.kind = LIGHT_POINT,
+                                       .value = {1, 1, 1},
+                                       .position = {0, 1, 0},
+                                       .attenuation = {0, 0, 1}});
         finish(&s);
         struct moments film = render_scene(&s, path_options, 4, 4, 16, 1, BVH_SAH);
         check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
@@ -257,18 +257,18 @@ static void shadow(void **state)
 /* A box with two spheres and a lamp; enough of everything for the metamorphic tests. */
 static struct scene box_scene(float radiance)
 {
-    struct scene s = scene_new();
-    uint32_t white = add_material(&s, grey(0.6f), grey(0));
-    uint32_t red = add_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
-    uint32_t lamp = add_material(&s, grey(0), grey(radiance));
-    add_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
-    add_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
-    add_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
-    add_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
-    add_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
-    add_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
-    add_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, red);
-    set_camera(&s, v3(0, 0.75f, 3), 49);
+    struct scene s = build_scene();
+    uint32_t white = build_material(&s, grey(0.6f), grey(0));
+    uint32_t red = build_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
+    uint32_t lamp = build_material(&s, grey(0), grey(radiance));
+    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
+    build_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
+    build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
+    build_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
+    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
+    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
+    build_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, red);
+    build_camera(&s, v3(0, 0.75f, 3), 49);
     finish(&s);
     return s;
 }
