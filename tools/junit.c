@@ -49,27 +49,18 @@ static bool write_text(xmlTextWriter *w, const char *value)
     return ok;
 }
 
-static const char *string_of(const json_t *claim, const char *name)
-{
-    return json_string_value(json_object_get(claim, name));
-}
-
-static double number_of(const json_t *object, const char *name)
-{
-    return json_number_value(json_object_get(object, name));
-}
-
 static bool write_numbers(xmlTextWriter *w, const json_t *claim)
 {
     const json_t *ci = json_object_get(claim, "ci");
     char text[512];
-    snprintf(text, sizeof text,
-             "difference %+.4f %% [%+.4f, %+.4f], margin %.4f %%, minimum detectable bias %.4f %%, "
-             "log10 p %.2f, alpha %.3g over %.0f tests",
-             100 * number_of(claim, "difference"), 100 * json_number_value(json_array_get(ci, 0)),
-             100 * json_number_value(json_array_get(ci, 1)),
-             100 * number_of(claim, "margin_global"), 100 * number_of(claim, "mdb_global"),
-             number_of(claim, "log10_p"), number_of(claim, "alpha"), number_of(claim, "num_tests"));
+    snprintf(
+        text, sizeof text,
+        "difference %+.4f %% [%+.4f, %+.4f], margin %.4f %%, minimum detectable bias %.4f %%, "
+        "log10 p %.2f, alpha %.3g over %.0f tests",
+        100 * member_number(claim, "difference"), 100 * json_number_value(json_array_get(ci, 0)),
+        100 * json_number_value(json_array_get(ci, 1)), 100 * member_number(claim, "margin_global"),
+        100 * member_number(claim, "mdb_global"), member_number(claim, "log10_p"),
+        member_number(claim, "alpha"), member_number(claim, "num_tests"));
     return write_text(w, text);
 }
 
@@ -78,31 +69,31 @@ static bool write_verdict(xmlTextWriter *w, const json_t *claim, enum outcome ou
     if (outcome == OUTCOME_NOT_JUDGED)
         return xmlTextWriterStartElement(w, BAD_CAST "error") >= 0 &&
                attribute(w, "type", "not judged") &&
-               attribute(w, "message", string_of(claim, "error")) &&
+               attribute(w, "message", member_text(claim, "error")) &&
                xmlTextWriterEndElement(w) >= 0;
     if (outcome == OUTCOME_AS_EXPECTED)
         return xmlTextWriterStartElement(w, BAD_CAST "system-out") >= 0 &&
                write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
     char message[128];
-    snprintf(message, sizeof message, "%.40s, expected %.40s", string_of(claim, "verdict"),
-             string_of(claim, "expected"));
+    snprintf(message, sizeof message, "%.40s, expected %.40s", member_text(claim, "verdict"),
+             member_text(claim, "expected"));
     return xmlTextWriterStartElement(w, BAD_CAST "failure") >= 0 &&
-           attribute(w, "type", string_of(claim, "verdict")) && attribute(w, "message", message) &&
-           write_text(w, string_of(claim, "reason")) && write_text(w, "\n") &&
-           write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
+           attribute(w, "type", member_text(claim, "verdict")) &&
+           attribute(w, "message", message) && write_text(w, member_text(claim, "reason")) &&
+           write_text(w, "\n") && write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
 }
 
 static bool write_testcase(xmlTextWriter *w, const json_t *claim)
 {
-    const char *quantity = string_of(claim, "quantity");
+    const char *quantity = member_text(claim, "quantity");
     return xmlTextWriterStartElement(w, BAD_CAST "testcase") >= 0 &&
-           attribute(w, "classname", string_of(claim, "scene")) &&
+           attribute(w, "classname", member_text(claim, "scene")) &&
            xmlTextWriterStartAttribute(w, BAD_CAST "name") >= 0 &&
-           write_text(w, string_of(claim, "a")) && write_text(w, " against ") &&
-           write_text(w, string_of(claim, "b")) && write_text(w, ": ") &&
+           write_text(w, member_text(claim, "a")) && write_text(w, " against ") &&
+           write_text(w, member_text(claim, "b")) && write_text(w, ": ") &&
            write_text(w, quantity != NULL ? quantity : "mean") &&
            xmlTextWriterEndAttribute(w) >= 0 &&
-           number_attribute(w, "time", "%.3f", number_of(claim, "seconds_a")) &&
+           number_attribute(w, "time", "%.3f", member_number(claim, "seconds_a")) &&
            write_verdict(w, claim, claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
 }
 
@@ -119,8 +110,8 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
               attribute(w, "name", "assay") && number_attribute(w, "tests", "%.0f", (double)num) &&
               number_attribute(w, "failures", "%.0f", (double)failures) &&
               number_attribute(w, "errors", "%.0f", (double)count[OUTCOME_NOT_JUDGED]) &&
-              number_attribute(w, "time", "%.3f", number_of(results, "seconds")) &&
-              attribute(w, "timestamp", string_of(results, "date"));
+              number_attribute(w, "time", "%.3f", member_number(results, "seconds")) &&
+              attribute(w, "timestamp", member_text(results, "date"));
     for (size_t i = 0; ok && i < num; i++)
         ok = write_testcase(w, json_array_get(claims, i));
     return ok && xmlTextWriterEndDocument(w) >= 0;

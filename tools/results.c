@@ -176,10 +176,10 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
         return err_set(e, "%s: 'worst.channel' is not from 0 to 3", where);
 
     enum verdict verdict, expected;
-    const char *name = json_string_value(json_object_get(claim, "verdict"));
+    const char *name = member_text(claim, "verdict");
     if (!verdict_parse(name, &verdict))
         return err_set(e, "%s: 'verdict' is unknown: '%s'", where, name);
-    if (!verdict_parse(json_string_value(json_object_get(claim, "expected")), &expected))
+    if (!verdict_parse(member_text(claim, "expected"), &expected))
         return err_set(e, "%s: 'expected' is unknown", where);
     if (json_is_true(json_object_get(claim, "passed")) != (verdict == expected))
         return err_set(e, "%s: 'passed' contradicts 'verdict' and 'expected'", where);
@@ -193,7 +193,7 @@ static bool check_claim(const json_t *claim, const char *where, struct err *e)
     if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e))
         return false;
     enum verdict expected;
-    const char *name = json_string_value(json_object_get(claim, "expected"));
+    const char *name = member_text(claim, "expected");
     if (!verdict_parse(name, &expected))
         return err_set(e, "%s: 'expected' is unknown: '%s'", where, name);
     if (json_object_get(claim, "error") == NULL)
@@ -217,8 +217,8 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
         return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
-        const char *scene = json_string_value(json_object_get(claim, "scene"));
-        const char *b = json_string_value(json_object_get(claim, "b"));
+        const char *scene = member_text(claim, "scene");
+        const char *b = member_text(claim, "b");
         char where[512];
         snprintf(where, sizeof where, "%.300s: claim %zu (%.60s against %.60s)", path, i + 1,
                  scene != NULL ? scene : "?", b != NULL ? b : "?");
@@ -243,6 +243,16 @@ bool results_read(const char *path, json_t **out, struct err *e)
     return true;
 }
 
+const char *member_text(const json_t *object, const char *name)
+{
+    return json_string_value(json_object_get(object, name));
+}
+
+double member_number(const json_t *object, const char *name)
+{
+    return json_number_value(json_object_get(object, name));
+}
+
 enum outcome claim_outcome(const json_t *claim)
 {
     if (json_object_get(claim, "error") != NULL)
@@ -250,8 +260,8 @@ enum outcome claim_outcome(const json_t *claim)
     if (json_is_true(json_object_get(claim, "passed")))
         return OUTCOME_AS_EXPECTED;
     enum verdict verdict, expected;
-    if (!verdict_parse(json_string_value(json_object_get(claim, "verdict")), &verdict) ||
-        !verdict_parse(json_string_value(json_object_get(claim, "expected")), &expected))
+    if (!verdict_parse(member_text(claim, "verdict"), &verdict) ||
+        !verdict_parse(member_text(claim, "expected"), &expected))
         return OUTCOME_NOT_JUDGED;
     if (verdict != VERDICT_INCONCLUSIVE && expected != VERDICT_INCONCLUSIVE)
         return OUTCOME_OPPOSITE;

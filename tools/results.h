@@ -49,6 +49,10 @@ bool json_write(const char *path, const json_t *root, struct err *e)
 bool results_read(const char *path, json_t **out, struct err *e)
     __attribute__((warn_unused_result));
 
+/* A member of a claim or of the root, checked by results_read(): NULL or 0 where it is absent. */
+const char *member_text(const json_t *object, const char *name);
+double member_number(const json_t *object, const char *name);
+
 /* How a claim came out, worst first. OPPOSITE: DIFFERENT for EQUIVALENT or the reverse. UNDECIDED: any
  * other verdict that was not expected. */
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };

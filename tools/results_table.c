@@ -33,9 +33,9 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
         [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
     };
     enum outcome outcome = claim_outcome(claim);
-    r->cell[0] = json_string_value(json_object_get(claim, "scene"));
-    r->cell[1] = json_string_value(json_object_get(claim, "b"));
-    r->cell[6] = json_string_value(json_object_get(claim, "expected"));
+    r->cell[0] = member_text(claim, "scene");
+    r->cell[1] = member_text(claim, "b");
+    r->cell[6] = member_text(claim, "expected");
     r->cell[7] = mark[markdown][outcome];
     if (outcome == OUTCOME_NOT_JUDGED) {
         r->cell[2] = r->cell[3] = r->cell[4] = "-";
@@ -51,7 +51,7 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
     r->cell[2] = r->difference;
     r->cell[3] = r->mdb;
     r->cell[4] = r->margin;
-    r->cell[5] = json_string_value(json_object_get(claim, "verdict"));
+    r->cell[5] = member_text(claim, "verdict");
 }
 
 /* Columns that UTF-8 text fills, taking each code point as one column wide. */
@@ -130,11 +130,11 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
 {
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
-        const char *error = json_string_value(json_object_get(claim, "error"));
+        const char *error = member_text(claim, "error");
         if (error == NULL)
             continue;
-        const char *scene = json_string_value(json_object_get(claim, "scene"));
-        const char *b = json_string_value(json_object_get(claim, "b"));
+        const char *scene = member_text(claim, "scene");
+        const char *b = member_text(claim, "b");
         if (!markdown) {
             fprintf(f, "%s against %s: %s\n", scene, b, error);
             continue;

@@ -1,0 +1,334 @@
+#include "report.h"
+
+#include "../renderer/fs.h"
+#include "report_html.h"
+#include "report_page.h"
+#include "report_parts.h"
+#include "report_plot.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The page stays below 5 MB: what is left after the pictures goes to the numbers behind them. */
+enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
+
+bool page_add_layer(struct page *p, int width, int height, int channels, const double *value,
+                    size_t *index, struct err *e)
+{
+    size_t n = (size_t)width * (size_t)height * (size_t)channels;
+    struct layer *grown = realloc(p->layer, (p->num_layers + 1) * sizeof *grown);
+    if (grown == NULL)
+        return err_set(e, "out of memory for the report");
+    p->layer = grown;
+    uint16_t *half = malloc(n * sizeof *half);
+    if (half == NULL)
+        return err_set(e, "out of memory for the report");
+    for (size_t i = 0; i < n; i++)
+        half[i] = half_from_double(value[i]);
+    *index = p->num_layers++;
+    p->layer[*index] = (struct layer){width, height, channels, half};
+    return true;
+}
+
+/* Worst outcome first, the file's order within. */
+static int compare_claims(const void *a, const void *b)
+{
+    const struct claim_ref *x = a, *y = b;
+    if (x->outcome != y->outcome)
+        return x->outcome < y->outcome ? -1 : 1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    fputs("<ul class=\"lede\">\n", f);
+    for (size_t i = 0; i < num; i++) {
+        fprintf(f, "<li><a href=\"#claim-%zu\">", claim[i].index);
+        html_text(f, member_text(claim[i].json, "scene"));
+        fputs(" against ", f);
+        report_reference(f, &claim[i]);
+        fputs("</a> ", f);
+        if (claim[i].outcome == OUTCOME_NOT_JUDGED) {
+            fputs("could not be judged: ", f);
+            html_text(f, member_text(claim[i].json, "error"));
+        } else {
+            fputs("is ", f);
+            html_text(f, member_text(claim[i].json, "verdict"));
+            fputs(", not ", f);
+            html_text(f, member_text(claim[i].json, "expected"));
+        }
+        fputs("</li>\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+/* claim is sorted: not judged, wrong, as expected. */
+static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    size_t errors = 0, wrong = 0, must_differ = 0;
+    for (size_t i = 0; i < num; i++) {
+        errors += claim[i].outcome == OUTCOME_NOT_JUDGED;
+        wrong += claim[i].outcome == OUTCOME_OPPOSITE || claim[i].outcome == OUTCOME_UNDECIDED;
+        must_differ += claim[i].outcome == OUTCOME_AS_EXPECTED &&
+                       strcmp(member_text(claim[i].json, "expected"), "DIFFERENT") == 0;
+    }
+    const char *s = num == 1 ? "" : "s";
+    if (errors + wrong == 0 && num == 1)
+        fputs("<h1 class=\"good\">The claim came out as expected.</h1>\n", f);
+    else if (errors + wrong == 0)
+        fprintf(f, "<h1 class=\"good\">All %zu claims came out as expected.</h1>\n", num);
+    else if (errors > 0 && wrong > 0)
+        fprintf(
+            f,
+            "<h1 class=\"bad\">Of %zu claims, %zu could not be judged and %zu did not come out as "
+            "expected.</h1>\n",
+            num, errors, wrong);
+    else if (errors > 0)
+        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s could not be judged.</h1>\n", errors, num,
+                s);
+    else
+        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s did not come out as expected.</h1>\n",
+                wrong, num, s);
+    if (errors + wrong > 0)
+        write_claim_list(f, claim, errors + wrong);
+    if (must_differ == 1)
+        fputs("<p class=\"lede\">1 claim is a deliberate mistake that had to be found, and "
+              "was.</p>\n",
+              f);
+    else if (must_differ > 1)
+        fprintf(f,
+                "<p class=\"lede\">%zu claims are deliberate mistakes that had to be found, and "
+                "were.</p>\n",
+                must_differ);
+}
+
+static void write_fact(FILE *f, const char *label, const char *text)
+{
+    if (text == NULL)
+        return;
+    fprintf(f, "<div><dt>%s</dt><dd>", label);
+    html_text(f, text);
+    fputs("</dd></div>\n", f);
+}
+
+static void write_header(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
+{
+    fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
+    write_verdict(f, claim, num);
+    fprintf(f,
+            "<p class=\"lede\">The chance that noise alone makes any claim of this page DIFFERENT "
+            "is at "
+            "most %.3g (family-wise alpha), and so is the chance of any wrong EQUIVALENT.</p>\n",
+            member_number(root, "alpha"));
+    fputs("<dl class=\"facts\">\n", f);
+    write_fact(f, "Date", member_text(root, "date"));
+    write_fact(f, "Version", member_text(root, "version"));
+    write_fact(f, "Machine", member_text(root, "machine"));
+    if (json_object_get(root, "seconds") != NULL)
+        write_fact(f, "Time", duration_text(member_number(root, "seconds")).s);
+    const char *mode = member_text(root, "mode");
+    if (mode != NULL && strcmp(mode, "golden") == 0)
+        mode = "golden: against stored references";
+    else if (mode != NULL && strcmp(mode, "live") == 0)
+        mode = "live: references rendered anew";
+    write_fact(f, "Mode", mode);
+    fputs("</dl>\n<pre tabindex=\"0\"><code>", f);
+    html_text(f, member_text(root, "command"));
+    fputs("</code></pre>\n</header>\n", f);
+}
+
+static void write_row(FILE *f, const struct claim_ref *claim)
+{
+    const json_t *c = claim->json;
+    fprintf(f, "<tr%s><th scope=\"row\"><a href=\"#claim-%zu\">",
+            claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"", claim->index);
+    html_text(f, member_text(c, "scene"));
+    fputs("</a></th><td>", f);
+    report_reference(f, claim);
+    fputs("</td><td>", f);
+    report_badge(f, claim);
+    fputs("</td><td>", f);
+    html_text(f, member_text(c, "expected"));
+    if (claim->outcome == OUTCOME_NOT_JUDGED) {
+        fputs("</td><td colspan=\"6\" class=\"error-cell\">", f);
+        html_text(f, member_text(c, "error"));
+        fputs("</td></tr>\n", f);
+        return;
+    }
+    const json_t *ci = json_object_get(c, "ci");
+    fputs("</td><td>", f);
+    plot_interval(f, c);
+    fprintf(f,
+            "</td><td class=\"num\">%s</td><td class=\"num\">%s to %s</td><td class=\"num\">%s</td>"
+            "<td class=\"num\">%s</td>",
+            percent_column(member_number(c, "difference")).s,
+            percent_column(json_number_value(json_array_get(ci, 0))).s,
+            percent_column(json_number_value(json_array_get(ci, 1))).s,
+            plain_number(100 * member_number(c, "mdb_global")).s,
+            plain_number(100 * member_number(c, "margin_global")).s);
+    fputs("<td class=\"num\">", f);
+    if (json_object_get(c, "seconds_a") != NULL)
+        fputs(duration_text(member_number(c, "seconds_a")).s, f);
+    fputs("</td></tr>\n", f);
+}
+
+static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    fputs(
+        "<section>\n<h2>The claims</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
+        "aria-label=\"Table of claims\">\n<table id=\"claims\"><thead><tr><th scope=\"col\">Scene"
+        "</th><th scope=\"col\">Against</th><th scope=\"col\">Verdict</th><th "
+        "scope=\"col\">Expected"
+        "</th><th scope=\"col\">Interval and margin</th><th scope=\"col\" class=\"num\">Difference "
+        "%"
+        "</th><th scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %"
+        "</th><th scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
+        "class=\"num\">Time</th>"
+        "</tr></thead>\n<tbody>\n",
+        f);
+    for (size_t i = 0; i < num; i++)
+        write_row(f, &claim[i]);
+    fputs(
+        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Difference</b>: how much brighter (+) "
+        "or "
+        "darker (−) our image is than the reference, on average. <b>Interval</b>: where "
+        "the "
+        "true difference lies, given the noise of both. <b>Margin</b>: a difference up to this "
+        "size "
+        "counts as equal; it is declared for each scene before anything is rendered. <b>MDB</b>, "
+        "the "
+        "minimum detectable bias: a true difference of this size would have come out DIFFERENT "
+        "with a "
+        "probability of 95 %. In the drawing the band is the margin, the line is the interval and "
+        "the "
+        "dot is the difference; an arrow head points to what lies outside. A verdict is EQUIVALENT "
+        "only where the intervals of the image and of every tile lie inside their margins, "
+        "DIFFERENT "
+        "where one lies outside, and INCONCLUSIVE where there are too few samples to tell.</p>\n"
+        "</section>\n",
+        f);
+}
+
+/* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
+ * keep the order in which the sorted claims first name them. */
+static size_t gather_scene(struct claim_ref *claim, size_t num)
+{
+    size_t front = 1;
+    const char *scene = member_text(claim[0].json, "scene");
+    for (size_t i = 1; i < num; i++) {
+        if (strcmp(member_text(claim[i].json, "scene"), scene) != 0)
+            continue;
+        struct claim_ref found = claim[i];
+        memmove(&claim[front + 1], &claim[front], (i - front) * sizeof *claim);
+        claim[front++] = found;
+    }
+    return front;
+}
+
+/* Little-endian halves, base64, in elements that no browser runs. */
+static void write_layers(struct page *p)
+{
+    bool all = true;
+    for (size_t i = 0; i < p->num_layers; i++) {
+        const struct layer *l = &p->layer[i];
+        size_t n = (size_t)l->width * (size_t)l->height * (size_t)l->channels;
+        long here = ftell(p->f);
+        if (here < 0 || (size_t)here + 2 * n * 4 / 3 + PAGE_RESERVE > PAGE_LIMIT) {
+            all = false;
+            continue;
+        }
+        uint8_t *bytes = malloc(2 * n);
+        if (bytes == NULL) {
+            all = false;
+            continue;
+        }
+        for (size_t k = 0; k < n; k++) {
+            bytes[2 * k] = (uint8_t)(l->half[k] & 0xff);
+            bytes[2 * k + 1] = (uint8_t)(l->half[k] >> 8);
+        }
+        fprintf(p->f,
+                "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" data-height=\"%d\" "
+                "data-channels=\"%d\">",
+                i, l->width, l->height, l->channels);
+        html_base64(p->f, bytes, 2 * n);
+        fputs("</script>\n", p->f);
+        free(bytes);
+    }
+    if (!all)
+        fputs("<p class=\"caption\">To stay below 5 MB this page leaves out the numbers behind "
+              "some of "
+              "its pictures; exposure and pixel values are not offered there.</p>\n",
+              p->f);
+}
+
+static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
+                       struct err *e)
+{
+    FILE *f = p->f;
+    fprintf(
+        f,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+        "style-src 'unsafe-inline'; script-src '%s'\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay report, ",
+        script_hash(page_js).s);
+    html_text(f, member_text(root, "date"));
+    fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
+    write_header(f, root, claim, num);
+    write_table(f, claim, num);
+    for (size_t done = 0; done < num;) {
+        size_t of_scene = gather_scene(claim + done, num - done);
+        if (!report_scene(p, claim + done, of_scene, e))
+            return false;
+        done += of_scene;
+    }
+    fputs("</main>\n", f);
+    write_layers(p);
+    fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
+    return true;
+}
+
+bool report_write(const char *results_path, const char *out_path, struct err *e)
+{
+    bool ok = false;
+    struct page page = {0};
+    struct out_file out = {0};
+    json_t *root = NULL;
+    struct claim_ref *claim = NULL;
+    const char *slash = strrchr(results_path, '/');
+    size_t dir = slash != NULL ? (size_t)(slash - results_path) + 1 : 0;
+    if (dir >= sizeof page.dir)
+        return err_set(e, "%.64s...: path too long", results_path);
+    memcpy(page.dir, results_path, dir);
+
+    if (!results_read(results_path, &root, e))
+        return false;
+    const json_t *claims = json_object_get(root, "claims");
+    size_t num = json_array_size(claims);
+    claim = calloc(num, sizeof *claim);
+    if (claim == NULL) {
+        err_set(e, "out of memory for the report");
+        goto done;
+    }
+    for (size_t i = 0; i < num; i++) {
+        claim[i].json = json_array_get(claims, i);
+        claim[i].index = i;
+        claim[i].outcome = claim_outcome(claim[i].json);
+    }
+    qsort(claim, num, sizeof *claim, compare_claims);
+    if (!make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
+        goto done;
+    page.f = out.f;
+    if (write_page(&page, root, claim, num, e))
+        ok = out_commit(&out, e);
+    else
+        out_abandon(&out);
+done:
+    for (size_t i = 0; i < page.num_layers; i++)
+        free(page.layer[i].half);
+    free(page.layer);
+    free(claim);
+    json_decref(root);
+    return ok;
+}

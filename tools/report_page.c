@@ -1,0 +1,12 @@
+#include "report_page.h"
+
+/* The assembler reads the two files, so that nothing has to be generated. Paths are relative to the
+ * directory in which the compiler runs: the top of the repository. */
+__asm__(".pushsection .rodata\n"
+        ".global page_css, page_js\n"
+        ".hidden page_css, page_js\n"
+        "page_css: .incbin \"tools/page.css\"\n"
+        ".byte 0\n"
+        "page_js: .incbin \"tools/page.js\"\n"
+        ".byte 0\n"
+        ".popsection\n");
