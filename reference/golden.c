@@ -1,0 +1,176 @@
+#define _GNU_SOURCE
+#include "reference.h"
+
+#include "../renderer/fs.h"
+#include "../tools/results.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+enum { PATH_SIZE = 4096 };
+
+static bool golden_path(char out[PATH_SIZE], const char *golden_dir, const char *scene,
+                        const char *name, const char *suffix, struct err *e)
+{
+    int n = snprintf(out, PATH_SIZE, "%s/%s/%s%s", golden_dir, scene, name, suffix);
+    return (n > 0 && n < PATH_SIZE) || err_set(e, "%.64s...: path too long", golden_dir);
+}
+
+/* The manifest's object; an empty one if there is no file. */
+static json_t *load_manifest(const char *path, struct err *e)
+{
+    json_error_t je;
+    if (access(path, F_OK) != 0)
+        return json_object();
+    json_t *all = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
+    if (all == NULL) {
+        err_set(e, "%s:%d: %s", path, je.line, je.text);
+    } else if (!json_is_object(all)) {
+        err_set(e, "%s: not a JSON object", path);
+        json_decref(all);
+        all = NULL;
+    }
+    return all;
+}
+
+/* Held while the manifest is read, changed and renamed, so that engines of one scene may finish at
+ * the same time. Close the descriptor to let go. */
+static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
+{
+    char dir[PATH_SIZE];
+    if (!golden_path(dir, golden_dir, scene, "", "", e) || !make_dirs(dir, e))
+        return -1;
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC), r = -1;
+    if (fd >= 0)
+        do
+            r = flock(fd, LOCK_EX);
+        while (r != 0 && errno == EINTR);
+    if (r == 0)
+        return fd;
+    err_set(e, "%s: cannot lock: %s", dir, strerror(errno));
+    if (fd >= 0)
+        close(fd);
+    return -1;
+}
+
+/* The image goes first: until the manifest follows, its hash there is another's, and golden_read()
+ * refuses the pair. */
+bool golden_write(const char *golden_dir, const char *scene, const char *engine,
+                  const struct moments *m, json_t *manifest, struct err *e)
+{
+    char exr[PATH_SIZE], path[PATH_SIZE], sha256[65];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
+    const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
+    bool ok = all != NULL && moments_write(exr, m, attrs, 2, e) && sha256_file(exr, sha256, e);
+    if (ok) {
+        ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
+             json_object_set(all, engine, entry) == 0;
+        ok = ok ? json_write(path, all, e) : err_set(e, "%s: out of memory", path);
+    }
+    json_decref(entry);
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
+static bool check_number(const json_t *entry, const char *key, int want, const char *where,
+                         struct err *e)
+{
+    const json_t *v = json_object_get(entry, key);
+    if (!json_is_integer(v))
+        return err_set(e, "%s: '%s' is missing", where, key);
+    if (json_integer_value(v) != want)
+        return err_set(e, "%s: golden has %s %lld, the suite wants %d: make it again", where, key,
+                       (long long)json_integer_value(v), want);
+    return true;
+}
+
+static bool check_string(const json_t *entry, const char *key, const char *want, const char *where,
+                         const char *why, struct err *e)
+{
+    const char *v = json_string_value(json_object_get(entry, key));
+    if (v == NULL)
+        return err_set(e, "%s: '%s' is missing", where, key);
+    return strcmp(v, want) == 0 || err_set(e, "%s: %s", where, why);
+}
+
+/* Made for this scene file and these settings of the suite. */
+static bool check_entry(const json_t *entry, const struct suite_scene *scene,
+                        const struct suite_reference *ref, const char *where, struct err *e)
+{
+    if (!check_string(entry, "scene_sha256", scene->sha256, where,
+                      "stale golden: the scene file has changed since: make it again", e) ||
+        !check_string(entry, "engine", ref->engine, where, "golden of another engine", e) ||
+        !check_number(entry, "width", scene->width, where, e) ||
+        !check_number(entry, "height", scene->height, where, e) ||
+        !check_number(entry, "depth", scene->depth, where, e) ||
+        !check_number(entry, "replicates", ref->replicates, where, e) ||
+        !check_number(entry, "spp", ref->spp, where, e) ||
+        !check_number(entry, "subgrid", ref->subgrid, where, e))
+        return false;
+    if (strcmp(ref->engine, "truth") != 0)
+        return true;
+    return check_string(entry, "kind", ref->kind, where, "golden of another closed form", e) &&
+           (json_equal(json_object_get(entry, "values"), ref->values) ||
+            err_set(e, "%s: stale golden: the closed form's values have changed: make it again",
+                    where));
+}
+
+/* The image is what its manifest says. */
+static bool check_moments(const struct moments *m, const json_t *entry,
+                          const struct suite_scene *scene, const struct suite_reference *ref,
+                          const char *exr, struct err *e)
+{
+    if (m->width != scene->width || m->height != scene->height)
+        return err_set(e, "%s: %d x %d pixels, its manifest says %d x %d", exr, m->width, m->height,
+                       scene->width, scene->height);
+    if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
+        return false;
+    double n = strcmp(m->unit, "exact") == 0 ? 1 : ref->replicates;
+    for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
+        if (m->n[p] != n)
+            return err_set(e, "%s: pixel %zu holds %g observations, not %g", exr, p, m->n[p], n);
+    return true;
+}
+
+bool golden_read(const char *golden_dir, const struct suite_scene *scene,
+                 const struct suite_reference *ref, struct moments *out, json_t **manifest,
+                 struct err *e)
+{
+    char exr[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32], sha256[65];
+    if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
+        !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
+        return false;
+    json_t *all = load_manifest(path, e);
+    if (all == NULL)
+        return false;
+    snprintf(where, sizeof where, "%s: %s", path, ref->engine);
+    json_t *entry = json_object_get(all, ref->engine);
+    struct moments m = {0};
+    bool ok = json_is_object(entry) ||
+              err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
+    ok = ok && check_entry(entry, scene, ref, where, e) && sha256_file(exr, sha256, e) &&
+         check_string(entry, "exr_sha256", sha256, exr, "not the image that its manifest describes",
+                      e) &&
+         moments_read(exr, &m, NULL, e);
+    if (ok && !check_moments(&m, entry, scene, ref, exr, e)) {
+        moments_free(&m);
+        ok = false;
+    }
+    if (ok) {
+        *out = m;
+        *manifest = json_incref(entry);
+    }
+    json_decref(all);
+    return ok;
+}

@@ -1,0 +1,127 @@
+#include "reference.h"
+
+#include "job.h"
+#include "truth.h"
+
+#include "../renderer/collada.h"
+#include "../renderer/fs.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+/* One round on 31 bits; each step can be undone, so different x stay different. */
+static uint32_t mix31(uint32_t x, uint32_t key)
+{
+    const uint32_t mask = 0x7fffffff;
+    x = (x + key) & mask;
+    x ^= x >> 15;
+    x = (x * 0x2c1b3c6d) & mask;
+    x ^= x >> 12;
+    x = (x * 0x297a2d39) & mask;
+    return x ^ x >> 15;
+}
+
+uint32_t replicate_seed(uint32_t seed, int k)
+{
+    uint32_t x = (uint32_t)k & 0x7fffffff;
+    do {
+        x = mix31(x, seed & 0xffff);
+        x = mix31(x, seed >> 16);
+        x = mix31(x, seed * 0x9e3779b1 >> 8);
+    } while (x == 0);
+    return x;
+}
+
+static double clock_s(clockid_t id)
+{
+    struct timespec t;
+    clock_gettime(id, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Of this process and of all children that were waited for. */
+static double cpu_s(void)
+{
+    struct rusage r;
+    getrusage(RUSAGE_CHILDREN, &r);
+    return clock_s(CLOCK_PROCESS_CPUTIME_ID) + (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
+           1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
+}
+
+/* An engine, in a directory of its own that stays for inspection if it fails. */
+static bool engine_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                          const struct reference_options *opt, struct moments *out,
+                          json_t *manifest, struct err *e)
+{
+    char dir[4096];
+    int n = snprintf(dir, sizeof dir, "%s/%s-%s-XXXXXX", opt->work_dir, scene->name, ref->engine);
+    if (n < 0 || (size_t)n >= sizeof dir)
+        return err_set(e, "%.64s...: path too long", opt->work_dir);
+    if (mkdtemp(dir) == NULL)
+        return err_set(e, "%s: cannot make directory: %s", dir, strerror(errno));
+    struct scene s = {0};
+    struct camera camera;
+    struct reference_job job = {
+        .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera, .dir = dir};
+    bool ok = collada_load(scene->dae, DIALECT_AUTO, &s, e);
+    if (ok) {
+        ok = camera_init(&camera, &s, scene->width, scene->height, e) ||
+             err_prefix(e, "%s", scene->dae);
+        if (ok)
+            ok = strcmp(ref->engine, "cycles") == 0 ? cycles_render(&job, out, manifest, e)
+                                                    : povray_render(&job, out, manifest, e);
+        scene_free(&s);
+    }
+    if (ok && !remove_tree(dir, e)) {
+        moments_free(out);
+        return false;
+    }
+    if (!ok && rmdir(dir) != 0) {
+        struct err what = *e;
+        err_set(e, "%.900s (see %s)", what.msg, dir);
+    }
+    return ok;
+}
+
+bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                      const struct reference_options *opt, struct moments *out, json_t **manifest,
+                      struct err *e)
+{
+    bool is_truth = strcmp(ref->engine, "truth") == 0;
+    bool is_engine = strcmp(ref->engine, "cycles") == 0 || strcmp(ref->engine, "povray") == 0;
+    if (!is_truth && !is_engine)
+        return err_set(e, "%s: unknown reference engine '%s'", scene->name, ref->engine);
+    double wall0 = clock_s(CLOCK_MONOTONIC), cpu0 = cpu_s();
+    char date[32];
+    time_t now = time(NULL);
+    struct tm tm;
+    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
+    json_t *m = json_object();
+    if (is_truth ? !truth_render(scene, ref, out, e) : !engine_render(scene, ref, opt, out, m, e)) {
+        json_decref(m);
+        return err_prefix(e, "%s, %s", scene->name, ref->engine);
+    }
+    json_t *common = json_pack("{ss,ss,ss,ss,ss,sf,si,si,si,si,si,si,sf,sf}", "scene", scene->name,
+                               "scene_sha256", scene->sha256, "engine", ref->engine, "date", date,
+                               "unit", out->unit, "spp_of_unit", out->spp, "width", scene->width,
+                               "height", scene->height, "depth", scene->depth, "replicates",
+                               ref->replicates, "spp", ref->spp, "subgrid", ref->subgrid, "cpu_s",
+                               cpu_s() - cpu0, "wall_s", clock_s(CLOCK_MONOTONIC) - wall0);
+    bool ok = common != NULL && json_object_update(m, common) == 0;
+    if (ok && is_truth)
+        ok = json_object_set_new(m, "kind", json_string(ref->kind)) == 0 &&
+             json_object_set(m, "values", ref->values) == 0;
+    json_decref(common);
+    if (!ok) {
+        json_decref(m);
+        moments_free(out);
+        return err_set(e, "%s, %s: out of memory", scene->name, ref->engine);
+    }
+    *manifest = m;
+    return true;
+}
