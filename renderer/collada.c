@@ -252,6 +252,8 @@ static bool read_scene(struct loader *ld)
     for (const xmlNode *c = first_child(visual); c != NULL; c = next_sibling(c))
         if (is_element(c, "node") && !walk(ld, c, &top))
             return false;
+    if (scene_num_primitives(&ld->scene) == 0)
+        return fail_at(ld, visual, "nothing to render: no triangles, no spheres");
     ld->scene.dialect = ld->dialect;
     if (ld->dialect == DIALECT_COLLADA)
         return scene_finish(&ld->scene, ld->path, ld->err);

@@ -179,13 +179,13 @@ static bool append_area_lights(struct scene *s, const char *where, struct err *e
                                                         .area = (float)area};
         }
         for (uint32_t k = o->first_sphere; k < o->first_sphere + o->num_spheres; k++) {
-            double r = s->spheres[k].radius;
+            double r = s->spheres[k].radius, sphere_area = 4 * pi * r * r;
+            if (!(sphere_area <= FLT_MAX))
+                return err_set(e, "%s: object '%s': emits, but its area is %g", where, o->name,
+                               sphere_area);
             s->sphere_light[k] = (int32_t)s->num_lights;
-            if (!(4 * pi * r * r <= FLT_MAX))
-                return err_set(e, "%s: object '%s': emits, but its area is out of range", where,
-                               o->name);
             s->lights[s->num_lights++] = (struct light){
-                .kind = LIGHT_SPHERE, .first = k, .count = 1, .area = (float)(4 * pi * r * r)};
+                .kind = LIGHT_SPHERE, .first = k, .count = 1, .area = (float)sphere_area};
         }
     }
     return true;
