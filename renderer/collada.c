@@ -76,11 +76,11 @@ static bool read_lookat(struct loader *ld, const xmlNode *n, mat4 *out)
     return true;
 }
 
-/* The element's matrix; *is_transform tells if it is one of the transforms. */
-static bool read_transform(struct loader *ld, const xmlNode *n, bool *is_transform, mat4 *out)
+/* The element's matrix, which is the identity for what is no transform. */
+static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
 {
     double v[4];
-    *is_transform = true;
+    *out = mat4_identity();
     if (is_element(n, "matrix"))
         return read_matrix(ld, n, out);
     if (is_element(n, "lookat"))
@@ -108,7 +108,6 @@ static bool read_transform(struct loader *ld, const xmlNode *n, bool *is_transfo
         *out = mat4_rotate(axis, v[3] * (3.14159265358979323846 / 180));
         return true;
     }
-    *is_transform = false;
     return true;
 }
 
@@ -192,12 +191,10 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
     if (ld->num_nodes++ >= MAX_NODES)
         return fail_at(ld, node, "more than %d instances of nodes", MAX_NODES);
     for (const xmlNode *c = first_child(node); c != NULL; c = next_sibling(c)) {
-        bool is_transform;
         mat4 m;
-        if (!read_transform(ld, c, &is_transform, &m))
+        if (!read_transform(ld, c, &m))
             return false;
-        if (is_transform)
-            at.to_world = mat4_mul(&at.to_world, &m);
+        at.to_world = mat4_mul(&at.to_world, &m);
     }
     for (const xmlNode *c = first_child(node); c != NULL; c = next_sibling(c))
         if (!read_content(ld, c, &at))
