@@ -1,43 +1,19 @@
-/* Drives POV-Ray. A replicate is
- *
- *     total_i = fine + (indirect_i - direct_i)
- *
- * fine: the direct light, one deterministic picture for all replicates, from many shifted windows
- * and a fine quadrature of the lamps. indirect_i and direct_i: two pictures that differ only in
- * whether radiosity is on, turned by a random rotation, with a block size, lamp points and a
- * sub-pixel shift of their own, since POV-Ray has no seed. Their difference is the indirect light:
- * a glowing lamp in view has the same value in both and drops out.
- *
- * Pictures are half-float EXR. Each is rendered at a scale of its own within one octave, so that
- * rounding (at most 2^-11 of a value) is a different one in each and averages out. */
+/* Drives POV-Ray: the pictures of povray_picture.h, rendered side by side and folded. */
 #include "job.h"
 
-#include "export_povray.h"
+#include "povray_picture.h"
 #include "process.h"
 
 #include "../renderer/fs.h"
-#include "../renderer/sampler.h"
 
 #include <assert.h>
 #include <errno.h>
-#include <gsl/gsl_math.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    WINDOWS = 32,      /* pictures in `fine` */
-    WINDOW_GRID = 2,   /* sub-pixels a side in each */
-    WINDOW_CELLS = 16, /* spotlights a side for one lamp, 2-point Gauss rule */
-    JITTER_CELLS = 3,  /* the same in a replicate, stratified random */
-    MIN_BLOCK = 4,
-    NUM_BLOCKS = 61 /* block sizes 4 .. 64 */
-};
-/* An emitter of radiance plan->radiance comes out as 16 .. 32, far from half's 6e-5 and 65504. */
-#define TOP_VALUE 16.0
-#define ROULETTE  0.1
-
-/* What the workers share. Task t < WINDOWS is a window, the rest are replicates. */
+/* What the workers share. Task t < POVRAY_WINDOWS is a window, the rest are replicates. */
 struct crew {
     const struct reference_job *job;
     const struct povray_plan *plan;
@@ -48,100 +24,42 @@ struct crew {
     pthread_mutex_t lock;
     int next;
     bool failed;
-    double cpu_s;
     struct err first; /* of the failures */
 };
 
-/* One run of the engine. */
-struct picture {
-    char name[32]; /* sub-directory of the job's */
-    int grid;      /* sub-pixels a side */
-    int block;     /* +BS */
-    struct povray_variant variant;
-};
-
-/* Uniformly random rotation from three uniform numbers, by way of a unit quaternion [Shoemake92].
- */
-static void random_rotation(const float u[3], double r[3][3])
+static struct povray_picture window(const struct crew *w, int j)
 {
-    double a = sqrt(1 - (double)u[0]), b = sqrt((double)u[0]);
-    double x = a * sin(2 * M_PI * (double)u[1]), y = a * cos(2 * M_PI * (double)u[1]);
-    double z = b * sin(2 * M_PI * (double)u[2]), w = b * cos(2 * M_PI * (double)u[2]);
-    const double m[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-                            {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-                            {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
-    memcpy(r, m, sizeof m);
+    return povray_window(w->plan, w->job->suite->width, w->job->suite->height, j);
 }
 
-static int block_size(int replicate)
+static struct povray_picture replicate(const struct crew *w, int i, bool indirect)
 {
-    return MIN_BLOCK + 17 * replicate % NUM_BLOCKS;
+    return povray_replicate(w->plan, w->job->suite->width, w->job->suite->height,
+                            w->job->ref->subgrid, i, replicate_seed(w->job->opt->seed, i),
+                            indirect);
 }
 
-/* Bits of i < 32 in reverse: second coordinate of a Hammersley set. */
-static int reverse5(int i)
-{
-    return (i & 1) << 4 | (i & 2) << 2 | (i & 4) | (i & 8) >> 2 | (i & 16) >> 4;
-}
-
-/* Shift by (u, v) - 1/2 sub-pixels. */
-static void set_shift(const struct crew *w, struct picture *p, double u, double v)
-{
-    p->variant.shift_x = (u - 0.5) / (p->grid * w->job->suite->width);
-    p->variant.shift_y = (v - 0.5) / (p->grid * w->job->suite->height);
-}
-
-static double scale_within_octave(const struct crew *w, double u)
-{
-    return TOP_VALUE / w->plan->radiance * exp2(u);
-}
-
-static void window_picture(const struct crew *w, int j, struct picture *p)
-{
-    *p = (struct picture){.grid = WINDOW_GRID, .block = 32, .variant = povray_variant_plain()};
-    snprintf(p->name, sizeof p->name, "fine_%02d", j);
-    set_shift(w, p, (j + 0.5) / WINDOWS, (reverse5(j) + 0.5) / WINDOWS);
-    p->variant.lamp_cells = WINDOW_CELLS;
-    p->variant.indirect = w->plan->constant;
-    p->variant.roulette = 0;
-    p->variant.scale = scale_within_octave(w, (j + 0.5) / WINDOWS);
-}
-
-static void replicate_picture(const struct crew *w, int i, bool indirect, struct picture *p)
-{
-    uint32_t seed = replicate_seed(w->job->opt->seed, i);
-    struct sample4 a = sampler_get(seed, 0, 0, 0, 0), b = sampler_get(seed, 0, 1, 0, 0);
-    *p = (struct picture){.grid = w->job->ref->subgrid,
-                          .block = block_size(i),
-                          .variant = {.lamp_cells = JITTER_CELLS,
-                                      .lamp_jitter = true,
-                                      .lamp_seed = seed,
-                                      .indirect = indirect,
-                                      .roulette = ROULETTE,
-                                      .scale = scale_within_octave(w, (double)a.u[3])}};
-    snprintf(p->name, sizeof p->name, "%s_%03d", indirect ? "indirect" : "direct", i);
-    random_rotation(a.u, p->variant.rotation);
-    set_shift(w, p, (double)b.u[0], (double)b.u[1]);
-}
-
-/* The log must say that radiosity kept no sample; a cache would be a bias that nobody sees. */
+/* A picture with radiosity must say in its log that no sample was kept; a cache would be a bias that
+ * nobody sees. */
 static bool check_log(const char *path, struct err *e)
 {
     FILE *f = fopen(path, "r");
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     char line[512];
-    long kept = 0;
-    while (fgets(line, sizeof line, f) != NULL)
-        if (sscanf(line, " retained for re-use: %ld", &kept) == 1 && kept != 0)
-            break;
+    long kept = -1;
+    while (kept < 0 && fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, " retained for re-use: %ld", &kept) != 1)
+            kept = -1;
     fclose(f);
+    if (kept < 0)
+        return err_set(e, "%s: POV-Ray does not say that it traced indirect light", path);
     return kept == 0 || err_set(e, "%s: POV-Ray kept %ld radiosity samples for re-use", path, kept);
 }
 
 /* out += sign x the box-averaged picture / scale. */
-static bool add_picture(const struct crew *w, const struct picture *p, const char *path, float sign,
-                        float *out, struct err *e)
+static bool add_picture(const struct crew *w, const struct povray_picture *p, const char *path,
+                        float sign, float *out, struct err *e)
 {
     int width = w->job->suite->width, height = w->job->suite->height, k = p->grid;
     struct image im = {0};
@@ -174,7 +92,7 @@ static bool add_picture(const struct crew *w, const struct picture *p, const cha
 enum { NUM_ARGS = 16 };
 
 /* The command line, in text that belongs to the caller. */
-static void command_line(const struct crew *w, const struct picture *p, char text[4][32],
+static void command_line(const struct crew *w, const struct povray_picture *p, char text[4][32],
                          const char *argv[NUM_ARGS])
 {
     snprintf(text[0], sizeof text[0], "+W%d", p->grid * w->job->suite->width);
@@ -187,7 +105,8 @@ static void command_line(const struct crew *w, const struct picture *p, char tex
     memcpy(argv, args, sizeof args);
 }
 
-static bool render(struct crew *w, const struct picture *p, float sign, float *out, struct err *e)
+static bool render(struct crew *w, const struct povray_picture *p, float sign, float *out,
+                   struct err *e)
 {
     char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
     const char *argv[NUM_ARGS];
@@ -207,33 +126,23 @@ static bool render(struct crew *w, const struct picture *p, float sign, float *o
     if (!ok)
         return false;
     command_line(w, p, text, argv);
-    struct process_usage usage;
-    if (!process_run(
-            &(struct process){
-                .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s},
-            &usage, e))
-        return false;
-    if (!check_log(log, e) || !add_picture(w, p, exr, sign, out, e) || !remove_tree(dir, e))
-        return false;
-    pthread_mutex_lock(&w->lock);
-    w->cpu_s += usage.cpu_s;
-    pthread_mutex_unlock(&w->lock);
-    return true;
+    struct process run = {
+        .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
+    bool radiosity = p->variant.indirect && w->plan->recursion > 0;
+    return process_run(&run, NULL, e) && (!radiosity || check_log(log, e)) &&
+           add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
 }
 
 static bool run_task(struct crew *w, int t, struct err *e)
 {
     float *out = w->result + (size_t)t * w->size;
-    struct picture p;
-    if (t < WINDOWS) {
-        window_picture(w, t, &p);
-        return render(w, &p, 1, out, e);
+    if (t < POVRAY_WINDOWS) {
+        struct povray_picture fine = window(w, t);
+        return render(w, &fine, 1, out, e);
     }
-    replicate_picture(w, t - WINDOWS, true, &p);
-    if (!render(w, &p, 1, out, e))
-        return false;
-    replicate_picture(w, t - WINDOWS, false, &p);
-    return render(w, &p, -1, out, e);
+    struct povray_picture indirect = replicate(w, t - POVRAY_WINDOWS, true);
+    struct povray_picture direct = replicate(w, t - POVRAY_WINDOWS, false);
+    return render(w, &indirect, 1, out, e) && render(w, &direct, -1, out, e);
 }
 
 static void *work(void *arg)
@@ -305,73 +214,84 @@ static bool describe(const struct crew *w, json_t *manifest, struct err *e)
 {
     char version[128], sha256[65], text[4][32], command[512] = "povray";
     const char *argv[NUM_ARGS];
-    struct picture p;
-    int replicates = w->num_tasks - WINDOWS;
+    int replicates = w->num_tasks - POVRAY_WINDOWS;
     if (!engine_version(w, version, e) || !sha256_file(w->program, sha256, e))
         return false;
-    if (replicates > 0)
-        replicate_picture(w, 0, true, &p);
-    else
-        window_picture(w, 0, &p);
-    command_line(w, &p, text, argv);
+    struct povray_picture first = replicates > 0 ? replicate(w, 0, true) : window(w, 0);
+    command_line(w, &first, text, argv);
     for (int i = 1; argv[i] != NULL; i++)
         snprintf(command + strlen(command), sizeof command - strlen(command), " %s", argv[i]);
     json_t *seeds = json_array(), *blocks = json_array();
     for (int i = 0; i < replicates; i++) {
         json_array_append_new(seeds, json_integer(replicate_seed(w->job->opt->seed, i)));
-        json_array_append_new(blocks, json_integer(block_size(i)));
+        json_array_append_new(blocks, json_integer(replicate(w, i, true).block));
     }
-    json_t *settings = json_pack(
-        "{s:s, s:i, s:b, s:f, s:[f,f], s:{s:i, s:i, s:s}, s:f}", "lit_by",
-        w->plan->sources ? "light sources" : "geometry", "recursion_limit", w->plan->recursion,
-        "exact", replicates == 0, "roulette", replicates > 0 ? ROULETTE : 0.0, "scale",
-        scale_within_octave(w, 0), scale_within_octave(w, 1), "fine", "windows", (int)WINDOWS,
-        "subgrid", (int)WINDOW_GRID, "lamps", "16 x 16, 2-point Gauss", "cpu_s", w->cpu_s);
-    if (settings != NULL && replicates > 0)
-        json_object_set_new(settings, "replicate",
-                            json_pack("{s:i, s:s, s:o}", "subgrid", w->job->ref->subgrid, "lamps",
-                                      "3 x 3, stratified random", "block_sizes",
-                                      json_incref(blocks)));
-    bool ok = settings != NULL &&
+    double top = POVRAY_TOP_VALUE / w->plan->radiance;
+    json_t *settings = json_pack("{s:s, s:i, s:[f,f], s:{s:i, s:i, s:i}}", "lit_by",
+                                 w->plan->sources ? "light sources" : "geometry", "recursion_limit",
+                                 w->plan->recursion, "scale", top, 2 * top, "fine", "windows",
+                                 (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
+                                 "gauss2_lamp_cells", (int)POVRAY_WINDOW_CELLS);
+    json_t *scheme = replicates > 0
+                         ? json_pack("{s:i, s:i, s:f, s:O}", "subgrid", w->job->ref->subgrid,
+                                     "jittered_lamp_cells", (int)POVRAY_JITTER_CELLS, "roulette",
+                                     POVRAY_ROULETTE, "block_sizes", blocks)
+                         : json_string("none: the picture has no noise");
+    bool ok = json_object_set(settings, "replicate", scheme) == 0 &&
               json_object_set_new(manifest, "version", json_string(version)) == 0 &&
               json_object_set_new(manifest, "binary_sha256", json_string(sha256)) == 0 &&
               json_object_set_new(manifest, "command", json_string(command)) == 0 &&
               json_object_set(manifest, "settings", settings) == 0 &&
               json_object_set(manifest, "seeds", seeds) == 0;
     json_decref(settings);
+    json_decref(scheme);
     json_decref(seeds);
     json_decref(blocks);
     return ok || err_set(e, "POV-Ray manifest: out of memory");
+}
+
+/* Replicates that repeat would make a standard error that is too small. */
+static bool check_different(const struct crew *w, struct err *e)
+{
+    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++)
+        for (int u = POVRAY_WINDOWS; u < t; u++)
+            if (memcmp(w->result + (size_t)t * w->size, w->result + (size_t)u * w->size,
+                       w->size * sizeof *w->result) == 0)
+                return err_set(e, "POV-Ray: replicates %d and %d are the same", u - POVRAY_WINDOWS,
+                               t - POVRAY_WINDOWS);
+    return true;
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
 static bool fold(const struct crew *w, struct moments *out, struct err *e)
 {
     const struct suite_scene *suite = w->job->suite;
+    bool exact = w->num_tasks == POVRAY_WINDOWS;
+    struct moments m = {0};
     double *fine = calloc(w->size, sizeof *fine);
     if (fine == NULL)
         return err_set(e, "POV-Ray pictures: out of memory");
-    if (!moments_alloc(out, suite->width, suite->height, e)) {
+    if (!check_different(w, e) || !moments_alloc(&m, suite->width, suite->height, e)) {
         free(fine);
         return false;
     }
-    for (int t = 0; t < WINDOWS; t++)
+    for (int t = 0; t < POVRAY_WINDOWS; t++)
         for (size_t i = 0; i < w->size; i++)
-            fine[i] += (double)w->result[(size_t)t * w->size + i] / WINDOWS;
-    bool exact = w->num_tasks == WINDOWS;
-    strcpy(out->unit, exact ? "exact" : "replicate");
-    out->spp = exact ? 0 : w->job->ref->subgrid * w->job->ref->subgrid;
-    for (int t = WINDOWS; t < w->num_tasks; t++) {
+            fine[i] += (double)w->result[(size_t)t * w->size + i] / POVRAY_WINDOWS;
+    strcpy(m.unit, exact ? "exact" : "replicate");
+    m.spp = exact ? 0 : w->job->ref->subgrid * w->job->ref->subgrid;
+    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++) {
         float *sum = w->result + (size_t)t * w->size;
         for (size_t i = 0; i < w->size; i++)
             sum[i] = (float)(fine[i] + (double)sum[i]);
-        moments_add_image(out, sum);
+        moments_add_image(&m, sum);
     }
     for (size_t i = 0; exact && i < w->size; i++) {
-        out->mean[i] = fine[i];
-        out->n[i / 3] = 1;
+        m.mean[i] = fine[i];
+        m.n[i / 3] = 1;
     }
     free(fine);
+    *out = m;
     return true;
 }
 
@@ -389,7 +309,7 @@ bool povray_render(const struct reference_job *job, struct moments *out, json_t 
     struct crew w = {.job = job,
                      .plan = &plan,
                      .program = program,
-                     .num_tasks = WINDOWS + (exact ? 0 : job->ref->replicates),
+                     .num_tasks = POVRAY_WINDOWS + (exact ? 0 : job->ref->replicates),
                      .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
     w.result = calloc((size_t)w.num_tasks * w.size, sizeof *w.result);
     if (w.result == NULL)
