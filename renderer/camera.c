@@ -12,8 +12,8 @@ enum { CGL_WIDTH = 800, CGL_HEIGHT = 600 };
 
 static void place_cgl(struct camera *c, const struct scene *s)
 {
-    vec3 target = scale(add(s->bounds_min, s->bounds_max), 0.5f);
-    float distance = 1.5f * length(sub(s->bounds_max, s->bounds_min));
+    vec3 target = scale(add(s->frame_min, s->frame_max), 0.5f);
+    float distance = 1.5f * length(sub(s->frame_max, s->frame_min));
     c->backward = normalize(s->camera.backward);
     c->eye = mad(target, distance, c->backward);
     vec3 up = v3(0, 1, 0);

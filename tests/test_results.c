@@ -367,17 +367,17 @@ static json_t *table_results(void)
     return results_of(4, (json_t *[]){a, b, c, parse(error_claim)});
 }
 
-/* Widths by the rule: 10, 7, 26, 7, 8, 12, 10 columns, two spaces between. */
+/* Widths by the rule: 10, 10, 7, 26, 7, 8, 12, 10 columns, two spaces between. */
 static void table_for_a_terminal(void **state)
 {
     (void)state;
     /* clang-format off */
     static const char wanted[] =
-        "scene       against     difference % [interval]    MDB %  margin %  verdict       expected    ok\n"
-        "41_cornell  cycles      +0.030 [-0.100, +0.200]    0.400     0.500  EQUIVALENT    EQUIVALENT  ok\n"
-        "91_l\xc3\xa4ngs    truth    -25.000 [-26.000, -23.990]    1.230     2.000  DIFFERENT     DIFFERENT   ok\n"
-        "a|b         cycles    +0.000 [-50.000, +50.000]  125.000     0.500  INCONCLUSIVE  EQUIVALENT  WRONG\n"
-        "12_furnace  povray                            -        -         -  NOT JUDGED    EQUIVALENT  ERROR\n"
+        "scene       tested      against     difference % [interval]    MDB %  margin %  verdict       expected    ok\n"
+        "41_cornell  pathtracer  cycles      +0.030 [-0.100, +0.200]    0.400     0.500  EQUIVALENT    EQUIVALENT  ok\n"
+        "91_l\xc3\xa4ngs    pathtracer  truth    -25.000 [-26.000, -23.990]    1.230     2.000  DIFFERENT     DIFFERENT   ok\n"
+        "a|b         pathtracer  cycles    +0.000 [-50.000, +50.000]  125.000     0.500  INCONCLUSIVE  EQUIVALENT  WRONG\n"
+        "12_furnace  pathtracer  povray                            -        -         -  NOT JUDGED    EQUIVALENT  ERROR\n"
         "12_furnace against povray: povray: not installed\n";
     /* clang-format on */
     json_t *root = table_results();
@@ -393,16 +393,16 @@ static void table_in_markdown(void **state)
 {
     (void)state;
     static const char wanted[] =
-        "| scene | against | difference % [interval] | MDB % | margin % | verdict | expected | ok "
+        "| scene | tested | against | difference % [interval] | MDB % | margin % | verdict | expected | ok "
         "|\n"
-        "|---|---|--:|--:|--:|---|---|---|\n"
-        "| 41\\_cornell | cycles | +0.030 [-0.100, +0.200] | 0.400 | 0.500 | EQUIVALENT | "
+        "|---|---|---|--:|--:|--:|---|---|---|\n"
+        "| 41\\_cornell | pathtracer | cycles | +0.030 [-0.100, +0.200] | 0.400 | 0.500 | EQUIVALENT | "
         "EQUIVALENT | ok |\n"
-        "| 91\\_l\xc3\xa4ngs | truth | -25.000 [-26.000, -23.990] | 1.230 | 2.000 | DIFFERENT | "
+        "| 91\\_l\xc3\xa4ngs | pathtracer | truth | -25.000 [-26.000, -23.990] | 1.230 | 2.000 | DIFFERENT | "
         "DIFFERENT | ok |\n"
-        "| a\\|b | cycles | +0.000 [-50.000, +50.000] | 125.000 | 0.500 | INCONCLUSIVE | "
+        "| a\\|b | pathtracer | cycles | +0.000 [-50.000, +50.000] | 125.000 | 0.500 | INCONCLUSIVE | "
         "EQUIVALENT | **wrong** |\n"
-        "| 12\\_furnace | povray | - | - | - | NOT JUDGED | EQUIVALENT | **error** |\n"
+        "| 12\\_furnace | pathtracer | povray | - | - | - | NOT JUDGED | EQUIVALENT | **error** |\n"
         "\n- 12\\_furnace against povray: povray: not installed\n";
     json_t *root = table_results();
     char *text = NULL;

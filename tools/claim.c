@@ -109,7 +109,7 @@ json_t *results_new(int argc, char **argv, double alpha)
 {
     char command[4096] = "assay", date[32], machine[192];
     size_t n = strlen(command);
-    for (int i = 1; i < argc && n < sizeof command - 1; i++) {
+    for (int i = 0; i < argc && n < sizeof command - 1; i++) {
         int added = snprintf(command + n, sizeof command - n, " %s", argv[i]);
         n += added > 0 ? (size_t)added : 0;
     }

@@ -116,9 +116,9 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     write_verdict(f, claim, num);
     fprintf(f,
-            "<p class=\"lede\">The chance that noise alone makes any claim of this page DIFFERENT "
-            "is at "
-            "most %.3g (family-wise alpha), and so is the chance of any wrong EQUIVALENT.</p>\n",
+            "<p class=\"lede\">The chance that noise alone makes any claim of this page "
+            "DIFFERENT is at most %.3g (family-wise alpha), and so is the chance of any wrong "
+            "EQUIVALENT.</p>\n",
             member_number(root, "alpha"));
     fputs("<dl class=\"facts\">\n", f);
     write_fact(f, "Date", member_text(root, "date"));
@@ -144,6 +144,8 @@ static void write_row(FILE *f, const struct claim_ref *claim)
             claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"", claim->index);
     html_text(f, member_text(c, "scene"));
     fputs("</a></th><td>", f);
+    html_text(f, member_text(c, "a"));
+    fputs("</td><td>", f);
     report_reference(f, claim);
     fputs("</td><td>", f);
     report_badge(f, claim);
@@ -175,36 +177,33 @@ static void write_row(FILE *f, const struct claim_ref *claim)
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
     fputs(
-        "<section>\n<h2>The claims</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
-        "aria-label=\"Table of claims\">\n<table id=\"claims\"><thead><tr><th scope=\"col\">Scene"
-        "</th><th scope=\"col\">Against</th><th scope=\"col\">Verdict</th><th "
-        "scope=\"col\">Expected"
-        "</th><th scope=\"col\">Interval and margin</th><th scope=\"col\" class=\"num\">Difference "
-        "%"
-        "</th><th scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %"
-        "</th><th scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
-        "class=\"num\">Time</th>"
-        "</tr></thead>\n<tbody>\n",
+        "<section>\n"
+        "<h2>The claims</h2>\n"
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
+        "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
+        "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
+        "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">Interval and "
+        "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
+        "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
+        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
+        "class=\"num\">Time</th></tr></thead>\n"
+        "<tbody>\n",
         f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
     fputs(
-        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Difference</b>: how much brighter (+) "
-        "or "
-        "darker (−) our image is than the reference, on average. <b>Interval</b>: where "
-        "the "
-        "true difference lies, given the noise of both. <b>Margin</b>: a difference up to this "
-        "size "
-        "counts as equal; it is declared for each scene before anything is rendered. <b>MDB</b>, "
-        "the "
-        "minimum detectable bias: a true difference of this size would have come out DIFFERENT "
-        "with a "
-        "probability of 95 %. In the drawing the band is the margin, the line is the interval and "
-        "the "
-        "dot is the difference; an arrow head points to what lies outside. A verdict is EQUIVALENT "
-        "only where the intervals of the image and of every tile lie inside their margins, "
-        "DIFFERENT "
-        "where one lies outside, and INCONCLUSIVE where there are too few samples to tell.</p>\n"
+        "</tbody></table>\n"
+        "</div>\n"
+        "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
+        "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
+        "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
+        "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
+        "detectable bias: a true difference of this size would have come out DIFFERENT with a "
+        "probability of 95 %. In the drawing the band is the margin, the line is the interval "
+        "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
+        "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
+        "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
+        "samples to tell.</p>\n"
         "</section>\n",
         f);
 }
@@ -256,8 +255,7 @@ static void write_layers(struct page *p)
     }
     if (!all)
         fputs("<p class=\"caption\">To stay below 5 MB this page leaves out the numbers behind "
-              "some of "
-              "its pictures; exposure and pixel values are not offered there.</p>\n",
+              "some of its pictures; exposure and pixel values are not offered there.</p>\n",
               p->f);
 }
 

@@ -168,8 +168,7 @@ static bool write_z(struct page *p, const struct claim_ref *claim, const struct 
     }
     fputs("<figcaption><b>The same difference in units of its noise (z map).</b> One unit is one "
           "standard error: the size a difference has by chance alone. If the engines agree, this "
-          "is an "
-          "even mix of pale red and blue, and about 5 of 100 pixels lie beyond ±2",
+          "is an even mix of pale red and blue, and about 5 of 100 pixels lie beyond ±2",
           p->f);
     if (noisy > 0)
         fprintf(p->f, " (here %.1f)", 100 * (double)beyond / (double)noisy);
@@ -186,8 +185,7 @@ static void write_histogram(FILE *f, const json_t *claim)
     fputs("<figure class=\"map\">", f);
     if (h.num_tiles == 0) {
         fputs("<figcaption><b>No p-values.</b> No tile has any noise, so there is nothing to test; "
-              "the "
-              "differences are exact.</figcaption></figure>\n",
+              "the differences are exact.</figcaption></figure>\n",
               f);
         return;
     }

@@ -227,8 +227,7 @@ static bool write_images(struct page *p, const struct scene *s, const char *scen
                           : " is shown at 80 % of white)",
           p->f);
     fputs(", then the usual sRGB curve. Each square is one pixel. If the engines agree you should "
-          "see "
-          "no difference but the grain.</p>\n",
+          "see no difference but the grain.</p>\n",
           p->f);
     return true;
 }

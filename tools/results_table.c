@@ -5,17 +5,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NUM_COLUMNS = 8 };
+enum {
+    SCENE,
+    TESTED,
+    AGAINST,
+    DIFFERENCE,
+    MDB,
+    MARGIN,
+    VERDICT,
+    EXPECTED,
+    MARK,
+    NUM_COLUMNS,
+    FIRST_OF_OURS = DIFFERENCE /* the columns before hold text that is not ours */
+};
 
-static const char *const heading[NUM_COLUMNS] = {"scene",    "against",  "difference % [interval]",
-                                                 "MDB %",    "margin %", "verdict",
-                                                 "expected", "ok"};
-static const bool right_aligned[NUM_COLUMNS] = {false, false, true,  true,
-                                                true,  false, false, false};
+static const char *const heading[NUM_COLUMNS] = {
+    "scene",   "tested",   "against", "difference % [interval]", "MDB %", "margin %",
+    "verdict", "expected", "ok"};
+static const bool right_aligned[NUM_COLUMNS] = {[DIFFERENCE] = true, [MDB] = true, [MARGIN] = true};
 
 struct row {
-    const char
-        *cell[NUM_COLUMNS]; /* borrowed from the claim, a literal, or one of the three below */
+    /* borrowed from the claim, a literal, or one of the three below */
+    const char *cell[NUM_COLUMNS];
     char difference[96], mdb[32], margin[32];
 };
 
@@ -33,13 +44,14 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
         [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
     };
     enum outcome outcome = claim_outcome(claim);
-    r->cell[0] = member_text(claim, "scene");
-    r->cell[1] = member_text(claim, "b");
-    r->cell[6] = member_text(claim, "expected");
-    r->cell[7] = mark[markdown][outcome];
+    r->cell[SCENE] = member_text(claim, "scene");
+    r->cell[TESTED] = member_text(claim, "a");
+    r->cell[AGAINST] = member_text(claim, "b");
+    r->cell[EXPECTED] = member_text(claim, "expected");
+    r->cell[MARK] = mark[markdown][outcome];
     if (outcome == OUTCOME_NOT_JUDGED) {
-        r->cell[2] = r->cell[3] = r->cell[4] = "-";
-        r->cell[5] = "NOT JUDGED";
+        r->cell[DIFFERENCE] = r->cell[MDB] = r->cell[MARGIN] = "-";
+        r->cell[VERDICT] = "NOT JUDGED";
         return;
     }
     const json_t *ci = json_object_get(claim, "ci");
@@ -48,10 +60,10 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
              percent(json_array_get(ci, 1)));
     snprintf(r->mdb, sizeof r->mdb, "%.3f", percent(json_object_get(claim, "mdb_global")));
     snprintf(r->margin, sizeof r->margin, "%.3f", percent(json_object_get(claim, "margin_global")));
-    r->cell[2] = r->difference;
-    r->cell[3] = r->mdb;
-    r->cell[4] = r->margin;
-    r->cell[5] = member_text(claim, "verdict");
+    r->cell[DIFFERENCE] = r->difference;
+    r->cell[MDB] = r->mdb;
+    r->cell[MARGIN] = r->margin;
+    r->cell[VERDICT] = member_text(claim, "verdict");
 }
 
 /* Columns that UTF-8 text fills, taking each code point as one column wide. */
@@ -115,8 +127,7 @@ static void print_markdown(FILE *f, const struct row *row, size_t num_rows)
     for (size_t r = 0; r < num_rows; r++) {
         for (size_t c = 0; c < NUM_COLUMNS; c++) {
             fputs("| ", f);
-            /* Only the first two hold text that is not ours. */
-            if (c < 2)
+            if (c < FIRST_OF_OURS)
                 print_markdown_text(f, row[r].cell[c]);
             else
                 fputs(row[r].cell[c], f);

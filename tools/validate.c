@@ -139,7 +139,7 @@ static const struct side *get_reference(struct validation *v, const struct suite
     data_path(v, path, s->name, file);
     if (!load_reference(v, s, ref, out))
         return out;
-    out->seconds = json_number_value(json_object_get(out->manifest, "cpu_seconds"));
+    out->seconds = json_number_value(json_object_get(out->manifest, "cpu_s"));
     out->present =
         make_parent_dirs(path, &out->e) && moments_write(path, &out->m, NULL, 0, &out->e);
     return out;
