@@ -6,6 +6,7 @@
 #include "../renderer/collada.h"
 #include "../renderer/fs.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,15 +27,19 @@ static uint32_t mix31(uint32_t x, uint32_t key)
     return x ^ x >> 15;
 }
 
+/* A permutation of the 31-bit numbers, another one for each seed. */
+static uint32_t permute31(uint32_t x, uint32_t seed)
+{
+    x = mix31(x, (seed & 0xffff) + 0x3c6ef372);
+    x = mix31(x, (seed >> 16) + 0x1b873593);
+    return mix31(x, (seed * 0x9e3779b1) >> 8);
+}
+
 uint32_t replicate_seed(uint32_t seed, int k)
 {
-    uint32_t x = (uint32_t)k & 0x7fffffff;
-    do {
-        x = mix31(x, seed & 0xffff);
-        x = mix31(x, seed >> 16);
-        x = mix31(x, seed * 0x9e3779b1 >> 8);
-    } while (x == 0);
-    return x;
+    assert(k >= 0 && k < INT32_MAX);
+    uint32_t x = permute31((uint32_t)k, seed);
+    return x != 0 ? x : permute31(INT32_MAX, seed); /* which no k has taken */
 }
 
 static double clock_s(clockid_t id)
@@ -63,7 +68,7 @@ static bool engine_render(const struct suite_scene *scene, const struct suite_re
     if (n < 0 || (size_t)n >= sizeof dir)
         return err_set(e, "%.64s...: path too long", opt->work_dir);
     if (mkdtemp(dir) == NULL)
-        return err_set(e, "%s: cannot make directory: %s", dir, strerror(errno));
+        return err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
     struct scene s = {0};
     struct camera camera;
     struct reference_job job = {
