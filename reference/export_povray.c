@@ -45,12 +45,13 @@ static struct point moved(struct point p, double s, vec3 d)
     return (struct point){p.x + s * d.x, p.y + s * d.y, p.z + s * d.z};
 }
 
+/* The last zero is there so that no coordinate reads -0. */
 static void put(const struct writer *w, struct point p)
 {
     const double(*r)[3] = w->v->rotation;
-    fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z,
-            r[1][0] * p.x + r[1][1] * p.y + r[1][2] * p.z,
-            r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z);
+    fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z + 0.0,
+            r[1][0] * p.x + r[1][1] * p.y + r[1][2] * p.z + 0.0,
+            r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z + 0.0);
 }
 
 static void put_rgb(const struct writer *w, const char *before, double r, double g, double b,
