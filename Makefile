@@ -9,6 +9,7 @@ LIVE   ?=
 ONLY   ?=
 ALPHA  ?= 1e-3
 V      ?=
+MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev

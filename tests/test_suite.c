@@ -103,8 +103,8 @@ static void fields_are_those_of_the_file(void **state)
     const struct suite_reference *povray = reference_of(c, "povray");
     assert_string_equal(povray->fidelity, "limit");
     assert_true(povray->margin_global == 0.005 && povray->margin_tile == 0.02);
-    assert_int_equal(povray->replicates, 16);
-    assert_int_equal(povray->subgrid, 4);
+    assert_int_equal(povray->replicates, 128);
+    assert_int_equal(povray->subgrid, 3);
     assert_int_equal(reference_of(c, "cycles")->spp, 256);
 
     const struct suite_scene *f = suite_find(&s, "11_furnace");
