@@ -148,15 +148,20 @@ static json_t *materials_json(const struct scene *s)
     json_t *out = json_array();
     for (uint32_t i = 0; i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
-        switch (m->kind) {
-        case MATERIAL_DIFFUSE:
-            push(&out, json_pack("{so,so,so,sb}", "name", from_name(m->name), "reflectance",
-                                 from_rgb(m->reflectance, 1), "radiance", from_rgb(m->radiance, 1),
-                                 "both_sides", m->radiance_both_sides));
-            break;
-        }
+        push(&out, json_pack("{so,so,so,sb}", "name", from_name(m->name), "reflectance",
+                             from_rgb(m->reflectance, 1), "radiance", from_rgb(m->radiance, 1),
+                             "both_sides", m->radiance_both_sides));
     }
     return out;
+}
+
+static bool check_materials(const struct scene *s, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_materials; i++)
+        if (s->materials[i].kind != MATERIAL_DIFFUSE)
+            return err_set(e, "Cycles: material '%s' is not diffuse, which is not matched yet",
+                           s->materials[i].name);
+    return true;
 }
 
 /* A triangle's shading normals: +1 all on the geometric normal's side, -1 all on the other (the
@@ -293,7 +298,7 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
     struct err why = {"out of memory"};
     if (depth > MAX_DEPTH)
         return err_set(e, "Cycles: depth %d, at most %d are possible", depth, MAX_DEPTH);
-    bool ok = (camera = camera_json(s, c, &why)) != NULL &&
+    bool ok = check_materials(s, &why) && (camera = camera_json(s, c, &why)) != NULL &&
               (meshes = meshes_json(s, &why)) != NULL && (lights = lights_json(s, &why)) != NULL;
     if (ok) {
         root = json_pack("{si,si,si,si,sf,sO,so,sO,so,sO}", "assay_cycles", 1, "depth", depth,

@@ -110,9 +110,10 @@ bool povray_lamp(const struct scene *s, const struct light *l, struct povray_lam
 
 static bool check_material(const struct material *m, struct err *e)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE: break;
-    }
+    if (m->kind != MATERIAL_DIFFUSE)
+        return err_set(e,
+                       "POV-Ray: material '%s' is not diffuse, which this version does not export",
+                       m->name);
     rgb a = m->reflectance, l = m->radiance;
     if (reflects(m) && ((a.r == 0 && l.r > 0) || (a.g == 0 && l.g > 0) || (a.b == 0 && l.b > 0)))
         return err_set(

@@ -3,71 +3,6 @@
 
 #include <string.h>
 
-/* Our own material tags. To support one more, give it a reader here. */
-struct material_tag {
-    const char *profile, *name;
-    bool (*read)(struct loader *ld, const xmlNode *tag,
-                 struct material *m); /* NULL: not supported */
-};
-
-/* The assignment's emitter shines to both sides and reflects nothing. */
-static bool read_cgl_emission(struct loader *ld, const xmlNode *tag, struct material *m)
-{
-    xmlNode *radiance;
-    if (!only_children(ld, tag, "radiance") || !one_child(ld, tag, "radiance", &radiance))
-        return false;
-    if (radiance == NULL)
-        return fail_at(ld, tag, "<emission> without <radiance>");
-    m->reflectance = grey(0);
-    m->radiance_both_sides = true;
-    return read_color(ld, radiance, &m->radiance, NULL);
-}
-
-/* Ours adds to the reflection of profile_COMMON, which is in *m already. */
-static bool read_assay_emission(struct loader *ld, const xmlNode *tag, struct material *m)
-{
-    xmlNode *radiance, *sides;
-    double n;
-    if (!rgb_is_zero(m->radiance))
-        return fail_at(ld, tag, "<emission> here and in profile_COMMON: give one");
-    if (!only_children(ld, tag, "radiance sides") || !one_child(ld, tag, "radiance", &radiance) ||
-        !one_child(ld, tag, "sides", &sides))
-        return false;
-    if (radiance == NULL || sides == NULL)
-        return fail_at(ld, tag, "<emission> needs <radiance> and <sides>");
-    if (!read_color(ld, radiance, &m->radiance, NULL) || !read_exactly(ld, sides, &n, 1))
-        return false;
-    if (n != 1 && n != 2)
-        return fail_at(ld, sides, "<sides> is 1 or 2, not %g", n);
-    m->radiance_both_sides = n == 2;
-    return true;
-}
-
-static const struct material_tag TAGS[] = {
-    {"ASSAY", "emission", read_assay_emission},
-    {"CGL", "emission", read_cgl_emission},
-    {"CGL", "mirror", NULL},
-    {"CGL", "glass", NULL},
-    {"CGL", "refraction", NULL},
-    {"CGL", "microfacet", NULL},
-};
-
-static bool read_tag(struct loader *ld, const xmlNode *technique, struct material *m)
-{
-    const char *profile = attribute(technique, "profile");
-    xmlNode *tag;
-    if (!technique_content(ld, technique, &tag))
-        return false;
-    for (size_t i = 0; i < sizeof TAGS / sizeof *TAGS; i++) {
-        if (strcmp(TAGS[i].profile, profile) != 0 || !is_element(tag, TAGS[i].name))
-            continue;
-        if (TAGS[i].read == NULL)
-            return fail_at(ld, tag, "material tag '%s' is not supported", TAGS[i].name);
-        return TAGS[i].read(ld, tag, m);
-    }
-    return fail_at(ld, tag, "unknown material tag '%.60s'", (const char *)tag->name);
-}
-
 /* One channel of a shader: a colour, or false with a line for a texture or a parameter. A missing
  * element leaves *value and *alpha as they are. */
 static bool read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb *value,
@@ -213,12 +148,12 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
         return false;
     bool is_cgl = technique != NULL && strcmp(attribute(technique, "profile"), "CGL") == 0;
     if (is_cgl)
-        return read_tag(ld, technique, m);
+        return read_material_tag(ld, technique, m);
     if (common == NULL && ld->dialect == DIALECT_COLLADA)
         return fail_at(ld, effect, "<effect> without <profile_COMMON>");
     if (common != NULL && !read_common(ld, common, m))
         return false;
-    return technique == NULL || read_tag(ld, technique, m);
+    return technique == NULL || read_material_tag(ld, technique, m);
 }
 
 static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)

@@ -153,6 +153,12 @@ bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
 /* The element's text without blanks around it; the caller frees. NULL: failed. */
 char *read_word(struct loader *ld, const xmlNode *n);
 
+/* collada_tag.c */
+
+/* Our or the assignment's material tag in a technique of theirs, on top of what profile_COMMON has
+ * put into *m. */
+bool read_material_tag(struct loader *ld, const xmlNode *technique, struct material *m);
+
 /* collada_build.c */
 
 /* `data` (count elements of size bytes, room for *capacity) with room for one more: moved or as it

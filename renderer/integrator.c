@@ -34,6 +34,7 @@ static int generate(const struct integrator *it, struct batch *b, int num_lanes)
         rgbs_set(&b->throughput, i, grey(1));
         rgbs_set(&b->radiance, i, grey(0));
         b->pdf_w[i] = 0;
+        b->eta2[i] = 1;
         b->active[i] = (uint16_t)i;
     }
     return num_lanes;
@@ -50,11 +51,11 @@ static uint32_t material_of(const struct scene *s, uint32_t prim)
                                    : s->sphere_material[prim - s->num_triangles];
 }
 
-/* Weight of emission that the path ran into at vertex `vertex`. */
-static float emission_weight(const struct integrator *it, const struct batch *b, int i, int vertex,
+/* Weight of emission that the path ran into. */
+static float emission_weight(const struct integrator *it, const struct batch *b, int i,
                              const struct surface *s)
 {
-    if (vertex == 0 || it->opt.direct == DIRECT_BSDF)
+    if (b->pdf_w[i] == 0 || it->opt.direct == DIRECT_BSDF)
         return 1;
     if (it->opt.direct != DIRECT_MIS)
         return 0;
@@ -81,13 +82,14 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
         if (light_of(it->scene, prim) >= 0 && counts(it, vertex)) {
             rgb le = emitted_radiance(m, s.ng, wo);
             if (!rgb_is_zero(le)) {
-                float w = emission_weight(it, b, i, vertex, &s);
+                float w = emission_weight(it, b, i, &s);
                 rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
             }
         }
-        if (vertex == it->opt.max_bounces || rgb_is_zero(m->reflectance))
+        if (vertex == it->opt.max_bounces || bsdf_is_black(m))
             continue;
-        if (dot(s.ng, wo) < 0) {
+        b->front[i] = dot(s.ng, wo) > 0;
+        if (!b->front[i]) {
             s.ng = neg(s.ng);
             s.ns = neg(s.ns);
         }
@@ -134,13 +136,13 @@ static ray leaving(const struct batch *b, int i, vec3 wi, float tmax)
     return (ray){.o = surface_origin(&s, wi), .d = wi, .tmin = 0, .tmax = tmax};
 }
 
-/* One sample of light l from every active lane, as one of `count` per lane. */
-static void connect_light(const struct integrator *it, struct batch *b, int num_active, int vertex,
+/* One sample of light l from every diffuse lane, as one of `count` per lane. */
+static void connect_light(const struct integrator *it, struct batch *b, int num_lanes, int vertex,
                           uint32_t l, uint32_t purpose, int count)
 {
     int n = 0;
-    for (int k = 0; k < num_active; k++) {
-        int i = b->active[k];
+    for (int k = 0; k < num_lanes; k++) {
+        int i = b->diffuse[k];
         struct sample4 u =
             sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
         struct light_sample ls = light_sample_direction(it->lights, l, vec3s_get(&b->p, i), u.u);
@@ -167,14 +169,14 @@ static void connect_light(const struct integrator *it, struct batch *b, int num_
     }
 }
 
-/* One uniform direction of the hemisphere from every active lane, as one of `count` per lane;
+/* One uniform direction of the hemisphere from every diffuse lane, as one of `count` per lane;
  * counts if it meets an emitter. */
-static void connect_hemisphere(const struct integrator *it, struct batch *b, int num_active,
+static void connect_hemisphere(const struct integrator *it, struct batch *b, int num_lanes,
                                int vertex, uint32_t purpose, int count)
 {
     int n = 0;
-    for (int k = 0; k < num_active; k++) {
-        int i = b->active[k];
+    for (int k = 0; k < num_lanes; k++) {
+        int i = b->diffuse[k];
         struct sample4 u =
             sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
         vec3 local = warp_uniform_hemisphere(u.u[0], u.u[1]);
@@ -209,7 +211,11 @@ static void connect(const struct integrator *it, struct batch *b, int num_active
 {
     const struct scene *s = it->scene;
     uint32_t purpose = PURPOSE_LIGHT;
-    int area_lights = 0;
+    int area_lights = 0, n = 0;
+    for (int k = 0; k < num_active; k++) {
+        b->diffuse[n] = b->active[k];
+        n += !bsdf_is_delta(&s->materials[b->material[b->active[k]]]);
+    }
     for (uint32_t l = 0; l < s->num_lights; l++) {
         bool delta = light_is_delta(&s->lights[l]);
         area_lights += !delta;
@@ -217,39 +223,44 @@ static void connect(const struct integrator *it, struct batch *b, int num_active
             continue;
         int count = delta ? 1 : it->opt.light_samples;
         for (int k = 0; k < count; k++)
-            connect_light(it, b, num_active, vertex, l, purpose++, count);
+            connect_light(it, b, n, vertex, l, purpose++, count);
     }
     if (it->opt.direct == DIRECT_HEMISPHERE) {
         int count = area_lights * it->opt.light_samples;
         for (int k = 0; k < count; k++)
-            connect_hemisphere(it, b, num_active, vertex, purpose++, count);
+            connect_hemisphere(it, b, n, vertex, purpose++, count);
     }
 }
 
-/* Sets up the next ray of every active lane that goes on. */
-static int scatter(const struct integrator *it, struct batch *b, int num_active, int vertex)
+/* Sets up the next ray of every active lane that goes on. only_delta: the last ray of a path, where
+ * light sampling has already dealt with all emitters but those behind a delta lobe. */
+static int scatter(const struct integrator *it, struct batch *b, int num_active, int vertex,
+                   bool only_delta)
 {
     int kept = 0;
     for (int k = 0; k < num_active; k++) {
         int i = b->active[k];
+        const struct material *m = &it->scene->materials[b->material[i]];
         struct sample4 u = sampler_get(it->opt.seed, b->pixel[i], b->sample[i],
                                        (uint32_t)vertex + 1, PURPOSE_BSDF);
         frame f = frame_from_normal(vec3s_get(&b->ns, i));
-        struct bsdf_sample s =
-            bsdf_sample_direction(&it->scene->materials[b->material[i]],
-                                  to_local(&f, vec3s_get(&b->wo, i)), u.u[0], u.u[1]);
+        vec3 wo = to_local(&f, vec3s_get(&b->wo, i));
+        struct bsdf_sample s = bsdf_sample_direction(m, b->front[i], wo, u.u[0], u.u[1], u.u[2]);
         vec3 wi = frame_to_world(&f, s.wi);
-        if (s.pdf_w <= 0 || dot(vec3s_get(&b->ng, i), wi) <= 0)
+        /* Both normals have to agree on which side the light leaves. */
+        if (s.pdf_w <= 0 || (only_delta && !s.delta) || s.wi.z * dot(vec3s_get(&b->ng, i), wi) <= 0)
             continue;
         rgb throughput = rgb_mul(rgbs_get(&b->throughput, i), s.weight);
+        float eta2 = b->eta2[i] * s.eta2;
         if (it->opt.roulette && vertex >= ROULETTE_FROM_VERTEX) {
-            float survival = minf(1, rgb_max(throughput));
+            float survival = minf(1, rgb_max(throughput) * eta2);
             if (u.u[3] >= survival)
                 continue;
             throughput = rgb_scale(throughput, 1 / survival);
         }
         rgbs_set(&b->throughput, i, throughput);
-        b->pdf_w[i] = s.pdf_w;
+        b->eta2[i] = eta2;
+        b->pdf_w[i] = s.delta ? 0 : s.pdf_w;
         rays_set(&b->ray, i, leaving(b, i, wi, INFINITY));
         b->active[kept++] = (uint16_t)i;
     }
@@ -277,15 +288,14 @@ void integrate(const struct integrator *it, struct batch *b, int num_lanes)
         integrate_normals(it, b, active);
         return;
     }
-    /* The last ray of a path only looks for emitters that light sampling has not dealt with. */
+    /* In these two the last ray of every path looks for emitters. */
     bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     for (int vertex = 0; active > 0; vertex++) {
         bvh_closest(it->bvh, &b->ray, b->active, active, &b->hit, &b->stats);
         active = shade_hits(it, b, active, vertex);
         if (counts(it, vertex + 1))
             connect(it, b, active, vertex);
-        if (vertex + 1 == it->opt.max_bounces && !last_ray)
-            break;
-        active = scatter(it, b, active, vertex);
+        bool only_delta = vertex + 1 == it->opt.max_bounces && !last_ray;
+        active = scatter(it, b, active, vertex, only_delta);
     }
 }

@@ -46,15 +46,19 @@ struct batch {
     uint32_t pixel[BATCH_LANES], sample[BATCH_LANES];
     struct rgbs radiance;
     struct rgbs throughput;
-    float pdf_w[BATCH_LANES]; /* of the ray's direction; 0 for camera rays */
+    float pdf_w[BATCH_LANES]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
+                                 whose emitters nothing else finds */
+    float eta2[BATCH_LANES];  /* what the throughput is divided by for being inside glass */
     struct rays ray, shadow;
     struct hits hit, shadow_hit;
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
     bool occluded[BATCH_LANES];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
     float eps[BATCH_LANES];
+    bool front[BATCH_LANES];
     uint32_t material[BATCH_LANES];
     uint16_t active[BATCH_LANES], shadow_lane[BATCH_LANES];
+    uint16_t diffuse[BATCH_LANES]; /* those of active that light sampling serves */
     struct bvh_stats stats;
 };
 

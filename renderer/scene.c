@@ -38,12 +38,30 @@ static bool is_radiometric(rgb c)
     return c.r >= 0 && c.g >= 0 && c.b >= 0 && isfinite(c.r) && isfinite(c.g) && isfinite(c.b);
 }
 
+static bool material_numbers_are_valid(const struct material *m)
+{
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE:
+    case MATERIAL_MIRROR: break;
+    case MATERIAL_REFRACTION:
+    case MATERIAL_GLASS: return m->ior > 0 && isfinite(m->ior);
+    case MATERIAL_MICROFACET:
+        return m->alpha > 0 && isfinite(m->alpha) && is_radiometric(m->eta) && is_radiometric(m->k);
+    }
+    return true;
+}
+
 static bool check_materials(const struct scene *s, const char *where, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
         if (!is_radiometric(m->reflectance) || rgb_max(m->reflectance) > 1)
             return err_set(e, "%s: material '%s': reflectance outside [0,1]", where, m->name);
+        if (!is_radiometric(m->transmittance) || rgb_max(m->transmittance) > 1)
+            return err_set(e, "%s: material '%s': transmittance outside [0,1]", where, m->name);
+        if (!material_numbers_are_valid(m))
+            return err_set(e, "%s: material '%s': index of refraction or roughness out of range",
+                           where, m->name);
         if (!is_radiometric(m->radiance))
             return err_set(e, "%s: material '%s': radiance negative or not finite", where, m->name);
     }

@@ -7,6 +7,7 @@
 #define ASSAY_SCENE_H
 
 #include "err.h"
+#include "microfacet.h"
 #include "vec.h"
 
 #include <stddef.h>
@@ -19,13 +20,28 @@ enum dialect {
     DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
 };
 
-enum material_kind { MATERIAL_DIFFUSE };
+enum material_kind {
+    MATERIAL_DIFFUSE,
+    MATERIAL_MIRROR,
+    MATERIAL_REFRACTION, /* only the refracted ray; nothing under total reflection */
+    MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
+    MATERIAL_MICROFACET  /* rough conductor */
+};
 
 /* Emission and reflection are independent: an emitter may reflect too. */
 struct material {
     char name[64];
     enum material_kind kind;
-    rgb reflectance;          /* diffuse: albedo in [0,1] */
+    rgb reflectance;   /* diffuse: albedo in [0,1]; mirror, glass: factor of the mirror ray */
+    rgb transmittance; /* refraction, glass: factor of the refracted ray */
+    float ior;         /* refraction, glass: of the side that the normal points away from,
+                                 relative to the side it points to; above 1 for glass in air */
+    bool schlick;      /* glass: Schlick's approximation, as the assignment has it */
+    enum microfacet_kind microfacet;
+    float alpha;              /* microfacet: roughness, root mean square slope times sqrt(2) */
+    bool separable;           /* microfacet: shadowing and masking independent */
+    bool conductor;           /* microfacet: Fresnel by eta and k; else reflectance, at any angle */
+    rgb eta, k;               /* microfacet: complex index of refraction against air */
     rgb radiance;             /* emitted radiance; zero for most */
     bool radiance_both_sides; /* else only from the side the geometric normal points to */
 };
