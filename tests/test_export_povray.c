@@ -174,6 +174,16 @@ static void test_small_scene_refused(void **state)
     scene_free(&s);
 }
 
+static void test_normals_refused(void **state)
+{
+    (void)state;
+    struct scene s = floor_and_ball(true);
+    s.normal[4] = v3(0, -1, 0);
+    struct camera c = finish(&s);
+    refused(&s, &c, 1, "behind the triangle");
+    scene_free(&s);
+}
+
 static void test_lights_refused(void **state)
 {
     (void)state;
@@ -428,6 +438,7 @@ int main(void)
         cmocka_unit_test(test_furnace_is_constant),
         cmocka_unit_test(test_camera_refused),
         cmocka_unit_test(test_small_scene_refused),
+        cmocka_unit_test(test_normals_refused),
         cmocka_unit_test(test_lights_refused),
         cmocka_unit_test(test_lamp_any_numbering),
         cmocka_unit_test(test_not_a_lamp),
