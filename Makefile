@@ -51,7 +51,7 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
 	tests/run.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
-	$(BUILD)/assay reference --out golden --work $(BUILD)/reference $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json

@@ -27,7 +27,7 @@ struct scene {
 
 static bool full_path(const struct page *p, const char *file, char path[8192], struct err *e)
 {
-    int n = snprintf(path, 8192, "%s%s", p->dir, file);
+    int n = snprintf(path, 8192, "%s%s", file[0] == '/' ? "" : p->dir, file);
     return n > 0 && n < 8192 ? true : err_set(e, "%.64s...: path too long", file);
 }
 

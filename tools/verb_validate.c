@@ -63,10 +63,10 @@ static void beside_program(char *path, size_t size, const char *name)
 /* The checkout's directory if we stand in one, else the installed one. */
 static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
 {
-    if (access(checkout, R_OK) == 0)
+    if (access("reference/scenes", R_OK) == 0)
         return checkout;
     beside_program(path, size, installed);
-    return access(path, R_OK) == 0 ? path : checkout;
+    return path;
 }
 
 static bool fresh_seed(uint32_t *seed, struct err *e)
@@ -139,6 +139,23 @@ static bool write_all(const json_t *results, const char *out_dir, bool markdown,
     return true;
 }
 
+/* The one line on stderr that exit code 3 owes, also where the table on stdout has gone elsewhere. */
+static void tell_not_judged(const json_t *results, struct err *e)
+{
+    const json_t *claims = json_object_get(results, "claims"), *first = NULL;
+    size_t n = 0;
+    for (size_t i = json_array_size(claims); i-- > 0;) {
+        const json_t *claim = json_array_get(claims, i);
+        if (claim_outcome(claim) == OUTCOME_NOT_JUDGED) {
+            first = claim;
+            n++;
+        }
+    }
+    err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
+            json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
+            member_text(first, "b"), member_text(first, "error"));
+}
+
 int verb_validate(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], golden[4096], share[4096];
@@ -165,6 +182,8 @@ int verb_validate(int argc, char **argv, struct err *e)
     int code = EXIT_NOT_JUDGED;
     if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, markdown, e))
         code = results_exit_code(results);
+    if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
+        tell_not_judged(results, e);
     json_decref(results);
     return code;
 }
