@@ -26,8 +26,8 @@ LIBS       = $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
 SANITIZE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 OPT      := -O3 -g -fno-math-errno -fno-trapping-math
-WARN     := -Wall -Wextra $(if $(WERROR),-Werror)
-WARN_C   := $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
+WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
+WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 # -ffp-contract=off: the same bits whether or not a processor can multiply and add in one step.
 cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(pkg_cflags)
 cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
@@ -51,7 +51,7 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
 	tests/run.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
-	$(BUILD)/assay reference --out golden --work $(BUILD)/reference $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json

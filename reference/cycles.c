@@ -6,7 +6,7 @@
 #include "process.h"
 
 #include "../renderer/fs.h"
-#include "../tools/results.h"
+#include "json_file.h"
 
 #include <assert.h>
 #include <errno.h>

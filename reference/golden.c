@@ -2,7 +2,7 @@
 #include "reference.h"
 
 #include "../renderer/fs.h"
-#include "../tools/results.h"
+#include "json_file.h"
 
 #include <errno.h>
 #include <fcntl.h>

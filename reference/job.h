@@ -14,7 +14,7 @@ struct reference_job {
     const char *dir;             /* empty working directory of this job */
 };
 
-/* Seed of replicate k: 31 bits, well spread, never 0 (a hash of opt->seed and k). */
+/* Seed of replicate k >= 0: 31 bits, well spread, never 0, and another one for each k. */
 uint32_t replicate_seed(uint32_t seed, int k);
 
 /* Each fills *out (unit "replicate", or "exact" where the engine's answer has no noise) and adds to

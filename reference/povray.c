@@ -89,7 +89,10 @@ static bool add_picture(const struct crew *w, const struct povray_picture *p, co
     return ok;
 }
 
-enum { NUM_ARGS = 16 };
+enum {
+    NUM_ARGS = 16,  /* of the engine's command line, NULL included */
+    MAX_STARTS = 10 /* of one picture */
+};
 
 /* The command line, in text that belongs to the caller. */
 static void command_line(const struct crew *w, const struct povray_picture *p, char text[4][32],
@@ -103,6 +106,19 @@ static void command_line(const struct crew *w, const struct povray_picture *p, c
         "-A",       "-C",          "-D",          "-P",  "-V",    "+Q9",   "File_Gamma=1.0", NULL};
     static_assert(sizeof args / sizeof *args == NUM_ARGS, "one slot per argument");
     memcpy(argv, args, sizeof args);
+}
+
+/* On a busy machine POV-Ray gives up before it has begun, when its own threads start too slowly. That
+ * says nothing about the picture, so it is asked again. */
+static bool run_engine(const struct process *run, struct err *e)
+{
+    for (int attempt = 1;; attempt++) {
+        if (process_run(run, NULL, e))
+            return true;
+        if (attempt == MAX_STARTS ||
+            strstr(e->msg, "Timed out waiting for worker thread startup") == NULL)
+            return false;
+    }
 }
 
 static bool render(struct crew *w, const struct povray_picture *p, float sign, float *out,
@@ -129,7 +145,7 @@ static bool render(struct crew *w, const struct povray_picture *p, float sign, f
     struct process run = {
         .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
     bool radiosity = p->variant.indirect && w->plan->recursion > 0;
-    return process_run(&run, NULL, e) && (!radiosity || check_log(log, e)) &&
+    return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
            add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
 }
 

@@ -122,6 +122,20 @@ static bool check_material(const struct material *m, struct err *e)
     return true;
 }
 
+static bool check_normals(const struct scene *s, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        vec3 n = face_normal(&s->position[3 * (size_t)i]);
+        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
+            if (!(dot(n, s->normal[k]) > 0))
+                return err_set(e,
+                               "POV-Ray is not verified with shading normals behind the triangle "
+                               "(object '%s')",
+                               s->objects[s->tri_object[i]].name);
+    }
+    return true;
+}
+
 static bool check_camera(const struct scene *s, const struct camera *c, double extent,
                          struct err *e)
 {
@@ -200,7 +214,7 @@ bool povray_plan(const struct scene *s, const struct camera *c, int depth, struc
     for (uint32_t i = 0; i < s->num_materials; i++)
         if (!check_material(&s->materials[i], e))
             return false;
-    if (!check_camera(s, c, p.extent, e) || !plan_lights(s, &p, e))
+    if (!check_normals(s, e) || !check_camera(s, c, p.extent, e) || !plan_lights(s, &p, e))
         return false;
     p.recursion = p.sources ? (depth > 1 ? depth - 1 : 0) : depth;
     if (s->num_lights == 0 || (p.sources && one_plane_reflects(s, p.extent)))

@@ -15,17 +15,21 @@ struct reference_options {
     const char *share_dir; /* where cycles.py is */
 };
 
-/* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds: scene name
- * and sha256, engine, its version line, sha256 of its binary, command lines, settings, seeds,
- * replicates, spp, width, height, depth, date (UTC), CPU and wall seconds. Fails (with the engine's
- * own last lines) when the engine is absent, dies, hangs, writes something unreadable or two
- * replicates that are the same, and when it cannot express the scene. "truth" has no seeds. */
+/* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds
+ *   scene, scene_sha256, engine, date (UTC), unit, spp_of_unit, width, height, depth, replicates,
+ *   spp, subgrid, cpu_s, wall_s (of all of it, this process included),
+ *   of engines: version, binary_sha256, command, settings, seeds; of "truth": kind, values.
+ * Fails (with the engine's own last lines) when the engine is absent, dies, hangs, writes something
+ * unreadable or two replicates that are the same, and when it cannot express the scene; what the
+ * engine left is then kept, and the line names the directory. */
 bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
                       const struct reference_options *opt, struct moments *out, json_t **manifest,
                       struct err *e) __attribute__((warn_unused_result));
 
-/* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json (an object with one member per
- * engine; the others are kept). Both appear by rename. */
+/* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
+ * what reference_render() said and exr_sha256; the others are kept. Both appear by rename, the image
+ * first, so that after an interruption golden_read() refuses the pair. Engines may be written at the
+ * same time. */
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));

@@ -56,7 +56,12 @@ expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -
 expect "unwritable output" 3 "/nonexistent/x.exr" \
     "$san_pathtracer" $small -f /nonexistent/x.exr $scene
 for bad in tests/bad/*.dae; do
-    expect "bad scene $(basename "$bad")" 3 "$bad" "$san_pathtracer" $small -f "$tmp/bad.exr" "$bad"
+    case $bad in
+    */00_valid.dae) continue ;; # what the others are faults of
+    */material_cgl_in_collada.dae) dialect=collada ;;
+    *) dialect=auto ;;
+    esac
+    expect "bad scene $(basename "$bad")" 3 "$bad" "$san_pathtracer" $small --dialect $dialect -f "$tmp/bad.exr" "$bad"
 done
 if [ -n "$(ls "$tmp" | grep -v '^out$\|^err$')" ]; then
     not_ok "failures leave no files" "$(ls "$tmp")"

@@ -35,7 +35,7 @@ static struct scene floor_and_ball(bool with_lamp)
 static struct camera finish(struct scene *s)
 {
     struct err e;
-    struct camera c;
+    struct camera c = {0};
     if (!scene_finish(s, "test", &e) || !camera_init(&c, s, 40, 30, &e))
         fail_msg("%s", e.msg);
     return c;
@@ -171,6 +171,16 @@ static void test_small_scene_refused(void **state)
     build_camera(&s, v3(0, 0, 1), 60);
     struct camera c = finish(&s);
     refused(&s, &c, 1, "tolerances");
+    scene_free(&s);
+}
+
+static void test_normals_refused(void **state)
+{
+    (void)state;
+    struct scene s = floor_and_ball(true);
+    s.normal[4] = v3(0, -1, 0);
+    struct camera c = finish(&s);
+    refused(&s, &c, 1, "behind the triangle");
     scene_free(&s);
 }
 
@@ -428,6 +438,7 @@ int main(void)
         cmocka_unit_test(test_furnace_is_constant),
         cmocka_unit_test(test_camera_refused),
         cmocka_unit_test(test_small_scene_refused),
+        cmocka_unit_test(test_normals_refused),
         cmocka_unit_test(test_lights_refused),
         cmocka_unit_test(test_lamp_any_numbering),
         cmocka_unit_test(test_not_a_lamp),

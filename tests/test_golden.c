@@ -2,7 +2,7 @@
  */
 #include "../reference/job.h"
 #include "../renderer/fs.h"
-#include "../tools/results.h"
+#include "../reference/json_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -126,7 +126,7 @@ static void test_rotations_are_uniform(void **state)
 }
 
 /* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
-enum { THREADS = 16 };
+enum { THREADS = 8 };
 
 /* What povray_render() is given, in a directory that goes with it. */
 struct fixture {
@@ -279,6 +279,32 @@ static void test_engine_failures(void **state)
     engine_fails("exit 139", 60, (const char *[]){"exit status 139", NULL});
     engine_fails("sleep 30", .2, (const char *[]){"no end after 0.2 s", NULL});
     engine_fails("true", 60, (const char *[]){"scene.exr", NULL});
+}
+
+/* The one failure that is tried again, ten times at most: the script leaves a line in its count for
+ * each start, with the picture's directory. */
+static void test_slow_start_is_tried_again(void **state)
+{
+    (void)state;
+    char count[64] = "/tmp/fake_count.XXXXXX", script[256];
+    int fd = mkstemp(count);
+    assert_true(fd >= 0);
+    close(fd);
+    snprintf(script, sizeof script,
+             "pwd >>%s; echo Timed out waiting for worker thread startup; exit 1", count);
+    engine_fails(script, 60, (const char *[]){"exit status 1", "worker thread startup", NULL});
+    FILE *f = fopen(count, "r");
+    assert_non_null(f);
+    char line[256], first[256];
+    int starts = 0;
+    while (fgets(line, sizeof line, f) != NULL) {
+        if (starts == 0)
+            strcpy(first, line);
+        starts += strcmp(line, first) == 0;
+    }
+    fclose(f);
+    unlink(count);
+    assert_int_equal(starts, 10);
 }
 
 /* A grey picture of w x h for the fakes to hand out. */
@@ -566,6 +592,7 @@ int main(void)
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_rotations_are_uniform),
         cmocka_unit_test(test_engine_failures),
+        cmocka_unit_test(test_slow_start_is_tried_again),
         cmocka_unit_test(test_implausible_pictures),
         cmocka_unit_test(test_direct_light),
         cmocka_unit_test(test_furnace),

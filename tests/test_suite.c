@@ -97,13 +97,13 @@ static void fields_are_those_of_the_file(void **state)
     assert_int_equal(c->width, 128);
     assert_int_equal(c->height, 128);
     assert_int_equal(c->depth, 5);
-    assert_int_equal(c->spp, 2048);
+    assert_int_equal(c->spp, 4096);
     assert_int_equal(c->tile, 16);
     assert_int_equal(c->expect, VERDICT_EQUIVALENT);
     const struct suite_reference *povray = reference_of(c, "povray");
     assert_string_equal(povray->fidelity, "limit");
     assert_true(povray->margin_global == 0.005 && povray->margin_tile == 0.02);
-    assert_int_equal(povray->replicates, 128);
+    assert_int_equal(povray->replicates, 256);
     assert_int_equal(povray->subgrid, 3);
     assert_int_equal(reference_of(c, "cycles")->spp, 256);
 

@@ -182,7 +182,7 @@ static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
         "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
         "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
         "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
-        "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">Interval and "
+        "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">In "
         "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
         "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
         "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "

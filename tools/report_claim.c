@@ -292,33 +292,45 @@ static void write_optional_number(FILE *f, const json_t *claim, const char *name
         fprintf(f, format, json_number_value(v));
 }
 
-static void write_provenance(FILE *f, const json_t *claim)
+/* Who rendered it, its version, and how often each pixel was observed. side is "a" or "b". */
+static void write_side(FILE *f, const json_t *claim, const char *side)
 {
-    fact_open(f, "First image (A)");
-    html_text(f, member_text(claim, "a"));
-    write_optional_number(f, claim, "n_a", ", %.0f samples per pixel");
-    write_optional_number(f, claim, "seed_a", ", seed %.0f");
-    if (json_object_get(claim, "seconds_a") != NULL)
-        fprintf(f, ", %s", duration_text(member_number(claim, "seconds_a")).s);
-    fact_close(f);
-
-    fact_open(f, "Reference (B)");
-    html_text(f, member_text(claim, "b"));
-    const char *unit = member_text(claim, "unit_b"), *version = member_text(claim, "version_b");
+    char n[8], spp[8], unit_key[8], version_key[16];
+    snprintf(n, sizeof n, "n_%s", side);
+    snprintf(spp, sizeof spp, "spp_%s", side);
+    snprintf(unit_key, sizeof unit_key, "unit_%s", side);
+    snprintf(version_key, sizeof version_key, "version_%s", side);
+    const char *unit = member_text(claim, unit_key), *version = member_text(claim, version_key);
+    html_text(f, member_text(claim, side));
     if (version != NULL) {
         fputs(" (", f);
         html_text(f, version);
         fputs(")", f);
     }
-    if (unit != NULL && strcmp(unit, "exact") == 0) {
-        fputs(", closed form", f);
-    } else if (unit != NULL) {
-        write_optional_number(f, claim, "n_b", ", %.0f ");
+    if (unit == NULL || strcmp(unit, "sample") == 0) {
+        write_optional_number(f, claim, n, ", %.0f samples per pixel");
+    } else if (strcmp(unit, "exact") == 0) {
+        fputs(", without noise", f);
+    } else {
+        write_optional_number(f, claim, n, ", %.0f ");
         html_text(f, unit);
         fputs("s", f);
-        if (strcmp(unit, "replicate") == 0 && member_number(claim, "spp_b") > 0)
-            write_optional_number(f, claim, "spp_b", " of %.0f samples per pixel");
+        if (member_number(claim, spp) > 0)
+            write_optional_number(f, claim, spp, " of %.0f samples per pixel");
     }
+}
+
+static void write_provenance(FILE *f, const json_t *claim)
+{
+    fact_open(f, "First image (A)");
+    write_side(f, claim, "a");
+    write_optional_number(f, claim, "seed_a", ", seed %.0f");
+    if (member_number(claim, "seconds_a") > 0)
+        fprintf(f, ", %s", duration_text(member_number(claim, "seconds_a")).s);
+    fact_close(f);
+
+    fact_open(f, "Reference (B)");
+    write_side(f, claim, "b");
     if (member_number(claim, "seconds_b") > 0)
         fprintf(f, ", %s when it was made", duration_text(member_number(claim, "seconds_b")).s);
     const char *fidelity = member_text(claim, "class");

@@ -27,7 +27,7 @@ struct scene {
 
 static bool full_path(const struct page *p, const char *file, char path[8192], struct err *e)
 {
-    int n = snprintf(path, 8192, "%s%s", p->dir, file);
+    int n = snprintf(path, 8192, "%s%s", file[0] == '/' ? "" : p->dir, file);
     return n > 0 && n < 8192 ? true : err_set(e, "%.64s...: path too long", file);
 }
 
@@ -158,8 +158,7 @@ void report_scale(FILE *f, int width)
             alone > 1 ? alone : 1);
 }
 
-/* "2048 samples per pixel", "16 replicates of 256 samples per pixel", "closed form, without noise".
- */
+/* "2048 samples per pixel", "16 replicates of 256 samples per pixel", "without noise". */
 static void print_observations(FILE *f, const struct moments *m)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -168,7 +167,7 @@ static void print_observations(FILE *f, const struct moments *m)
         sum += m->n[i];
     double n = sum / (double)pixels;
     if (strcmp(m->unit, "exact") == 0)
-        fputs("closed form, without noise", f);
+        fputs("without noise", f);
     else if (strcmp(m->unit, "sample") == 0)
         fprintf(f, "%.0f samples per pixel", n);
     else if (m->spp > 0)

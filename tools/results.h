@@ -22,7 +22,7 @@
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
  * false, "error": "one line" } ] }
  *
- * Paths in "files" are relative to the directory of results.json. A claim with "error" could not be
+ * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where
  * "verdict" equals "expected". An element of tile_log10_p and tile_t is null where a tile has no
  * noise at all and so no test.
@@ -34,16 +34,13 @@
 #ifndef ASSAY_RESULTS_H
 #define ASSAY_RESULTS_H
 
-#include "../renderer/err.h"
+#include "../reference/json_file.h"
 
 #include <jansson.h>
 
 /* Exit codes of every verb. */
 enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_JUDGED = 3 };
 
-/* Writes by rename, indented, with a final newline. */
-bool json_write(const char *path, const json_t *root, struct err *e)
-    __attribute__((warn_unused_result));
 /* Reads results.json and checks all that report and junit rely on (see above), each failure a line
  * with file, claim and member. New reference in *out. */
 bool results_read(const char *path, json_t **out, struct err *e)

@@ -192,9 +192,12 @@ static void judge(struct validation *v, const struct suite_scene *s, const struc
                   const char *a_name, const struct side *a, const struct suite_reference *ref,
                   const struct side *b)
 {
-    char rerun[512];
-    snprintf(rerun, sizeof rerun, "assay validate --only %s --seed %llu%s", s->name,
-             (unsigned long long)v->opt->seed, v->opt->live ? " --live" : "");
+    /* Of this scene alone, and yet with the same alpha for each of its claims. */
+    char rerun[512], live[64] = "";
+    if (v->opt->live)
+        snprintf(live, sizeof live, " --live --reference-seed %u", v->opt->reference_seed);
+    snprintf(rerun, sizeof rerun, "assay validate --only %s --alpha %.6g --seed %llu%s", s->name,
+             v->alpha * count_claims(s), (unsigned long long)v->opt->seed, live);
     struct claim_context c = {.scene = s,
                               .a = a_name,
                               .b = ref->engine,

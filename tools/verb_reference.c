@@ -27,7 +27,7 @@ static const struct cli_option options[] = {
     [OPT_OUT] = {'o', "out", 1, "DIR", "where the goldens go (golden)"},
     [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
     [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
-    [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/reference)"},
+    [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/work)"},
     [OPT_SEED] = {0, "seed", 1, "N", "seed of all replicates (1)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for one engine and scene (7200)"},
@@ -89,7 +89,7 @@ static bool make_golden(const struct settings *s, const struct suite_scene *scen
         return false;
     bool ok = golden_write(s->out, scene->name, ref->engine, &m, manifest, e);
     if (ok)
-        printf("%s/%s/%s.exr: %d x %d, %g %ss, %.0f s\n", s->out, scene->name, ref->engine, m.width,
+        printf("%s/%s/%s.exr: %d x %d pixels, %g x %s, %.0f s\n", s->out, scene->name, ref->engine, m.width,
                m.height, m.n[0], m.unit, now_seconds() - start);
     moments_free(&m);
     json_decref(manifest);
@@ -100,7 +100,7 @@ int verb_reference(int argc, char **argv, struct err *e)
 {
     struct settings s = {.out = "golden",
                          .suite = "reference/scenes",
-                         .work = "build/reference",
+                         .work = "build/work",
                          .opt = {.seed = 1, .timeout_s = 7200, .share_dir = "reference"}};
     struct suite suite;
     if (!parse(argc, argv, &s, e))

@@ -3,25 +3,55 @@
 #include "results.h"
 #include "verbs.h"
 
+#include <stdlib.h>
 #include <string.h>
 
+enum option { OPT_OUT, OPT_MARKDOWN, OPT_HELP };
+
 static const struct cli_option options[] = {
-    {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
-    {'h', "help", 0, "", "print this"},
+    [OPT_OUT] = {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
+    [OPT_MARKDOWN] = {0, "markdown", 0, "", "no page; print the verdict table as Markdown"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
+
+static bool print_markdown(const char *path, struct err *e)
+{
+    json_t *results;
+    char *table;
+    if (!results_read(path, &results, e))
+        return false;
+    bool ok = results_print_table(results, true, &table, e);
+    if (ok) {
+        fputs(table, stdout);
+        free(table);
+    }
+    json_decref(results);
+    return ok;
+}
+
+/* index.html in the directory of the results. */
+static void page_beside(const char *results, char *path, size_t size)
+{
+    const char *slash = strrchr(results, '/');
+    int n = slash ? (int)(slash - results) + 1 : 0;
+    snprintf(path, size, "%.*sindex.html", n, results);
+}
 
 int verb_report(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     const char *results = NULL, *out = NULL;
+    bool markdown = false;
     for (int i; (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return EXIT_NOT_JUDGED;
         if (i == CLI_POSITIONAL && results == NULL) {
             results = c.value[0];
-        } else if (i == 0) {
+        } else if (i == OPT_OUT) {
             out = c.value[0];
-        } else if (i == 1) {
+        } else if (i == OPT_MARKDOWN) {
+            markdown = true;
+        } else if (i == OPT_HELP) {
             puts("usage: assay report [options] RESULTS.json\n");
             cli_print_options(stdout, options);
             return 0;
@@ -34,11 +64,11 @@ int verb_report(int argc, char **argv, struct err *e)
         err_set(e, "report needs a results.json (see --help)");
         return EXIT_NOT_JUDGED;
     }
+    if (markdown)
+        return print_markdown(results, e) ? 0 : EXIT_NOT_JUDGED;
     char beside[4096];
     if (out == NULL) {
-        const char *slash = strrchr(results, '/');
-        int n = slash ? (int)(slash - results) + 1 : 0;
-        snprintf(beside, sizeof beside, "%.*sindex.html", n, results);
+        page_beside(results, beside, sizeof beside);
         out = beside;
     }
     if (!report_write(results, out, e))

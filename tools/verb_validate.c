@@ -23,7 +23,6 @@ enum option {
     OPT_REFERENCE_SEED,
     OPT_THREADS,
     OPT_TIMEOUT,
-    OPT_MARKDOWN,
     OPT_QUIET,
     OPT_HELP
 };
@@ -43,7 +42,6 @@ static const struct cli_option options[] = {
     [OPT_REFERENCE_SEED] = {0, "reference-seed", 1, "N", "with --live (a fresh one)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
-    [OPT_MARKDOWN] = {0, "markdown", 0, "", "print the table as Markdown"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -63,10 +61,10 @@ static void beside_program(char *path, size_t size, const char *name)
 /* The checkout's directory if we stand in one, else the installed one. */
 static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
 {
-    if (access(checkout, R_OK) == 0)
+    if (access("reference/scenes", R_OK) == 0)
         return checkout;
     beside_program(path, size, installed);
-    return access(path, R_OK) == 0 ? path : checkout;
+    return path;
 }
 
 static bool fresh_seed(uint32_t *seed, struct err *e)
@@ -77,8 +75,7 @@ static bool fresh_seed(uint32_t *seed, struct err *e)
 }
 
 /* Sets *done where only the help was asked for. */
-static bool parse(int argc, char **argv, struct validate_options *o, bool *markdown, bool *done,
-                  struct err *e)
+static bool parse(int argc, char **argv, struct validate_options *o, bool *done, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true, has_seed = false;
@@ -112,7 +109,6 @@ static bool parse(int argc, char **argv, struct validate_options *o, bool *markd
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
-        case OPT_MARKDOWN: *markdown = true; break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
@@ -124,19 +120,36 @@ static bool parse(int argc, char **argv, struct validate_options *o, bool *markd
     return ok && (has_seed || !o->live || fresh_seed(&o->reference_seed, e));
 }
 
-static bool write_all(const json_t *results, const char *out_dir, bool markdown, struct err *e)
+static bool write_all(const json_t *results, const char *out_dir, struct err *e)
 {
     char json[4096], junit[4096], html[4096], *table;
     snprintf(json, sizeof json, "%s/results.json", out_dir);
     snprintf(junit, sizeof junit, "%s/junit.xml", out_dir);
     snprintf(html, sizeof html, "%s/index.html", out_dir);
     if (!json_write(json, results, e) || !results_write_junit(junit, results, e) ||
-        !report_write(json, html, e) || !results_print_table(results, markdown, &table, e))
+        !report_write(json, html, e) || !results_print_table(results, false, &table, e))
         return false;
     fputs(table, stdout);
     free(table);
     printf("\n%s\n", html);
     return true;
+}
+
+/* The one line on stderr that exit code 3 owes, also where the table on stdout has gone elsewhere. */
+static void tell_not_judged(const json_t *results, struct err *e)
+{
+    const json_t *claims = json_object_get(results, "claims"), *first = NULL;
+    size_t n = 0;
+    for (size_t i = json_array_size(claims); i-- > 0;) {
+        const json_t *claim = json_array_get(claims, i);
+        if (claim_outcome(claim) == OUTCOME_NOT_JUDGED) {
+            first = claim;
+            n++;
+        }
+    }
+    err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
+            json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
+            member_text(first, "b"), member_text(first, "error"));
 }
 
 int verb_validate(int argc, char **argv, struct err *e)
@@ -152,9 +165,9 @@ int verb_validate(int argc, char **argv, struct err *e)
         .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
         .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
         .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
-    bool markdown = false, done = false;
+    bool done = false;
     json_t *results = NULL;
-    if (!parse(argc, argv, &o, &markdown, &done, e))
+    if (!parse(argc, argv, &o, &done, e))
         return EXIT_NOT_JUDGED;
     if (done)
         return 0;
@@ -163,8 +176,10 @@ int verb_validate(int argc, char **argv, struct err *e)
         o.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
     }
     int code = EXIT_NOT_JUDGED;
-    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, markdown, e))
+    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
         code = results_exit_code(results);
+    if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
+        tell_not_judged(results, e);
     json_decref(results);
     return code;
 }
