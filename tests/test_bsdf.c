@@ -211,6 +211,27 @@ static void check_row(int i, int a)
                  angle[a]);
 }
 
+/* GGX of roughness 1 is D = 1/pi. Seen from above G2 is G1(wi) = 2c/(1 + c), c = cos(theta_i), and the
+ * albedo is the integral of G1/(4 pi) over directions, of c/(1 + c) over c: 1 - ln 2. */
+static void albedo_in_closed_form(void **state)
+{
+    (void)state;
+    for (int separable = 0; separable < 2; separable++) {
+        struct material m = metal(MICROFACET_GGX, 1);
+        m.separable = separable;
+        struct optics_view v = optics_view(1, AZIMUTH, 1);
+        struct pair pair = {&m, to_float(v.wo)};
+        double share[PATCHES + 1];
+        shares(&v, f_cos, &pair, share);
+        assert_true(fabs(1 - share[PATCHES] - (1 - log(2))) < 1e-5);
+        struct optics_metal same = {.ggx = true, .separable = separable, .alpha = 1};
+        assert_true(fabs(optics_metal_albedo(&same, 1) - (1 - log(2))) < 1e-5);
+        /* Negative control. */
+        same.ggx = false;
+        assert_true(fabs(optics_metal_albedo(&same, 1) - (1 - log(2))) > 0.1);
+    }
+}
+
 static void samples_have_their_density(void **state)
 {
     (void)state;
@@ -539,6 +560,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_have_their_density),
+        cmocka_unit_test(albedo_in_closed_form),
         cmocka_unit_test(values_and_reciprocity),
         cmocka_unit_test(facets_cover_the_surface),
         cmocka_unit_test(nothing_becomes_nan),
