@@ -13,34 +13,42 @@ static rgb mirror_reflectance(const struct material *m, float cos_m)
                  fresnel_conductor(cos_m, m->eta.b, m->k.b)};
 }
 
+/* Closer to the surface than this, squares of cosines leave the range of float32. */
+#define LOWEST_COS 1e-15f
+
 /* F D G / (4 cos_o cos_i) [Walter07 eq. 20]. */
 static rgb eval_microfacet(const struct material *m, vec3 wo, vec3 wi)
 {
-    if (wo.z <= 0 || wi.z <= 0)
+    if (wo.z < LOWEST_COS || wi.z < LOWEST_COS)
         return grey(0);
     vec3 h = normalize(add(wo, wi));
     float d = microfacet_d(m->microfacet, m->alpha, h);
     float g = microfacet_g2(m->microfacet, m->alpha, m->separable, wo, wi);
-    return rgb_scale(mirror_reflectance(m, dot(wo, h)), d * g / (4 * wo.z * wi.z));
+    /* Between two grazing directions the rounding of h can be more than its cosine. */
+    return rgb_scale(mirror_reflectance(m, maxf(LOWEST_COS, dot(wo, h))),
+                     d * g / (4 * wo.z * wi.z));
 }
 
 /* Normals are sampled; a solid angle of them is 4 wo.m times as large in mirrored directions
- * [Walter07 eq. 14]. */
+ * [Walter07 eq. 14], which cancels with the cosine in their density. */
 static float microfacet_pdf_w(const struct material *m, vec3 wo, vec3 wi)
 {
-    if (wo.z <= 0 || wi.z <= 0)
+    if (wo.z < LOWEST_COS || wi.z < LOWEST_COS)
         return 0;
     vec3 h = normalize(add(wo, wi));
-    return microfacet_pdf_m(m->microfacet, m->alpha, wo, h) / (4 * dot(wo, h));
+    return microfacet_d(m->microfacet, m->alpha, h) /
+           (4 * (1 + microfacet_lambda(m->microfacet, m->alpha, wo)) * wo.z);
 }
 
 static struct bsdf_sample sample_microfacet(const struct material *m, vec3 wo, float u, float v)
 {
     struct bsdf_sample s = {.eta2 = 1};
+    if (wo.z < LOWEST_COS)
+        return s;
     vec3 h = microfacet_sample(m->microfacet, m->alpha, wo, u, v);
     float cos_m = dot(wo, h);
     s.wi = sub(scale(h, 2 * cos_m), wo);
-    if (cos_m <= 0 || s.wi.z <= 0)
+    if (cos_m <= 0 || s.wi.z < LOWEST_COS)
         return s;
     s.pdf_w = microfacet_pdf_w(m, wo, s.wi);
     /* D, the cosines and the Jacobian cancel. */

@@ -57,9 +57,9 @@ static bool read_factor(struct loader *ld, const xmlNode *tag, const char *name,
     return rgb_max(*out) <= most || fail_at(ld, n, "<%s> above %g", name, (double)most);
 }
 
-/* A required child with one number from lo (excluded) to hi. */
-static bool read_number(struct loader *ld, const xmlNode *tag, const char *name, double lo,
-                        double hi, float *out)
+/* A required child with one number from lo to hi. */
+static bool read_number(struct loader *ld, const xmlNode *tag, const char *name, float lo, float hi,
+                        float *out)
 {
     xmlNode *n;
     double v;
@@ -69,10 +69,10 @@ static bool read_number(struct loader *ld, const xmlNode *tag, const char *name,
         return fail_at(ld, tag, "<%s> without <%s>", (const char *)tag->name, name);
     if (!read_exactly(ld, n, &v, 1))
         return false;
-    if (!(v > lo && v <= hi))
-        return fail_at(ld, n, "<%s> is %g, not above %g and at most %g", name, v, lo, hi);
-    *out = (float)v;
-    return true;
+    /* Compared as what will be stored: 0.0001 is not the same number in both precisions. */
+    *out = fabs(v) <= (double)hi ? (float)v : INFINITY;
+    return (*out >= lo && *out <= hi) ||
+           fail_at(ld, n, "<%s> is %g, outside %g to %g", name, v, (double)lo, (double)hi);
 }
 
 /* The assignment's files carry a <roughness> that nothing uses; another than 0 would mean something. */
@@ -101,7 +101,7 @@ static bool read_refraction(struct loader *ld, const xmlNode *tag, struct materi
     m->reflectance = grey(0);
     return only_children(ld, tag, "transmittance roughness ior") && no_roughness(ld, tag) &&
            read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
-           read_number(ld, tag, "ior", 0, 100, &m->ior);
+           read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
 }
 
 static bool read_glass(struct loader *ld, const xmlNode *tag, struct material *m)
@@ -110,7 +110,7 @@ static bool read_glass(struct loader *ld, const xmlNode *tag, struct material *m
     return only_children(ld, tag, "transmittance reflectance roughness ior") &&
            no_roughness(ld, tag) && read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
            read_factor(ld, tag, "reflectance", 1, &m->reflectance) &&
-           read_number(ld, tag, "ior", 0, 100, &m->ior);
+           read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
 }
 
 /* The assignment's conductor: Beckmann, heights correlated, Fresnel by eta and k. */
@@ -121,7 +121,7 @@ static bool read_cgl_microfacet(struct loader *ld, const xmlNode *tag, struct ma
     m->conductor = true;
     m->reflectance = grey(0);
     return only_children(ld, tag, "alpha eta k") &&
-           read_number(ld, tag, "alpha", 0, 10, &m->alpha) &&
+           read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha) &&
            read_factor(ld, tag, "eta", 1000, &m->eta) && read_factor(ld, tag, "k", 1000, &m->k);
 }
 
@@ -156,7 +156,7 @@ static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct 
                                     : "distribution shadowing alpha reflectance") ||
         !read_choice(ld, tag, "distribution", "ggx", "beckmann", &beckmann) ||
         !read_choice(ld, tag, "shadowing", "correlated", "separable", &m->separable) ||
-        !read_number(ld, tag, "alpha", 0, 10, &m->alpha))
+        !read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha))
         return false;
     m->microfacet = beckmann ? MICROFACET_BECKMANN : MICROFACET_GGX;
     if (!m->conductor)

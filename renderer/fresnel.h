@@ -9,12 +9,13 @@
  * reflection (result 1). */
 static inline float fresnel_dielectric(float cos_i, float eta, float *cos_t)
 {
-    float sin2_t = (1 - cos_i * cos_i) / (eta * eta);
-    if (sin2_t >= 1) {
+    /* eta^2 - sin^2, in a form that keeps its digits for eta near 1 and at grazing angles. */
+    float d = (eta - 1) * (eta + 1) + cos_i * cos_i;
+    if (d <= 0) {
         *cos_t = 0;
         return 1;
     }
-    float c = sqrtf(1 - sin2_t);
+    float c = sqrtf(d) / eta;
     float parallel = (eta * cos_i - c) / (eta * cos_i + c);
     float perpendicular = (cos_i - eta * c) / (cos_i + eta * c);
     *cos_t = c;
@@ -32,12 +33,19 @@ static inline float fresnel_schlick(float cos_i, float eta, float *cos_t)
     return r0 + (1 - r0) * m * m * m * m * m;
 }
 
-/* Unpolarised reflectance of a conductor with index eta + i k against air [Born99 14.2]. */
+/* Unpolarised reflectance of a conductor with index eta + i k against air [Born99 14.2]; 1 if both
+ * are 0. cos_i > 0. */
 static inline float fresnel_conductor(float cos_i, float eta, float k)
 {
-    float cos2 = cos_i * cos_i, sin2 = 1 - cos2, t0 = eta * eta - k * k - sin2;
-    float a2b2 = sqrtf(t0 * t0 + 4 * eta * eta * k * k);
-    float a = sqrtf(maxf(0, 0.5f * (a2b2 + t0)));
+    if (eta == 0 && k == 0)
+        return 1;
+    float cos2 = cos_i * cos_i, sin2 = 1 - cos2;
+    /* eta^2 - k^2 - sin^2, in a form that keeps its digits for eta near 1 and at grazing angles. */
+    float t0 = (eta - 1) * (eta + 1) - k * k + cos2;
+    float a2b2 = hypotf(t0, 2 * eta * k);
+    /* a + i b = sqrt(t0 + 2 i eta k): the larger by its root, the other by a b = eta k. */
+    float large = sqrtf(0.5f * (a2b2 + fabsf(t0)));
+    float a = t0 >= 0 ? large : eta * k / large;
     float perpendicular = (a2b2 + cos2 - 2 * a * cos_i) / (a2b2 + cos2 + 2 * a * cos_i);
     float parallel = perpendicular * (cos2 * a2b2 + sin2 * sin2 - 2 * a * cos_i * sin2) /
                      (cos2 * a2b2 + sin2 * sin2 + 2 * a * cos_i * sin2);

@@ -19,7 +19,7 @@ struct settings {
     int num_outputs;
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left; dx 0: the whole picture */
-    int dialect, accel, kind, direct;
+    int dialect, accel, kind, direct, fresnel;
     int spp, light_samples, threads, max_bounces, first_bounce;
     bool roulette, quiet;
     uint64_t seed;
@@ -51,6 +51,7 @@ enum option {
     OPT_INTEGRATOR,
     OPT_ACCEL,
     OPT_DIALECT,
+    OPT_FRESNEL,
     OPT_QUIET,
     OPT_VERSION,
     OPT_HELP
@@ -88,12 +89,17 @@ static const struct cli_option options[] = {
     [OPT_DIALECT] = {0, "dialect", 1, "NAME",
                      "auto, collada or cgl: whose rules for camera and lights;\n"
                      "auto: cgl if the file has CGL extras (auto)"},
+    [OPT_FRESNEL] = {0, "fresnel", 1, "HOW",
+                     "of glass: exact, or schlick as in the assignment (exact)"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress, no statistics"},
     [OPT_VERSION] = {0, "version", 0, "", "print version and libraries"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
 static const char *const dialect_names[] = {"auto", "collada", "cgl", NULL};
+
+enum { FRESNEL_EXACT, FRESNEL_SCHLICK };
+static const char *const fresnel_names[] = {"exact", "schlick", NULL};
 
 static void print_help(void)
 {
@@ -177,6 +183,7 @@ static bool parse_option(struct settings *s, enum option o, const struct cli *c,
     case OPT_INTEGRATOR: return cli_choice("--integrator", v, integrator_kind_names, &s->kind, e);
     case OPT_ACCEL: return cli_choice("--accel", v, bvh_kind_names, &s->accel, e);
     case OPT_DIALECT: return cli_choice("--dialect", v, dialect_names, &s->dialect, e);
+    case OPT_FRESNEL: return cli_choice("--fresnel", v, fresnel_names, &s->fresnel, e);
     case OPT_QUIET: s->quiet = true; return true;
     case OPT_VERSION:
         printf("pathtracer %s, %s\n", assay_version, image_library_version());
@@ -323,6 +330,8 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
     if (scene.num_degenerate > 0 && !s->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u triangles without area left out\n", s->scene,
                 scene.num_degenerate);
+    for (uint32_t i = 0; i < scene.num_materials; i++)
+        scene.materials[i].schlick = s->fresnel == FRESNEL_SCHLICK;
     if (!setup_camera(s, &scene, &camera, e))
         goto done;
     if (scene.num_lights == 0 && s->kind == INTEGRATE_PATHS) {

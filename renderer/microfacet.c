@@ -14,7 +14,11 @@ float microfacet_d(enum microfacet_kind kind, float alpha, vec3 m)
         float e = sin2 + a2 * cos2;
         return a2 * INV_PI_F / (e * e);
     }
-    return expf(-sin2 / (cos2 * a2)) * INV_PI_F / (a2 * cos2 * cos2);
+    float e = sin2 / (cos2 * a2);
+    /* expf() is 0 there, and cos2 may be. */
+    if (!(e < 100))
+        return 0;
+    return expf(-e) * INV_PI_F / (a2 * cos2 * cos2);
 }
 
 float microfacet_lambda(enum microfacet_kind kind, float alpha, vec3 w)
@@ -32,15 +36,6 @@ float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3
 {
     float lo = microfacet_lambda(kind, alpha, wo), li = microfacet_lambda(kind, alpha, wi);
     return separable ? 1 / ((1 + lo) * (1 + li)) : 1 / (1 + lo + li);
-}
-
-float microfacet_pdf_m(enum microfacet_kind kind, float alpha, vec3 wo, vec3 m)
-{
-    float cos_om = dot(wo, m);
-    if (wo.z <= 0 || cos_om <= 0)
-        return 0;
-    return microfacet_d(kind, alpha, m) * cos_om /
-           ((1 + microfacet_lambda(kind, alpha, wo)) * wo.z);
 }
 
 /* Visible normals of a hemisphere seen from wo, stretched back [Heitz18, section 3]. */

@@ -1,9 +1,13 @@
 /* Rough surfaces as many small mirrors: distribution D of their normals m, Smith shadowing, sampling of
- * the normals that are visible from wo [Heitz14]. Local frame, normal on +Z; alpha > 0. */
+ * the normals that are visible from wo [Heitz14]. Local frame, normal on +Z; alpha at least
+ * MICROFACET_MIN_ALPHA, directions above the surface by more than 1e-15. */
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
 #include "vec.h"
+
+/* Smoother than this is a mirror: float32 hardly tells the normals apart. */
+#define MICROFACET_MIN_ALPHA 1e-4f
 
 enum microfacet_kind { MICROFACET_GGX, MICROFACET_BECKMANN };
 
@@ -21,6 +25,5 @@ float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3
 /* A normal with density D(m) max(0, wo.m) / ((1 + lambda(wo)) wo.z), per steradian: GGX [Heitz18];
  * Beckmann by inverting the distribution of visible slopes numerically. wo.z > 0. */
 vec3 microfacet_sample(enum microfacet_kind kind, float alpha, vec3 wo, float u, float v);
-float microfacet_pdf_m(enum microfacet_kind kind, float alpha, vec3 wo, vec3 m);
 
 #endif

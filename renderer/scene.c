@@ -44,9 +44,10 @@ static bool material_numbers_are_valid(const struct material *m)
     case MATERIAL_DIFFUSE:
     case MATERIAL_MIRROR: break;
     case MATERIAL_REFRACTION:
-    case MATERIAL_GLASS: return m->ior > 0 && isfinite(m->ior);
+    case MATERIAL_GLASS: return m->ior >= 1 / MAX_IOR && m->ior <= MAX_IOR;
     case MATERIAL_MICROFACET:
-        return m->alpha > 0 && isfinite(m->alpha) && is_radiometric(m->eta) && is_radiometric(m->k);
+        return m->alpha >= MICROFACET_MIN_ALPHA && isfinite(m->alpha) && is_radiometric(m->eta) &&
+               is_radiometric(m->k);
     }
     return true;
 }

@@ -20,6 +20,9 @@ enum dialect {
     DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
 };
 
+/* Relative index of refraction: 1/MAX_IOR to MAX_IOR. */
+#define MAX_IOR 100.0f
+
 enum material_kind {
     MATERIAL_DIFFUSE,
     MATERIAL_MIRROR,

@@ -37,7 +37,8 @@ scene=reference/scenes/41_cornell.dae
 small="-r 32 32 -s 16 -t 2 -q"
 
 # The command line of pathtracer.
-for option in --spp --light-samples --max-bounces --hemisphere --adaptive --resolution --cell --seed; do
+for option in --spp --light-samples --max-bounces --hemisphere --adaptive --resolution --cell --seed \
+    --fresnel; do
     expect "help names $option" 0 "$option" "$san_pathtracer" --help
 done
 expect "version" 0 "pathtracer 0" "$san_pathtracer" --version
@@ -50,6 +51,7 @@ expect "negative samples" 3 "not a whole number" "$san_pathtracer" -s -1 -f "$tm
 expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $scene $scene
 expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
 expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
+expect "unknown Fresnel" 3 "fresnel" "$san_pathtracer" --fresnel guess -f "$tmp/x.exr" $scene
 expect "environment map" 3 "not supported" "$san_pathtracer" -e x.exr -f "$tmp/x.exr" $scene
 expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
 expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene

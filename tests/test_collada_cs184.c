@@ -150,11 +150,67 @@ static void meshes_of_assignment_two(void **state)
     scene_free(&s);
 }
 
+static void assert_rgb(rgb c, float r, float g, float b)
+{
+    assert_close(v3(c.r, c.g, c.b), r, g, b);
+}
+
+/* One mirror of 1, one glass of 1.45, both clear; the box as in CBspheres_lambertian. */
+static void mirror_and_glass(void **state)
+{
+    (void)state;
+    struct scene s = must_load("sky/CBspheres.dae", DIALECT_AUTO);
+    assert_int_equal(s.dialect, DIALECT_CGL);
+    assert_int_equal(s.num_triangles, 12);
+    assert_int_equal(s.num_spheres, 2);
+    assert_int_equal(s.num_lights, 1);
+    int mirrors = 0, glasses = 0;
+    for (uint32_t i = 0; i < s.num_spheres; i++) {
+        const struct material *m = &s.materials[s.sphere_material[i]];
+        mirrors += m->kind == MATERIAL_MIRROR;
+        glasses += m->kind == MATERIAL_GLASS;
+        assert_rgb(m->reflectance, 1, 1, 1);
+        assert_rgb(m->radiance, 0, 0, 0);
+        assert_true(s.spheres[i].normal_out == 1);
+        if (m->kind == MATERIAL_GLASS) {
+            assert_rgb(m->transmittance, 1, 1, 1);
+            assert_true(m->ior == 1.45f && !m->schlick);
+        }
+    }
+    assert_int_equal(mirrors, 1);
+    assert_int_equal(glasses, 1);
+    scene_free(&s);
+}
+
+/* Three tinted glasses; 252 triangles. The camera's matrix has 15 numbers. */
+static void gems(void **state)
+{
+    (void)state;
+    struct scene s = must_load("sky/CBgems.dae", DIALECT_AUTO);
+    assert_int_equal(s.num_triangles + s.num_degenerate, 252);
+    assert_int_equal(s.num_lights, 1);
+    static const float tint[3][3] = {{1, 0.75f, 0.75f}, {0.75f, 0.75f, 1}, {1, 0.85f, 1}};
+    int found[3] = {0}, glasses = 0;
+    for (uint32_t i = 0; i < s.num_materials; i++) {
+        const struct material *m = &s.materials[i];
+        if (m->kind != MATERIAL_GLASS)
+            continue;
+        glasses++;
+        assert_rgb(m->reflectance, 1, 1, 1);
+        assert_true(m->ior == 1.45f);
+        for (int k = 0; k < 3; k++)
+            found[k] += m->transmittance.r == tint[k][0] && m->transmittance.g == tint[k][1] &&
+                        m->transmittance.b == tint[k][2];
+    }
+    assert_int_equal(glasses, 3);
+    for (int k = 0; k < 3; k++)
+        assert_int_equal(found[k], 1);
+    scene_free(&s);
+}
+
 static void what_is_not_supported_yet(void **state)
 {
     (void)state;
-    must_fail("sky/CBgems.dae", DIALECT_AUTO, "material tag 'glass' is not supported");
-    must_fail("sky/CBspheres.dae", DIALECT_AUTO, "is not supported");
     must_fail("keenan/banana.dae", DIALECT_CGL, "ambient light is not supported");
 }
 
@@ -165,6 +221,8 @@ int main(void)
         cmocka_unit_test(bunny),
         cmocka_unit_test(empty_box),
         cmocka_unit_test(meshes_of_assignment_two),
+        cmocka_unit_test(mirror_and_glass),
+        cmocka_unit_test(gems),
         cmocka_unit_test(what_is_not_supported_yet),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
