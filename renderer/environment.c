@@ -47,7 +47,7 @@ struct environment *environment_constant(rgb radiance, struct err *e)
     struct environment *env = new_environment(ENVIRONMENT_CONSTANT, e);
     if (env != NULL) {
         env->radiance = radiance;
-        env->total = 4 * PI * luminance(radiance);
+        env->total = 4 * PI * rgb_luminance(radiance);
     }
     return env;
 }
@@ -57,7 +57,7 @@ struct environment *environment_upper_half(rgb radiance, struct err *e)
     struct environment *env = new_environment(ENVIRONMENT_UPPER_HALF, e);
     if (env != NULL) {
         env->radiance = radiance;
-        env->total = 2 * PI * luminance(radiance);
+        env->total = 2 * PI * rgb_luminance(radiance);
     }
     return env;
 }
@@ -134,8 +134,8 @@ static void build_tables(struct environment *env, double *weight, double *row_we
         for (uint32_t c = 0; c < env->width; c++) {
             uint32_t left = left_of(env, c);
             weight[c] = 0.25 * cell *
-                        (luminance(above[left]) + luminance(above[c]) + luminance(below[left]) +
-                         luminance(below[c]));
+                        (rgb_luminance(above[left]) + rgb_luminance(above[c]) +
+                         rgb_luminance(below[left]) + rgb_luminance(below[c]));
         }
         row_weight[r] =
             discrete_build(weight, env->width, env->column_end + (size_t)r * env->width);

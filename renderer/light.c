@@ -37,17 +37,17 @@ static double light_power(const struct scene *s, const struct light *l)
     double falloff = (double)l->attenuation[0] + r * l->attenuation[1] + r2 * l->attenuation[2];
     const struct material *m = NULL;
     switch (l->kind) {
-    case LIGHT_POINT: return 4 * pi * luminance(l->value) / falloff * r2;
+    case LIGHT_POINT: return 4 * pi * rgb_luminance(l->value) / falloff * r2;
     case LIGHT_SPOT: {
         double n = (double)l->exponent + 1;
-        return 2 * pi * (1 - pow(l->cos_cutoff, n)) / n * luminance(l->value) / falloff * r2;
+        return 2 * pi * (1 - pow(l->cos_cutoff, n)) / n * rgb_luminance(l->value) / falloff * r2;
     }
-    case LIGHT_DIRECTIONAL: return pi * r2 * luminance(l->value);
+    case LIGHT_DIRECTIONAL: return pi * r2 * rgb_luminance(l->value);
     case LIGHT_TRIANGLES: m = &s->materials[s->tri_material[l->first]]; break;
     case LIGHT_SPHERE: m = &s->materials[s->sphere_material[l->first]]; break;
     case LIGHT_ENVIRONMENT: return pi * r2 * environment_total(s->environment);
     }
-    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * luminance(m->radiance);
+    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * rgb_luminance(m->radiance);
 }
 
 /* NULL if none of them has power; *ok false if that is for want of memory. */
