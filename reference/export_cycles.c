@@ -269,6 +269,12 @@ static json_t *lights_json(const struct scene *s, struct err *e)
             push(&out, json_pack("{ss,so,so}", "kind", "directional", "to_light",
                                  from_vec3(l->to_light), "irradiance", from_rgb(l->value, 1)));
             break;
+        case LIGHT_SPOT:
+        case LIGHT_ENVIRONMENT:
+            err_set(e, "Cycles: light %u: %s is not matched yet", i,
+                    l->kind == LIGHT_SPOT ? "a spot light" : "an environment");
+            json_decref(out);
+            return NULL;
         case LIGHT_TRIANGLES:
         case LIGHT_SPHERE: break; /* by their material */
         }

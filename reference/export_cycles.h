@@ -29,8 +29,8 @@
 /* Writes the dump, by rename. Fails on a write error, and with a line that starts with "Cycles: "
  * on what our recipe for Cycles cannot express: a thin lens, pixels that are not square, an angle
  * of view out of Blender's range, clipping planes that cut geometry, a depth above 1025, a point
- * light whose falloff is neither constant nor purely quadratic, shading normals of one triangle on
- * both of its sides. */
+ * light whose falloff is neither constant nor purely quadratic, spot lights, an environment,
+ * shading normals of one triangle on both of its sides. */
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
                    struct err *e) __attribute__((warn_unused_result));
 

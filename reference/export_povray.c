@@ -243,6 +243,8 @@ static void put_light(const struct writer *w, uint32_t index)
         fputs(" }\n", w->f);
         break;
     }
+    case LIGHT_SPOT:
+    case LIGHT_ENVIRONMENT: assert(false); break; /* the plan has refused them */
     case LIGHT_TRIANGLES:
     case LIGHT_SPHERE: {
         bool ok = povray_lamp(w->s, l, &lamp);

@@ -185,6 +185,10 @@ static bool plan_lights(const struct scene *s, struct povray_plan *p, struct err
             radiance = fmax(radiance, rgb_max(l->value) / M_PI);
             delta++;
             break;
+        case LIGHT_SPOT:
+        case LIGHT_ENVIRONMENT:
+            return err_set(e, "POV-Ray: light %u: %s is not matched yet", i,
+                           l->kind == LIGHT_SPOT ? "a spot light" : "an environment");
         case LIGHT_TRIANGLES:
         case LIGHT_SPHERE:
             if (!povray_lamp(s, l, &lamp))

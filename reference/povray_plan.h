@@ -23,11 +23,11 @@ struct povray_plan {
 };
 
 /* Looks the scene over for pictures with paths of 0 .. depth bounces. Fails if POV-Ray cannot
- * express it: lens, clipping planes that cut geometry, point lights whose falloff is neither
- * constant nor purely quadratic, light sources together with emitters that need radiosity, an
- * emitter that reflects no red, green or blue but emits it while reflecting others, depth beyond
- * what is verified, shading normals behind their triangle, and sizes at which POV-Ray's fixed
- * tolerances show. */
+ * express it: lens, clipping planes that cut geometry, spot lights, an environment, point lights
+ * whose falloff is neither constant nor purely quadratic, light sources together with emitters that
+ * need radiosity, an emitter that reflects no red, green or blue but emits it while reflecting
+ * others, depth beyond what is verified, shading normals behind their triangle, and sizes at which
+ * POV-Ray's fixed tolerances show. */
 bool povray_plan(const struct scene *s, const struct camera *c, int depth, struct povray_plan *out,
                  struct err *e) __attribute__((warn_unused_result));
 

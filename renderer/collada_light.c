@@ -1,5 +1,6 @@
 /* <light> and <camera> as they are instanced. */
 #include "collada_priv.h"
+#include "environment.h"
 
 #include <float.h>
 #include <string.h>
@@ -75,10 +76,18 @@ static bool read_attenuation(struct loader *ld, const xmlNode *n, struct light *
     return true;
 }
 
+static bool place_light(struct loader *ld, const xmlNode *n, const mat4 *m, struct light *l)
+{
+    dvec3 p = mat4_point(m, d3(0, 0, 0));
+    if (!(fabs(p.x) <= FARTHEST && fabs(p.y) <= FARTHEST && fabs(p.z) <= FARTHEST))
+        return fail_at(ld, n, "the light is beyond %g", FARTHEST);
+    l->position = to_float(p);
+    return true;
+}
+
 static bool add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_POINT, .attenuation = {1, 0, 0}};
-    dvec3 p = mat4_point(m, d3(0, 0, 0));
     if (!only_children(ld, n,
                        "color constant_attenuation linear_attenuation quadratic_attenuation") ||
         !required_color(ld, n, "color", &l.value))
@@ -86,10 +95,39 @@ static bool add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
     /* The assignment's point lights do not fall off, whatever the file says. */
     if (ld->dialect == DIALECT_COLLADA && !read_attenuation(ld, n, &l))
         return false;
-    if (!(fabs(p.x) <= FARTHEST && fabs(p.y) <= FARTHEST && fabs(p.z) <= FARTHEST))
-        return fail_at(ld, n, "the light is beyond %g", FARTHEST);
-    l.position = to_float(p);
-    return add_light(ld, &l);
+    return place_light(ld, n, m, &l) && add_light(ld, &l);
+}
+
+/* A point light with a cone around its -Z. */
+static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
+{
+    struct light l = {.kind = LIGHT_SPOT};
+    bool given;
+    double angle, exponent;
+    if (ld->dialect == DIALECT_CGL)
+        return fail_at(ld, n, "spot lights of the assignment are not supported: they never shone");
+    if (!only_children(ld, n,
+                       "color constant_attenuation linear_attenuation quadratic_attenuation "
+                       "falloff_angle falloff_exponent") ||
+        !required_color(ld, n, "color", &l.value) || !read_attenuation(ld, n, &l) ||
+        !optional_number(ld, n, "falloff_exponent", &given, &exponent) ||
+        !optional_number(ld, n, "falloff_angle", &given, &angle))
+        return false;
+    if (!given)
+        angle = 180;
+    if (!(angle >= 0.1 && angle <= 180))
+        return fail_at(ld, child_named(n, "falloff_angle"),
+                       "<falloff_angle> of %g degrees is not between 0.1 and 180", angle);
+    if (!(exponent >= 0 && exponent <= 1e6))
+        return fail_at(ld, child_named(n, "falloff_exponent"),
+                       "<falloff_exponent> of %g is not between 0 and 1e6", exponent);
+    l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * DEGREE) : 0;
+    l.exponent = (float)exponent;
+    dvec3 backward = mat4_column(m, 2);
+    if (!d3_normalize(&backward))
+        return fail_at(ld, n, "the light has no direction");
+    l.axis = neg(to_float(backward));
+    return place_light(ld, n, m, &l) && add_light(ld, &l);
 }
 
 static bool add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
@@ -131,14 +169,19 @@ static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name,
     return true;
 }
 
-static bool check_ambient(struct loader *ld, const xmlNode *n)
+static bool add_ambient(struct loader *ld, const xmlNode *n)
 {
+    struct light l = {.kind = LIGHT_ENVIRONMENT};
     rgb color;
     if (!only_children(ld, n, "color") || !required_color(ld, n, "color", &color))
         return false;
     if (rgb_is_zero(color))
         return true;
-    return fail_at(ld, n, "ambient light is not supported unless it is black");
+    if (ld->scene.environment != NULL)
+        return fail_at(ld, n, "a second ambient light");
+    ld->scene.environment = ld->dialect == DIALECT_CGL ? environment_upper_half(color, ld->err)
+                                                       : environment_constant(color, ld->err);
+    return ld->scene.environment != NULL ? add_light(ld, &l) : fail_memory(ld);
 }
 
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
@@ -179,9 +222,9 @@ bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
     if (!is_assay && is_element(kind, "directional"))
         return add_directional(ld, kind, m);
     if (!is_assay && is_element(kind, "ambient"))
-        return check_ambient(ld, kind);
+        return add_ambient(ld, kind);
     if (!is_assay && is_element(kind, "spot"))
-        return fail_at(ld, kind, "spot lights are not supported");
+        return add_spot(ld, kind, m);
     return fail_at(ld, kind, "unknown light tag '%.60s'", (const char *)kind->name);
 }
 

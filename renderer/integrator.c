@@ -1,6 +1,7 @@
 #include "integrator.h"
 
 #include "bsdf.h"
+#include "environment.h"
 #include "sampler.h"
 #include "warp.h"
 
@@ -51,18 +52,46 @@ static uint32_t material_of(const struct scene *s, uint32_t prim)
                                    : s->sphere_material[prim - s->num_triangles];
 }
 
-/* Weight of emission that the path ran into. */
-static float emission_weight(const struct integrator *it, const struct batch *b, int i,
+/* One light, chosen by power, is sampled at a vertex and not each of them. */
+static bool chooses_light(const struct integrator *it)
+{
+    switch (it->opt.many_lights) {
+    case LIGHTS_AUTO: break;
+    case LIGHTS_ALL: return false;
+    case LIGHTS_ONE: return true;
+    }
+    return it->scene->num_lights > MANY_LIGHTS;
+}
+
+/* Weight of emission of light l that the path ran into on surface s, or in the environment (s is
+ * NULL). */
+static float emission_weight(const struct integrator *it, const struct batch *b, int i, uint32_t l,
                              const struct surface *s)
 {
     if (b->pdf_w[i] == 0 || it->opt.direct == DIRECT_BSDF)
         return 1;
     if (it->opt.direct != DIRECT_MIS)
         return 0;
-    int32_t l = light_of(it->scene, b->hit.prim[i]);
-    float pdf_light = light_pdf_w(it->lights, (uint32_t)l, vec3s_get(&b->ray.o, i),
-                                  vec3s_get(&b->ray.d, i), b->hit.t[i], s);
+    vec3 d = vec3s_get(&b->ray.d, i);
+    float pdf_light = s == NULL
+                          ? environment_pdf_w(it->scene->environment, d)
+                          : light_pdf_w(it->lights, l, vec3s_get(&b->ray.o, i), d, b->hit.t[i], s);
+    if (chooses_light(it))
+        pdf_light *= light_choice_probability(it->lights, l);
     return power_heuristic(b->pdf_w[i], (float)it->opt.light_samples * pdf_light);
+}
+
+/* The ray of lane i has left the scene. */
+static void add_environment(const struct integrator *it, struct batch *b, int i)
+{
+    const struct scene *s = it->scene;
+    if (s->environment == NULL || (b->pdf_w[i] == 0 && environment_is_hidden(s->environment)))
+        return;
+    rgb le = environment_radiance(s->environment, vec3s_get(&b->ray.d, i));
+    if (rgb_is_zero(le))
+        return;
+    float w = emission_weight(it, b, i, (uint32_t)s->environment_light, NULL);
+    rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
 }
 
 /* Adds emission, sets up the surfaces, drops lanes whose path has ended. */
@@ -72,17 +101,21 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
     for (int k = 0; k < num_active; k++) {
         int i = b->active[k];
         uint32_t prim = b->hit.prim[i];
-        if (prim == NO_HIT)
+        if (prim == NO_HIT) {
+            if (counts(it, vertex))
+                add_environment(it, b, i);
             continue;
+        }
         ray r = rays_get(&b->ray, i);
         struct surface s = surface_at(it->scene, prim, &r, b->hit.t[i], b->hit.u[i], b->hit.v[i]);
         vec3 wo = neg(r.d);
         b->material[i] = material_of(it->scene, prim);
         const struct material *m = &it->scene->materials[b->material[i]];
-        if (light_of(it->scene, prim) >= 0 && counts(it, vertex)) {
+        int32_t light = light_of(it->scene, prim);
+        if (light >= 0 && counts(it, vertex)) {
             rgb le = emitted_radiance(m, s.ng, wo);
             if (!rgb_is_zero(le)) {
-                float w = emission_weight(it, b, i, &s);
+                float w = emission_weight(it, b, i, (uint32_t)light, &s);
                 rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
             }
         }
@@ -136,18 +169,23 @@ static ray leaving(const struct batch *b, int i, vec3 wi, float tmax)
     return (ray){.o = surface_origin(&s, wi), .d = wi, .tmin = 0, .tmax = tmax};
 }
 
-/* One sample of light l from every diffuse lane, as one of `count` per lane. */
+/* One sample of a light from every diffuse lane, as one of `count` per lane. b->choice says which
+ * light. */
 static void connect_light(const struct integrator *it, struct batch *b, int num_lanes, int vertex,
-                          uint32_t l, uint32_t purpose, int count)
+                          uint32_t purpose, int count)
 {
     int n = 0;
     for (int k = 0; k < num_lanes; k++) {
         int i = b->diffuse[k];
+        if (b->choice[i].probability == 0)
+            continue;
         struct sample4 u =
             sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
-        struct light_sample ls = light_sample_direction(it->lights, l, vec3s_get(&b->p, i), u.u);
+        struct light_sample ls =
+            light_sample_direction(it->lights, b->choice[i].light, vec3s_get(&b->p, i), u.u);
         if (ls.pdf_w <= 0)
             continue;
+        ls.pdf_w *= b->choice[i].probability;
         float pdf_bsdf;
         rgb f = scatter_towards(it, b, i, ls.wi, &pdf_bsdf);
         if (rgb_is_zero(f))
@@ -196,6 +234,11 @@ static void connect_hemisphere(const struct integrator *it, struct batch *b, int
     for (int k = 0; k < n; k++) {
         int i = b->shadow_lane[k];
         uint32_t prim = b->shadow_hit.prim[i];
+        if (prim == NO_HIT && it->scene->environment != NULL)
+            rgbs_add(
+                &b->radiance, i,
+                rgb_mul(rgbs_get(&b->shadow_light, i),
+                        environment_radiance(it->scene->environment, vec3s_get(&b->shadow.d, i))));
         if (prim == NO_HIT || light_of(it->scene, prim) < 0)
             continue;
         ray r = rays_get(&b->shadow, i);
@@ -207,26 +250,52 @@ static void connect_hemisphere(const struct integrator *it, struct batch *b, int
     }
 }
 
+/* Every lane samples the same light. */
+static void choose_for_all(struct batch *b, int num_lanes, uint32_t l)
+{
+    for (int k = 0; k < num_lanes; k++)
+        b->choice[b->diffuse[k]] = (struct light_choice){l, 1};
+}
+
+/* Every lane samples a light of its own. only_delta: among the delta lights. */
+static void choose_for_each(const struct integrator *it, struct batch *b, int num_lanes, int vertex,
+                            uint32_t purpose, bool only_delta)
+{
+    for (int k = 0; k < num_lanes; k++) {
+        int i = b->diffuse[k];
+        struct sample4 u =
+            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        b->choice[i] = light_choose(it->lights, only_delta, u.u[0]);
+    }
+}
+
 static void connect(const struct integrator *it, struct batch *b, int num_active, int vertex)
 {
     const struct scene *s = it->scene;
     uint32_t purpose = PURPOSE_LIGHT;
-    int area_lights = 0, n = 0;
+    bool only_delta = it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
+    bool choose = chooses_light(it);
+    int n = 0;
     for (int k = 0; k < num_active; k++) {
         b->diffuse[n] = b->active[k];
         n += !bsdf_is_delta(&s->materials[b->material[b->active[k]]]);
     }
-    for (uint32_t l = 0; l < s->num_lights; l++) {
+    for (int k = 0; choose && k < it->opt.light_samples; k++) {
+        choose_for_each(it, b, n, vertex, purpose++, only_delta);
+        connect_light(it, b, n, vertex, purpose++, it->opt.light_samples);
+    }
+    for (uint32_t l = 0; !choose && l < s->num_lights; l++) {
         bool delta = light_is_delta(&s->lights[l]);
-        area_lights += !delta;
-        if (!delta && it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS)
+        if (!delta && only_delta)
             continue;
         int count = delta ? 1 : it->opt.light_samples;
+        choose_for_all(b, n, l);
         for (int k = 0; k < count; k++)
-            connect_light(it, b, n, vertex, l, purpose++, count);
+            connect_light(it, b, n, vertex, purpose++, count);
     }
     if (it->opt.direct == DIRECT_HEMISPHERE) {
-        int count = area_lights * it->opt.light_samples;
+        uint32_t areas = light_count_areas(it->lights);
+        int count = (int)(areas < MANY_LIGHTS ? areas : MANY_LIGHTS) * it->opt.light_samples;
         for (int k = 0; k < count; k++)
             connect_hemisphere(it, b, n, vertex, purpose++, count);
     }

@@ -17,9 +17,16 @@ enum integrator_kind {
  * delta lights are always sampled. */
 enum direct_kind {
     DIRECT_HEMISPHERE, /* uniform directions, the assignment's -H */
-    DIRECT_LIGHT,      /* points on the lights */
+    DIRECT_LIGHT,      /* points on the lights, directions of the environment */
     DIRECT_BSDF,       /* only what the path itself runs into */
     DIRECT_MIS         /* lights and path, power heuristic [Veach97 9.2] */
+};
+
+/* Which lights a vertex samples. All have the same mean. */
+enum many_lights {
+    LIGHTS_AUTO, /* all up to MANY_LIGHTS of them, else one */
+    LIGHTS_ALL,  /* light_samples of each; one of each delta light */
+    LIGHTS_ONE   /* light_samples times one light, chosen by power */
 };
 
 struct integrator_options {
@@ -27,8 +34,10 @@ struct integrator_options {
     enum direct_kind direct;
     int max_bounces;   /* 0: emission seen directly, 1: + direct light, ... */
     int first_bounce;  /* light with fewer bounces is left out */
-    int light_samples; /* per area light and vertex; hemisphere: directions per area light */
-    bool roulette;     /* end paths by their throughput from the third vertex on [Arvo90] */
+    int light_samples; /* per area light and vertex; hemisphere: directions per area light, of which
+                          no more than MANY_LIGHTS count */
+    enum many_lights many_lights;
+    bool roulette; /* end paths by their throughput from the third vertex on [Arvo90] */
     uint64_t seed;
 };
 
@@ -58,6 +67,7 @@ struct batch {
     bool front[BATCH_LANES];
     uint32_t material[BATCH_LANES];
     uint16_t active[BATCH_LANES], shadow_lane[BATCH_LANES];
+    struct light_choice choice[BATCH_LANES];
     uint16_t diffuse[BATCH_LANES]; /* those of active that light sampling serves */
     struct bvh_stats stats;
 };

@@ -1,5 +1,7 @@
 #include "light.h"
 
+#include "discrete.h"
+#include "environment.h"
 #include "warp.h"
 
 #include <assert.h>
@@ -8,19 +10,13 @@
 struct light_table {
     const struct scene *scene;
     float *cdf; /* per triangle: area up to and including it, from its light's first one */
+    /* Choices among all lights and among the delta lights; NULL where there is nothing to choose. */
+    uint32_t *all, *delta;
+    uint32_t num_areas;
 };
 
-struct light_table *light_table_build(const struct scene *s, struct err *e)
+static void sum_areas(const struct scene *s, float *cdf)
 {
-    struct light_table *t = calloc(1, sizeof *t);
-    if (t != NULL)
-        t->cdf = calloc((size_t)s->num_triangles + 1, sizeof *t->cdf);
-    if (t == NULL || t->cdf == NULL) {
-        light_table_free(t);
-        err_set(e, "out of memory for the lights");
-        return NULL;
-    }
-    t->scene = s;
     for (uint32_t l = 0; l < s->num_lights; l++) {
         const struct light *light = &s->lights[l];
         if (light->kind != LIGHT_TRIANGLES)
@@ -29,9 +25,72 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
         for (uint32_t i = light->first; i < light->first + light->count; i++) {
             const vec3 *p = s->position + 3 * (size_t)i;
             sum += 0.5 * (double)length(cross(sub(p[1], p[0]), sub(p[2], p[0])));
-            t->cdf[i] = (float)sum;
+            cdf[i] = (float)sum;
         }
     }
+}
+
+static double light_power(const struct scene *s, const struct light *l)
+{
+    const double pi = 3.14159265358979323846;
+    double r = 0.5 * (double)length(sub(s->bounds_max, s->bounds_min)), r2 = r * r;
+    double falloff = (double)l->attenuation[0] + r * l->attenuation[1] + r2 * l->attenuation[2];
+    const struct material *m = NULL;
+    switch (l->kind) {
+    case LIGHT_POINT: return 4 * pi * rgb_luminance(l->value) / falloff * r2;
+    case LIGHT_SPOT: {
+        double n = (double)l->exponent + 1;
+        return 2 * pi * (1 - pow(l->cos_cutoff, n)) / n * rgb_luminance(l->value) / falloff * r2;
+    }
+    case LIGHT_DIRECTIONAL: return pi * r2 * rgb_luminance(l->value);
+    case LIGHT_TRIANGLES: m = &s->materials[s->tri_material[l->first]]; break;
+    case LIGHT_SPHERE: m = &s->materials[s->sphere_material[l->first]]; break;
+    case LIGHT_ENVIRONMENT: return pi * r2 * environment_total(s->environment);
+    }
+    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * rgb_luminance(m->radiance);
+}
+
+/* NULL if none of them has power; *ok false if that is for want of memory. */
+static uint32_t *build_choice(const struct scene *s, bool only_delta, double *power, bool *ok)
+{
+    for (uint32_t l = 0; l < s->num_lights; l++)
+        power[l] = only_delta && !light_is_delta(&s->lights[l]) ? 0 : light_power(s, &s->lights[l]);
+    uint32_t *end = malloc(((size_t)s->num_lights + 1) * sizeof *end);
+    *ok = end != NULL;
+    if (*ok && (s->num_lights == 0 || !(discrete_build(power, s->num_lights, end) > 0))) {
+        free(end);
+        end = NULL;
+    }
+    return end;
+}
+
+struct light_table *light_table_build(const struct scene *s, struct err *e)
+{
+    if (s->num_lights > DISCRETE_MOST) {
+        err_set(e, "more than %d lights", DISCRETE_MOST);
+        return NULL;
+    }
+    struct light_table *t = calloc(1, sizeof *t);
+    double *power = malloc(((size_t)s->num_lights + 1) * sizeof *power);
+    bool ok = t != NULL && power != NULL;
+    if (ok) {
+        t->scene = s;
+        t->cdf = calloc((size_t)s->num_triangles + 1, sizeof *t->cdf);
+        ok = t->cdf != NULL;
+    }
+    if (ok)
+        t->all = build_choice(s, false, power, &ok);
+    if (ok)
+        t->delta = build_choice(s, true, power, &ok);
+    free(power);
+    if (!ok) {
+        light_table_free(t);
+        err_set(e, "out of memory for the lights");
+        return NULL;
+    }
+    sum_areas(s, t->cdf);
+    for (uint32_t l = 0; l < s->num_lights; l++)
+        t->num_areas += !light_is_delta(&s->lights[l]);
     return t;
 }
 
@@ -40,7 +99,28 @@ void light_table_free(struct light_table *t)
     if (t == NULL)
         return;
     free(t->cdf);
+    free(t->all);
+    free(t->delta);
     free(t);
+}
+
+struct light_choice light_choose(const struct light_table *t, bool only_delta, float u)
+{
+    const uint32_t *end = only_delta ? t->delta : t->all;
+    if (end == NULL)
+        return (struct light_choice){0};
+    uint32_t l = discrete_pick(end, t->scene->num_lights, u);
+    return (struct light_choice){l, discrete_probability(end, l)};
+}
+
+float light_choice_probability(const struct light_table *t, uint32_t l)
+{
+    return t->all != NULL ? discrete_probability(t->all, l) : 0;
+}
+
+uint32_t light_count_areas(const struct light_table *t)
+{
+    return t->num_areas;
 }
 
 /* pdf_w and direction for a place on an area light of density pdf_a there. */
@@ -124,27 +204,36 @@ static struct light_sample sample_sphere(const struct light_table *t, const stru
     return out;
 }
 
+static struct light_sample sample_point(const struct light *light, vec3 p)
+{
+    struct light_sample out = {.sphere = NO_HIT};
+    vec3 w = sub(light->position, p);
+    float d = length(w), share = 1;
+    if (d == 0)
+        return out;
+    out.wi = scale(w, 1 / d);
+    if (light->kind == LIGHT_SPOT) {
+        float cosine = -dot(light->axis, out.wi);
+        if (!(cosine > light->cos_cutoff))
+            return out;
+        share = powf(cosine, light->exponent);
+    }
+    const float *a = light->attenuation;
+    out.distance = d;
+    out.radiance = rgb_scale(light->value, share / (a[0] + d * (a[1] + d * a[2])));
+    out.pdf_w = 1;
+    out.delta = true;
+    return out;
+}
+
 struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
-                                           const float u[3])
+                                           const float u[4])
 {
     const struct light *light = &t->scene->lights[l];
     struct light_sample out = {.sphere = NO_HIT};
     switch (light->kind) {
-    case LIGHT_POINT: {
-        vec3 w = sub(light->position, p);
-        float d = length(w);
-        if (d == 0)
-            break;
-        const float *a = light->attenuation;
-        out = (struct light_sample){.sphere = NO_HIT,
-                                    .wi = scale(w, 1 / d),
-                                    .distance = d,
-                                    .radiance =
-                                        rgb_scale(light->value, 1 / (a[0] + d * (a[1] + d * a[2]))),
-                                    .pdf_w = 1,
-                                    .delta = true};
-        break;
-    }
+    case LIGHT_POINT:
+    case LIGHT_SPOT: out = sample_point(light, p); break;
     case LIGHT_DIRECTIONAL:
         out = (struct light_sample){.sphere = NO_HIT,
                                     .wi = light->to_light,
@@ -155,6 +244,14 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
         break;
     case LIGHT_TRIANGLES: out = sample_triangles(t, light, p, u); break;
     case LIGHT_SPHERE: out = sample_sphere(t, light, p, u); break;
+    case LIGHT_ENVIRONMENT: {
+        struct environment_sample s = environment_sample_direction(t->scene->environment, u);
+        out.wi = s.wi;
+        out.distance = INFINITY;
+        out.radiance = s.radiance;
+        out.pdf_w = s.pdf_w;
+        break;
+    }
     }
     return out;
 }
@@ -163,7 +260,7 @@ float light_pdf_w(const struct light_table *t, uint32_t l, vec3 p, vec3 wi, floa
                   const struct surface *hit)
 {
     const struct light *light = &t->scene->lights[l];
-    assert(!light_is_delta(light));
+    assert(light->kind == LIGHT_TRIANGLES || light->kind == LIGHT_SPHERE);
     if (light->kind == LIGHT_SPHERE) {
         const struct sphere *sp = &t->scene->spheres[light->first];
         vec3 to_centre = sub(sp->centre, p);

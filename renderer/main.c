@@ -1,6 +1,7 @@
 /* pathtracer: options -> scene -> render -> pictures. */
 #include "cli.h"
 #include "collada.h"
+#include "environment.h"
 #include "fs.h"
 #include "render.h"
 #include "tone.h"
@@ -14,7 +15,7 @@
 enum { MAX_OUTPUTS = 8, EXIT_BAD_INPUT = 3 };
 
 struct settings {
-    const char *scene, *camera_file;
+    const char *scene, *camera_file, *environment_file;
     const char *output[MAX_OUTPUTS];
     int num_outputs;
     int width, height;
@@ -73,7 +74,8 @@ static const struct cli_option options[] = {
     [OPT_ADAPTIVE] = {'a', "adaptive", 2, "N TOL",
                       "every N samples a pixel stops if its 95 % interval\n"
                       "is within TOL of its mean; biased (off)"},
-    [OPT_ENVIRONMENT] = {'e', "environment", 1, "FILE", "environment map; not supported yet"},
+    [OPT_ENVIRONMENT] = {'e', "environment", 1, "FILE",
+                         "environment map in latitude and longitude, .exr or .hdr"},
     [OPT_LENS] = {'b', "lens-radius", 1, "R", "thin lens, scene units; 0: pinhole (0)"},
     [OPT_FOCUS] = {'d', "focal-distance", 1, "D", "distance in focus, scene units (4.7)"},
     [OPT_OUT] = {'f', "out", 1, "FILE",
@@ -170,7 +172,7 @@ static bool parse_option(struct settings *s, enum option o, const struct cli *c,
     case OPT_ADAPTIVE:
         return cli_int("--adaptive", v, 1, 1 << 24, &s->adaptive_batch, e) &&
                cli_double("--adaptive", c->value[1], 0, 1e6, &s->adaptive_tolerance, e);
-    case OPT_ENVIRONMENT: return err_set(e, "-e %s: environment maps are not supported yet", v);
+    case OPT_ENVIRONMENT: s->environment_file = v; return true;
     case OPT_LENS: return cli_double("--lens-radius", v, 0, 1e6, &s->lens_radius, e);
     case OPT_FOCUS: return cli_double("--focal-distance", v, 1e-6, 1e9, &s->focal_distance, e);
     case OPT_OUT: return add_output(s, v, e);
@@ -316,6 +318,17 @@ static bool setup_camera(const struct settings *s, const struct scene *scene, st
     return true;
 }
 
+static bool add_environment(const struct settings *s, struct scene *scene, struct err *e)
+{
+    struct environment *env = environment_read(s->environment_file, e);
+    if (env == NULL)
+        return false;
+    if (scene_add_environment(scene, env, e))
+        return true;
+    environment_free(env);
+    return err_prefix(e, "-e %s with %s", s->environment_file, s->scene);
+}
+
 static bool run(const struct settings *s, int argc, char **argv, struct err *e)
 {
     struct scene scene = {0};
@@ -332,6 +345,11 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
                 scene.num_degenerate);
     for (uint32_t i = 0; i < scene.num_materials; i++)
         scene.materials[i].schlick = s->fresnel == FRESNEL_SCHLICK;
+    if (scene.num_dark_lights > 0 && !s->quiet)
+        fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", s->scene,
+                scene.num_dark_lights);
+    if (s->environment_file != NULL && !add_environment(s, &scene, e))
+        goto done;
     if (!setup_camera(s, &scene, &camera, e))
         goto done;
     if (scene.num_lights == 0 && s->kind == INTEGRATE_PATHS) {

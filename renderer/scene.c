@@ -1,5 +1,7 @@
 #include "scene.h"
 
+#include "environment.h"
+
 #include <assert.h>
 #include <float.h>
 #include <stdlib.h>
@@ -19,6 +21,7 @@ void scene_free(struct scene *s)
     free(s->materials);
     free(s->lights);
     free(s->objects);
+    environment_free(s->environment);
     memset(s, 0, sizeof *s);
 }
 
@@ -69,25 +72,56 @@ static bool check_materials(const struct scene *s, const char *where, struct err
     return true;
 }
 
-static bool check_delta_lights(const struct scene *s, const char *where, struct err *e)
+static bool check_point(const struct light *l, uint32_t i, const char *where, struct err *e)
 {
+    const float *a = l->attenuation;
+    if (!finite3(l->position))
+        return err_set(e, "%s: light %u: position not finite", where, i);
+    if (!(a[0] >= 0 && a[1] >= 0 && a[2] >= 0 && a[0] + a[1] + a[2] > 0 &&
+          isfinite(a[0] + a[1] + a[2])))
+        return err_set(e, "%s: light %u: attenuation negative, zero or not finite", where, i);
+    return true;
+}
+
+/* All lights that do not come from primitives; finds the environment's and counts the dark ones. */
+static bool check_lights(struct scene *s, const char *where, struct err *e)
+{
+    s->environment_light = -1;
+    s->num_dark_lights = 0;
     for (uint32_t i = 0; i < s->num_lights; i++) {
         const struct light *l = &s->lights[i];
-        assert(l->kind == LIGHT_POINT || l->kind == LIGHT_DIRECTIONAL);
         if (!is_radiometric(l->value))
             return err_set(e, "%s: light %u: value negative or not finite", where, i);
-        if (l->kind == LIGHT_DIRECTIONAL) {
+        s->num_dark_lights += l->kind != LIGHT_ENVIRONMENT && rgb_is_zero(l->value);
+        switch (l->kind) {
+        case LIGHT_DIRECTIONAL:
             if (!is_unit(l->to_light))
                 return err_set(e, "%s: light %u: direction not of unit length", where, i);
-            continue;
+            break;
+        case LIGHT_SPOT:
+            if (!is_unit(l->axis))
+                return err_set(e, "%s: light %u: direction not of unit length", where, i);
+            if (!(l->cos_cutoff >= 0 && l->cos_cutoff < 1 && l->exponent >= 0) ||
+                !isfinite(l->exponent))
+                return err_set(e, "%s: light %u: cone or exponent out of range", where, i);
+            if (!check_point(l, i, where, e))
+                return false;
+            break;
+        case LIGHT_POINT:
+            if (!check_point(l, i, where, e))
+                return false;
+            break;
+        case LIGHT_ENVIRONMENT:
+            if (s->environment_light >= 0 || s->environment == NULL)
+                return err_set(e, "%s: light %u: more than one environment, or none", where, i);
+            s->environment_light = (int32_t)i;
+            break;
+        case LIGHT_TRIANGLES:
+        case LIGHT_SPHERE: assert(false); break;
         }
-        const float *a = l->attenuation;
-        if (!finite3(l->position))
-            return err_set(e, "%s: light %u: position not finite", where, i);
-        if (!(a[0] >= 0 && a[1] >= 0 && a[2] >= 0 && a[0] + a[1] + a[2] > 0 &&
-              isfinite(a[0] + a[1] + a[2])))
-            return err_set(e, "%s: light %u: attenuation negative, zero or not finite", where, i);
     }
+    if (s->environment != NULL && s->environment_light < 0)
+        return err_set(e, "%s: an environment that is no light", where);
     return true;
 }
 
@@ -232,7 +266,7 @@ bool scene_finish(struct scene *s, const char *where, struct err *e)
     if (s->num_objects > INT32_MAX / 2 || s->num_spheres > INT32_MAX / 2 ||
         s->num_lights > INT32_MAX / 2 || s->num_triangles > UINT32_MAX / 4)
         return err_set(e, "%s: too many primitives", where);
-    if (!check_materials(s, where, e) || !check_delta_lights(s, where, e) ||
+    if (!check_materials(s, where, e) || !check_lights(s, where, e) ||
         !check_objects(s, where, e) || !check_primitives(s, where, e))
         return false;
     if (!make_room(s))
@@ -244,5 +278,19 @@ bool scene_finish(struct scene *s, const char *where, struct err *e)
     if (!append_area_lights(s, where, e))
         return false;
     find_bounds(s);
+    return true;
+}
+
+bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)
+{
+    if (s->environment != NULL)
+        return err_set(e, "the scene has an environment of its own: its ambient light");
+    struct light *lights = realloc(s->lights, ((size_t)s->num_lights + 1) * sizeof *lights);
+    if (lights == NULL)
+        return err_set(e, "out of memory");
+    s->lights = lights;
+    s->environment = env;
+    s->environment_light = (int32_t)s->num_lights;
+    lights[s->num_lights++] = (struct light){.kind = LIGHT_ENVIRONMENT};
     return true;
 }

@@ -60,16 +60,22 @@ struct sphere {
 enum light_kind {
     LIGHT_POINT, /* radiant intensity value / (att[0] + att[1] d + att[2] d^2); att = {0,0,1} is
                     physical and value is then W sr^-1 */
+    LIGHT_SPOT,  /* the same, times cos(angle to axis)^exponent; 0 where cos <= cos_cutoff */
     LIGHT_DIRECTIONAL, /* value: irradiance on a plane facing it, W m^-2 */
     LIGHT_TRIANGLES,   /* emissive triangles, all of one object */
-    LIGHT_SPHERE       /* one emissive sphere */
+    LIGHT_SPHERE,      /* one emissive sphere */
+    LIGHT_ENVIRONMENT  /* the scene's environment */
 };
+
+struct environment;
 
 struct light {
     enum light_kind kind;
-    rgb value;     /* point, directional */
-    vec3 position; /* point */
-    vec3 to_light; /* directional: unit, from the scene towards the light */
+    rgb value;                  /* point, spot, directional */
+    vec3 position;              /* point, spot */
+    vec3 axis;                  /* spot: unit, the direction it shines in */
+    float cos_cutoff, exponent; /* spot: 0 <= cos_cutoff < 1, exponent >= 0 */
+    vec3 to_light;              /* directional: unit, from the scene towards the light */
     float attenuation[3];
     uint32_t first; /* triangles: first triangle; sphere: index of the sphere */
     uint32_t count; /* triangles: they are contiguous, first .. first+count-1 */
@@ -111,26 +117,34 @@ struct scene {
     struct material *materials;
     struct light *lights;
     struct object *objects;
+    struct environment *environment; /* NULL if there is none */
+    int32_t environment_light;       /* index into lights, -1 if there is none */
     struct scene_camera camera;
     vec3 bounds_min, bounds_max; /* of all primitives */
     /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
      * lights, with the meshes that gave way to them; else the bounds. */
     vec3 frame_min, frame_max;
-    unsigned num_degenerate; /* triangles without area that were dropped at loading */
-    char note[256];          /* what the dialect merged, one line for the user; else empty */
+    unsigned num_degenerate;  /* triangles without area that were dropped at loading */
+    unsigned num_dark_lights; /* point, spot and directional lights of zero power */
+    char note[256];           /* what the dialect merged, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
 void scene_free(struct scene *s);
 
-/* Completes a scene whose triangles, spheres, materials, objects, camera and delta lights are in
- * place: drops nothing, appends one area light for the triangles and one for each sphere of each
- * emissive object (in object order), allocates and fills tri_light and sphere_light, fills areas
- * and bounds. `lights` must come from malloc() or be NULL. Fails on an index out of range, objects
- * that are not contiguous, a value that is not finite, a normal not of unit length, a negative
- * reflectance or radiance, a reflectance above 1, or a scene without primitives; `where` starts the
- * line. */
+/* Completes a scene whose triangles, spheres, materials, objects, camera, delta lights and
+ * environment (with its light) are in place: drops nothing, appends one area light for the
+ * triangles and one for each sphere of each emissive object (in object order), allocates and fills
+ * tri_light and sphere_light, fills areas and bounds. `lights` must come from malloc() or be NULL.
+ * Fails on an index out of range, objects that are not contiguous, a value that is not finite, a
+ * normal not of unit length, a negative reflectance or radiance, a reflectance above 1, or a scene
+ * without primitives; `where` starts the line. */
 bool scene_finish(struct scene *s, const char *where, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns
+ * it from then on; on failure (there is one already; out of memory) the caller still does. */
+bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)
     __attribute__((warn_unused_result));
 
 static inline uint32_t scene_num_primitives(const struct scene *s)

@@ -105,6 +105,11 @@ static inline float rgb_max(rgb a)
 {
     return maxf(a.r, maxf(a.g, a.b));
 }
+/* Rec. 709; in double, so that it is 0 for black only. */
+static inline double rgb_luminance(rgb a)
+{
+    return 0.2126 * (double)a.r + 0.7152 * (double)a.g + 0.0722 * (double)a.b;
+}
 static inline bool rgb_is_zero(rgb a)
 {
     return a.r == 0 && a.g == 0 && a.b == 0;

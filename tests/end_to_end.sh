@@ -52,7 +52,10 @@ expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $s
 expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
 expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
 expect "unknown Fresnel" 3 "fresnel" "$san_pathtracer" --fresnel guess -f "$tmp/x.exr" $scene
-expect "environment map" 3 "not supported" "$san_pathtracer" -e x.exr -f "$tmp/x.exr" $scene
+expect "environment map that is not there" 3 "nosky.exr: cannot read" \
+    "$san_pathtracer" $small -e nosky.exr -f "$tmp/x.exr" $scene
+expect "environment map of 8 bits" 3 "must be an .exr or .hdr" \
+    "$san_pathtracer" $small -e sky.png -f "$tmp/x.exr" $scene
 expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
 expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
 expect "unwritable output" 3 "/nonexistent/x.exr" \
@@ -74,6 +77,8 @@ fi
 # Pictures.
 expect "render" 0 "mean radiance" \
     "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
+expect "environment map" 0 "mean radiance" \
+    "$san_pathtracer" $small -e "$tmp/a.exr" -f "$tmp/sky.png" $scene
 "$pathtracer" $small -t 1 --seed 1 -f "$tmp/a1.png" $scene >/dev/null
 "$pathtracer" $small -t 2 --seed 1 -f "$tmp/a2.png" $scene >/dev/null
 if cmp -s "$tmp/a1.png" "$tmp/a2.png"; then ok "1 and 2 threads, same bytes"; else

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "../renderer/environment.h"
 #include "dae.h"
 
 static const double DEGREE = 3.14159265358979323846 / 180;
@@ -303,6 +304,62 @@ static void directional_lights(void **state)
     s = dae_must_load(unscaled, DIALECT_CGL);
     assert_vec(s.lights[0].to_light, 3 / sqrt(26), -1 / sqrt(26), 4 / sqrt(26));
     scene_free(&s);
+}
+
+/* Shines along -Z of its node, which looks along world -X after a quarter turn about Y. The angle is
+ * that of the whole cone; the falloff is that of a point light. */
+static void spot_lights(void **state)
+{
+    (void)state;
+    struct scene s = dae_must_load(
+        (struct dae){.asset = "<unit meter=\"0.01\"/>",
+                     .libraries = LIGHT("<spot><color>10 20 30</color>"
+                                        "<constant_attenuation>0</constant_attenuation>"
+                                        "<quadratic_attenuation>4</quadratic_attenuation>"
+                                        "<falloff_angle>60</falloff_angle>"
+                                        "<falloff_exponent>1.5</falloff_exponent></spot>",
+                                        ""),
+                     .nodes = SHINE("<translate>100 200 300</translate><rotate>0 1 0 90</rotate>"
+                                    "<scale>3 3 3</scale>")},
+        DIALECT_AUTO);
+    assert_int_equal(s.num_lights, 1);
+    assert_int_equal(s.lights[0].kind, LIGHT_SPOT);
+    assert_vec(s.lights[0].position, 1, 2, 3);
+    assert_vec(s.lights[0].axis, -1, 0, 0);
+    assert_near(s.lights[0].cos_cutoff, 0.8660254038, 1e-6);
+    assert_near(s.lights[0].exponent, 1.5, 0);
+    assert_rgb(s.lights[0].value, 10 / 40000., 20 / 40000., 30 / 40000.);
+    assert_near(s.lights[0].attenuation[0], 0, 0);
+    assert_near(s.lights[0].attenuation[2], 1, 0);
+    scene_free(&s);
+    s = dae_must_load((struct dae){.libraries = LIGHT("<spot><color>1 1 1</color></spot>", ""),
+                                   .nodes = SHINE("")},
+                      DIALECT_AUTO);
+    assert_near(s.lights[0].cos_cutoff, 0, 0);
+    assert_near(s.lights[0].exponent, 0, 0);
+    assert_near(s.lights[0].attenuation[0], 1, 0);
+    assert_vec(s.lights[0].axis, 0, 0, -1);
+    scene_free(&s);
+}
+
+/* Everywhere the same, and seen; in the assignment from above only, and hidden. */
+static void ambient_light(void **state)
+{
+    (void)state;
+    static const struct dae AMBIENT = {
+        .libraries = LIGHT("<ambient><color>1 2 3</color></ambient>", ""), .nodes = SHINE("")};
+    for (int cgl = 0; cgl < 2; cgl++) {
+        struct scene s = dae_must_load(AMBIENT, cgl ? DIALECT_CGL : DIALECT_COLLADA);
+        assert_int_equal(s.num_lights, 1);
+        assert_int_equal(s.lights[0].kind, LIGHT_ENVIRONMENT);
+        assert_int_equal(s.environment_light, 0);
+        assert_non_null(s.environment);
+        assert_rgb(environment_radiance(s.environment, v3(0, 1, 0)), 1, 2, 3);
+        rgb below = environment_radiance(s.environment, v3(0, -1, 0));
+        assert_rgb(below, cgl ? 0 : 1, cgl ? 0 : 2, cgl ? 0 : 3);
+        assert_int_equal(environment_is_hidden(s.environment), cgl);
+        scene_free(&s);
+    }
 }
 
 static void black_ambient_light_is_nothing(void **state)
@@ -653,6 +710,8 @@ int main(void)
         cmocka_unit_test(without_a_binding),
         cmocka_unit_test(point_lights),
         cmocka_unit_test(directional_lights),
+        cmocka_unit_test(spot_lights),
+        cmocka_unit_test(ambient_light),
         cmocka_unit_test(black_ambient_light_is_nothing),
         cmocka_unit_test(rectangles_are_geometry),
         cmocka_unit_test(area_light_of_the_assignment),

@@ -253,6 +253,15 @@ static void falloff_that_cycles_lacks_is_refused(void **state)
     assert_refused(f, 1, "light 0: falloff 1/(1 + 0 d + 4 d^2)");
 }
 
+static void lights_not_matched_yet_are_refused(void **state)
+{
+    struct fixture *f = *state;
+    f->s.lights[1].kind = LIGHT_SPOT;
+    assert_refused(f, 1, "light 1: a spot light is not matched yet");
+    f->s.lights[1].kind = LIGHT_ENVIRONMENT;
+    assert_refused(f, 1, "light 1: an environment is not matched yet");
+}
+
 static void cameras_that_cycles_lacks_are_refused(void **state)
 {
     struct fixture *f = *state;
@@ -304,6 +313,7 @@ int main(void)
         WITH_SCENE(spheres),
         WITH_SCENE(delta_lights),
         WITH_SCENE(falloff_that_cycles_lacks_is_refused),
+        WITH_SCENE(lights_not_matched_yet_are_refused),
         WITH_SCENE(cameras_that_cycles_lacks_are_refused),
         WITH_SCENE(depth_is_limited_and_files_appear_whole),
     };

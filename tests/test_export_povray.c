@@ -197,6 +197,18 @@ static void test_lights_refused(void **state)
         refused(&s, &c, 1, "falloff");
         scene_free(&s);
     }
+    for (int kind = 0; kind < 2; kind++) {
+        struct scene s = floor_and_ball(false);
+        struct light l = {.kind = LIGHT_POINT,
+                          .value = {1, 1, 1},
+                          .position = {0, 1, 0},
+                          .attenuation = {0, 0, 1}};
+        build_light(&s, l);
+        struct camera c = finish(&s);
+        s.lights[0].kind = kind == 0 ? LIGHT_SPOT : LIGHT_ENVIRONMENT;
+        refused(&s, &c, 1, "not matched yet");
+        scene_free(&s);
+    }
     struct scene s = floor_and_ball(false);
     build_sphere(&s, v3(0, 2, 0), .2f, 1, build_material(&s, grey(.5f), grey(3)));
     build_light(

@@ -185,6 +185,20 @@ static void spoil_light_direction(struct scene *s)
 {
     s->lights[0].kind = LIGHT_DIRECTIONAL;
 }
+static void spoil_spot_axis(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_SPOT;
+}
+static void spoil_spot_cone(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_SPOT;
+    s->lights[0].axis = v3(0, 1, 0);
+    s->lights[0].cos_cutoff = 1;
+}
+static void spoil_environment(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_ENVIRONMENT;
+}
 static void spoil_lamp_area(struct scene *s)
 {
     for (int k = 6; k < 12; k++)
@@ -213,6 +227,9 @@ static void bad_scenes_are_refused(void **state)
         {spoil_light_value, "light 0: value"},
         {spoil_attenuation, "light 0: attenuation"},
         {spoil_light_direction, "light 0: direction"},
+        {spoil_spot_axis, "light 0: direction"},
+        {spoil_spot_cone, "light 0: cone"},
+        {spoil_environment, "light 0: more than one environment, or none"},
         {spoil_lamp_area, "'panel': emits, but its area is 0"},
     };
     for (size_t i = 0; i < sizeof SPOILS / sizeof *SPOILS; i++) {

@@ -1,0 +1,36 @@
+#include "discrete.h"
+
+#include <assert.h>
+
+double discrete_build(const double *weight, uint32_t n, uint32_t *end)
+{
+    assert(n >= 1 && n <= DISCRETE_MOST);
+    double total = 0, sum = 0;
+    uint32_t positive = 0, seen = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        assert(weight[i] >= 0);
+        total += weight[i];
+        positive += weight[i] > 0;
+    }
+    /* One step each, the rest by weight. The last sum is the total to the bit. */
+    for (uint32_t i = 0; i < n; i++) {
+        sum += weight[i];
+        seen += weight[i] > 0;
+        end[i] = total > 0 ? seen + (uint32_t)(sum / total * (DISCRETE_STEPS - positive)) : 0;
+    }
+    return total;
+}
+
+uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
+{
+    assert(end[n - 1] == DISCRETE_STEPS);
+    uint32_t step = (uint32_t)(u * DISCRETE_STEPS), lo = 0, hi = n - 1;
+    while (lo < hi) {
+        uint32_t mid = lo + (hi - lo) / 2;
+        if (end[mid] > step)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    return lo;
+}

@@ -1,0 +1,28 @@
+/* Choosing one of n things in proportion to their weights, with one number of the sampler.
+ *
+ * Those numbers are multiples of 2^-24. Comparing them with a running sum in floating point would
+ * give a thing of small weight noticeably more or fewer of them than its share, while the estimator
+ * divides by its share. So every thing owns a whole number of the 2^24 steps, at least one unless
+ * its weight is zero, and the probability that is told is that count: exact, if not quite
+ * proportional. */
+#ifndef ASSAY_DISCRETE_H
+#define ASSAY_DISCRETE_H
+
+#include <stdint.h>
+
+enum { DISCRETE_STEPS = 1 << 24, DISCRETE_MOST = 1 << 23 };
+
+/* end[i], for i below n: the steps of things 0 .. i together. 1 <= n <= DISCRETE_MOST; weights are
+ * finite and not negative. Returns their sum; if that is 0, all of end is 0 and nothing may be
+ * picked. */
+double discrete_build(const double *weight, uint32_t n, uint32_t *end);
+
+/* u in [0, 1). Never a thing of weight 0. */
+uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u);
+
+static inline float discrete_probability(const uint32_t *end, uint32_t i)
+{
+    return (float)(end[i] - (i > 0 ? end[i - 1] : 0)) * (1.0f / DISCRETE_STEPS);
+}
+
+#endif
