@@ -55,6 +55,24 @@ static const struct material *material_of(const struct scene *s, const char *obj
     return NULL;
 }
 
+static void must_fail(const char *name, enum dialect dialect, const char *keyword)
+{
+    char path[4096];
+    path_of(path, name);
+    FILE *f = fopen(path, "rb");
+    if (f == NULL) {
+        print_message("SKIPPED: no %s (set ASSAY_CS184)\n", path);
+        skip();
+    }
+    fclose(f);
+    struct scene s = {0};
+    struct err e = {""};
+    if (collada_load(path, dialect, &s, &e))
+        fail_msg("%s loads, but should fail with '%s'", name, keyword);
+    if (strncmp(e.msg, path, strlen(path)) != 0 || strstr(e.msg, keyword) == NULL)
+        fail_msg("expected '%s', got '%s'", keyword, e.msg);
+}
+
 /* 5 walls of 2 triangles, the lamp of 2, 2 spheres. Box 2 x 1.5 x 2. The lamp's node is
  * diag(0.6, 0.8, 1) at z = 1.49 of a Z-up file: corners (+-0.3, 1.49, +-0.4), area 0.48, downwards. */
 static void spheres_lambertian(void **state)
