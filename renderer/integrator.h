@@ -1,5 +1,6 @@
 /* The light transport estimators, over batches of paths in stages: generate, intersect, shade,
- * connect, scatter. One path is one independent sample of its pixel's radiance. */
+ * connect, scatter. One path is one sample of its pixel's radiance,
+ * independent of the others if the sampler is. */
 #ifndef ASSAY_INTEGRATOR_H
 #define ASSAY_INTEGRATOR_H
 
@@ -7,6 +8,7 @@
 #include "bvh.h"
 #include "camera.h"
 #include "light.h"
+#include "sampler.h"
 
 enum integrator_kind {
     INTEGRATE_PATHS,
@@ -29,7 +31,7 @@ struct integrator_options {
     int first_bounce;  /* light with fewer bounces is left out */
     int light_samples; /* per area light and vertex; hemisphere: directions per area light */
     bool roulette;     /* end paths by their throughput from the third vertex on [Arvo90] */
-    uint64_t seed;
+    struct sampler sampler;
 };
 
 struct integrator {
