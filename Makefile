@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
-DEPS_TEST := libcmocka-dev clang libxml2-utils
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -132,6 +132,7 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
+$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
 	$(archive)

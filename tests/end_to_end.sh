@@ -96,7 +96,7 @@ expect "compare: not moments" 3 "not a moments EXR" "$san_assay" compare "$tmp/a
 expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
 "$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
 expect "compare: samples that are not independent" 3 "only replicates" \
-    "$san_assay" compare "$tmp/sobol.exr" "$tmp/a.exr"
+    "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
