@@ -247,7 +247,7 @@ static bool write_png(const char *path, const struct moments *m, enum tone_curve
     return ok;
 }
 
-static bool write_outputs(const struct settings *s, const struct scene *scene,
+static bool write_outputs(const struct settings *s, const struct scene *scene, const char *accel,
                           const struct moments *m, const struct render_stats *stats, int argc,
                           char **argv, struct err *e)
 {
@@ -268,7 +268,8 @@ static bool write_outputs(const struct settings *s, const struct scene *scene,
                                        {"assay:seed", seed},
                                        {"assay:sampler", sampler_kind_names[s->sampler]},
                                        {"assay:seconds", seconds},
-                                       {"assay:rays", rays}};
+                                       {"assay:rays", rays},
+                                       {"assay:accel", accel}};
     for (int i = 0; i < s->num_outputs; i++) {
         const char *path = s->output[i];
         bool exr = strcasecmp(strrchr(path, '.'), ".exr") == 0;
@@ -281,7 +282,7 @@ static bool write_outputs(const struct settings *s, const struct scene *scene,
 }
 
 /* The image mean with its standard error, on stdout; what it cost, on stderr. */
-static void print_summary(const struct settings *s, const struct bvh *bvh, const struct moments *m,
+static void print_summary(const struct settings *s, const char *accel, const struct moments *m,
                           const struct render_stats *stats)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -302,10 +303,10 @@ static void print_summary(const struct settings *s, const struct bvh *bvh, const
     double rays = (double)stats->rays.rays;
     fprintf(stderr,
             "%.3g paths, %.3g rays in %.2f s (%.2f CPU s); per ray %.1f box and %.1f primitive "
-            "tests; %s: %u nodes, depth %d, SAH cost %.1f\n",
+            "tests; %s\n",
             stats->samples, rays, stats->wall_seconds, stats->cpu_seconds,
             (double)stats->rays.box_tests / rays, (double)stats->rays.primitive_tests / rays,
-            bvh_kind_names[s->accel], bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh));
+            accel);
 }
 
 static bool setup_camera(const struct settings *s, const struct scene *scene, struct camera *c,
@@ -342,9 +343,14 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
         err_set(e, "%s: the scene has no light", s->scene);
         goto done;
     }
+    double start = now_seconds();
     bvh = bvh_build(&scene, (enum bvh_kind)s->accel, e);
     if (bvh == NULL)
         goto done;
+    char accel[160];
+    snprintf(accel, sizeof accel, "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s",
+             bvh_kind_names[s->accel], bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh),
+             now_seconds() - start);
     const struct sampler sampler = {(enum sampler_kind)s->sampler, s->seed};
     struct render_options opt = {.integrator = {.kind = (enum integrator_kind)s->kind,
                                                 .direct = (enum direct_kind)s->direct,
@@ -368,9 +374,9 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
     if (!ok)
         goto done;
     progress_end(&progress, stats.samples);
-    ok = write_outputs(s, &scene, &film, &stats, argc, argv, e);
+    ok = write_outputs(s, &scene, accel, &film, &stats, argc, argv, e);
     if (ok)
-        print_summary(s, bvh, &film, &stats);
+        print_summary(s, accel, &film, &stats);
 done:
     moments_free(&film);
     bvh_free(bvh);
