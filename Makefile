@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
-DEPS_TEST := libcmocka-dev clang libxml2-utils
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -35,7 +35,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c),$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_mesh.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -49,6 +49,9 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 
 check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%)
 	tests/run.sh $(BUILD)
+
+bvh-table: $(BUILD)/pathtracer
+	tests/bvh_table.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
@@ -76,6 +79,7 @@ help:
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render the stored references again (ONLY=SCENE: of one scene)'
 	@echo 'make report     make the page of the last validation again'
 	@echo 'make deps       install the Debian packages that building needs'
@@ -132,11 +136,14 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
+$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
+$(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a
+	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c))
 
@@ -175,7 +182,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

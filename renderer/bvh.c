@@ -241,7 +241,11 @@ struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
         if (prim >= s->num_triangles)
             continue;
         const vec3 *p = s->position + 3 * (size_t)prim;
-        t->triangles[i] = (struct triangle){p[0], sub(p[1], p[0]), sub(p[2], p[0])};
+        for (int k = 0; k < 3; k++) {
+            t->triangles[i].p[k][0] = p[k].x;
+            t->triangles[i].p[k][1] = p[k].y;
+            t->triangles[i].p[k][2] = p[k].z;
+        }
     }
     return t;
 fail:
@@ -292,35 +296,56 @@ static vec3 safe_inverse(vec3 d)
               1 / (fabsf(d.z) < tiny ? copysignf(tiny, d.z) : d.z));
 }
 
-/* Entry and exit of the slabs, the exit widened by the rounding of three operations [Ize13]. */
-static bool box_hit(const struct box *b, vec3 o, vec3 inv, float tmin, float tmax)
+/* A ray as the boxes want it. */
+struct slab_ray {
+    vec3 before, behind, inv; /* origin for the lower and for the upper planes; 1/d */
+};
+
+/* The triangle test moves the corners by its own rounding, at most 6 half steps of float of their
+ * distance from the origin. A box has to be hit by every ray that the test lets hit what is in it,
+ * or rays slip through the edges of neighbours in different boxes [Woop13 3.3]; so the boxes are
+ * grown by 8, of the largest distance and coordinate there is. */
+static struct slab_ray slab_ray(const struct bvh *t, const ray *r)
 {
-    float x0 = (b->min.x - o.x) * inv.x, x1 = (b->max.x - o.x) * inv.x;
-    float y0 = (b->min.y - o.y) * inv.y, y1 = (b->max.y - o.y) * inv.y;
-    float z0 = (b->min.z - o.z) * inv.z, z1 = (b->max.z - o.z) * inv.z;
+    const struct box *root = &t->nodes[0].box;
+    vec3 a = sub(root->min, r->o), b = sub(root->max, r->o);
+    float reach = maxf(maxf(maxf(fabsf(a.x), fabsf(b.x)), maxf(fabsf(a.y), fabsf(b.y))),
+                       maxf(fabsf(a.z), fabsf(b.z)));
+    float coordinate = maxf(fabsf(r->o.x), maxf(fabsf(r->o.y), fabsf(r->o.z)));
+    float e = 4 * FLT_EPSILON * (reach + coordinate);
+    vec3 grow = v3(e, e, e);
+    return (struct slab_ray){add(r->o, grow), sub(r->o, grow), safe_inverse(r->d)};
+}
+
+/* Entry and exit of the slabs, the exit widened by the rounding of three operations [Ize13]. */
+static bool box_hit(const struct box *b, const struct slab_ray *r, float tmin, float tmax)
+{
+    float x0 = (b->min.x - r->before.x) * r->inv.x, x1 = (b->max.x - r->behind.x) * r->inv.x;
+    float y0 = (b->min.y - r->before.y) * r->inv.y, y1 = (b->max.y - r->behind.y) * r->inv.y;
+    float z0 = (b->min.z - r->before.z) * r->inv.z, z1 = (b->max.z - r->behind.z) * r->inv.z;
     float near = maxf(maxf(minf(x0, x1), minf(y0, y1)), maxf(minf(z0, z1), tmin));
     float far = minf(minf(maxf(x0, x1), maxf(y0, y1)), minf(maxf(z0, z1), tmax));
     return near <= far * (1 + 4 * FLT_EPSILON);
 }
 
-static bool primitive_hit(const struct bvh *t, uint32_t i, const ray *r, float *d, float *u,
-                          float *v)
+static bool primitive_hit(const struct bvh *t, uint32_t i, const ray *r, const struct shear *s,
+                          float *d, float *u, float *v)
 {
     uint32_t prim = t->order[i];
     if (prim < t->scene->num_triangles)
-        return triangle_intersect(&t->triangles[i], r, d, u, v);
+        return triangle_intersect(&t->triangles[i], r, s, d, u, v);
     *u = *v = 0;
     return sphere_intersect(&t->scene->spheres[prim - t->scene->num_triangles], r, d);
 }
 
 /* Shortens r->tmax to the nearest hit among list entries [first, last). */
-static bool leaf_closest(const struct bvh *t, uint32_t first, uint32_t last, ray *r, float *u,
-                         float *v, uint32_t *prim)
+static bool leaf_closest(const struct bvh *t, uint32_t first, uint32_t last, ray *r,
+                         const struct shear *s, float *u, float *v, uint32_t *prim)
 {
     bool any = false;
     for (uint32_t i = first; i < last; i++) {
         float d, bu, bv;
-        if (!primitive_hit(t, i, r, &d, &bu, &bv))
+        if (!primitive_hit(t, i, r, s, &d, &bu, &bv))
             continue;
         r->tmax = d;
         *u = bu;
@@ -336,13 +361,14 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
 {
     *prim = NO_HIT;
     stats->rays++;
+    const struct shear s = shear_of(&r);
     if (t->nodes == NULL) {
         stats->primitive_tests += t->num_primitives;
-        leaf_closest(t, 0, t->num_primitives, &r, u, v, prim);
+        leaf_closest(t, 0, t->num_primitives, &r, &s, u, v, prim);
         *d = r.tmax;
         return;
     }
-    vec3 inv = safe_inverse(r.d);
+    const struct slab_ray slabs = slab_ray(t, &r);
     const bool backwards[3] = {r.d.x < 0, r.d.y < 0, r.d.z < 0};
     uint32_t stack[STACK];
     int top = 0;
@@ -350,11 +376,11 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
     while (top > 0) {
         const struct node *n = &t->nodes[stack[--top]];
         stats->box_tests++;
-        if (!box_hit(&n->box, r.o, inv, r.tmin, r.tmax))
+        if (!box_hit(&n->box, &slabs, r.tmin, r.tmax))
             continue;
         if (n->count > 0) {
             stats->primitive_tests += n->count;
-            leaf_closest(t, n->first, n->first + n->count, &r, u, v, prim);
+            leaf_closest(t, n->first, n->first + n->count, &r, &s, u, v, prim);
         } else {
             uint32_t near = backwards[n->axis];
             stack[top++] = n->first + 1 - near;
@@ -367,23 +393,24 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
 static bool is_occluded(const struct bvh *t, const ray *r, uint32_t ignore, struct bvh_stats *stats)
 {
     float d, u, v;
+    const struct shear s = shear_of(r);
     stats->rays++;
     if (t->nodes == NULL) {
         for (uint32_t i = 0; i < t->num_primitives; i++) {
             stats->primitive_tests++;
-            if (t->order[i] != ignore && primitive_hit(t, i, r, &d, &u, &v))
+            if (t->order[i] != ignore && primitive_hit(t, i, r, &s, &d, &u, &v))
                 return true;
         }
         return false;
     }
-    vec3 inv = safe_inverse(r->d);
+    const struct slab_ray slabs = slab_ray(t, r);
     uint32_t stack[STACK];
     int top = 0;
     stack[top++] = 0;
     while (top > 0) {
         const struct node *n = &t->nodes[stack[--top]];
         stats->box_tests++;
-        if (!box_hit(&n->box, r->o, inv, r->tmin, r->tmax))
+        if (!box_hit(&n->box, &slabs, r->tmin, r->tmax))
             continue;
         if (n->count == 0) {
             stack[top++] = n->first + 1;
@@ -392,7 +419,7 @@ static bool is_occluded(const struct bvh *t, const ray *r, uint32_t ignore, stru
         }
         for (uint32_t i = n->first; i < n->first + n->count; i++) {
             stats->primitive_tests++;
-            if (t->order[i] != ignore && primitive_hit(t, i, r, &d, &u, &v))
+            if (t->order[i] != ignore && primitive_hit(t, i, r, &s, &d, &u, &v))
                 return true;
         }
     }

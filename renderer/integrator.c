@@ -2,7 +2,6 @@
 
 #include "bsdf.h"
 #include "environment.h"
-#include "sampler.h"
 #include "warp.h"
 
 const char *const integrator_kind_names[] = {"path", "normals", NULL};
@@ -29,7 +28,8 @@ static int generate(const struct integrator *it, struct batch *b, int num_lanes)
 {
     uint32_t width = (uint32_t)it->camera->width;
     for (int i = 0; i < num_lanes; i++) {
-        struct sample4 s = sampler_get(it->opt.seed, b->pixel[i], b->sample[i], 0, PURPOSE_CAMERA);
+        struct sample4 s =
+            sampler_draw(&it->opt.sampler, b->pixel[i], b->sample[i], 0, PURPOSE_CAMERA);
         float x = (float)(b->pixel[i] % width) + s.u[0], y = (float)(b->pixel[i] / width) + s.u[1];
         rays_set(&b->ray, i, camera_ray(it->camera, x, y, s.u[2], s.u[3]));
         rgbs_set(&b->throughput, i, grey(1));
@@ -179,8 +179,8 @@ static void connect_light(const struct integrator *it, struct batch *b, int num_
         int i = b->diffuse[k];
         if (b->choice[i].probability == 0)
             continue;
-        struct sample4 u =
-            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        struct sample4 u = sampler_draw(&it->opt.sampler, b->pixel[i], b->sample[i],
+                                        (uint32_t)vertex + 1, purpose);
         struct light_sample ls =
             light_sample_direction(it->lights, b->choice[i].light, vec3s_get(&b->p, i), u.u);
         if (ls.pdf_w <= 0)
@@ -215,8 +215,8 @@ static void connect_hemisphere(const struct integrator *it, struct batch *b, int
     int n = 0;
     for (int k = 0; k < num_lanes; k++) {
         int i = b->diffuse[k];
-        struct sample4 u =
-            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        struct sample4 u = sampler_draw(&it->opt.sampler, b->pixel[i], b->sample[i],
+                                        (uint32_t)vertex + 1, purpose);
         vec3 local = warp_uniform_hemisphere(u.u[0], u.u[1]);
         frame f = frame_from_normal(vec3s_get(&b->ns, i));
         vec3 wi = frame_to_world(&f, local);
@@ -263,8 +263,8 @@ static void choose_for_each(const struct integrator *it, struct batch *b, int nu
 {
     for (int k = 0; k < num_lanes; k++) {
         int i = b->diffuse[k];
-        struct sample4 u =
-            sampler_get(it->opt.seed, b->pixel[i], b->sample[i], (uint32_t)vertex + 1, purpose);
+        struct sample4 u = sampler_draw(&it->opt.sampler, b->pixel[i], b->sample[i],
+                                        (uint32_t)vertex + 1, purpose);
         b->choice[i] = light_choose(it->lights, only_delta, u.u[0]);
     }
 }
@@ -310,8 +310,8 @@ static int scatter(const struct integrator *it, struct batch *b, int num_active,
     for (int k = 0; k < num_active; k++) {
         int i = b->active[k];
         const struct material *m = &it->scene->materials[b->material[i]];
-        struct sample4 u = sampler_get(it->opt.seed, b->pixel[i], b->sample[i],
-                                       (uint32_t)vertex + 1, PURPOSE_BSDF);
+        struct sample4 u = sampler_draw(&it->opt.sampler, b->pixel[i], b->sample[i],
+                                        (uint32_t)vertex + 1, PURPOSE_BSDF);
         frame f = frame_from_normal(vec3s_get(&b->ns, i));
         vec3 wo = to_local(&f, vec3s_get(&b->wo, i));
         struct bsdf_sample s = bsdf_sample_direction(m, b->front[i], wo, u.u[0], u.u[1], u.u[2]);

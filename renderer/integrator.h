@@ -1,5 +1,6 @@
 /* The light transport estimators, over batches of paths in stages: generate, intersect, shade,
- * connect, scatter. One path is one independent sample of its pixel's radiance. */
+ * connect, scatter. One path is one sample of its pixel's radiance,
+ * independent of the others if the sampler is. */
 #ifndef ASSAY_INTEGRATOR_H
 #define ASSAY_INTEGRATOR_H
 
@@ -7,6 +8,7 @@
 #include "bvh.h"
 #include "camera.h"
 #include "light.h"
+#include "sampler.h"
 
 enum integrator_kind {
     INTEGRATE_PATHS,
@@ -38,7 +40,7 @@ struct integrator_options {
                           no more than MANY_LIGHTS count */
     enum many_lights many_lights;
     bool roulette; /* end paths by their throughput from the third vertex on [Arvo90] */
-    uint64_t seed;
+    struct sampler sampler;
 };
 
 struct integrator {

@@ -20,7 +20,7 @@ struct settings {
     int num_outputs;
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left; dx 0: the whole picture */
-    int dialect, accel, kind, direct, fresnel;
+    int dialect, accel, kind, direct, fresnel, sampler;
     int spp, light_samples, threads, max_bounces, first_bounce;
     bool roulette, quiet;
     uint64_t seed;
@@ -49,6 +49,7 @@ enum option {
     OPT_CELL,
     OPT_CAMERA,
     OPT_SEED,
+    OPT_SAMPLER,
     OPT_INTEGRATOR,
     OPT_ACCEL,
     OPT_DIALECT,
@@ -86,6 +87,8 @@ static const struct cli_option options[] = {
     [OPT_CAMERA] = {'c', "camera", 1, "FILE",
                     "camera settings as the assignment's GUI writes them"},
     [OPT_SEED] = {0, "seed", 1, "N", "64-bit seed of all samples (1)"},
+    [OPT_SAMPLER] = {0, "sampler", 1, "NAME",
+                     "independent or sobol: less noise, but unknown error (independent)"},
     [OPT_INTEGRATOR] = {0, "integrator", 1, "NAME", "path or normals (path)"},
     [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid or sah (sah)"},
     [OPT_DIALECT] = {0, "dialect", 1, "NAME",
@@ -182,6 +185,7 @@ static bool parse_option(struct settings *s, enum option o, const struct cli *c,
     case OPT_CELL: return parse_cell(s, c->value, e);
     case OPT_CAMERA: s->camera_file = v; return true;
     case OPT_SEED: return cli_uint64("--seed", v, &s->seed, e);
+    case OPT_SAMPLER: return cli_choice("--sampler", v, sampler_kind_names, &s->sampler, e);
     case OPT_INTEGRATOR: return cli_choice("--integrator", v, integrator_kind_names, &s->kind, e);
     case OPT_ACCEL: return cli_choice("--accel", v, bvh_kind_names, &s->accel, e);
     case OPT_DIALECT: return cli_choice("--dialect", v, dialect_names, &s->dialect, e);
@@ -219,6 +223,11 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
     if (s->first_bounce > s->max_bounces)
         return err_set(e, "nothing to render: light with %d bounces or more, but at most %d",
                        s->first_bounce, s->max_bounces);
+    if (s->adaptive_batch > 0 && s->sampler != SAMPLER_INDEPENDENT)
+        return err_set(e,
+                       "--adaptive estimates the error from samples that have to be independent: "
+                       "not with --sampler %s",
+                       sampler_kind_names[s->sampler]);
     if (s->cell[2] == 0) {
         s->cell[2] = s->width;
         s->cell[3] = s->height;
@@ -247,7 +256,7 @@ static bool write_png(const char *path, const struct moments *m, enum tone_curve
     return ok;
 }
 
-static bool write_outputs(const struct settings *s, const struct scene *scene,
+static bool write_outputs(const struct settings *s, const struct scene *scene, const char *accel,
                           const struct moments *m, const struct render_stats *stats, int argc,
                           char **argv, struct err *e)
 {
@@ -266,8 +275,10 @@ static bool write_outputs(const struct settings *s, const struct scene *scene,
     const struct image_attr attrs[] = {{"assay:version", assay_version},
                                        {"assay:command", command},
                                        {"assay:seed", seed},
+                                       {"assay:sampler", sampler_kind_names[s->sampler]},
                                        {"assay:seconds", seconds},
-                                       {"assay:rays", rays}};
+                                       {"assay:rays", rays},
+                                       {"assay:accel", accel}};
     for (int i = 0; i < s->num_outputs; i++) {
         const char *path = s->output[i];
         bool exr = strcasecmp(strrchr(path, '.'), ".exr") == 0;
@@ -280,7 +291,7 @@ static bool write_outputs(const struct settings *s, const struct scene *scene,
 }
 
 /* The image mean with its standard error, on stdout; what it cost, on stderr. */
-static void print_summary(const struct settings *s, const struct bvh *bvh, const struct moments *m,
+static void print_summary(const struct settings *s, const char *accel, const struct moments *m,
                           const struct render_stats *stats)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -291,17 +302,20 @@ static void print_summary(const struct settings *s, const struct bvh *bvh, const
             double v = moments_var_of_mean(m, p, c);
             var[c] += v > 0 ? v / (double)pixels / (double)pixels : 0;
         }
-    printf("mean radiance %.6g %.6g %.6g +- %.2g %.2g %.2g\n", mean[0], mean[1], mean[2],
-           sqrt(var[0]), sqrt(var[1]), sqrt(var[2]));
+    printf("mean radiance %.6g %.6g %.6g", mean[0], mean[1], mean[2]);
+    if (s->sampler == SAMPLER_INDEPENDENT)
+        printf(" +- %.2g %.2g %.2g\n", sqrt(var[0]), sqrt(var[1]), sqrt(var[2]));
+    else
+        puts(", error unknown");
     if (s->quiet)
         return;
     double rays = (double)stats->rays.rays;
     fprintf(stderr,
             "%.3g paths, %.3g rays in %.2f s (%.2f CPU s); per ray %.1f box and %.1f primitive "
-            "tests; %s: %u nodes, depth %d, SAH cost %.1f\n",
+            "tests; %s\n",
             stats->samples, rays, stats->wall_seconds, stats->cpu_seconds,
             (double)stats->rays.box_tests / rays, (double)stats->rays.primitive_tests / rays,
-            bvh_kind_names[s->accel], bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh));
+            accel);
 }
 
 static bool setup_camera(const struct settings *s, const struct scene *scene, struct camera *c,
@@ -356,16 +370,22 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
         err_set(e, "%s: the scene has no light", s->scene);
         goto done;
     }
+    double start = now_seconds();
     bvh = bvh_build(&scene, (enum bvh_kind)s->accel, e);
     if (bvh == NULL)
         goto done;
+    char accel[160];
+    snprintf(accel, sizeof accel, "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s",
+             bvh_kind_names[s->accel], bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh),
+             now_seconds() - start);
+    const struct sampler sampler = {(enum sampler_kind)s->sampler, s->seed};
     struct render_options opt = {.integrator = {.kind = (enum integrator_kind)s->kind,
                                                 .direct = (enum direct_kind)s->direct,
                                                 .max_bounces = s->max_bounces,
                                                 .first_bounce = s->first_bounce,
                                                 .light_samples = s->light_samples,
                                                 .roulette = s->roulette,
-                                                .seed = s->seed},
+                                                .sampler = sampler},
                                  .x = s->cell[0],
                                  .y = s->height - s->cell[1] - s->cell[3],
                                  .width = s->cell[2],
@@ -381,9 +401,9 @@ static bool run(const struct settings *s, int argc, char **argv, struct err *e)
     if (!ok)
         goto done;
     progress_end(&progress, stats.samples);
-    ok = write_outputs(s, &scene, &film, &stats, argc, argv, e);
+    ok = write_outputs(s, &scene, accel, &film, &stats, argc, argv, e);
     if (ok)
-        print_summary(s, bvh, &film, &stats);
+        print_summary(s, accel, &film, &stats);
 done:
     moments_free(&film);
     bvh_free(bvh);

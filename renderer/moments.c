@@ -82,6 +82,8 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
     double n = m->n[pixel];
     if (strcmp(m->unit, "exact") == 0)
         return 0;
+    if (strcmp(m->unit, "stratified") == 0)
+        return NAN;
     return n < 2 ? NAN : m->m2[3 * pixel + (size_t)channel] / (n * (n - 1));
 }
 
@@ -152,7 +154,7 @@ bool moments_read(const char *path, struct moments *out, struct image *image, st
         goto fail;
     }
     if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
-        strcmp(unit, "exact") != 0) {
+        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0) {
         err_set(e, "%s: unknown unit of observation '%s'", path, unit);
         goto fail;
     }

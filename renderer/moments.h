@@ -14,8 +14,9 @@ struct moments {
     double *mean; /* 3 per pixel, RGB, linear radiance */
     double *m2;   /* 3 per pixel */
     double *m3;   /* 3 per pixel */
-    /* What one observation is: "sample", "replicate", or "exact" (a closed form: n = 1, M2 = M3 =
-     * 0, no uncertainty). */
+    /* What one observation is: "sample", "replicate", "exact" (a closed form: n = 1, M2 = M3 = 0, no
+     * uncertainty), or "stratified": a sample that is not independent of the pixel's others, so that
+     * M2 tells nothing about the error of the mean. */
     char unit[16];
     double spp; /* paths per pixel in one observation; 0 where that has no meaning */
 };
@@ -34,7 +35,7 @@ void moments_add_image(struct moments *m, const float *pixels_rgb);
 bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
     __attribute__((warn_unused_result));
 /* Groups of `k` samples are not kept apart, so the variance of the pixel's mean is M2/(n(n-1));
- * NAN if n < 2, 0 if exact. channel 0..2. */
+ * NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 
 /* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes

@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 enum { TILE = 16 };
@@ -120,6 +121,8 @@ bool render(const struct scene *s, const struct camera *c, const struct bvh *bvh
         goto done;
     struct integrator it = {
         .opt = opt->integrator, .scene = s, .camera = c, .bvh = bvh, .lights = lights};
+    if (opt->integrator.sampler.kind != SAMPLER_INDEPENDENT)
+        strcpy(film.unit, "stratified");
     struct job j = {.it = &it, .opt = opt, .film = &film};
     j.tiles_x = (opt->width + TILE - 1) / TILE;
     j.num_tiles = j.tiles_x * ((opt->height + TILE - 1) / TILE);

@@ -25,7 +25,8 @@ struct render_stats {
     double wall_seconds, cpu_seconds;
 };
 
-/* Renders the cell into *out (unit "sample", one path each; the caller frees). The result depends
+/* Renders the cell into *out (one path each, unit "sample", or "stratified" unless the sampler is
+ * the independent one; the caller frees). The result depends
  * only on scene, camera and options, never on threads. */
 bool render(const struct scene *s, const struct camera *c, const struct bvh *bvh,
             const struct render_options *opt, struct progress *progress, struct moments *out,

@@ -1,11 +1,29 @@
 /* Random numbers as a function: the value depends on (seed, pixel, sample, vertex, purpose) and on
- * nothing else, so threads, tiles and order of work cannot matter. The function is the
- * counter-based generator Philox4x32-10 [Salmon11]: the four indices are its counter, the seed its
- * key. */
+ * nothing else, so threads, tiles and order of work cannot matter. Two functions of that kind:
+ *
+ * Independent: the counter-based generator Philox4x32-10 [Salmon11]; the four indices are its
+ * counter, the seed its key.
+ *
+ * Sobol: for each (pixel, vertex, purpose) the samples 0, 1, 2, ... are points of one digital
+ * sequence in 4 dimensions, scrambled as a nested uniform scrambling would [Owen95] by a hash
+ * [Burley20]; scrambles and order of the points are chosen by Philox from (seed, pixel, vertex,
+ * purpose), so blocks are padded and pixels are decorrelated. Each number is uniform, but the
+ * samples of one pixel depend on each other: their spread is no measure of the error of their mean.
+ * What is promised of samples k 2^m .. (k+1) 2^m - 1 of a block, for every k:
+ * - u[0..1] and u[2..3] are (0,m,2)-nets in base 2: one point in each box of area 2^-m;
+ * - u[0..3] is a (0,m/2,4)-net in base 4 if m is even: one point in each box of volume 2^-m whose
+ *   sides are powers of 1/4. */
 #ifndef ASSAY_SAMPLER_H
 #define ASSAY_SAMPLER_H
 
 #include <stdint.h>
+
+enum sampler_kind { SAMPLER_INDEPENDENT, SAMPLER_SOBOL };
+
+struct sampler {
+    enum sampler_kind kind;
+    uint64_t seed;
+};
 
 /* Four uniform numbers in [0, 1), multiples of 2^-24. */
 struct sample4 {
@@ -23,7 +41,21 @@ enum sampler_purpose {
 /* The raw generator, `rounds` rounds (10 everywhere but in its test). */
 void philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds, uint32_t out[4]);
 
+/* Independent numbers, for what needs no choice of a sampler. */
 struct sample4 sampler_get(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t vertex,
                            uint32_t purpose);
+
+struct sample4 sampler_draw(const struct sampler *s, uint32_t pixel, uint32_t sample,
+                            uint32_t vertex, uint32_t purpose);
+
+/* The unscrambled point `index` of the sequence, as binary fractions (the top bit is worth 1/2).
+ * Its generator matrices are I, P, U and PU: P is Pascal's triangle mod 2, so that the first two
+ * are Sobol's; U is the like triangle over the field of four elements 0, 1, w, w^2 with entries
+ * binomial(j, i) w^(j-i), the fields' elements written as matrices of 2 x 2 bits. All four together
+ * are the sequence of [Faure82] in base 4, as [Niederreiter87] has it for prime powers; (U, PU) is
+ * (I, P) with its points in another order, since U is triangular. */
+void sobol_point(uint32_t index, uint32_t x[4]);
+
+extern const char *const sampler_kind_names[]; /* by enum sampler_kind; ends with NULL */
 
 #endif

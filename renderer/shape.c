@@ -2,22 +2,50 @@
 
 #include <float.h>
 
-bool triangle_intersect(const struct triangle *tri, const ray *r, float *t, float *u, float *v)
+struct shear shear_of(const ray *r)
 {
-    vec3 h = cross(r->d, tri->e2);
-    float det = dot(tri->e1, h);
+    const float d[3] = {r->d.x, r->d.y, r->d.z};
+    float x = fabsf(d[0]), y = fabsf(d[1]), z = fabsf(d[2]);
+    int kz = x > y && x > z ? 0 : y > z ? 1 : 2;
+    struct shear s = {.o = {r->o.x, r->o.y, r->o.z},
+                      .kx = (kz + 1) % 3,
+                      .ky = (kz + 2) % 3,
+                      .kz = kz,
+                      .sz = 1 / d[kz]};
+    s.sx = d[s.kx] * s.sz;
+    s.sy = d[s.ky] * s.sz;
+    return s;
+}
+
+/* Twice the signed area of triangle (origin, a, b). Neighbours that share the edge get the same
+ * number, or exactly its negative, and rounding is monotonic, so its sign is right unless both
+ * products round to the same; products of two floats are exact in double. */
+static float edge_function(float ax, float ay, float bx, float by)
+{
+    float e = ax * by - ay * bx;
+    return e != 0 ? e : (float)((double)ax * (double)by - (double)ay * (double)bx);
+}
+
+bool triangle_intersect(const struct triangle *tri, const ray *r, const struct shear *s, float *t,
+                        float *u, float *v)
+{
+    float x[3], y[3], z[3];
+    for (int k = 0; k < 3; k++) {
+        z[k] = tri->p[k][s->kz] - s->o[s->kz];
+        x[k] = tri->p[k][s->kx] - s->o[s->kx] - s->sx * z[k];
+        y[k] = tri->p[k][s->ky] - s->o[s->ky] - s->sy * z[k];
+    }
+    float e0 = edge_function(x[1], y[1], x[2], y[2]);
+    float e1 = edge_function(x[2], y[2], x[0], y[0]);
+    float e2 = edge_function(x[0], y[0], x[1], y[1]);
+    if ((e0 < 0 || e1 < 0 || e2 < 0) && (e0 > 0 || e1 > 0 || e2 > 0))
+        return false;
+    float det = e0 + e1 + e2;
     if (det == 0)
         return false;
     float inv = 1 / det;
-    vec3 s = sub(r->o, tri->p);
-    float bu = inv * dot(s, h);
-    if (!(bu >= 0 && bu <= 1))
-        return false;
-    vec3 q = cross(s, tri->e1);
-    float bv = inv * dot(r->d, q);
-    if (!(bv >= 0 && bu + bv <= 1))
-        return false;
-    float d = inv * dot(tri->e2, q);
+    float bu = e1 * inv, bv = e2 * inv;
+    float d = s->sz * (e0 * inv * z[0] + bu * z[1] + bv * z[2]);
     if (!(d > r->tmin && d < r->tmax))
         return false;
     *t = d;

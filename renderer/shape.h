@@ -4,14 +4,26 @@
 
 #include "scene.h"
 
-/* Vertex and edges, as the intersection wants them. */
+/* Corners by axis, as the intersection wants them. */
 struct triangle {
-    vec3 p, e1, e2;
+    float p[3][3];
 };
 
-/* [Moller97]. If r meets the triangle inside (tmin, tmax): true, with distance t and barycentric
- * coordinates (u, v) of the second and third vertex. Both sides are hit. */
-bool triangle_intersect(const struct triangle *tri, const ray *r, float *t, float *u, float *v);
+/* What takes a ray to the frame where it starts at the origin and runs along axis kz, the one of its
+ * largest component. */
+struct shear {
+    float o[3], sx, sy, sz;
+    int kx, ky, kz;
+};
+
+struct shear shear_of(const ray *r);
+
+/* [Woop13]. s must be the shear of r, whose tmin and tmax may have changed since. If r meets the triangle inside (tmin, tmax): true, with distance t and barycentric
+ * coordinates (u, v) of the second and third vertex. Both sides are hit, and the rim counts. Of
+ * triangles that share an edge or a vertex bit for bit and close the space around it at least one is
+ * hit: no ray slips through a closed mesh. */
+bool triangle_intersect(const struct triangle *tri, const ray *r, const struct shear *s, float *t,
+                        float *u, float *v);
 
 /* Nearest root inside (tmin, tmax), from outside or inside. The quadratic is solved without
  * cancellation [Haines19, "Precision improvements for ray/sphere intersection"]. */

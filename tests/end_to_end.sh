@@ -56,6 +56,8 @@ expect "environment map that is not there" 3 "nosky.exr: cannot read" \
     "$san_pathtracer" $small -e nosky.exr -f "$tmp/x.exr" $scene
 expect "environment map of 8 bits" 3 "must be an .exr or .hdr" \
     "$san_pathtracer" $small -e sky.png -f "$tmp/x.exr" $scene
+expect "adaptive sobol" 3 "independent" \
+    "$san_pathtracer" -a 8 0.1 --sampler sobol -f "$tmp/x.exr" $scene
 expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
 expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
 expect "unwritable output" 3 "/nonexistent/x.exr" \
@@ -104,6 +106,9 @@ expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
 expect "compare: missing file" 3 "gone.exr" "$san_assay" compare "$tmp/gone.exr" "$tmp/two.exr"
 expect "compare: not moments" 3 "not a moments EXR" "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
 expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
+"$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
+expect "compare: samples that are not independent" 3 "only replicates" \
+    "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"

@@ -483,6 +483,7 @@ enum fault {
     FAULT_N,
     FAULT_N_NONE,
     FAULT_UNIT,
+    FAULT_STRATIFIED,
     FAULT_EXACT,
     FAULT_IDENTICAL,
     FAULT_BLACK,
@@ -507,6 +508,7 @@ static void inject(enum fault fault, struct moments *m, struct compare_options *
     case FAULT_N: m->n[5] = 2; break;
     case FAULT_N_NONE: m->n[5] = 0; break;
     case FAULT_UNIT: strcpy(m->unit, "frame"); break;
+    case FAULT_STRATIFIED: strcpy(m->unit, "stratified"); break;
     case FAULT_EXACT: strcpy(m->unit, "exact"); break;
     case FAULT_IDENTICAL: set_all(m, 8, 1, 0, 0); break;
     case FAULT_BLACK:
@@ -540,6 +542,8 @@ static void test_hygiene(void **state)
         {FAULT_N, "B: pixel 1,1 has 2 observations, at least 3 are needed"},
         {FAULT_N_NONE, "B: pixel 1,1 has 0 observations, at least 3 are needed"},
         {FAULT_UNIT, "B: unknown unit 'frame' of an observation"},
+        {FAULT_STRATIFIED, "B: its samples depend on each other (--sampler sobol), so its variance "
+                           "is unknown: only replicates with seeds of their own may be compared"},
         {FAULT_EXACT, "B: pixel 0,0 is called exact but has variance"},
         {FAULT_IDENTICAL, "B: 8 replicates without any variance: was the seed ignored?"},
         {FAULT_BLACK, "B is black: relative differences have no unit"},

@@ -19,7 +19,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
                                                        .roulette = true,
-                                                       .seed = 20260101};
+                                                       .sampler = {SAMPLER_INDEPENDENT, 20260101}};
 
 static struct moments render_scene(struct scene *s, struct integrator_options io, int width,
                                    int height, int spp, int threads, enum bvh_kind kind)
@@ -295,7 +295,7 @@ static void same_bits_for_any_threads(void **state)
         moments_free(&many);
     }
     /* Negative control: another seed is another picture. */
-    io.seed++;
+    io.sampler.seed++;
     struct moments other = render_scene(&s, io, 50, 38, 8, 1, BVH_SAH);
     assert_false(same_bits(&one, &other));
     moments_free(&other);
@@ -413,7 +413,7 @@ static void estimators_agree(void **state)
     struct moments reference = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int roulette = 0; roulette < 2; roulette++) {
-            io.seed++;
+            io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.roulette = roulette != 0;
             struct moments film = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);

@@ -19,7 +19,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
                                                        .roulette = true,
-                                                       .seed = 20260202};
+                                                       .sampler = {SAMPLER_INDEPENDENT, 20260202}};
 
 static void look(struct scene *s, vec3 eye, vec3 backward, vec3 up)
 {
@@ -312,7 +312,7 @@ static void sky_or_sphere_of_emitters(void **state)
             struct scene s = corner_scene();
             give_sky(&s, environment_constant(grey(dim ? 1.94f : 2), &e));
             check_finish(&s);
-            io.seed++;
+            io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             struct moments film = check_render(&s, io, 32, 24, 256);
             double z = check_z(&film, &reference, 0);
@@ -553,7 +553,7 @@ static void all_or_one_of_the_lights(void **state)
     struct moments reference = check_render(&s, io, 32, 24, 256);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int many = LIGHTS_ALL; many <= LIGHTS_ONE; many++) {
-            io.seed++;
+            io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.many_lights = (enum many_lights)many;
             struct moments film = check_render(&s, io, 32, 24, 128);

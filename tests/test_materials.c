@@ -23,7 +23,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
                                                        .roulette = true,
-                                                       .seed = 20260204};
+                                                       .sampler = {SAMPLER_INDEPENDENT, 20260204}};
 
 struct result {
     double mean[3], std_error[3];
