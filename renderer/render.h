@@ -57,7 +57,8 @@ struct render_stats {
 
 /* Renders the cell into a film of its size, going on after the film->num_samples that it holds. The
  * result depends only on scene, camera, options and, if it stops early, on the number of samples by
- * then; never on threads or on how often it was stopped. control may be NULL. */
+ * then; never on threads or on how often it was stopped. A pilot that is stopped leaves nothing and
+ * starts again. control may be NULL. */
 bool render_film(const struct scene *s, const struct camera *c, const struct bvh *bvh,
                  const struct render_options *opt, const struct render_control *control,
                  struct progress *progress, struct film *film, struct render_stats *stats,
