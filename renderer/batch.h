@@ -32,6 +32,14 @@ struct hits {
     uint32_t prim[BATCH_LANES];
 };
 
+/* What camera rays met, for the layers beside the picture (first_hit.h). */
+struct first_hits {
+    float depth[BATCH_LANES];     /* from the plane through the eye, along the viewing axis */
+    struct vec3s normal;          /* shading normal as the scene has it, world space */
+    struct rgbs albedo;           /* see first_hits_record() */
+    uint32_t object[BATCH_LANES]; /* object number; NO_HIT: nothing met, the rest is not set */
+};
+
 static inline vec3 vec3s_get(const struct vec3s *a, int i)
 {
     return (vec3){a->x[i], a->y[i], a->z[i]};

@@ -2,6 +2,7 @@
 
 #include "bsdf.h"
 #include "environment.h"
+#include "first_hit.h"
 #include "warp.h"
 
 const char *const integrator_kind_names[] = {"path", "normals", NULL};
@@ -339,6 +340,8 @@ static int scatter(const struct integrator *it, struct batch *b, int num_active,
 static void integrate_normals(const struct integrator *it, struct batch *b, int num_active)
 {
     bvh_closest(it->bvh, &b->ray, b->active, num_active, &b->hit, &b->stats);
+    if (it->opt.first_hits)
+        first_hits_record(it, b, num_active);
     for (int k = 0; k < num_active; k++) {
         int i = b->active[k];
         if (b->hit.prim[i] == NO_HIT)
@@ -361,6 +364,8 @@ void integrate(const struct integrator *it, struct batch *b, int num_lanes)
     bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     for (int vertex = 0; active > 0; vertex++) {
         bvh_closest(it->bvh, &b->ray, b->active, active, &b->hit, &b->stats);
+        if (vertex == 0 && it->opt.first_hits)
+            first_hits_record(it, b, active);
         active = shade_hits(it, b, active, vertex);
         if (counts(it, vertex + 1))
             connect(it, b, active, vertex);

@@ -41,6 +41,7 @@ struct integrator_options {
     enum many_lights many_lights;
     bool roulette; /* end paths by their throughput from the third vertex on [Arvo90] */
     struct sampler sampler;
+    bool first_hits; /* fill the batch's `first`; changes nothing else */
 };
 
 struct integrator {
@@ -52,10 +53,11 @@ struct integrator {
 };
 
 /* The working memory of one thread. In: lanes 0 .. num_lanes-1 of pixel (number in the full
- * picture, row 0 at the top) and sample. Out: radiance. */
+ * picture, row 0 at the top) and sample. Out: radiance and, if asked for, first. */
 struct batch {
     uint32_t pixel[BATCH_LANES], sample[BATCH_LANES];
     struct rgbs radiance;
+    struct first_hits first;
     struct rgbs throughput;
     float pdf_w[BATCH_LANES]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
                                  whose emitters nothing else finds */

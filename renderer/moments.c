@@ -1,5 +1,6 @@
 #include "moments.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -90,21 +91,30 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 static const char *const channel_names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                               "M2.B", "M3.R", "M3.G", "M3.B", "n"};
 
-bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
-                   int num_attrs, struct err *e)
+bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
+                          const struct image_attr *attrs, int num_attrs, struct err *e)
 {
+    enum { MAX_LAYERS = 64 };
+    const char *names[10 + MAX_LAYERS];
+    size_t more = layers != NULL ? (size_t)layers->channels : 0, channels = 10 + more;
+    assert(more <= MAX_LAYERS);
+    memcpy(names, channel_names, sizeof channel_names);
+    for (size_t c = 0; c < more; c++)
+        names[10 + c] = layers->names[c];
     struct image im;
-    if (!image_alloc(&im, m->width, m->height, 10, channel_names, e))
+    if (!image_alloc(&im, m->width, m->height, (int)channels, names, e))
         return false;
     size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t p = 0; p < pixels; p++) {
-        float *px = im.data + 10 * p;
+        float *px = im.data + channels * p;
         for (size_t c = 0; c < 3; c++) {
             px[c] = (float)m->mean[3 * p + c];
             px[3 + c] = (float)m->m2[3 * p + c];
             px[6 + c] = (float)m->m3[3 * p + c];
         }
         px[9] = (float)m->n[p];
+        for (size_t c = 0; c < more; c++)
+            px[10 + c] = layers->data[more * p + c];
     }
     char spp[32];
     snprintf(spp, sizeof spp, "%.17g", m->spp);
@@ -115,6 +125,12 @@ bool moments_write(const char *path, const struct moments *m, const struct image
     ok = ok && image_write_exr(path, &im, e);
     image_free(&im);
     return ok;
+}
+
+bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
+                   int num_attrs, struct err *e)
+{
+    return moments_write_layers(path, m, NULL, attrs, num_attrs, e);
 }
 
 /* One pixel of a moments EXR: finite, M2 >= 0, n a whole number >= 0. */

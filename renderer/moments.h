@@ -42,6 +42,10 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
  * "assay:unit", "assay:spp" and those given. float32. */
 bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
                    int num_attrs, struct err *e) __attribute__((warn_unused_result));
+/* The same with the channels of `layers` (same size; NULL: none) after those. */
+bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
+                          const struct image_attr *attrs, int num_attrs, struct err *e)
+    __attribute__((warn_unused_result));
 /* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
  * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
  * n, n not a whole number, or no pixel. */

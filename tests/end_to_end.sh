@@ -91,6 +91,105 @@ if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
     not_ok "another seed, another picture" "PNG files are the same"
 else ok "another seed, another picture"; fi
 
+# Stopping and going on. --keep-state leaves every sum to the last bit, so equal states are equal renders.
+box="$pathtracer -q -r 48 32 --aov $scene"
+$box -s 40 --keep-state -f "$tmp/whole.exr" >/dev/null || not_ok "--keep-state" "failed"
+$box -s 17 --keep-state -f "$tmp/part.exr" >/dev/null || not_ok "--keep-state" "failed"
+expect "resume" 0 "mean radiance" "$san_pathtracer" -q -r 48 32 --aov $scene -s 40 --keep-state \
+    -t 3 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+if cmp -s "$tmp/whole.exr.state" "$tmp/part.exr.state"; then ok "resumed, same bytes"; else
+    not_ok "resumed, same bytes" "states differ"
+fi
+expect "resume: other seed" 3 "'seed 1' there, 'seed 2' here" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene --seed 2 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+expect "resume: fewer samples" 3 "has 40 samples" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene -s 8 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+expect "resume: no state" 3 "nothing.exr.state: cannot read" \
+    "$san_pathtracer" -q -r 48 32 $scene --resume "$tmp/nothing.exr" -f "$tmp/part.exr"
+head -c 4000 "$tmp/whole.exr.state" >"$tmp/cut.exr.state"
+expect "resume: damaged state" 3 "damaged" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene -s 40 --resume "$tmp/cut.exr" -f "$tmp/part.exr"
+
+# interrupt SIGNAL STATUS: a render without end is interrupted, its moments are valid, and it can be gone
+# on with for two samples more than it has.
+interrupt() {
+    rm -f "$tmp/long.exr" "$tmp/long.exr.state"
+    expect "$1 ends with $2 and says how to resume" "$2" "long.exr --resume $tmp/long.exr" \
+        timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
+    local done
+    done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
+    expect "$1: the picture has moments" 0 "EQUIVALENT" \
+        "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
+    $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
+        -f "$tmp/long.exr" >/dev/null
+    $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state -f "$tmp/straight.exr" >/dev/null
+    if cmp -s "$tmp/long.exr.state" "$tmp/straight.exr.state"; then ok "$1, resumed, same bytes"; else
+        not_ok "$1, resumed, same bytes" "states differ after $done samples"
+    fi
+}
+interrupt INT 130
+interrupt TERM 143
+
+expect "--time" 0 "stopped by --time" "$pathtracer" -r 32 32 --time 0.3s $scene -f "$tmp/x.exr"
+expect "--error" 0 "stopped by --error" "$pathtracer" -r 32 32 --error 40% $scene -f "$tmp/x.exr"
+if ls "$tmp"/x.exr.state >/dev/null 2>&1; then not_ok "no state is left" "it is"; else ok "no state is left"; fi
+$pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" >/dev/null &
+for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
+kill -9 $!
+wait $! 2>/dev/null
+expect "--write-every: the picture of a killed render" 0 "EQUIVALENT" \
+    "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
+if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
+    not_ok "--write-every: its state" "none"
+fi
+expect "--time: not a time" 3 "5d" "$san_pathtracer" --time 5d $scene -f "$tmp/x.exr"
+expect "--samples: not a range" 3 "not a range" "$san_pathtracer" --samples 5 $scene -f "$tmp/x.exr"
+expect "--samples: empty" 3 "no sample" "$san_pathtracer" --samples 5:5 $scene -f "$tmp/x.exr"
+expect "two adaptive modes" 3 "exclude" \
+    "$san_pathtracer" -a 32 0.1 --adaptive-unbiased 0.1 $scene -f "$tmp/x.exr"
+expect "adaptive pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 -a 16 0.2 $scene \
+    -f "$tmp/rule.exr" -f "$tmp/rule.png" --heatmap "$tmp/heat.png"
+expect "a pilot's pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 --pilot 16 \
+    --adaptive-unbiased 0.2 $scene -f "$tmp/pilot.png"
+for file in rule_rate.png heat.png pilot_rate.png; do
+    if [ -s "$tmp/$file" ]; then ok "there is $file"; else not_ok "there is $file" "no"; fi
+done
+expect "--list" 0 "integrators: path normals" "$san_pathtracer" --list
+expect "--version names libxml2" 0 "libxml2 [0-9]" "$san_pathtracer" --version
+for option in $("$pathtracer" --help | grep -o '^ *\(-., \| \)*--[a-z-]*' | grep -o -- '--[a-z-]*'); do
+    if grep -q -- "\\\\-\\\\-$(sed 's/-/\\\\-/g' <<<"${option#--}")" renderer/pathtracer.1; then
+        ok "the man page has $option"
+    else not_ok "the man page has $option" "no"; fi
+done
+
+# merge. Layers: names that OpenImageIO, a reader of its own, finds.
+$box --samples 0:10 -f "$tmp/s0.exr" >/dev/null
+$box --samples 10:40 -f "$tmp/s1.exr" >/dev/null
+$box -s 40 -p 0 0 20 32 -f "$tmp/c0.exr" >/dev/null
+$box -s 40 -p 20 0 28 32 -f "$tmp/c1.exr" >/dev/null
+$box --seed 2 --samples 10:40 -f "$tmp/s2.exr" >/dev/null
+expect "merge samples" 0 "" "$san_assay" merge "$tmp/ms.exr" "$tmp/s1.exr" "$tmp/s0.exr"
+expect "merge cells" 0 "" "$san_assay" merge "$tmp/mc.exr" "$tmp/c1.exr" "$tmp/c0.exr"
+if command -v oiiotool >/dev/null; then
+    expect "merged cells, same bits" 0 "PASS" \
+        oiiotool --fail 0 --hardfail 0 --diff "$tmp/mc.exr" "$tmp/whole.exr"
+    expect "merged samples, same mean" 0 "PASS" oiiotool --fail 4e-6 --hardfail 4e-6 \
+        "$tmp/ms.exr" --ch R,G,B "$tmp/whole.exr" --ch R,G,B --diff
+    expect "layers" 0 "albedo.R.*depth.Z.*id.object.*normal.X.*stderr.R.*variance.B" \
+        oiiotool --info -v "$tmp/whole.exr"
+else
+    ok "oiiotool is not here: bits of merged pictures are not compared"
+fi
+expect "merge: the same samples twice" 3 "both have samples 10:40" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/s0.exr" "$tmp/s1.exr" "$tmp/whole.exr"
+expect "merge: another seed" 3 "different seed" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/s0.exr" "$tmp/s2.exr"
+expect "merge: cells overlap" 3 "overlap" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr" "$tmp/whole.exr"
+$box -s 40 -p 40 0 8 32 -f "$tmp/c2.exr" >/dev/null
+expect "merge: a cell is missing" 3 "open" "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr" "$tmp/c2.exr"
+expect "merge: one share" 3 "two shares" "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr"
+
 # compare: two seeds of a correct renderer; a render that lacks a bounce; too few samples; no file.
 render() { "$pathtracer" -q -r 64 64 "$@" $scene >/dev/null || not_ok "render $*" "failed"; }
 render -s 256 --seed 3 -f "$tmp/one.exr"

@@ -1,0 +1,69 @@
+#include "identity.h"
+
+#include <errno.h>
+#include <nettle/sha2.h>
+#include <stdio.h>
+#include <string.h>
+
+static bool hash_file(const char *path, char hex[65], struct err *e)
+{
+    FILE *f = fopen(path, "rb");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    struct sha256_ctx ctx;
+    uint8_t buffer[1 << 14], digest[SHA256_DIGEST_SIZE];
+    sha256_init(&ctx);
+    for (size_t n; (n = fread(buffer, 1, sizeof buffer, f)) > 0;)
+        sha256_update(&ctx, n, buffer);
+    bool ok = !ferror(f);
+    fclose(f);
+    if (!ok)
+        return err_set(e, "%s: cannot read", path);
+    sha256_digest(&ctx, sizeof digest, digest);
+    for (size_t i = 0; i < sizeof digest; i++)
+        snprintf(hex + 2 * i, 3, "%02x", digest[i]);
+    return true;
+}
+
+bool identity_make(const struct options *o, struct identity *id, struct err *e)
+{
+    char camera[65] = "none", environment[65] = "none";
+    *id = (struct identity){.first_sample = (uint32_t)o->first};
+    if (!hash_file(o->scene, id->scene, e) ||
+        (o->camera_file != NULL && !hash_file(o->camera_file, camera, e)) ||
+        (o->environment_file != NULL && !hash_file(o->environment_file, environment, e)))
+        return false;
+    /* The dialect by number: 0 stands for auto, which the scene file decides. */
+    snprintf(id->settings, sizeof id->settings,
+             "integrator %s; direct %s; max-bounces %d; first-bounce %d; light-samples %d; "
+             "roulette %s; accel %s; dialect %d; lens-radius %.17g; focal-distance %.17g; "
+             "camera %s; environment %s; fresnel %d; sampler %s",
+             integrator_kind_names[o->kind], direct_kind_names[o->direct], o->max_bounces,
+             o->first_bounce, o->light_samples, o->roulette ? "on" : "off",
+             bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
+             environment, o->fresnel, sampler_kind_names[o->sampler]);
+    if (o->adaptive_batch > 0)
+        snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,
+                 o->adaptive_tolerance);
+    else if (o->pilot_tolerance >= 0)
+        snprintf(id->adaptive, sizeof id->adaptive, "pilot %d %.17g most %d", o->pilot,
+                 o->pilot_tolerance, o->spp);
+    else
+        snprintf(id->adaptive, sizeof id->adaptive, "off");
+    snprintf(id->seed, sizeof id->seed, "%llu", (unsigned long long)o->seed);
+    snprintf(id->cell, sizeof id->cell, "%d %d %d %d of %d %d", o->cell[0], o->cell[1], o->cell[2],
+             o->cell[3], o->width, o->height);
+    return true;
+}
+
+bool identity_parse_cell(const char *text, int c[6])
+{
+    int end = 0;
+    if (strlen(text) > 60 ||
+        sscanf(text, "%5d %5d %5d %5d of %5d %5d%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5],
+               &end) != 6 ||
+        text[end] != '\0')
+        return false;
+    return c[0] >= 0 && c[1] >= 0 && c[2] > 0 && c[3] > 0 && c[0] + c[2] <= c[4] &&
+           c[1] + c[3] <= c[5];
+}

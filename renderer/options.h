@@ -1,0 +1,45 @@
+/* The command line of pathtracer. */
+#ifndef ASSAY_OPTIONS_H
+#define ASSAY_OPTIONS_H
+
+#include "render.h"
+
+enum { MAX_OUTPUTS = 8 };
+
+enum { FRESNEL_EXACT, FRESNEL_SCHLICK }; /* options.fresnel */
+
+struct options {
+    const char *scene, *camera_file, *environment_file;
+    const char *output[MAX_OUTPUTS]; /* each ends in .exr or .png */
+    int num_outputs;
+    const char *heatmap; /* PNG file; NULL: none */
+    const char *resume;  /* the picture to go on with; NULL: from the start */
+    int width, height;
+    int cell[4]; /* x y dx dy, origin at the bottom left */
+    int dialect, accel, kind, direct, fresnel, sampler;
+    int spp;         /* of the whole picture, the most if adaptive */
+    int first, last; /* sample numbers first .. last-1 are this program's share */
+    int light_samples, threads, max_bounces, first_bounce;
+    bool roulette, quiet, aov, keep_state;
+    uint64_t seed;
+    int adaptive_batch; /* 0: off */
+    double adaptive_tolerance;
+    int pilot;                                  /* samples */
+    double pilot_tolerance;                     /* negative: no pilot */
+    double lens_radius, focal_distance;         /* negative: not given */
+    double max_seconds, max_error, write_every; /* 0: off */
+    enum { ACTION_RENDER, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
+};
+
+/* Fills *o from the command line, with defaults where it is silent. An action other than
+ * ACTION_RENDER leaves the rest unchecked. */
+bool options_parse(int argc, char **argv, struct options *o, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* What --help, --version and --list say, on stdout. */
+void options_print(const struct options *o);
+
+/* Does a file name end in .exr (else it ends in .png)? */
+bool is_exr(const char *path);
+
+#endif
