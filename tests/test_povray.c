@@ -499,7 +499,7 @@ static void render_ours(struct fixture *f, int depth, double mean[3], double var
                                               .direct = DIRECT_MIS,
                                               .max_bounces = depth,
                                               .light_samples = 1,
-                                              .seed = 5},
+                                              .sampler = {SAMPLER_INDEPENDENT, 5}},
                                .width = f->suite.width,
                                .height = f->suite.height,
                                .num_samples = 4096,
