@@ -3,6 +3,7 @@
 #include "../renderer/film.h"
 #include "../renderer/identity.h"
 
+#include <ctype.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,9 +28,12 @@ static bool parse_ranges(struct share *s, const char *text, struct err *e)
         return err_set(e, "%s: out of memory", s->path);
     const char *at = text;
     for (long long after = 0; (size_t)s->num_ranges < most; at++) {
-        char *end;
-        long long a = strtoll(at, &end, 10), b = *end == ':' ? strtoll(end + 1, &end, 10) : -1;
-        if (a < after || b < a || b > UINT32_MAX || (*end != ',' && *end != '\0'))
+        char *colon, *end;
+        long long a = strtoll(at, &colon, 10), b = -1;
+        bool ok = isdigit((unsigned char)*at) && *colon == ':' && isdigit((unsigned char)colon[1]);
+        if (ok)
+            b = strtoll(colon + 1, &end, 10);
+        if (!ok || a < after || b < a || b > UINT32_MAX || (*end != ',' && *end != '\0'))
             return err_set(e, "%s: assay:samples '%.64s' are not sample ranges", s->path, text);
         s->range[s->num_ranges][0] = (uint32_t)a;
         s->range[s->num_ranges++][1] = (uint32_t)b;

@@ -47,8 +47,10 @@ int verb_merge(int argc, char **argv, struct err *e)
         strcat(command, " ");
         strcat(command, argv[i]);
     }
-    if (merge_shares(share, num, &whole, e) && share_write(out, &whole, command, e))
+    if (merge_shares(share, num, &whole, e) && share_write(out, &whole, command, e)) {
+        printf("%s\n", out);
         code = 0;
+    }
 done:
     for (int i = 0; i < num; i++)
         share_free(&share[i]);
