@@ -14,9 +14,11 @@ enum { ROULETTE_FROM_VERTEX = 2 };
  */
 #define SHADOW_SHORTENING 1e-4f
 
+/* a^2/(a^2 + b^2) by way of b/a: the squares of densities of small lights overflow. */
 static float power_heuristic(float a, float b)
 {
-    return a * a / (a * a + b * b);
+    float r = b / a;
+    return a > 0 ? 1 / (1 + r * r) : 0;
 }
 
 static bool counts(const struct integrator *it, int bounces)
