@@ -1,8 +1,5 @@
 #include "suite.h"
 
-#include <nettle/base16.h>
-#include <nettle/sha2.h>
-
 #include <dirent.h>
 #include <errno.h>
 #include <limits.h>
@@ -30,30 +27,6 @@ bool verdict_parse(const char *name, enum verdict *out)
             return true;
         }
     return false;
-}
-
-bool sha256_file(const char *path, char hex[65], struct err *e)
-{
-    FILE *f = fopen(path, "rb");
-    if (f == NULL)
-        return err_set(e, "%s: %s", path, strerror(errno));
-    struct sha256_ctx ctx;
-    sha256_init(&ctx);
-    uint8_t buf[16384];
-    size_t n;
-    while ((n = fread(buf, 1, sizeof buf, f)) > 0)
-        sha256_update(&ctx, n, buf);
-    bool ok = ferror(f) == 0;
-    if (!ok)
-        err_set(e, "%s: %s", path, strerror(errno));
-    fclose(f);
-    if (!ok)
-        return false;
-    uint8_t digest[SHA256_DIGEST_SIZE];
-    sha256_digest(&ctx, sizeof digest, digest);
-    base16_encode_update(hex, sizeof digest, digest);
-    hex[64] = '\0';
-    return true;
 }
 
 /* An object of a .json file under inspection: `at` is "" or "references.cycles.", so that

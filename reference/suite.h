@@ -22,6 +22,7 @@
 #define ASSAY_SUITE_H
 
 #include "../renderer/err.h"
+#include "../renderer/sha256.h"
 
 #include <jansson.h>
 
@@ -72,8 +73,5 @@ const struct suite_scene *suite_find(const struct suite *s, const char *name);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
 bool verdict_parse(const char *name, enum verdict *out);
-
-/* Lower-case hex SHA-256 of a file (nettle). */
-bool sha256_file(const char *path, char hex[65], struct err *e) __attribute__((warn_unused_result));
 
 #endif

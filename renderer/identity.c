@@ -1,37 +1,17 @@
 #include "identity.h"
 
-#include <errno.h>
-#include <nettle/sha2.h>
+#include "sha256.h"
+
 #include <stdio.h>
 #include <string.h>
-
-static bool hash_file(const char *path, char hex[65], struct err *e)
-{
-    FILE *f = fopen(path, "rb");
-    if (f == NULL)
-        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
-    struct sha256_ctx ctx;
-    uint8_t buffer[1 << 14], digest[SHA256_DIGEST_SIZE];
-    sha256_init(&ctx);
-    for (size_t n; (n = fread(buffer, 1, sizeof buffer, f)) > 0;)
-        sha256_update(&ctx, n, buffer);
-    bool ok = !ferror(f);
-    fclose(f);
-    if (!ok)
-        return err_set(e, "%s: cannot read", path);
-    sha256_digest(&ctx, sizeof digest, digest);
-    for (size_t i = 0; i < sizeof digest; i++)
-        snprintf(hex + 2 * i, 3, "%02x", digest[i]);
-    return true;
-}
 
 bool identity_make(const struct options *o, struct identity *id, struct err *e)
 {
     char camera[65] = "none", environment[65] = "none";
     *id = (struct identity){.first_sample = (uint32_t)o->first};
-    if (!hash_file(o->scene, id->scene, e) ||
-        (o->camera_file != NULL && !hash_file(o->camera_file, camera, e)) ||
-        (o->environment_file != NULL && !hash_file(o->environment_file, environment, e)))
+    if (!sha256_file(o->scene, id->scene, e) ||
+        (o->camera_file != NULL && !sha256_file(o->camera_file, camera, e)) ||
+        (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)))
         return false;
     /* The dialect by number: 0 stands for auto, which the scene file decides. */
     snprintf(id->settings, sizeof id->settings,

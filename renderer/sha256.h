@@ -1,0 +1,10 @@
+/* Files by their content. */
+#ifndef ASSAY_SHA256_H
+#define ASSAY_SHA256_H
+
+#include "err.h"
+
+/* Lower-case hex SHA-256 of a file (nettle). */
+bool sha256_file(const char *path, char hex[65], struct err *e) __attribute__((warn_unused_result));
+
+#endif
