@@ -5,6 +5,7 @@
 #include "export_cycles.h"
 #include "process.h"
 
+#include "../renderer/sha256.h"
 #include "../renderer/fs.h"
 #include "json_file.h"
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "reference.h"
 
+#include "../renderer/sha256.h"
 #include "../renderer/fs.h"
 #include "json_file.h"
 

@@ -4,6 +4,7 @@
 #include "povray_picture.h"
 #include "process.h"
 
+#include "../renderer/sha256.h"
 #include "../renderer/fs.h"
 
 #include <assert.h>

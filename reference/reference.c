@@ -3,7 +3,6 @@
 #include "job.h"
 #include "truth.h"
 
-#include "../renderer/collada.h"
 #include "../renderer/fs.h"
 
 #include <assert.h>
@@ -73,13 +72,10 @@ static bool engine_render(const struct suite_scene *scene, const struct suite_re
     struct camera camera;
     struct reference_job job = {
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera, .dir = dir};
-    bool ok = collada_load(scene->dae, DIALECT_AUTO, &s, e);
+    bool ok = suite_open(scene, &s, &camera, e);
     if (ok) {
-        ok = camera_init(&camera, &s, scene->width, scene->height, e) ||
-             err_prefix(e, "%s", scene->dae);
-        if (ok)
-            ok = strcmp(ref->engine, "cycles") == 0 ? cycles_render(&job, out, manifest, e)
-                                                    : povray_render(&job, out, manifest, e);
+        ok = strcmp(ref->engine, "cycles") == 0 ? cycles_render(&job, out, manifest, e)
+                                                : povray_render(&job, out, manifest, e);
         scene_free(&s);
     }
     if (ok && !remove_tree(dir, e)) {

@@ -8,6 +8,9 @@
  *     "detects": "one line", "blind_to": "one line",
  *     "width": 128, "height": 128, "depth": 5, "spp": 2048, "tile": 16,
  *     "expect": "EQUIVALENT",
+ *     "environment": "sky.exr",                  (optional: the file beside this one that lights it)
+ *     "lens_radius": 0.1, "focal_distance": 2,   (optional, both or none: a thin lens)
+ *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
  *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
  *     "references": {
  *       "cycles": {"class": "exact", "margin_global": 0.005, "margin_tile": 0.02,
@@ -21,8 +24,8 @@
 #ifndef ASSAY_SUITE_H
 #define ASSAY_SUITE_H
 
+#include "../renderer/camera.h"
 #include "../renderer/err.h"
-#include "../renderer/sha256.h"
 
 #include <jansson.h>
 
@@ -42,16 +45,20 @@ struct suite_reference {
 };
 
 struct suite_scene {
-    char name[64];   /* "41_cornell" */
-    char dae[4096];  /* path of the .dae */
-    char sha256[65]; /* of the .dae, lower-case hex */
+    char name[64];                      /* "41_cornell" */
+    char dae[4096];                     /* path of the .dae */
+    char environment[4096];             /* path of an .exr or .hdr; empty if there is none */
+    double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
+    char sha256[65]; /* lower-case hex: of the .dae; with an environment or a lens, of a text that
+                        holds that, the environment's and the lens */
     char title[128], detects[512], blind_to[512];
     int width, height;
     int depth; /* -m: largest number of bounces */
     int spp;   /* of our render */
     int tile;  /* side of a reporting tile, pixels; divides width and height */
     enum verdict expect;
-    char references_of[64]; /* name of the scene whose references are used; its own name by default
+    json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
+    char references_of[64];  /* name of the scene whose references are used; its own name by default
                              */
     struct suite_reference reference[3];
     int num_references;
@@ -68,6 +75,10 @@ struct suite {
 bool suite_load(const char *dir, struct suite *out, struct err *e)
     __attribute__((warn_unused_result));
 void suite_free(struct suite *s);
+/* Reads the scene with its environment, and its camera with its lens. The caller calls
+ * scene_free(scene). */
+bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
+                struct err *e) __attribute__((warn_unused_result));
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);
 

@@ -7,6 +7,14 @@
 #include <stdio.h>
 #include <string.h>
 
+static void finish(struct sha256_ctx *ctx, char hex[65])
+{
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    sha256_digest(ctx, sizeof digest, digest);
+    base16_encode_update(hex, sizeof digest, digest);
+    hex[64] = '\0';
+}
+
 bool sha256_file(const char *path, char hex[65], struct err *e)
 {
     FILE *f = fopen(path, "rb");
@@ -24,9 +32,14 @@ bool sha256_file(const char *path, char hex[65], struct err *e)
     fclose(f);
     if (!ok)
         return false;
-    uint8_t digest[SHA256_DIGEST_SIZE];
-    sha256_digest(&ctx, sizeof digest, digest);
-    base16_encode_update(hex, sizeof digest, digest);
-    hex[64] = '\0';
+    finish(&ctx, hex);
     return true;
+}
+
+void sha256_text(const char *text, char hex[65])
+{
+    struct sha256_ctx ctx;
+    sha256_init(&ctx);
+    sha256_update(&ctx, strlen(text), (const uint8_t *)text);
+    finish(&ctx, hex);
 }

@@ -1,4 +1,4 @@
-/* Files by their content. */
+/* Files and texts by their content. */
 #ifndef ASSAY_SHA256_H
 #define ASSAY_SHA256_H
 
@@ -6,5 +6,7 @@
 
 /* Lower-case hex SHA-256 of a file (nettle). */
 bool sha256_file(const char *path, char hex[65], struct err *e) __attribute__((warn_unused_result));
+/* The same of a text. */
+void sha256_text(const char *text, char hex[65]);
 
 #endif

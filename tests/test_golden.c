@@ -1,6 +1,7 @@
 /* Stored references: what was written comes back, and nothing else is accepted. Seeds of replicates.
  */
 #include "../reference/job.h"
+#include "../renderer/sha256.h"
 #include "../renderer/fs.h"
 #include "../reference/json_file.h"
 

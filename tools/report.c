@@ -176,36 +176,34 @@ static void write_row(FILE *f, const struct claim_ref *claim)
 
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
-    fputs(
-        "<section>\n"
-        "<h2>The claims</h2>\n"
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
-        "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
-        "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
-        "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">In "
-        "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
-        "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
-        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
-        "class=\"num\">Time</th></tr></thead>\n"
-        "<tbody>\n",
-        f);
+    fputs("<section>\n"
+          "<h2>The claims</h2>\n"
+          "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
+          "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
+          "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
+          "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">In "
+          "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
+          "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
+          "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
+          "class=\"num\">Time</th></tr></thead>\n"
+          "<tbody>\n",
+          f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
-    fputs(
-        "</tbody></table>\n"
-        "</div>\n"
-        "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
-        "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
-        "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
-        "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
-        "detectable bias: a true difference of this size would have come out DIFFERENT with a "
-        "probability of 95 %. In the drawing the band is the margin, the line is the interval "
-        "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
-        "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
-        "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
-        "samples to tell.</p>\n"
-        "</section>\n",
-        f);
+    fputs("</tbody></table>\n"
+          "</div>\n"
+          "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
+          "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
+          "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
+          "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
+          "detectable bias: a true difference of this size would have come out DIFFERENT with a "
+          "probability of 95 %. In the drawing the band is the margin, the line is the interval "
+          "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
+          "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
+          "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
+          "samples to tell.</p>\n"
+          "</section>\n",
+          f);
 }
 
 /* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus

@@ -79,7 +79,7 @@ static void say(const struct validation *v, const char *scene, const char *what)
 static void render_ours(const struct validation *v, const struct suite_scene *s, struct side *out)
 {
     char path[MAX_PATH], log[MAX_PATH], width[16], height[16], spp[16], depth[16], threads[16];
-    char seed[32];
+    char seed[32], lens[32], focus[32];
     data_path(v, path, s->name, "pathtracer.exr");
     data_path(v, log, s->name, "pathtracer.log");
     snprintf(width, sizeof width, "%d", s->width);
@@ -88,9 +88,22 @@ static void render_ours(const struct validation *v, const struct suite_scene *s,
     snprintf(depth, sizeof depth, "%d", s->depth);
     snprintf(threads, sizeof threads, "%d", v->opt->threads);
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)v->opt->seed);
-    const char *argv[] = {
-        v->opt->pathtracer, "-r", width, height, "-s",   spp, "-m", depth, "-t", threads,
-        "--seed",           seed, "-f",  path,   s->dae, NULL};
+    snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
+    snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
+    const char *argv[24] = {
+        v->opt->pathtracer, "-r", width, height, "-s",  spp, "-m", depth, "-t", threads,
+        "--seed",           seed, "-f",  path,   s->dae};
+    int argc = 15;
+    if (s->environment[0] != '\0') {
+        argv[argc++] = "-e";
+        argv[argc++] = s->environment;
+    }
+    if (s->lens_radius > 0) {
+        argv[argc++] = "-b";
+        argv[argc++] = lens;
+        argv[argc++] = "-d";
+        argv[argc++] = focus;
+    }
     const struct process p = {.argv = argv, .log = log, .timeout_s = v->opt->timeout_s};
     struct process_usage usage;
     say(v, s->name, "rendering with pathtracer");

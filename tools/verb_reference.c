@@ -89,8 +89,8 @@ static bool make_golden(const struct settings *s, const struct suite_scene *scen
         return false;
     bool ok = golden_write(s->out, scene->name, ref->engine, &m, manifest, e);
     if (ok)
-        printf("%s/%s/%s.exr: %d x %d pixels, %g x %s, %.0f s\n", s->out, scene->name, ref->engine, m.width,
-               m.height, m.n[0], m.unit, now_seconds() - start);
+        printf("%s/%s/%s.exr: %d x %d pixels, %g x %s, %.0f s\n", s->out, scene->name, ref->engine,
+               m.width, m.height, m.n[0], m.unit, now_seconds() - start);
     moments_free(&m);
     json_decref(manifest);
     return ok;

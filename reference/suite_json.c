@@ -1,0 +1,158 @@
+#include "suite_json.h"
+
+#include "json_node.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* The keys that every reference has and those of its engine. */
+static bool read_reference(const char *file, const char *engine, json_t *object,
+                           struct suite_reference *r, struct err *e)
+{
+    static const char *const cycles_keys[] = {"class",      "margin_global", "margin_tile",
+                                              "replicates", "spp",           NULL};
+    static const char *const povray_keys[] = {"class",      "margin_global", "margin_tile",
+                                              "replicates", "subgrid",       NULL};
+    static const char *const truth_keys[] = {"class", "margin_global", "margin_tile",
+                                             "kind",  "values",        NULL};
+    bool cycles = strcmp(engine, "cycles") == 0, povray = strcmp(engine, "povray") == 0;
+    bool truth = strcmp(engine, "truth") == 0;
+    if (!cycles && !povray && !truth)
+        return err_set(e, "%s: unknown engine 'references.%s'", file, engine);
+    if (!json_is_object(object))
+        return err_set(e, "%s: 'references.%s' is not an object", file, engine);
+    char at[64];
+    snprintf(at, sizeof at, "references.%s.", engine);
+    struct json_node n = {file, at, object};
+    snprintf(r->engine, sizeof r->engine, "%s", engine);
+    if (!json_only_keys(&n,
+                        cycles   ? cycles_keys
+                        : povray ? povray_keys
+                                 : truth_keys,
+                        e) ||
+        !json_get_text(&n, "class", r->fidelity, sizeof r->fidelity, e) ||
+        !json_get_number(&n, "margin_global", 0, 1, &r->margin_global, e) ||
+        !json_get_number(&n, "margin_tile", 0, 1, &r->margin_tile, e))
+        return false;
+    if (strcmp(r->fidelity, "exact") != 0 && strcmp(r->fidelity, "limit") != 0 &&
+        strcmp(r->fidelity, "approximate") != 0)
+        return err_set(e, "%s: '%sclass' is '%s', not 'exact', 'limit' or 'approximate'", file, at,
+                       r->fidelity);
+    if (truth)
+        return json_get_text(&n, "kind", r->kind, sizeof r->kind, e) &&
+               json_get_object(&n, "values", &r->values, e);
+    /* One replicate would have no variance. */
+    if (!json_get_int(&n, "replicates", 2, 4096, &r->replicates, e))
+        return false;
+    return cycles ? json_get_int(&n, "spp", 1, 1 << 20, &r->spp, e)
+                  : json_get_int(&n, "subgrid", 1, 64, &r->subgrid, e);
+}
+
+static bool read_references(const char *file, json_t *object, struct suite_scene *s, struct err *e)
+{
+    const char *engine;
+    json_t *value;
+    json_object_foreach(object, engine, value)
+    {
+        struct suite_reference r = {0};
+        if (!read_reference(file, engine, value, &r, e))
+            return false;
+        s->reference[s->num_references++] = r;
+    }
+    return s->num_references > 0 || err_set(e, "%s: 'references' is empty", file);
+}
+
+/* A file beside the .json: no directories. */
+static bool read_environment(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    char name[256];
+    if (json_object_get(n->object, "environment") == NULL)
+        return true;
+    if (!json_get_text(n, "environment", name, sizeof name, e))
+        return false;
+    if (strchr(name, '/') != NULL)
+        return err_set(e, "%s: 'environment' is '%s', not a file beside it", n->file, name);
+    const char *slash = strrchr(n->file, '/');
+    int dir = slash != NULL ? (int)(slash - n->file) + 1 : 0;
+    int length = snprintf(s->environment, sizeof s->environment, "%.*s%s", dir, n->file, name);
+    return (length > 0 && (size_t)length < sizeof s->environment) ||
+           err_set(e, "%s: path too long", name);
+}
+
+static bool read_lens(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    if (json_object_get(n->object, "lens_radius") == NULL &&
+        json_object_get(n->object, "focal_distance") == NULL)
+        return true;
+    return json_get_number(n, "lens_radius", 0, 1e6, &s->lens_radius, e) &&
+           json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e);
+}
+
+/* An engine either has a reference or a reason, not both. */
+static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    static const char *const engines[] = {"cycles", "povray", NULL};
+    if (json_object_get(n->object, "not_expressible") == NULL)
+        return true;
+    if (!json_get_object(n, "not_expressible", &s->not_expressible, e))
+        return false;
+    struct json_node reasons = {n->file, "not_expressible.", s->not_expressible};
+    if (!json_only_keys(&reasons, engines, e))
+        return false;
+    const char *engine;
+    json_t *value;
+    json_object_foreach(s->not_expressible, engine, value)
+    {
+        char reason[256];
+        if (!json_get_text(&reasons, engine, reason, sizeof reason, e))
+            return false;
+        for (int i = 0; i < s->num_references; i++)
+            if (strcmp(s->reference[i].engine, engine) == 0)
+                return err_set(e, "%s: '%s' is both a reference and not expressible", n->file,
+                               engine);
+    }
+    return true;
+}
+
+bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
+{
+    static const char *const keys[] = {
+        "title",      "detects",         "blind_to",    "width",
+        "height",     "depth",           "spp",         "tile",
+        "expect",     "environment",     "lens_radius", "focal_distance",
+        "references", "not_expressible", NULL};
+    static const char *const keys_9x[] = {
+        "title", "detects", "blind_to",    "width",       "height",         "depth",         "spp",
+        "tile",  "expect",  "environment", "lens_radius", "focal_distance", "references_of", NULL};
+    if (!json_is_object(s->json))
+        return err_set(e, "%s: not an object", file);
+    bool must_differ = s->name[0] == '9';
+    struct json_node n = {file, "", s->json};
+    char expect[32];
+    if (!json_only_keys(&n, must_differ ? keys_9x : keys, e) ||
+        !json_get_text(&n, "title", s->title, sizeof s->title, e) ||
+        !json_get_text(&n, "detects", s->detects, sizeof s->detects, e) ||
+        !json_get_text(&n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
+        !json_get_int(&n, "width", 1, 16384, &s->width, e) ||
+        !json_get_int(&n, "height", 1, 16384, &s->height, e) ||
+        !json_get_int(&n, "depth", 0, 100, &s->depth, e) ||
+        !json_get_int(&n, "spp", 2, 1 << 24, &s->spp, e) ||
+        !json_get_int(&n, "tile", 1, 16384, &s->tile, e) ||
+        !json_get_text(&n, "expect", expect, sizeof expect, e))
+        return false;
+    if (s->width % s->tile != 0 || s->height % s->tile != 0)
+        return err_set(e, "%s: tile %d does not divide %d x %d pixels", file, s->tile, s->width,
+                       s->height);
+    enum verdict wanted = must_differ ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT;
+    if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
+        return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,
+                       s->name[0], verdict_name(wanted));
+    if (!read_environment(&n, s, e) || !read_lens(&n, s, e))
+        return false;
+    if (must_differ)
+        return json_get_text(&n, "references_of", s->references_of, sizeof s->references_of, e);
+    memcpy(s->references_of, s->name, sizeof s->name);
+    json_t *references;
+    return json_get_object(&n, "references", &references, e) &&
+           read_references(file, references, s, e) && read_not_expressible(&n, s, e);
+}

@@ -1,0 +1,12 @@
+/* The .json of one scene of the suite. */
+#ifndef ASSAY_SUITE_JSON_H
+#define ASSAY_SUITE_JSON_H
+
+#include "suite.h"
+
+/* Everything that suite.h describes but what a 9x scene inherits. s->name is set and s->json is the
+ * parsed file, which s->reference and s->not_expressible then borrow from. */
+bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif
