@@ -164,7 +164,8 @@ static void pixels_match_rays(void **state)
             assert_true(same(mean_at(&m, col, row, c),
                              background[c] + share * (p.panel->radiance[c] - background[c])));
         blurred += share > 0.02 && share < 0.98;
-        for (enum mistake k = RADIUS_1_PERCENT; share > 0.02 && share < 0.98 && k <= SQUARE; k++) {
+        bool try_mistakes = i == 0 || i == 5; /* near and far */
+        for (enum mistake k = RADIUS_1_PERCENT; try_mistakes && k <= SQUARE; k++) {
             p.mistake = k;
             double wrong = lens_share(&p);
             assert_false(same(mean_at(&m, col, row, 0),
