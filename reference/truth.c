@@ -1,5 +1,9 @@
 #include "truth.h"
 
+#include "truth_ggx.h"
+#include "truth_optics.h"
+#include "truth_sky.h"
+
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
 
@@ -109,8 +113,7 @@ done:
     return ok;
 }
 
-/* `hi` may be HUGE_VAL. */
-static bool check_triple(const char *name, const double v[3], double hi, struct err *e)
+bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
 {
     for (int c = 0; c < 3; c++)
         if (!(v[c] >= 0 && v[c] <= hi))
@@ -125,7 +128,8 @@ static bool furnace_values(json_t *values, double emission[3], double albedo[3],
                        &emission[0], &emission[1], &emission[2], "albedo", &albedo[0], &albedo[1],
                        &albedo[2]) != 0)
         return err_set(e, "%s", why.text);
-    return check_triple("emission", emission, HUGE_VAL, e) && check_triple("albedo", albedo, 1, e);
+    return truth_check_triple("emission", emission, HUGE_VAL, e) &&
+           truth_check_triple("albedo", albedo, 1, e);
 }
 
 static bool point_values(json_t *values, struct plane *p, struct err *e)
@@ -139,7 +143,7 @@ static bool point_values(json_t *values, struct plane *p, struct err *e)
         return err_set(e, "%s", why.text);
     if (!(p->light[1] > 0))
         return err_set(e, "light is at height %g, not above the plane", p->light[1]);
-    return check_triple("intensity", p->strength, HUGE_VAL, e);
+    return truth_check_triple("intensity", p->strength, HUGE_VAL, e);
 }
 
 static bool rectangle_values(json_t *values, struct plane *p, struct err *e)
@@ -156,7 +160,7 @@ static bool rectangle_values(json_t *values, struct plane *p, struct err *e)
         return err_set(e, "height is %g, not above the plane", p->height);
     if (!(p->ex[0] < p->ex[1] && p->ez[0] < p->ez[1]))
         return err_set(e, "emitter has no area");
-    return check_triple("radiance", p->strength, HUGE_VAL, e);
+    return truth_check_triple("radiance", p->strength, HUGE_VAL, e);
 }
 
 static bool fill_furnace(json_t *values, int depth, struct moments *out, struct err *e)
@@ -177,13 +181,24 @@ static bool fill_plane(struct plane *p, json_t *values, int depth, struct moment
 {
     if (p->source == SOURCE_POINT ? !point_values(values, p, e) : !rectangle_values(values, p, e))
         return false;
-    if (!check_triple("albedo", p->albedo, 1, e))
+    if (!truth_check_triple("albedo", p->albedo, 1, e))
         return false;
     if (p->foot_x[0] == p->foot_x[1] || p->foot_z[0] == p->foot_z[1])
         return err_set(e, "footprint has no area");
     if (depth < 1)
         return err_set(e, "depth is %d, but the form needs direct light (1 or more)", depth);
     return plane_render(p, out, e);
+}
+
+static const struct truth_kind *const families[] = {truth_optics, truth_ggx, truth_sky};
+
+static const struct truth_kind *find_kind(const char *name)
+{
+    for (size_t i = 0; i < sizeof families / sizeof *families; i++)
+        for (const struct truth_kind *k = families[i]; k->name != NULL; k++)
+            if (strcmp(k->name, name) == 0)
+                return k;
+    return NULL;
 }
 
 bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
@@ -205,6 +220,8 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
     else if (strcmp(ref->kind, "rectangle_over_plane") == 0)
         ok = fill_plane(&(struct plane){.source = SOURCE_RECTANGLE}, ref->values, scene->depth, &m,
                         e);
+    else if (find_kind(ref->kind) != NULL)
+        ok = find_kind(ref->kind)->fill(scene, ref->values, &m, e);
     else
         ok = err_set(e, "unknown closed form");
     if (!ok)

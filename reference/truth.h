@@ -38,4 +38,16 @@ double truth_point_irradiance(const double light[3], double x, double z);
 double truth_rectangle_irradiance(double height, const double ex[2], const double ez[2], double x,
                                   double z);
 
+/* A closed form by name. fill() sets all of out->mean, out->width x out->height pixels, from
+ * `values`; of the scene it may use depth, lens_radius and focal_distance. */
+struct truth_kind {
+    const char *name;
+    bool (*fill)(const struct suite_scene *scene, json_t *values, struct moments *out,
+                 struct err *e);
+};
+
+/* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */
+bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
+    __attribute__((warn_unused_result));
+
 #endif
