@@ -2,6 +2,7 @@
  * adaptive quadrature over the emitter, Lambert's polygon formula, conservation of energy. All
  * comparisons use one tolerance, and the same tolerance must reject forms with a known mistake. */
 #include "../reference/truth.h"
+#include "../reference/truth_lights.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
