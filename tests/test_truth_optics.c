@@ -490,7 +490,7 @@ static void ball_pixels(void **state)
     moments_free(&m);
 }
 
-/* The largest relative difference of a square, a sixteenth of the picture's side (4 pixels of 64), in
+/* The largest difference, relative to the larger of the two, of a square, a sixteenth of the picture's side (4 pixels of 64), in
  * the mean of its channels, with its sign. */
 static double worst_square(const struct moments *a, const struct moments *b)
 {
@@ -503,8 +503,9 @@ static double worst_square(const struct moments *a, const struct moments *b)
                 sum_a += a->mean[3 * row * a->width + i];
                 sum_b += b->mean[3 * row * a->width + i];
             }
-        if (fabs(sum_a / sum_b - 1) > fabs(worst))
-            worst = sum_a / sum_b - 1;
+        double larger = fmax(sum_a, sum_b);
+        if (larger > 0 && fabs(sum_a - sum_b) > fabs(worst) * larger)
+            worst = (sum_a - sum_b) / larger;
     }
     return worst;
 }
