@@ -5,7 +5,8 @@
  * kind      "values" in the .json (all keys needed, no others; triples are R, G, B)
  * furnace   emission [W sr^-1 m^-2], albedo
  *
- * The other kinds are listed in truth_lights.h, truth_sun.h and truth_lens.h. */
+ * The other kinds are listed in truth_lights.h, truth_sun.h, truth_lens.h, truth_optics.h, truth_ggx.h
+ * and truth_sky.h. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
 
@@ -14,7 +15,8 @@
 
 /* Fills *out (unit "exact", spp 0) for that reference of that scene. Fails on an unknown kind, on
  * missing, unknown or impossible values, on a depth at which the form does not hold, and where a
- * quadrature over a pixel has not converged to 1e-10 of the pixel's value. The caller frees. */
+ * quadrature over a pixel has not converged (to 1e-10 of the pixel's value; glass_sphere: truth_view.h).
+ * The caller frees. */
 bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
                   struct moments *out, struct err *e) __attribute__((warn_unused_result));
 
