@@ -237,16 +237,16 @@ struct estimate converge_slope(const struct rung *rung, int num)
         double w = 1 / (rung[i].log_mse.se * rung[i].log_mse.se + mean_v);
         sxx += w * pow(log(rung[i].spp) - sx / sw, 2);
     }
-    double slope = 0, v = 0, var_v = 0;
+    double slope = 0, v = 0, dof = INFINITY;
     for (int i = 0; i < num; i++) {
         double se = rung[i].log_mse.se, w = 1 / (se * se + mean_v);
         /* 1/2: ln RMSE is half of ln MSE. */
-        double c = 0.5 * w * (log(rung[i].spp) - sx / sw) / sxx, part = c * c * se * se;
+        double c = 0.5 * w * (log(rung[i].spp) - sx / sw) / sxx;
         slope += c * rung[i].log_mse.value;
-        v += part;
-        var_v += 2 * part * part / rung[i].log_mse.dof;
+        v += c * c * se * se;
+        dof = fmin(dof, rung[i].log_mse.dof);
     }
-    return (struct estimate){slope, sqrt(v), stats_dof(v, var_v)};
+    return (struct estimate){slope, sqrt(v), dof};
 }
 
 enum verdict converge_slope_verdict(struct estimate slope, double alpha, double half_width)

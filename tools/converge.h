@@ -62,8 +62,9 @@ bool converge_rung(const float *images, int count, double spp, const struct conv
 
 /* Slope of ln RMSE on ln spp over num >= 2 rungs with replicates of their own. Weighted least squares:
  * the weights are 1/(own + mean squared standard error), so that a rung whose few replicates happen to
- * agree does not rule the fit; the standard error holds for any weights, sum c_i^2 se_i^2, with
- * Satterthwaite's degrees of freedom. */
+ * agree does not rule the fit; the standard error holds for any weights, sum c_i^2 se_i^2. The degrees of
+ * freedom are the smallest of any rung, not the larger number that their sum would have: squared errors are
+ * skewed, and that makes up for it (tests/test_converge.c). */
 struct estimate converge_slope(const struct rung *rung, int num);
 
 /* Is the slope -1/2, as of independent samples? DIFFERENT if the 1 - alpha interval does not contain it,
