@@ -144,11 +144,11 @@ static json_t *pair(double lo, double hi)
     return isfinite(lo) && isfinite(hi) ? json_pack("[f, f]", lo, hi) : json_null();
 }
 
-/* exp of an interval of a logarithm, to a power. */
+/* exp of an interval of a logarithm, to a power; null where it says nothing (a factor of e^20). */
 static json_t *exp_pair(struct estimate x, double alpha, double power)
 {
     struct interval i = estimate_interval(x, alpha);
-    return pair(exp(power * i.lo), exp(power * i.hi));
+    return i.hi - i.lo < 20 ? pair(exp(power * i.lo), exp(power * i.hi)) : json_null();
 }
 
 static json_t *rung_json(const struct rung *g, const struct cost *c, double alpha)
