@@ -28,6 +28,7 @@ struct side {
 struct validation {
     const struct validate_options *opt;
     struct suite suite;
+    const struct suite_scene **order;         /* in which scenes are judged */
     struct side (*reference)[MAX_REFERENCES]; /* per scene: 9x scenes share those of another */
     json_t *claims;
     double alpha; /* of one claim */
@@ -274,6 +275,39 @@ static bool check_selection(const struct validation *v, struct err *e)
     return true;
 }
 
+static bool differs_unexpectedly(const json_t *claims)
+{
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const json_t *c = json_array_get(claims, i);
+        const char *verdict = member_text(c, "verdict");
+        if (strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
+            strcmp(member_text(c, "expected"), verdict) != 0)
+            return true;
+    }
+    return false;
+}
+
+/* Samples are what a scene of the suite costs, about. */
+static int by_cost(const void *a, const void *b)
+{
+    const struct suite_scene *s = *(const struct suite_scene *const *)a;
+    const struct suite_scene *t = *(const struct suite_scene *const *)b;
+    double x = (double)s->width * s->height * s->spp, y = (double)t->width * t->height * t->spp;
+    return x != y ? (x > y) - (x < y) : strcmp(s->name, t->name);
+}
+
+static bool order_scenes(struct validation *v, struct err *e)
+{
+    v->order = calloc((size_t)v->suite.num_scenes, sizeof(const struct suite_scene *));
+    if (v->order == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < v->suite.num_scenes; i++)
+        v->order[i] = &v->suite.scene[i];
+    if (v->opt->until_different)
+        qsort(v->order, (size_t)v->suite.num_scenes, sizeof(const struct suite_scene *), by_cost);
+    return true;
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -282,7 +316,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     double start = now_seconds();
     if (!suite_load(opt->suite_dir, &v.suite, e))
         return false;
-    bool ok = check_selection(&v, e) && make_dirs(opt->out_dir, e);
+    bool ok = check_selection(&v, e) && order_scenes(&v, e) && make_dirs(opt->out_dir, e);
     if (!ok)
         goto done;
     v.reference = calloc((size_t)v.suite.num_scenes, sizeof *v.reference);
@@ -301,8 +335,11 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     if (opt->live)
         json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
     for (int i = 0; i < v.suite.num_scenes; i++)
-        if (is_selected(opt, v.suite.scene[i].name))
-            validate_scene(&v, &v.suite.scene[i]);
+        if (is_selected(opt, v.order[i]->name)) {
+            validate_scene(&v, v.order[i]);
+            if (opt->until_different && differs_unexpectedly(v.claims))
+                break;
+        }
     json_object_set_new(root, "seconds", json_real(now_seconds() - start));
     *results = root;
     root = NULL;
@@ -312,6 +349,7 @@ done:
         for (int k = 0; k < MAX_REFERENCES; k++)
             side_free(&v.reference[i][k]);
     free(v.reference);
+    free(v.order);
     suite_free(&v.suite);
     return ok;
 }
