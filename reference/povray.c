@@ -302,6 +302,8 @@ static bool fold(const struct crew *w, struct moments *out, struct err *e)
         for (size_t i = 0; i < w->size; i++)
             sum[i] = (float)(fine[i] + (double)sum[i]);
         moments_add_image(&m, sum);
+        if (w->job->opt->on_replicate != NULL)
+            w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, t - POVRAY_WINDOWS, sum);
     }
     for (size_t i = 0; exact && i < w->size; i++) {
         m.mean[i] = fine[i];

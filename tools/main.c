@@ -14,6 +14,7 @@ static const struct {
 } verbs[] = {
     {"validate", verb_validate, "render the suite and judge it against its references"},
     {"compare", verb_compare, "judge two moments images"},
+    {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
     {"report", verb_report, "make the HTML page of a results.json"},
     {"reference", verb_reference, "render references with Cycles and POV-Ray into golden/"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},

@@ -1,5 +1,6 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
+#include "places.h"
 #include "report.h"
 #include "results.h"
 #include "validate.h"
@@ -49,27 +50,6 @@ static const struct cli_option options[] = {
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
-
-/* A file beside this program, or below the installation's share directory. */
-static void beside_program(char *path, size_t size, const char *name)
-{
-    char self[3072];
-    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(self, '/');
-    if (slash != NULL)
-        *slash = '\0';
-    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
-}
-
-/* The checkout's directory if we stand in one, else the installed one. */
-static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
-{
-    if (access("reference/scenes", R_OK) == 0)
-        return checkout;
-    beside_program(path, size, installed);
-    return path;
-}
 
 static bool fresh_seed(uint32_t *seed, struct err *e)
 {
