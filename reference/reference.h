@@ -18,9 +18,10 @@ struct reference_options {
 /* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds
  *   scene, scene_sha256, engine, date (UTC), unit, spp_of_unit, width, height, depth, replicates,
  *   spp, subgrid, cpu_s, wall_s (of all of it, this process included),
- *   of engines: version, binary_sha256, command, settings, seeds; of "truth": kind, values.
+ *   of engines: version, binary_sha256, command, settings, seeds, and independence (independence.h)
+ *   unless the unit is "exact"; of "truth": kind, values.
  * Fails (with the engine's own last lines) when the engine is absent, dies, hangs, writes something
- * unreadable or two replicates that are the same, and when it cannot express the scene; what the
+ * unreadable or replicates that are not independent, and when it cannot express the scene; what the
  * engine left is then kept, and the line names the directory. */
 bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
                       const struct reference_options *opt, struct moments *out, json_t **manifest,
