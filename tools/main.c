@@ -15,7 +15,8 @@ static const struct {
     {"validate", verb_validate, "render the suite and judge it against its references"},
     {"compare", verb_compare, "judge two moments images"},
     {"report", verb_report, "make the HTML page of a results.json"},
-    {"reference", verb_reference, "render references with Cycles and POV-Ray into golden/"},
+    {"golden", verb_golden, "render, inspect and approve the stored references"},
+    {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
     {"export", verb_export, "write a scene for Cycles or POV-Ray"},
 };
