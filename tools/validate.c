@@ -1,5 +1,6 @@
 #include "validate.h"
 
+#include "../reference/import_check.h"
 #include "../reference/process.h"
 #include "../reference/reference.h"
 #include "../reference/truth.h"
@@ -274,6 +275,24 @@ static bool check_selection(const struct validation *v, struct err *e)
     return true;
 }
 
+/* The loader is not believed either: what Blender's importer makes of the chosen scenes. */
+static bool check_loader(const struct validation *v, json_t *root, struct err *e)
+{
+    const struct import_options opt = {.work_dir = v->opt->out_dir,
+                                       .share_dir = v->opt->share_dir,
+                                       .timeout_s = v->opt->timeout_s};
+    const struct suite_scene **scene = malloc((size_t)v->suite.num_scenes * sizeof *scene);
+    int num = 0;
+    json_t *reports;
+    for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
+        if (is_selected(v->opt, v->suite.scene[i].name))
+            scene[num++] = &v->suite.scene[i];
+    bool ok =
+        scene != NULL ? import_check(scene, num, &opt, &reports, e) : err_set(e, "out of memory");
+    free(scene);
+    return ok && (json_object_set_new(root, "loader", reports) == 0 || err_set(e, "out of memory"));
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -300,6 +319,10 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
     if (opt->live)
         json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
+    if (opt->live && !check_loader(&v, root, e)) {
+        ok = false;
+        goto done;
+    }
     for (int i = 0; i < v.suite.num_scenes; i++)
         if (is_selected(opt, v.suite.scene[i].name))
             validate_scene(&v, &v.suite.scene[i]);

@@ -1,0 +1,13 @@
+/* What import_check() found, for people and for exit codes. */
+#ifndef ASSAY_IMPORT_LINES_H
+#define ASSAY_IMPORT_LINES_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+/* One line per scene, then the sum. */
+void import_print(FILE *f, const json_t *reports);
+/* 0: all agree; else 3 if any could not be judged, else 1. */
+int import_exit_code(const json_t *reports);
+
+#endif
