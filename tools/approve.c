@@ -67,6 +67,17 @@ static bool store(const struct approve_options *opt, const struct suite_scene *s
     return ok;
 }
 
+/* Bit for bit, whatever else the two files hold. */
+static bool same_moments(const struct moments *a, const struct moments *b)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    return a->width == b->width && a->height == b->height && strcmp(a->unit, b->unit) == 0 &&
+           a->spp == b->spp && memcmp(a->n, b->n, pixels * sizeof *a->n) == 0 &&
+           memcmp(a->mean, b->mean, 3 * pixels * sizeof *a->mean) == 0 &&
+           memcmp(a->m2, b->m2, 3 * pixels * sizeof *a->m2) == 0 &&
+           memcmp(a->m3, b->m3, 3 * pixels * sizeof *a->m3) == 0;
+}
+
 static enum approval stored_or_not(bool ok, FILE *out)
 {
     if (ok)
@@ -82,8 +93,8 @@ static enum approval approve_identical(const struct approve_options *opt,
                                        FILE *out, struct err *e)
 {
     fprintf(out, "  IDENTICAL: the same bits\n");
-    if (stored->state == GOLDEN_CURRENT && json_equal(json_object_get(stored->manifest, "key"),
-                                                      json_object_get(candidate->manifest, "key")))
+    if (stored->state == GOLDEN_CURRENT &&
+        strcmp(text_of(stored->manifest, "key"), text_of(candidate->manifest, "key")) == 0)
         return APPROVE_UNCHANGED;
     return stored_or_not(store(opt, scene, ref, candidate, stored, "IDENTICAL", json_object(), e),
                          out);
@@ -195,8 +206,7 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
         print_provenance(out, "candidate", candidate.manifest);
         if (stored.state == GOLDEN_MISSING)
             done = approve_new(opt, scene, ref, &candidate, out, e);
-        else if (json_equal(json_object_get(stored.manifest, "exr_sha256"),
-                            json_object_get(candidate.manifest, "exr_sha256")))
+        else if (same_moments(&stored.m, &candidate.m))
             done = approve_identical(opt, scene, ref, &candidate, &stored, out, e);
         else if (stored.m.width != candidate.m.width || stored.m.height != candidate.m.height)
             done = approve_incomparable(opt, scene, ref, &candidate, &stored, out, e);
