@@ -50,6 +50,10 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%)
 	tests/run.sh $(BUILD)
 
+# Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
+mutants: all $(BUILD)/libassay.a
+	tests/mutants.sh $(BUILD) $(ONLY)
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
@@ -61,6 +65,12 @@ golden: all $(BUILD)/deps-live
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
+
+# For tests/mutants.sh.
+print-compile:
+	@echo $(CC) $(filter-out -g,$(cflags))
+print-libs:
+	@echo $(LIBS)
 
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
@@ -83,6 +93,7 @@ help:
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
@@ -187,7 +198,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

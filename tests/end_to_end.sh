@@ -51,6 +51,7 @@ expect "negative samples" 3 "not a whole number" "$san_pathtracer" -s -1 -f "$tm
 expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $scene $scene
 expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
 expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
+expect "roulette" 3 "neither on, off, nor" "$san_pathtracer" --roulette 1.5 -f "$tmp/x.exr" $scene
 expect "unknown Fresnel" 3 "fresnel" "$san_pathtracer" --fresnel guess -f "$tmp/x.exr" $scene
 expect "environment map that is not there" 3 "nosky.exr: cannot read" \
     "$san_pathtracer" $small -e nosky.exr -f "$tmp/x.exr" $scene

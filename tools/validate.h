@@ -21,6 +21,10 @@ struct validate_options {
     int threads;
     double timeout_s; /* of one program */
     bool quiet;
+    /* Cheapest scenes first, and stop after the scene that holds the first claim that came out
+     * DIFFERENT against expectation: to find out fast that a renderer is wrong. alpha is still
+     * divided by all claims. */
+    bool until_different;
 };
 
 /* Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr,

@@ -1,14 +1,10 @@
 /* assay import-check: our loader against Blender's. */
-#include "../reference/import_check.h"
 #include "../reference/json_file.h"
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "import_lines.h"
 #include "results.h"
 #include "verbs.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 enum { MAX_SCENES = 64 };
 enum option { OPT_ONLY, OPT_SUITE, OPT_SHARE, OPT_WORK, OPT_JSON, OPT_TIMEOUT, OPT_HELP };
@@ -61,25 +57,6 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
     return ok;
 }
 
-/* The chosen scenes, by name and all of them if none was named; the caller frees. */
-static const struct suite_scene **choose(const struct settings *s, const struct suite *suite,
-                                         int *num, struct err *e)
-{
-    *num = s->num_only > 0 ? s->num_only : suite->num_scenes;
-    const struct suite_scene **scene = malloc((size_t)*num * sizeof *scene);
-    if (scene == NULL)
-        err_set(e, "out of memory");
-    for (int i = 0; scene != NULL && i < *num; i++) {
-        scene[i] = s->num_only > 0 ? suite_find(suite, s->only[i]) : &suite->scene[i];
-        if (scene[i] == NULL) {
-            err_set(e, "no scene '%s' in %s", s->only[i], s->suite);
-            free(scene);
-            return NULL;
-        }
-    }
-    return scene;
-}
-
 int verb_import_check(int argc, char **argv, struct err *e)
 {
     struct settings s = {
@@ -92,10 +69,9 @@ int verb_import_check(int argc, char **argv, struct err *e)
         return 0;
     if (!make_dirs(s.opt.work_dir, e) || !suite_load(s.suite, &suite, e))
         return EXIT_NOT_JUDGED;
-    int num, code = EXIT_NOT_JUDGED;
+    int code = EXIT_NOT_JUDGED;
     json_t *reports;
-    const struct suite_scene **scene = choose(&s, &suite, &num, e);
-    if (scene != NULL && import_check(scene, num, &s.opt, &reports, e)) {
+    if (import_check_suite(&suite, s.only, s.num_only, &s.opt, &reports, e)) {
         import_print(stdout, reports);
         if (s.json == NULL || json_write(s.json, reports, e))
             code = import_exit_code(reports);
@@ -103,7 +79,6 @@ int verb_import_check(int argc, char **argv, struct err *e)
             err_set(e, "Blender's importer: a scene could not be judged, see above");
         json_decref(reports);
     }
-    free(scene);
     suite_free(&suite);
     return code;
 }

@@ -24,6 +24,7 @@ enum option {
     OPT_REFERENCE_SEED,
     OPT_THREADS,
     OPT_TIMEOUT,
+    OPT_UNTIL_DIFFERENT,
     OPT_QUIET,
     OPT_HELP
 };
@@ -43,6 +44,9 @@ static const struct cli_option options[] = {
     [OPT_REFERENCE_SEED] = {0, "reference-seed", 1, "N", "with --live (a fresh one)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
+    [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
+                             "cheapest scenes first; stop at the first that differs where it\n"
+                             "should not"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -110,6 +114,7 @@ static bool parse(int argc, char **argv, struct validate_options *o, bool *done,
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
+        case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
