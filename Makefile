@@ -58,7 +58,10 @@ bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
-	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
+	  $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden approve --new --golden golden --from $(BUILD)/golden-candidate \
+	  $(or $(ONLY),--all)
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
@@ -76,7 +79,7 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -m 644 reference/cycles.py $(DESTDIR)$(PREFIX)/share/assay
+	install -m 644 reference/cycles.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
 	cp -R reference/scenes golden $(DESTDIR)$(PREFIX)/share/assay
 
 format:
@@ -92,7 +95,8 @@ help:
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
-	@echo 'make golden     render the stored references again (ONLY=SCENE: of one scene)'
+	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
+	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'

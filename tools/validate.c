@@ -6,6 +6,7 @@
 #include "../renderer/fs.h"
 #include "../renderer/progress.h"
 #include "claim.h"
+#include "import_lines.h"
 #include "results.h"
 
 #include <stdio.h>
@@ -334,6 +335,16 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
     if (opt->live)
         json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
+    if (opt->live) {
+        /* The loader is not believed either. */
+        const struct import_options io = {
+            .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};
+        json_t *loader;
+        ok = import_check_suite(&v.suite, opt->only, opt->num_only, &io, &loader, e);
+        if (!ok)
+            goto done;
+        json_object_set_new(root, "loader", loader);
+    }
     for (int i = 0; i < v.suite.num_scenes; i++)
         if (is_selected(opt, v.order[i]->name)) {
             validate_scene(&v, v.order[i]);

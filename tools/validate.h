@@ -28,7 +28,8 @@ struct validate_options {
 };
 
 /* Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr,
- * z_<engine>.exr and rel_<engine>.exr. A claim that cannot be judged is in the results with its error;
+ * z_<engine>.exr and rel_<engine>.exr. With `live`, "loader" in the results is what import_check() says of
+ * the same scenes. A claim that cannot be judged is in the results with its error;
  * false only if nothing could be judged at all (no suite, no output directory). */
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e) __attribute__((warn_unused_result));

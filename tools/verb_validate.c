@@ -1,6 +1,7 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "places.h"
+#include "import_lines.h"
 #include "report.h"
 #include "results.h"
 #include "validate.h"
@@ -116,6 +117,11 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
         return false;
     fputs(table, stdout);
     free(table);
+    const json_t *loader = json_object_get(results, "loader");
+    if (loader != NULL) {
+        puts("");
+        import_print(stdout, loader);
+    }
     printf("\n%s\n", html);
     return true;
 }
@@ -135,6 +141,17 @@ static void tell_not_judged(const json_t *results, struct err *e)
     err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
             json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
             member_text(first, "b"), member_text(first, "error"));
+}
+
+/* Not judged counts most, then a difference, then an inconclusive claim. */
+static int with_loader(int code, const json_t *results, struct err *e)
+{
+    int loader = import_exit_code(json_object_get(results, "loader"));
+    if (loader == EXIT_NOT_JUDGED && code != EXIT_NOT_JUDGED)
+        err_set(e, "Blender's importer: a scene could not be judged, see above");
+    return loader == EXIT_NOT_JUDGED || (loader == EXIT_DIFFERENT && code != EXIT_NOT_JUDGED)
+               ? loader
+               : code;
 }
 
 int verb_validate(int argc, char **argv, struct err *e)
@@ -162,7 +179,7 @@ int verb_validate(int argc, char **argv, struct err *e)
     }
     int code = EXIT_NOT_JUDGED;
     if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
-        code = results_exit_code(results);
+        code = with_loader(results_exit_code(results), results, e);
     if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
         tell_not_judged(results, e);
     json_decref(results);
