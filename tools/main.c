@@ -17,7 +17,7 @@ static const struct {
     {"report", verb_report, "make the HTML page of a results.json"},
     {"reference", verb_reference, "render references with Cycles and POV-Ray into golden/"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
-    {"export", verb_export, "write a scene for Cycles or POV-Ray"},
+    {"export", verb_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
 };
 
 static void print_help(void)
