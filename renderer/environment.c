@@ -302,6 +302,13 @@ bool environment_is_hidden(const struct environment *env)
     return env->kind == ENVIRONMENT_UPPER_HALF;
 }
 
+bool environment_size(const struct environment *env, int *width, int *height)
+{
+    *width = (int)env->width;
+    *height = (int)env->height;
+    return env->kind == ENVIRONMENT_IMAGE;
+}
+
 double environment_total(const struct environment *env)
 {
     return env->total;

@@ -52,6 +52,8 @@ float environment_pdf_w(const struct environment *env, vec3 w);
 
 /* Lights rough surfaces only: neither the camera nor a mirror sees it. */
 bool environment_is_hidden(const struct environment *env);
+/* Texels of an image; false of the others, which have none. */
+bool environment_size(const struct environment *env, int *width, int *height);
 /* Luminance summed over directions, W m^-2: of an image, as the mean over each cell's corners. */
 double environment_total(const struct environment *env);
 
