@@ -140,6 +140,15 @@ class Number(Expression):
     def exp(self):
         return self.nodes.math("EXPONENT", self)
 
+    def log(self):
+        return self.nodes.math("LOGARITHM", self, math.e)
+
+    def cos(self):
+        return self.nodes.math("COSINE", self)
+
+    def sin(self):
+        return self.nodes.math("SINE", self)
+
     def max(self, other):
         return self.nodes.math("MAXIMUM", self, other)
 

@@ -106,33 +106,49 @@ def smith_lambda(m, c):
     return 0.5 * (-1.0 * a * a).exp() * (1.0 / (math.sqrt(math.pi) * a) - p)
 
 
+def visible_ggx(alpha, c, u, v):
+    """A normal seen from the direction of cosine c in the x-z plane, and the factor of a mirror along
+    it but for F G2: 1 / G1 [Heitz18]."""
+    x, z = alpha * (1.0 - c * c).max(0.0).sqrt(), c
+    length = (x * x + z * z).sqrt()
+    x, z = x / length, z / length
+    r, phi = u.sqrt(), 2 * math.pi * v
+    across, along = r * phi.cos(), r * phi.sin()
+    half = 0.5 + 0.5 * z
+    along = (1.0 - half) * (1.0 - across * across).max(0.0).sqrt() + half * along
+    up = (1.0 - across * across - along * along).max(0.0).sqrt()
+    return alpha * (x * up - z * along), alpha * across, (z * up + x * along).max(1e-7)
+
+
+def any_beckmann(alpha, u, v):
+    """A normal with density D(m) cos(m)."""
+    tan = (-alpha ** 2 * (1.0 - u.min(ALMOST_1)).log()).max(0.0).sqrt()
+    phi = 2 * math.pi * v
+    return tan * phi.cos(), tan * phi.sin(), 1.0
+
+
 def facets(nodes, m):
-    """A mirror along one normal m of the distribution, with density D(m) cos(m), other at every
-    place; its factor F G2 (wo.m) / (cos(wo) cos(m)) makes the mean over them the microfacet BRDF.
-    The random numbers are a hash of the place: no two samples meet the same place."""
+    """A mirror along one normal of the distribution, another at every place, with the factor that makes
+    the mean over the normals the microfacet BRDF: F G2 / G1 for visible ones, F G2 (wo.m) / (cos(wo)
+    cos(m)) for ones of density D(m) cos(m). The random numbers are a hash of the place: no two
+    samples meet the same place."""
     wo, ns, ng = frame(nodes)
     noise = nodes.node("TexWhiteNoise", nodes.geometry("Position"), noise_dimensions="3D")
     u, v, _ = Vector(nodes, noise.outputs["Color"]).parts()
-    rest = 1.0 - u.min(ALMOST_1)
-    alpha2 = m["alpha"] ** 2
+    cos_o = wo.dot(ns)
     if m["distribution"] == "ggx":
-        tan2 = alpha2 * (1.0 - rest) / rest
+        x, y, z = visible_ggx(m["alpha"], cos_o, u, v)
     else:
-        tan2 = -alpha2 * nodes.math("LOGARITHM", rest, math.e)
-    tan = tan2.max(0.0).sqrt()
-    cos_m = 1.0 / (1.0 + tan2).sqrt()
-    x, y, _ = ns.parts()
-    steep = x * x > 0.5
-    s = ns.cross(nodes.combine(1.0 - steep, steep, 0.0)).normalize()
-    t = ns.cross(s)
-    phi = 2 * math.pi * v
-    normal = (ns + s * (tan * nodes.math("COSINE", phi)) + t * (tan * nodes.math("SINE", phi))) * cos_m
+        x, y, z = any_beckmann(m["alpha"], u, v)
+    t = ns.cross(wo).normalize()
+    normal = (t.cross(ns) * x + t * y + ns * z).normalize()
     om = wo.dot(normal)
     wi = normal * (2.0 * om) - wo
-    cos_o, cos_i = wo.dot(ns), wi.dot(ns)
+    cos_i = wi.dot(ns)
     lo, li = smith_lambda(m, cos_o), smith_lambda(m, cos_i)
-    shadow = (1.0 + lo) * (1.0 + li) if m["separable"] else 1.0 + lo + li
-    factor = om / (shadow * cos_o * cos_m) * (om > 0.0) * (cos_i > 0.0) * (wi.dot(ng) > 0.0)
+    factor = (om > 0.0) * (cos_i > 0.0) * (wi.dot(ng) > 0.0)
+    factor = factor / ((1.0 + lo) * (1.0 + li) if m["separable"] else 1.0 + lo + li)
+    factor = factor * (1.0 + lo if m["distribution"] == "ggx" else om / (cos_o * normal.dot(ns)))
     if m["eta"] is None:
         color = tinted(nodes, m["reflectance"], factor)
     else:

@@ -124,16 +124,21 @@ double *probe_expect(const struct probe *f, double tan_h, int sub, probe_radianc
     return truth;
 }
 
-void probe_render(struct probe *f, struct moments *m)
+void probe_run(struct probe *f, int spp, struct moments *m)
 {
     struct err e;
     json_t *manifest = json_object();
     f->ref.replicates = 8;
-    f->ref.spp = 64;
-    probe_finish(f);
+    f->ref.spp = spp;
     bool ok = cycles_render(&f->job, m, manifest, &e);
     json_decref(manifest);
     probe_ok(ok, &e);
+}
+
+void probe_render(struct probe *f, struct moments *m)
+{
+    probe_finish(f);
+    probe_run(f, 64, m);
 }
 
 static void report(const struct moments *m, const double *truth)

@@ -40,7 +40,9 @@ typedef void probe_radiance(const double d[3], double out[3], const void *data);
 double *probe_expect(const struct probe *f, double tan_h, int sub, probe_radiance *radiance,
                      const void *data);
 
-/* 8 replicates of 64 samples per pixel. */
+/* 8 replicates of spp samples per pixel. */
+void probe_run(struct probe *f, int spp, struct moments *m);
+/* probe_finish() and 8 replicates of 64 samples per pixel. */
 void probe_render(struct probe *f, struct moments *m);
 
 /* H0: each quadrant's mean radiance is the closed form's, up to a relative error of `allowed` that a
