@@ -80,7 +80,7 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -m 644 reference/cycles.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
+	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
 	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
 
 format:

@@ -276,13 +276,13 @@ static bool put_sky_picture(struct writer *w, int width, int height, struct err 
 
 static bool put_sky(struct writer *w, struct err *e)
 {
-    int width, height;
+    struct environment_parts sky = environment_parts(w->s->environment);
     if (environment_is_hidden(w->s->environment))
         return err_set(e, "Mitsuba has no ambient light that only rough surfaces receive");
-    if (environment_size(w->s->environment, &width, &height))
-        return put_sky_picture(w, width, height, e);
+    if (sky.kind == ENVIRONMENT_IMAGE)
+        return put_sky_picture(w, (int)sky.width, (int)sky.height, e);
     mitsuba_begin(w->xml, "emitter", "constant", NULL, NULL);
-    mitsuba_rgb(w->xml, "radiance", environment_radiance(w->s->environment, v3(0, 1, 0)));
+    mitsuba_rgb(w->xml, "radiance", sky.radiance);
     mitsuba_end(w->xml);
     return true;
 }

@@ -169,13 +169,13 @@ static void put_object(const struct writer *w, const struct object *o)
 
 static bool put_sky(const struct writer *w, struct err *e)
 {
-    int width, height;
+    struct environment_parts sky = environment_parts(w->s->environment);
     if (environment_is_hidden(w->s->environment))
         return err_set(e, "pbrt has no ambient light that only rough surfaces receive");
-    if (environment_size(w->s->environment, &width, &height))
+    if (sky.kind == ENVIRONMENT_IMAGE)
         return err_set(e, "pbrt has no environment picture in latitude and longitude");
     fputs("LightSource \"infinite\"", w->f);
-    put_rgb(w, "L", environment_radiance(w->s->environment, v3(0, 1, 0)));
+    put_rgb(w, "L", sky.radiance);
     fputc('\n', w->f);
     return true;
 }

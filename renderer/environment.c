@@ -9,8 +9,6 @@
 
 static const double PI = 3.14159265358979323846;
 
-enum environment_kind { ENVIRONMENT_CONSTANT, ENVIRONMENT_UPPER_HALF, ENVIRONMENT_IMAGE };
-
 struct environment {
     enum environment_kind kind;
     rgb radiance; /* not image */
@@ -302,11 +300,13 @@ bool environment_is_hidden(const struct environment *env)
     return env->kind == ENVIRONMENT_UPPER_HALF;
 }
 
-bool environment_size(const struct environment *env, int *width, int *height)
+struct environment_parts environment_parts(const struct environment *env)
 {
-    *width = (int)env->width;
-    *height = (int)env->height;
-    return env->kind == ENVIRONMENT_IMAGE;
+    return (struct environment_parts){.kind = env->kind,
+                                      .radiance = env->radiance,
+                                      .width = env->width,
+                                      .height = env->height,
+                                      .texel = env->texel};
 }
 
 double environment_total(const struct environment *env)
