@@ -35,7 +35,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_mesh.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c,$(filter-out tests/student_tracer.c,$(wildcard tests/*.c)))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -51,14 +51,27 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
   $(BUILD)/tests/student_tracer
 	tests/run.sh $(BUILD)
 
+# Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
+mutants: all $(BUILD)/libassay.a
+	tests/mutants.sh $(BUILD) $(ONLY)
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
-	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
+	  $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden approve --new --golden golden --from $(BUILD)/golden-candidate \
+	  $(or $(ONLY),--all)
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
+
+# For tests/mutants.sh.
+print-compile:
+	@echo $(CC) $(filter-out -g,$(cflags))
+print-libs:
+	@echo $(LIBS)
 
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
@@ -67,7 +80,7 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -m 644 reference/cycles.py $(DESTDIR)$(PREFIX)/share/assay
+	install -m 644 reference/cycles.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
 	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
 
 format:
@@ -81,8 +94,10 @@ help:
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
-	@echo 'make golden     render the stored references again (ONLY=SCENE: of one scene)'
+	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
+	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'
@@ -148,6 +163,8 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
+$(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
+	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c))
 
@@ -186,7 +203,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -202,6 +202,49 @@ static void equal_replicates_are_refused(void **state)
     assert_fails(f, "Cycles: replicate 2 is the same image as an earlier one");
 }
 
+/* 16 x 16 pixels of noise, uniform in 1 .. 2; a replicate that shares all but `own` of its pixels with the
+ * one before it. */
+static void write_noise(struct fixture *f, int k, size_t own, uint64_t *random, struct image *im)
+{
+    char path[128];
+    struct err e;
+    for (size_t i = 0; i < 3 * own; i++) {
+        *random = *random * 6364136223846793005u + 1442695040888963407u;
+        im->data[i] = 1 + (float)(*random >> 40) * 0x1p-24f;
+    }
+    snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
+    fail_on(image_write_exr(path, im, &e), &e);
+}
+
+/* Different pictures all, but two were made with the same random numbers up to the last row. */
+static void replicates_that_share_their_noise_are_refused(void **state)
+{
+    struct fixture *f = *state;
+    static const char *const names[] = {"R", "G", "B"};
+    struct image im;
+    struct moments m;
+    struct err e;
+    uint64_t random = 1;
+    json_t *manifest = json_object();
+    f->suite.width = f->suite.height = 16;
+    f->ref.replicates = 4;
+    plain_scene(f);
+    stand_in(f, OK);
+    fail_on(image_alloc(&im, 16, 16, 3, names, &e), &e);
+    for (int k = 0; k < 4; k++)
+        write_noise(f, k, 256, &random, &im);
+    fail_on(cycles_render(&f->job, &m, manifest, &e), &e); /* these are independent */
+    const json_t *test = json_object_get(manifest, "independence");
+    assert_true(json_is_true(json_object_get(test, "tested")));
+    assert_true(json_is_true(json_object_get(test, "passed")));
+    moments_free(&m);
+    json_decref(manifest);
+    for (int k = 0; k < 4; k++)
+        write_noise(f, k, k == 3 ? 16 : 256, &random, &im);
+    assert_fails(f, "Cycles: replicates 2 and 3 are not independent");
+    image_free(&im);
+}
+
 static void unusable_images_are_refused(void **state)
 {
     struct fixture *f = *state;
@@ -488,6 +531,7 @@ int main(void)
         WITH_JOB(replicates_are_folded_and_described),
         WITH_JOB(light_without_noise_is_exact),
         WITH_JOB(equal_replicates_are_refused),
+        WITH_JOB(replicates_that_share_their_noise_are_refused),
         WITH_JOB(unusable_images_are_refused),
         WITH_JOB(a_blender_that_fails_is_quoted),
         WITH_JOB(what_is_missing_is_named),

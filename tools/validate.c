@@ -6,6 +6,7 @@
 #include "../renderer/fs.h"
 #include "../renderer/progress.h"
 #include "claim.h"
+#include "import_lines.h"
 #include "results.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ struct side {
 struct validation {
     const struct validate_options *opt;
     struct suite suite;
+    const struct suite_scene **order;         /* in which scenes are judged */
     struct side (*reference)[MAX_REFERENCES]; /* per scene: 9x scenes share those of another */
     json_t *claims;
     bool *engine_can; /* per scene: the further engine can express it */
@@ -352,6 +354,39 @@ static bool ask_engine(struct validation *v, json_t *cannot, struct err *e)
     return true;
 }
 
+static bool differs_unexpectedly(const json_t *claims)
+{
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const json_t *c = json_array_get(claims, i);
+        const char *verdict = member_text(c, "verdict");
+        if (strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
+            strcmp(member_text(c, "expected"), verdict) != 0)
+            return true;
+    }
+    return false;
+}
+
+/* Samples are what a scene of the suite costs, about. */
+static int by_cost(const void *a, const void *b)
+{
+    const struct suite_scene *s = *(const struct suite_scene *const *)a;
+    const struct suite_scene *t = *(const struct suite_scene *const *)b;
+    double x = (double)s->width * s->height * s->spp, y = (double)t->width * t->height * t->spp;
+    return x != y ? (x > y) - (x < y) : strcmp(s->name, t->name);
+}
+
+static bool order_scenes(struct validation *v, struct err *e)
+{
+    v->order = calloc((size_t)v->suite.num_scenes, sizeof(const struct suite_scene *));
+    if (v->order == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < v->suite.num_scenes; i++)
+        v->order[i] = &v->suite.scene[i];
+    if (v->opt->until_different)
+        qsort(v->order, (size_t)v->suite.num_scenes, sizeof(const struct suite_scene *), by_cost);
+    return true;
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -362,7 +397,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         json_decref(cannot);
         return false;
     }
-    bool ok = check_selection(&v, e) && make_dirs(opt->out_dir, e);
+    bool ok = check_selection(&v, e) && order_scenes(&v, e) && make_dirs(opt->out_dir, e);
     if (!ok)
         goto done;
     v.reference = calloc((size_t)v.suite.num_scenes, sizeof *v.reference);
@@ -390,9 +425,22 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
     if (opt->live)
         json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
+    if (opt->live) {
+        /* The loader is not believed either. */
+        const struct import_options io = {
+            .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};
+        json_t *loader;
+        ok = import_check_suite(&v.suite, opt->only, opt->num_only, &io, &loader, e);
+        if (!ok)
+            goto done;
+        json_object_set_new(root, "loader", loader);
+    }
     for (int i = 0; i < v.suite.num_scenes; i++)
-        if (is_selected(opt, v.suite.scene[i].name))
-            validate_scene(&v, &v.suite.scene[i]);
+        if (is_selected(opt, v.order[i]->name)) {
+            validate_scene(&v, v.order[i]);
+            if (opt->until_different && differs_unexpectedly(v.claims))
+                break;
+        }
     json_object_set_new(root, "seconds", json_real(now_seconds() - start));
     *results = root;
     root = NULL;
@@ -404,6 +452,7 @@ done:
             side_free(&v.reference[i][k]);
     free(v.reference);
     free(v.engine_can);
+    free(v.order);
     suite_free(&v.suite);
     return ok;
 }

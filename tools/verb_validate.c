@@ -1,5 +1,7 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
+#include "places.h"
+#include "import_lines.h"
 #include "report.h"
 #include "results.h"
 #include "validate.h"
@@ -26,6 +28,7 @@ enum option {
     OPT_REFERENCE_SEED,
     OPT_THREADS,
     OPT_TIMEOUT,
+    OPT_UNTIL_DIFFERENT,
     OPT_QUIET,
     OPT_HELP
 };
@@ -51,30 +54,12 @@ static const struct cli_option options[] = {
                             "with --live (a fresh one), of --engine otherwise (0)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
+    [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
+                             "cheapest scenes first; stop at the first that differs where it\n"
+                             "should not"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
-
-/* A file beside this program, or below the installation's share directory. */
-static void beside_program(char *path, size_t size, const char *name)
-{
-    char self[3072];
-    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(self, '/');
-    if (slash != NULL)
-        *slash = '\0';
-    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
-}
-
-/* The checkout's directory if we stand in one, else the installed one. */
-static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
-{
-    if (access("reference/scenes", R_OK) == 0)
-        return checkout;
-    beside_program(path, size, installed);
-    return path;
-}
 
 static bool fresh_seed(uint32_t *seed, struct err *e)
 {
@@ -129,6 +114,7 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
+        case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
@@ -173,6 +159,11 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
     fputs(table, stdout);
     free(table);
     print_not_expressible(results);
+    const json_t *loader = json_object_get(results, "loader");
+    if (loader != NULL) {
+        puts("");
+        import_print(stdout, loader);
+    }
     printf("\n%s\n", html);
     return true;
 }
@@ -192,6 +183,17 @@ static void tell_not_judged(const json_t *results, struct err *e)
     err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
             json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
             member_text(first, "b"), member_text(first, "error"));
+}
+
+/* Not judged counts most, then a difference, then an inconclusive claim. */
+static int with_loader(int code, const json_t *results, struct err *e)
+{
+    int loader = import_exit_code(json_object_get(results, "loader"));
+    if (loader == EXIT_NOT_JUDGED && code != EXIT_NOT_JUDGED)
+        err_set(e, "Blender's importer: a scene could not be judged, see above");
+    return loader == EXIT_NOT_JUDGED || (loader == EXIT_DIFFERENT && code != EXIT_NOT_JUDGED)
+               ? loader
+               : code;
 }
 
 int verb_validate(int argc, char **argv, struct err *e)
@@ -225,7 +227,7 @@ int verb_validate(int argc, char **argv, struct err *e)
     }
     int code = EXIT_NOT_JUDGED;
     if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
-        code = results_exit_code(results);
+        code = with_loader(results_exit_code(results), results, e);
     if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
         tell_not_judged(results, e);
     json_decref(results);
