@@ -295,6 +295,28 @@ cp -R reference/scenes "$tmp/scenes"
 echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
 expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace --suite "$tmp/scenes"
 
+# golden: what may be stored. The stored goldens stand in for candidates.
+golden="$san_assay golden"
+expect "golden status" 0 "current  41_cornell/cycles" $golden status
+expect "golden status of damaged goldens" 3 "damaged  11_furnace/cycles" \
+    $golden status --golden "$tmp/golden"
+expect "golden status of another scene" 3 "stale    11_furnace/cycles" \
+    $golden status --suite "$tmp/scenes"
+expect "golden approve needs names" 3 "takes --all or names" $golden approve --from golden
+expect "golden approve: nothing is stored" 3 "approve it with --new" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace
+expect "golden approve --new" 0 "2 approved" \
+    $golden approve --from golden --golden "$tmp/store" --new 11_furnace
+expect "golden approve: the same again" 0 "1 unchanged" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: no candidate" 3 "no candidate in" \
+    $golden approve --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: not in the suite" 3 "no such reference" \
+    $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
+cp -R golden/41_cornell "$tmp/store/98_deleted"
+expect "golden status: an orphan" 3 "orphan   .*98_deleted/cycles" $golden status --golden "$tmp/store"
+expect "golden: unknown" 3 "none of render" $golden forget
+
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"

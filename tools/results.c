@@ -270,7 +270,8 @@ int results_exit_code(const json_t *results)
         for (size_t k = 0; k < json_array_size(engines); k++)
             count[convergence_outcome(json_array_get(engines, k))]++;
     }
-    if (json_array_size(claims) + json_array_size(convergence) == 0 || count[OUTCOME_NOT_JUDGED] > 0)
+    if (json_array_size(claims) + json_array_size(convergence) == 0 ||
+        count[OUTCOME_NOT_JUDGED] > 0)
         return EXIT_NOT_JUDGED;
     if (count[OUTCOME_OPPOSITE] > 0)
         return EXIT_DIFFERENT;

@@ -6,6 +6,7 @@
  *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
  *     "seconds": 98.1,
  *     "convergence": [ ... ],             convergence.h; absent where `assay converge` has not run
+ *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
  *         "scene": "41_cornell", "title": "...", "detects": "...", "blind_to": "...",
  *         "quantity": "mean", "a": "pathtracer", "b": "cycles", "class": "exact",

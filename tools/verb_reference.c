@@ -8,10 +8,14 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { MAX_SCENES = 64 };
+
 enum option {
     OPT_ONLY,
     OPT_ENGINE,
     OPT_OUT,
+    OPT_GOLDEN,
+    OPT_FRESH,
     OPT_SUITE,
     OPT_SHARE,
     OPT_WORK,
@@ -22,9 +26,11 @@ enum option {
 };
 
 static const struct cli_option options[] = {
-    [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene"},
+    [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene; may be given again"},
     [OPT_ENGINE] = {0, "engine", 1, "NAME", "only cycles, or only povray"},
-    [OPT_OUT] = {'o', "out", 1, "DIR", "where the goldens go (golden)"},
+    [OPT_OUT] = {'o', "out", 1, "DIR", "where they go (build/golden-candidate)"},
+    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "leave out what is stored there and up to date"},
+    [OPT_FRESH] = {0, "fresh", 0, "", "render also what is there and up to date"},
     [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
     [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
     [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/work)"},
@@ -35,9 +41,10 @@ static const struct cli_option options[] = {
     {0}};
 
 struct settings {
-    const char *only, *engine, *out, *suite, *work;
+    const char *only[MAX_SCENES], *engine, *out, *golden, *suite, *work;
+    int num_only;
     struct reference_options opt;
-    bool done;
+    bool fresh, done;
 };
 
 static bool parse(int argc, char **argv, struct settings *s, struct err *e)
@@ -53,12 +60,18 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         const char *v = c.value[0];
         int n;
         switch ((enum option)i) {
-        case OPT_ONLY: s->only = v; break;
+        case OPT_ONLY:
+            if (s->num_only == MAX_SCENES)
+                return err_set(e, "--only: at most %d scenes", MAX_SCENES);
+            s->only[s->num_only++] = v;
+            break;
         case OPT_ENGINE:
             ok = cli_choice("--engine", v, engines, &n, e);
             s->engine = v;
             break;
         case OPT_OUT: s->out = v; break;
+        case OPT_GOLDEN: s->golden = v; break;
+        case OPT_FRESH: s->fresh = true; break;
         case OPT_SUITE: s->suite = v; break;
         case OPT_SHARE: s->opt.share_dir = v; break;
         case OPT_WORK: s->work = v; break;
@@ -78,16 +91,38 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
     return ok;
 }
 
+static bool is_up_to_date(const char *dir, const struct suite_scene *scene,
+                          const struct suite_reference *ref, const char *key)
+{
+    struct golden g;
+    golden_inspect(dir, scene, ref, &g);
+    const char *has = json_string_value(json_object_get(g.manifest, "key"));
+    bool same = g.state == GOLDEN_CURRENT && has != NULL && strcmp(has, key) == 0;
+    golden_free(&g);
+    return same;
+}
+
 static bool make_golden(const struct settings *s, const struct suite_scene *scene,
                         const struct suite_reference *ref, struct err *e)
 {
     struct moments m;
     json_t *manifest;
+    char key[65];
     double start = now_seconds();
+    if (!reference_key(scene, ref, &s->opt, key, e))
+        return false;
+    const char *dirs[2] = {s->golden, s->out};
+    for (int i = 0; !s->fresh && i < 2; i++)
+        if (dirs[i] != NULL && is_up_to_date(dirs[i], scene, ref, key)) {
+            printf("%s/%s/%s.exr: up to date\n", dirs[i], scene->name, ref->engine);
+            return true;
+        }
     fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
     if (!reference_render(scene, ref, &s->opt, &m, &manifest, e))
         return false;
-    bool ok = golden_write(s->out, scene->name, ref->engine, &m, manifest, e);
+    bool ok =
+        json_object_set_new(manifest, "key", json_string(key)) == 0 || err_set(e, "out of memory");
+    ok = ok && golden_write(s->out, scene->name, ref->engine, &m, manifest, e);
     if (ok)
         printf("%s/%s/%s.exr: %d x %d pixels, %g x %s, %.0f s\n", s->out, scene->name, ref->engine,
                m.width, m.height, m.n[0], m.unit, now_seconds() - start);
@@ -96,9 +131,19 @@ static bool make_golden(const struct settings *s, const struct suite_scene *scen
     return ok;
 }
 
+static bool is_selected(const struct settings *s, const struct suite_scene *scene)
+{
+    if (strcmp(scene->references_of, scene->name) != 0)
+        return false;
+    for (int i = 0; i < s->num_only; i++)
+        if (strcmp(s->only[i], scene->name) == 0)
+            return true;
+    return s->num_only == 0;
+}
+
 int verb_reference(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.out = "golden",
+    struct settings s = {.out = "build/golden-candidate",
                          .suite = "reference/scenes",
                          .work = "build/work",
                          .opt = {.seed = 1, .timeout_s = 7200, .share_dir = "reference"}};
@@ -115,11 +160,13 @@ int verb_reference(int argc, char **argv, struct err *e)
     if (!make_dirs(s.work, e) || !suite_load(s.suite, &suite, e))
         return EXIT_NOT_JUDGED;
     bool ok = true;
+    for (int i = 0; ok && i < s.num_only; i++)
+        ok = suite_find(&suite, s.only[i]) != NULL ||
+             err_set(e, "no scene '%s' in %s", s.only[i], s.suite);
     int made = 0;
     for (int i = 0; ok && i < suite.num_scenes; i++) {
         const struct suite_scene *scene = &suite.scene[i];
-        if ((s.only != NULL && strcmp(s.only, scene->name) != 0) ||
-            strcmp(scene->references_of, scene->name) != 0)
+        if (!is_selected(&s, scene))
             continue;
         for (int k = 0; ok && k < scene->num_references; k++) {
             const struct suite_reference *ref = &scene->reference[k];
