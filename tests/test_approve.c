@@ -304,8 +304,8 @@ static void render_twice(struct fixture *f, const char *program, struct suite_sc
                                               .timeout_s = 600,
                                               .work_dir = f->dir,
                                               .share_dir = "reference"};
-        struct moments m;
-        json_t *manifest;
+        struct moments m = {0};
+        json_t *manifest = NULL;
         struct err e;
         if (!reference_key(&scene, &ref, &opt, key[i], &e) ||
             !reference_render(&scene, &ref, &opt, &m, &manifest, &e) ||
