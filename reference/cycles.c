@@ -139,6 +139,8 @@ static bool fold(const struct reference_job *job, struct moments *out, json_t *m
         num_first += memcmp(digest[0], digest[k], SHA256_DIGEST_SIZE) == 0;
         num_constant += is_constant(px, pixels);
         moments_add_image(out, px);
+        if (job->opt->on_replicate != NULL)
+            job->opt->on_replicate(job->opt->on_replicate_ctx, k, px);
         replicates_add(&all, px);
         free(px);
     }

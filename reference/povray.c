@@ -303,6 +303,8 @@ static bool fold(const struct crew *w, struct moments *out, json_t *manifest, st
         for (size_t i = 0; i < w->size; i++)
             sum[i] = (float)(fine[i] + (double)sum[i]);
         moments_add_image(&m, sum);
+        if (w->job->opt->on_replicate != NULL)
+            w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, t - POVRAY_WINDOWS, sum);
         replicates_add(&all, sum);
     }
     ok = exact || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray");

@@ -13,6 +13,10 @@ struct reference_options {
     const char
         *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
     const char *share_dir; /* where cycles.py is */
+    /* NULL, or called with each replicate (RGB, 3 floats a pixel) in their order, by the calling
+     * thread; not where the engine's answer is exact. */
+    void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
+    void *on_replicate_ctx;
 };
 
 /* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds

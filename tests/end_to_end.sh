@@ -216,6 +216,41 @@ expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/res
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 
+# Convergence. The controls are our own program with a fault: a slope that is not -1/2, a bias, a seed
+# without effect.
+converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16 --alpha 0.01 --slope-margin 0.25"
+expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
+    $converge --margin 0.2 -o "$tmp/conv" 41_cornell
+expect "converge: results have all rungs" 0 "^3$" grep -c '"spp"' "$tmp/conv/results.json"
+expect "converge: too few samples to tell a bias" 2 "RMS bias.*INCONCLUSIVE" \
+    $converge --margin 0.001 -o "$tmp/conv2" 41_cornell
+expect "converge: against a long run of our own" 0 "pathtracer, 1024 samples" \
+    $converge --margin 0.2 --reference own -o "$tmp/conv3" 41_cornell
+expect "converge: against a closed form" 0 "closed form" \
+    $converge --margin 0.2 -o "$tmp/conv4" 13_square_patch
+faulty() {
+    printf '#!/bin/bash\n%s\n' "$1" >"$tmp/faulty"
+    chmod +x "$tmp/faulty"
+}
+faulty "exec $pathtracer \"\$@\" -s 4"
+expect "converge: samples without effect" 1 "slope of RMSE.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv5" 41_cornell
+faulty "exec $pathtracer \"\$@\" -m 1"
+expect "converge: a bias" 1 "RMS bias.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv6" 41_cornell
+faulty "exec $pathtracer \"\$@\" --seed 7"
+expect "converge: a seed without effect" 3 "the seed has no effect" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv7" 41_cornell
+expect "converge: no scene" 3 "name of a scene" "$san_assay" converge
+expect "converge: unknown scene" 3 "no scene 'x'" "$san_assay" converge -o "$tmp/conv8" x
+expect "converge: two rungs" 3 "three rungs" "$san_assay" converge --ladder 1,4 x
+expect "converge: a ladder that falls" 3 "does not ascend" "$san_assay" converge --ladder 4,1,16 x
+expect "converge: size" 3 "3 times smaller" "$san_assay" converge --shrink 3 -o "$tmp/conv8" 41_cornell
+expect "report of convergence as Markdown" 0 "| slope of RMSE |" \
+    "$san_assay" report --markdown "$tmp/conv/results.json"
+expect "report of claims and convergence" 0 "joined.html" "$san_assay" report \
+    --converge "$tmp/conv/results.json" -o "$tmp/joined.html" "$tmp/cmp/results.json"
+
 # export.
 expect "export to POV-Ray" 0 "c.pov" "$san_assay" export -o "$tmp/c.pov" $scene
 expect "export to Cycles" 0 "c.json" "$san_assay" export -o "$tmp/c.json" $scene

@@ -9,6 +9,7 @@
 #include "import_lines.h"
 #include "results.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,7 +33,8 @@ struct validation {
     const struct suite_scene **order;         /* in which scenes are judged */
     struct side (*reference)[MAX_REFERENCES]; /* per scene: 9x scenes share those of another */
     json_t *claims;
-    double alpha; /* of one claim */
+    bool *engine_can; /* per scene: the further engine can express it */
+    double alpha;     /* of one claim */
     int num_claims, done;
 };
 
@@ -59,12 +61,13 @@ static const struct suite_reference *find_reference(const struct suite_scene *s,
     return NULL;
 }
 
-/* Ours against each reference; and each engine against the closed form, where there is one: the
- * probes that show the engine to be set up right. */
-static int count_claims(const struct suite_scene *s)
+/* Ours against each reference; each engine against the closed form, where there is one: the probes
+ * that show the engine to be set up right; and a further engine against all of these and ours. */
+static int count_claims(const struct validation *v, const struct suite_scene *s)
 {
     bool has_truth = find_reference(s, "truth") != NULL;
-    return s->num_references + (has_truth ? s->num_references - 1 : 0);
+    return s->num_references + (has_truth ? s->num_references - 1 : 0) +
+           (v->engine_can[s - v->suite.scene] ? s->num_references + 1 : 0);
 }
 
 static void data_path(const struct validation *v, char *path, const char *scene, const char *file)
@@ -208,16 +211,23 @@ static void judge(struct validation *v, const struct suite_scene *s, const struc
                   const struct side *b)
 {
     /* Of this scene alone, and yet with the same alpha for each of its claims. */
-    char rerun[512], live[64] = "";
+    char rerun[8192], live[64] = "", engine[4200] = "";
     if (v->opt->live)
         snprintf(live, sizeof live, " --live --reference-seed %u", v->opt->reference_seed);
-    snprintf(rerun, sizeof rerun, "assay validate --only %s --alpha %.6g --seed %llu%s", s->name,
-             v->alpha * count_claims(s), (unsigned long long)v->opt->seed, live);
+    if (v->opt->engine != NULL && !v->opt->live)
+        snprintf(live, sizeof live, " --reference-seed %u", v->opt->reference_seed);
+    if (v->opt->engine != NULL)
+        snprintf(engine, sizeof engine, " --engine %s --engine-spp %d --engine-replicates %d",
+                 v->opt->engine->file, v->opt->engine_spp, v->opt->engine_replicates);
+    snprintf(rerun, sizeof rerun, "assay validate --only %s --alpha %.6g --seed %llu%s%s", s->name,
+             v->alpha * count_claims(v, s), (unsigned long long)v->opt->seed, live, engine);
     struct claim_context c = {.scene = s,
                               .a = a_name,
                               .b = ref->engine,
                               .fidelity = ref->fidelity,
-                              .expected = s->expect,
+                              .expected = strcmp(ref->engine, "pathtracer") == 0
+                                              ? VERDICT_EQUIVALENT /* of the same scene, also 9x */
+                                              : s->expect,
                               .rerun = rerun,
                               .opt = {.alpha = v->alpha,
                                       .margin_global = ref->margin_global,
@@ -249,6 +259,48 @@ static void judge(struct validation *v, const struct suite_scene *s, const struc
     json_array_append_new(v->claims, claim);
 }
 
+static void render_engine(const struct validation *v, const struct suite_scene *s, struct side *out)
+{
+    const struct validate_options *o = v->opt;
+    const struct engine_options eo = {.spp = o->engine_spp,
+                                      .replicates = o->engine_replicates,
+                                      .seed = o->reference_seed,
+                                      .threads = o->threads,
+                                      .timeout_s = o->timeout_s,
+                                      .work_dir = o->out_dir};
+    char path[MAX_PATH], manifest[MAX_PATH], file[64];
+    *out = (struct side){0};
+    snprintf(file, sizeof file, "%s.exr", o->engine->name);
+    data_path(v, path, s->name, file);
+    snprintf(file, sizeof file, "%s.json", o->engine->name);
+    data_path(v, manifest, s->name, file);
+    snprintf(file, sizeof file, "rendering with %s", o->engine->name);
+    say(v, s->name, file);
+    if (!engine_render(o->engine, s, &eo, &out->m, &out->manifest, &out->e))
+        return;
+    out->seconds = json_number_value(json_object_get(out->manifest, "cpu_s"));
+    out->present = make_parent_dirs(path, &out->e) &&
+                   moments_write(path, &out->m, NULL, 0, &out->e) &&
+                   json_write(manifest, out->manifest, &out->e);
+}
+
+/* Against all references, inside their margins, and against ours inside the widest of them. */
+static void judge_engine(struct validation *v, const struct suite_scene *s,
+                         const struct suite_scene *from, const struct side *ours)
+{
+    struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
+    struct side engine;
+    render_engine(v, s, &engine);
+    for (int i = 0; i < s->num_references; i++) {
+        const struct suite_reference *ref = &s->reference[i];
+        judge(v, s, from, v->opt->engine->name, &engine, ref, get_reference(v, from, i));
+        self.margin_global = fmax(self.margin_global, ref->margin_global);
+        self.margin_tile = fmax(self.margin_tile, ref->margin_tile);
+    }
+    judge(v, s, s, v->opt->engine->name, &engine, &self, ours);
+    side_free(&engine);
+}
+
 static void validate_scene(struct validation *v, const struct suite_scene *s)
 {
     const struct suite_scene *from = suite_find(&v->suite, s->references_of);
@@ -265,6 +317,8 @@ static void validate_scene(struct validation *v, const struct suite_scene *s)
     for (int i = 0; truth != NULL && i < s->num_references; i++)
         if (&s->reference[i] != truth)
             judge(v, s, from, s->reference[i].engine, get_reference(v, from, i), truth, truth_side);
+    if (v->engine_can[s - v->suite.scene])
+        judge_engine(v, s, from, &ours);
     side_free(&ours);
 }
 
@@ -309,29 +363,65 @@ static bool order_scenes(struct validation *v, struct err *e)
     return true;
 }
 
+/* Which of the selected scenes the further engine can express; appends the others to `cannot`. */
+static bool ask_engine(struct validation *v, json_t *cannot, struct err *e)
+{
+    const struct validate_options *o = v->opt;
+    int num_can = 0;
+    if (o->engine == NULL)
+        return true;
+    for (int i = 0; i < v->suite.num_scenes; i++) {
+        const struct suite_scene *s = &v->suite.scene[i];
+        if (!is_selected(o, s->name))
+            continue;
+        v->engine_can[i] = engine_expresses(o->engine, s, o->out_dir, e);
+        num_can += v->engine_can[i];
+        if (!v->engine_can[i])
+            json_array_append_new(cannot, json_pack("{ss,ss,ss}", "scene", s->name, "engine",
+                                                    o->engine->name, "reason", e->msg));
+    }
+    if (num_can == 0)
+        return err_prefix(e, "%s can express none of the scenes, of the last because",
+                          o->engine->name);
+    e->msg[0] = '\0';
+    return true;
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
     struct validation v = {.opt = opt};
-    json_t *root = NULL;
+    json_t *root = NULL, *cannot = json_array();
     double start = now_seconds();
-    if (!suite_load(opt->suite_dir, &v.suite, e))
+    if (!suite_load(opt->suite_dir, &v.suite, e)) {
+        json_decref(cannot);
         return false;
+    }
     bool ok = check_selection(&v, e) && order_scenes(&v, e) && make_dirs(opt->out_dir, e);
     if (!ok)
         goto done;
     v.reference = calloc((size_t)v.suite.num_scenes, sizeof *v.reference);
+    v.engine_can = calloc((size_t)v.suite.num_scenes, sizeof *v.engine_can);
+    if (v.reference == NULL || v.engine_can == NULL || cannot == NULL) {
+        ok = err_set(e, "out of memory");
+        goto done;
+    }
+    ok = ask_engine(&v, cannot, e);
+    if (!ok)
+        goto done;
     for (int i = 0; i < v.suite.num_scenes; i++)
         if (is_selected(opt, v.suite.scene[i].name))
-            v.num_claims += count_claims(&v.suite.scene[i]);
+            v.num_claims += count_claims(&v, &v.suite.scene[i]);
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
     v.alpha = opt->alpha / v.num_claims;
     root = results_new(argc, argv, opt->alpha);
-    if (root == NULL || v.reference == NULL) {
+    if (root == NULL) {
         ok = err_set(e, "out of memory");
         goto done;
     }
     v.claims = json_object_get(root, "claims");
+    if (opt->engine != NULL)
+        json_object_set(root, "not_expressible", cannot);
     json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
     if (opt->live)
         json_object_set_new(root, "reference_seed", json_integer(opt->reference_seed));
@@ -356,11 +446,13 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     root = NULL;
 done:
     json_decref(root);
+    json_decref(cannot);
     for (int i = 0; v.reference != NULL && i < v.suite.num_scenes; i++)
         for (int k = 0; k < MAX_REFERENCES; k++)
             side_free(&v.reference[i][k]);
     free(v.reference);
     free(v.order);
+    free(v.engine_can);
     suite_free(&v.suite);
     return ok;
 }
