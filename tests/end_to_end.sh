@@ -381,6 +381,8 @@ expect "golden approve: the same again" 0 "1 unchanged" \
     $golden approve --from golden --golden "$tmp/store" 11_furnace/cycles
 expect "golden approve: no candidate" 3 "no candidate in" \
     $golden approve --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve --all: none needed" 0 "0 approved, 0 unchanged" \
+    $golden approve --all --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
 expect "golden approve: not in the suite" 3 "no such reference" \
     $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
 cp -R golden/41_cornell "$tmp/store/98_deleted"
