@@ -5,6 +5,7 @@
  *     "command": "assay validate ...", "version": "0.1 (commit)", "date": "2026-..Z",
  *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
  *     "seconds": 98.1,
+ *     "consistency": [ ... ],             consistency_run.h; absent where `assay validate` has not run
  *     "convergence": [ ... ],             convergence.h; absent where `assay converge` has not run
  *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
