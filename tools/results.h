@@ -24,6 +24,8 @@
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
  * false, "error": "one line" } ] }
  *
+ * With --engine the root also has "not_expressible": [{"scene":, "engine":, "reason": "one line"}].
+ *
  * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where
  * "verdict" equals "expected". An element of tile_log10_p and tile_t is null where a tile has no
