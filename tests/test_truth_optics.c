@@ -122,14 +122,14 @@ static void render(const char *name, int depth, int size, struct moments *out)
 enum { BOX_DEPTH = 9 };
 static const struct truth_mirror_box box = {
     .x = {-1, 1.5},
-    .y = {-0.75, 1},
+    .y = {-0.75, 0.75},
     .z = {-1.5, 1.5},
     .eye = {0.25, 0.25, 0.5},
     .tan_half = 1,
     .split = {0.5, 0},
     .radiance = {{1, .4, .3}, {.3, .9, .5}, {.4, .5, 1}},
     .reflectance = {
-        {.9, .8, .6}, {.6, .8, .9}, {.8, .9, .7}, {.7, .8, .95}, {.9, .85, .8}, {.8, .7, .9}}};
+        {.9, .8, .6}, {.6, .8, .9}, {.8, .9, .7}, {.7, .8, .95}, {.3, .35, .4}, {.4, .35, .3}}};
 
 /* A ray that goes from wall to wall. */
 static void march(const struct truth_mirror_box *b, int depth, double sx, double sy,
@@ -401,7 +401,8 @@ static const struct truth_glass_sphere ball = {
     .centre = {.3, -.2, -1},
     .radius = 1.2,
     .room = {{-2, 2.5}, {-1.8, 2.2}, {-7, 4.5}},
-    .walls = {{1, .7, .6}, {.6, 1, .7}, {.7, .7, .5}, {.9, 1, 1}, {.6, .7, 1}, {1, .85, .6}},
+    .walls =
+        {{1, .75, .65}, {.65, 1, .75}, {.75, .75, .65}, {.9, 1, 1}, {.65, .75, 1}, {1, .85, .65}},
     .depth = 3};
 static const double ball_eye[3] = {0, 0, 3};
 
