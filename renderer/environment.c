@@ -3,6 +3,7 @@
 #include "discrete.h"
 #include "warp.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -300,6 +301,19 @@ float environment_pdf_w(const struct environment *env, vec3 w)
 bool environment_is_hidden(const struct environment *env)
 {
     return env->kind == ENVIRONMENT_UPPER_HALF;
+}
+
+bool environment_size(const struct environment *env, uint32_t *width, uint32_t *height)
+{
+    *width = env->width;
+    *height = env->height;
+    return env->kind == ENVIRONMENT_IMAGE;
+}
+
+rgb environment_texel(const struct environment *env, uint32_t column, uint32_t row)
+{
+    assert(env->kind == ENVIRONMENT_IMAGE && column < env->width && row < env->height);
+    return env->texel[(size_t)row * env->width + column];
 }
 
 double environment_total(const struct environment *env)

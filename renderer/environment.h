@@ -52,6 +52,10 @@ float environment_pdf_w(const struct environment *env, vec3 w);
 
 /* Lights rough surfaces only: neither the camera nor a mirror sees it. */
 bool environment_is_hidden(const struct environment *env);
+/* Its image's size; false, and 0 x 0, if it is not an image. */
+bool environment_size(const struct environment *env, uint32_t *width, uint32_t *height);
+/* Texel of an image; row 0 is the top one. */
+rgb environment_texel(const struct environment *env, uint32_t column, uint32_t row);
 /* Luminance summed over directions, W m^-2: of an image, as the mean over each cell's corners. */
 double environment_total(const struct environment *env);
 
