@@ -177,6 +177,7 @@ static void put_sky_row(const struct povray_writer *w, const struct environment 
         fputs(c % 4 == 3 ? "\n      " : " ", w->f);
         put_entry(w, (c + 0.5) / width, environment_texel(env, c, row));
     }
+    fputc(' ', w->f);
     put_entry(w, 1, seam);
     fputs(" }", w->f);
 }
