@@ -149,6 +149,10 @@ static void put_sphere(const struct povray_writer *w, const struct sphere *b, do
     fputs("sphere { ", w->f);
     povray_put(w, povray_at(b->centre));
     fprintf(w->f, ", %.9g\n", b->radius + b->normal_out * offset);
+    /* A ray that begins inside a body makes POV-Ray take the inner reflections of glass in there for
+     * zero; `inverse` has the eye outside. */
+    if (length(sub(w->eye, b->centre)) < b->radius)
+        fputs("  inverse\n", w->f);
 }
 
 /* What becomes one POV-Ray object: the triangles of an object or one of its spheres. */
@@ -248,24 +252,25 @@ static void put_object(const struct povray_writer *w, const struct object *o)
 
 static void put_header(const struct povray_writer *w, const struct camera *c)
 {
+    bool deep = w->radiosity || w->v->indirect_levels;
     fprintf(w->f,
             "// Render linear: povray +Iscene.pov +Oscene.exr +FE +W%d +H%d -A -D -P +WT1 "
             "File_Gamma=1.0\n"
             "// Numbers are radiance times S, right-handed, Y up.\n"
             "#version 3.7;\n#declare S = %.17g;\n"
-            "global_settings { assumed_gamma 1.0 max_trace_level %d adc_bailout 1e-9",
-            c->width, c->height, w->v->scale,
-            w->radiosity || w->v->indirect_levels ? w->pass->levels_indirect : w->pass->levels);
+            "global_settings { assumed_gamma 1.0 max_trace_level %d adc_bailout %g",
+            c->width, c->height, w->v->scale, deep ? w->pass->levels_indirect : w->pass->levels,
+            deep ? w->pass->bailout_indirect : 1e-9);
     if (w->radiosity)
         fprintf(w->f,
                 "\n  // a path tracer: no sample is kept, one of the five rays is followed\n"
                 "  radiosity { pretrace_start 1 pretrace_end 1 count 5,100003 recursion_limit %d\n"
                 "    nearest_count 1 error_bound 1e-3 low_error_factor 1 gray_threshold 0 "
                 "brightness 1\n"
-                "    adc_bailout 1e-9 always_sample on normal off media off\n"
+                "    adc_bailout %g always_sample on normal off media off\n"
                 "    maximum_reuse 1e30 minimum_reuse 0 }\n}\n#default { radiosity { importance "
                 "0.01 } }\n",
-                w->pass->recursion);
+                w->pass->recursion, w->pass->bailout_indirect);
     else
         fputs(" }\n", w->f);
     if (w->roulette > 0)
@@ -309,6 +314,7 @@ bool export_povray(const struct scene *s, const struct camera *c, int depth,
                               .v = v,
                               .plan = &plan,
                               .pass = pass,
+                              .eye = c->eye,
                               .radiosity = v->indirect && pass->recursion > 0,
                               .hide_reflections = povray_hides_total_reflection(s),
                               .roulette = pass->recursion > 0 && !plan.constant ? v->roulette : 0};

@@ -175,6 +175,7 @@ static void put_sky_row(const struct povray_writer *w, const rgb *texel, uint32_
         fputs(c % 4 == 3 ? "\n      " : " ", w->f);
         put_entry(w, (c + 0.5) / width, texel[c]);
     }
+    fputc(' ', w->f);
     put_entry(w, 1, seam);
     fputs(" }", w->f);
 }

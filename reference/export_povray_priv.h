@@ -14,6 +14,7 @@ struct povray_writer {
     bool radiosity;
     bool hide_reflections; /* total reflection has to find nothing */
     double roulette;
+    vec3 eye;
 };
 
 struct povray_point {

@@ -227,6 +227,8 @@ static bool plan_lights(const struct scene *s, struct povray_plan *p, struct cen
 static void set_levels(struct povray_pass *pass, bool specular, int surfaces)
 {
     pass->levels = specular ? surfaces : MAX_LEVELS;
+    pass->bailout_indirect =
+        specular && pass->recursion > 0 ? fmin(1e-4, 0.2 * exp2(-pass->recursion)) : 1e-9;
     pass->levels_indirect =
         specular && pass->recursion > 0 ? surfaces + surfaces / 2 : pass->levels;
 }

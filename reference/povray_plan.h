@@ -20,6 +20,11 @@ struct povray_pass {
     /* max_trace_level, the number of surfaces along mirrors and glass. Exactly right without
      * radiosity; with it, what leaves no path of allowed length out. */
     int levels, levels_indirect;
+    /* adc_bailout with radiosity. POV-Ray halves a ray's weight with each diffuse surface, however
+     * much it reflects; mirrors and glass multiply it by their share. Glass splits rays, so in
+     * radiosity shares that do not matter have to end: those below 1e-4, and a fifth of the weight of
+     * the last diffuse surface. */
+    double bailout_indirect;
 };
 
 struct povray_plan {

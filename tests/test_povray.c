@@ -1,13 +1,11 @@
 /* The POV-Ray driver: the pictures of a replicate, an engine that fails (a shell script that is
  * called povray), and POV-Ray itself against closed forms and against our own renderer. */
 #include "build_scene.h"
+#include "povray_fixture.h"
 
-#include "../reference/job.h"
 #include "../reference/povray_picture.h"
-#include "../reference/process.h"
 #include "../reference/truth.h"
 #include "../renderer/fs.h"
-#include "../renderer/render.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
@@ -129,68 +127,6 @@ static void test_rotations_are_uniform(void **state)
     for (int i = 0; i < n; i++)
         sum += pow(cos(2 * M_PI * (i + .5) / n), 2);
     assert_true(fabs((sum - n / 3.0) / sqrt(n * 4 / 45.0)) > 4.89);
-}
-
-/* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
-enum { THREADS = 8 };
-
-/* What povray_render() is given, in a directory that goes with it. */
-struct fixture {
-    char dir[64];
-    struct scene s;
-    struct camera c;
-    struct suite_scene suite;
-    struct suite_reference ref;
-    struct reference_options opt;
-    struct reference_job job;
-};
-
-static void fixture_init(struct fixture *f, struct scene s, int size, int depth)
-{
-    struct err e;
-    *f = (struct fixture){.dir = "/tmp/test_povray.XXXXXX",
-                          .s = s,
-                          .suite = {.width = size, .height = size, .depth = depth},
-                          .ref = {.replicates = 2, .subgrid = 1},
-                          .opt = {.seed = 1, .threads = THREADS, .timeout_s = 60}};
-    assert_non_null(mkdtemp(f->dir));
-    if (!scene_finish(&f->s, "test", &e) || !camera_init(&f->c, &f->s, size, size, &e))
-        fail_msg("%s", e.msg);
-    f->job = (struct reference_job){.suite = &f->suite,
-                                    .ref = &f->ref,
-                                    .opt = &f->opt,
-                                    .scene = &f->s,
-                                    .camera = &f->c,
-                                    .dir = f->dir};
-}
-
-static void fixture_free(struct fixture *f)
-{
-    struct err e;
-    assert_true(remove_tree(f->dir, &e));
-    scene_free(&f->s);
-}
-
-static struct moments must_render(struct fixture *f, json_t *manifest)
-{
-    struct err e;
-    struct moments m;
-    if (!povray_render(&f->job, &m, manifest, &e))
-        fail_msg("%s", e.msg);
-    return m;
-}
-
-/* Looks straight down at the plane y = 0 from height h; the picture is 2 h x 2 h wide. */
-static void look_down(struct scene *s, float h)
-{
-    s->camera = (struct scene_camera){.present = true,
-                                      .right = {1, 0, 0},
-                                      .up = {0, 0, -1},
-                                      .backward = {0, 1, 0},
-                                      .eye = {0, h, 0},
-                                      .hfov = PI_F / 2,
-                                      .near = 1e-3f,
-                                      .far = 1e3f};
 }
 
 static const rgb plane_albedo = {.8f, .5f, .3f};
@@ -352,15 +288,6 @@ static void test_implausible_pictures(void **state)
     unlink(large);
 }
 
-static bool have_povray(void)
-{
-    char path[4096];
-    if (process_find("povray", path, sizeof path))
-        return true;
-    print_message("SKIPPED: povray is not in PATH; POV-Ray itself was not tested\n");
-    return false;
-}
-
 /* Largest relative difference of a picture from a closed form, and that of the mean. The picture
  * shows [-1/2, 1/2]^2; a pixel is the mean of 8 x 8 points. */
 static void compare(const struct moments *m, double (*irradiance)(double, double), rgb light,
@@ -481,44 +408,6 @@ static void test_furnace(void **state)
         json_decref(manifest);
         fixture_free(&f);
     }
-}
-
-static double image_mean(const struct moments *m, int channel)
-{
-    double sum = 0;
-    for (int i = 0; i < m->width * m->height; i++)
-        sum += m->mean[3 * i + channel];
-    return sum / (m->width * m->height);
-}
-
-/* Our own renderer: image means of paths of up to `depth` bounces, and their variances. */
-static void render_ours(struct fixture *f, int depth, double mean[3], double variance[3])
-{
-    struct err e;
-    struct progress quiet;
-    struct render_stats stats;
-    struct moments m;
-    progress_start(&quiet, "test", NULL, true);
-    struct bvh *bvh = bvh_build(&f->s, BVH_SAH, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = {.kind = INTEGRATE_PATHS,
-                                              .direct = DIRECT_MIS,
-                                              .max_bounces = depth,
-                                              .light_samples = 1,
-                                              .sampler = {SAMPLER_INDEPENDENT, 5}},
-                               .width = f->suite.width,
-                               .height = f->suite.height,
-                               .num_samples = 4096,
-                               .threads = 2};
-    assert_true(render(&f->s, &f->c, bvh, &o, &quiet, &m, &stats, &e));
-    for (int k = 0; k < 3; k++) {
-        mean[k] = image_mean(&m, k);
-        variance[k] = 0;
-        for (int i = 0; i < m.width * m.height; i++)
-            variance[k] += moments_var_of_mean(&m, (size_t)i, k) / pow(m.width * m.height, 2);
-    }
-    moments_free(&m);
-    bvh_free(bvh);
 }
 
 /* H0: POV-Ray's image mean is ours, to five bounces. 6 independent calls with a seed each give 6
