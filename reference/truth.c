@@ -5,6 +5,7 @@
 #include "truth_lights.h"
 #include "truth_optics.h"
 #include "truth_sky.h"
+#include "truth_sun.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -24,6 +25,12 @@ bool truth_check_triple(const char *name, const double v[3], double hi, struct e
         if (!(v[c] >= 0 && v[c] <= hi))
             return err_set(e, "%s[%d] is %g, not in [0, %g]", name, c, v[c], hi);
     return true;
+}
+
+bool truth_check_depth(const struct suite_scene *scene, struct err *e)
+{
+    return scene->depth >= 1 ||
+           err_set(e, "depth is %d, but the form needs direct light (1 or more)", scene->depth);
 }
 
 static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct moments *out,
@@ -46,8 +53,8 @@ static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct
 
 static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, NULL}};
 
-static const struct truth_kind *const families[] = {furnaces,     truth_lights, truth_lens,
-                                                    truth_optics, truth_ggx,    truth_sky};
+static const struct truth_kind *const families[] = {
+    furnaces, truth_lights, truth_lens, truth_optics, truth_ggx, truth_sky, truth_sun};
 
 static const struct truth_kind *find_kind(const char *name)
 {

@@ -5,8 +5,8 @@
  * kind      "values" in the .json (all keys needed, no others; triples are R, G, B)
  * furnace   emission [W sr^-1 m^-2], albedo
  *
- * The other kinds are listed in truth_lights.h, truth_lens.h, truth_optics.h, truth_ggx.h and
- * truth_sky.h. */
+ * The other kinds are listed in truth_lights.h, truth_sun.h, truth_lens.h, truth_optics.h, truth_ggx.h
+ * and truth_sky.h. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
 
@@ -34,6 +34,10 @@ struct truth_kind {
 
 /* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */
 bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Fails unless paths of one bounce, direct light, are counted. */
+bool truth_check_depth(const struct suite_scene *scene, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

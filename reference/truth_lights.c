@@ -208,20 +208,14 @@ static bool read_sphere(json_t *values, struct plane *p, struct err *e)
     return truth_check_triple("radiance", p->strength, HUGE_VAL, e);
 }
 
-/* The source itself is out of sight and the surface does not see itself, so that every depth from 1
- * on gives the same picture. */
-static bool needs_direct_light(int depth, struct err *e)
-{
-    return depth >= 1 ||
-           err_set(e, "depth is %d, but the form needs direct light (1 or more)", depth);
-}
-
+/* The source itself is out of sight and the plane does not see itself, so that every depth from 1 on
+ * gives the same picture. */
 static bool fill_plane(struct plane *p, bool (*read)(json_t *, struct plane *, struct err *),
                        const struct suite_scene *scene, json_t *values, struct moments *out,
                        struct err *e)
 {
     if (!read(values, p, e) || !truth_check_triple("albedo", p->albedo, 1, e) ||
-        !needs_direct_light(scene->depth, e))
+        !truth_check_depth(scene, e))
         return false;
     if (p->foot_x[0] == p->foot_x[1] || p->foot_z[0] == p->foot_z[1])
         return err_set(e, "footprint has no area");
@@ -253,64 +247,8 @@ static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct 
     return fill_plane(&(struct plane){.source = SOURCE_SPHERE}, read_sphere, scene, values, out, e);
 }
 
-/* Facets lie between the edges k-1 and k: top, right, bottom, left. With the edges u before v, in
- * the order of the drops, v x u points up. */
-void truth_pyramid_cosines(const double drop[4], const double to_light[3], double cosine[4])
-{
-    static const double x[4] = {-1, 1, 1, -1}, z[4] = {-1, -1, 1, 1};
-    double length =
-        sqrt(to_light[0] * to_light[0] + to_light[1] * to_light[1] + to_light[2] * to_light[2]);
-    for (int k = 0; k < 4; k++) {
-        int u = k, v = (k + 1) % 4;
-        double nx = -drop[v] * z[u] + z[v] * drop[u], ny = z[v] * x[u] - x[v] * z[u],
-               nz = -x[v] * drop[u] + drop[v] * x[u];
-        cosine[k] = (nx * to_light[0] + ny * to_light[1] + nz * to_light[2]) /
-                    (length * sqrt(nx * nx + ny * ny + nz * nz));
-    }
-}
-
-/* The share of a pixel on the far side of a diagonal that it is `steps` pixels beyond. */
-static double beyond(int steps)
-{
-    return steps > 0 ? 1 : steps == 0 ? 0.5 : 0;
-}
-
-static bool fill_pyramid(const struct suite_scene *scene, json_t *values, struct moments *out,
-                         struct err *e)
-{
-    double irradiance[3], albedo[3], to_light[3], d[4], cosine[4];
-    json_error_t why;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F,F]}",
-                       "irradiance", &irradiance[0], &irradiance[1], &irradiance[2], "albedo",
-                       &albedo[0], &albedo[1], &albedo[2], "to_light", &to_light[0], &to_light[1],
-                       &to_light[2], "drop", &d[0], &d[1], &d[2], &d[3]) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_check_triple("irradiance", irradiance, HUGE_VAL, e) ||
-        !truth_check_triple("albedo", albedo, 1, e) || !needs_direct_light(scene->depth, e))
-        return false;
-    if (out->width != out->height)
-        return err_set(e, "%d x %d pixels, but the picture has to be square", out->width,
-                       out->height);
-    /* Else facets see each other. */
-    if (!(d[0] + d[2] > 0 && d[1] + d[3] > 0))
-        return err_set(e, "the pyramid is not convex");
-    truth_pyramid_cosines(d, to_light, cosine);
-    for (int k = 0; k < 4; k++)
-        if (!(cosine[k] > 0))
-            return err_set(e, "facet %d faces away from the light", k);
-    for (int row = 0; row < out->height; row++)
-        for (int col = 0; col < out->width; col++) {
-            double a = beyond(col - row), b = beyond(col + row - (out->width - 1));
-            double mean = a * (1 - b) * cosine[0] + a * b * cosine[1] + (1 - a) * b * cosine[2] +
-                          (1 - a) * (1 - b) * cosine[3];
-            size_t pixel = (size_t)row * (size_t)out->width + (size_t)col;
-            for (size_t c = 0; c < 3; c++)
-                out->mean[3 * pixel + c] = albedo[c] / M_PI * irradiance[c] * mean;
-        }
-    return true;
-}
-
-const struct truth_kind truth_lights[] = {
-    {"point_over_plane", fill_point},         {"spot_over_plane", fill_spot},
-    {"rectangle_over_plane", fill_rectangle}, {"sphere_over_plane", fill_sphere},
-    {"sun_on_pyramid", fill_pyramid},         {NULL, NULL}};
+const struct truth_kind truth_lights[] = {{"point_over_plane", fill_point},
+                                          {"spot_over_plane", fill_spot},
+                                          {"rectangle_over_plane", fill_rectangle},
+                                          {"sphere_over_plane", fill_sphere},
+                                          {NULL, NULL}};

@@ -9,8 +9,6 @@
 
 static const double PI = 3.14159265358979323846;
 
-enum environment_kind { ENVIRONMENT_CONSTANT, ENVIRONMENT_UPPER_HALF, ENVIRONMENT_IMAGE };
-
 struct environment {
     enum environment_kind kind;
     rgb radiance; /* not image */
@@ -300,6 +298,15 @@ float environment_pdf_w(const struct environment *env, vec3 w)
 bool environment_is_hidden(const struct environment *env)
 {
     return env->kind == ENVIRONMENT_UPPER_HALF;
+}
+
+struct environment_parts environment_parts(const struct environment *env)
+{
+    return (struct environment_parts){.kind = env->kind,
+                                      .radiance = env->radiance,
+                                      .width = env->width,
+                                      .height = env->height,
+                                      .texel = env->texel};
 }
 
 double environment_total(const struct environment *env)

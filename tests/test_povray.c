@@ -25,14 +25,19 @@
 #define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
 
 static const struct povray_plan bright = {
-    .sources = true, .recursion = 4, .extent = 3, .radiance = 10};
+    .pass = {{.sources = true, .glow = true, .recursion = 4, .levels = 60, .levels_indirect = 60}},
+    .num_passes = 1,
+    .num_lamps = 1,
+    .extent = 3,
+    .radiance = 10};
 
 static bool same_variant(const struct povray_variant *a, const struct povray_variant *b)
 {
-    return memcmp(a->rotation, b->rotation, sizeof a->rotation) == 0 &&
-           a->lamp_cells == b->lamp_cells && a->lamp_jitter == b->lamp_jitter &&
-           a->lamp_seed == b->lamp_seed && a->shift_x == b->shift_x && a->shift_y == b->shift_y &&
-           a->roulette == b->roulette && a->scale == b->scale;
+    return memcmp(a->rotation, b->rotation, sizeof a->rotation) == 0 && a->pass == b->pass &&
+           a->lamp_cells == b->lamp_cells && a->rule == b->rule &&
+           a->indirect_levels == b->indirect_levels && a->lamp_seed == b->lamp_seed &&
+           a->shift_x == b->shift_x && a->shift_y == b->shift_y && a->roulette == b->roulette &&
+           a->scale == b->scale;
 }
 
 /* The pair differs in radiosity only; two replicates differ in all that stands for a seed. */
@@ -42,10 +47,10 @@ static void test_replicate_pair(void **state)
     bool seen[65] = {false};
     for (int i = 0; i < 61; i++) {
         uint32_t seed = replicate_seed(3, i);
-        struct povray_picture a = povray_replicate(&bright, 128, 64, 4, i, seed, true);
-        struct povray_picture b = povray_replicate(&bright, 128, 64, 4, i, seed, false);
+        struct povray_picture a = povray_replicate(&bright, 128, 64, 4, i, seed, 0, true);
+        struct povray_picture b = povray_replicate(&bright, 128, 64, 4, i, seed, 0, false);
         struct povray_picture c =
-            povray_replicate(&bright, 128, 64, 4, i + 1, replicate_seed(3, i + 1), true);
+            povray_replicate(&bright, 128, 64, 4, i + 1, replicate_seed(3, i + 1), 0, true);
         assert_true(a.variant.indirect && !b.variant.indirect);
         assert_true(same_variant(&a.variant, &b.variant));
         assert_true(a.block == b.block && a.grid == 4 && b.grid == 4);
@@ -79,14 +84,15 @@ static void test_windows(void **state)
     bool column[32] = {false}, row[32] = {false};
     double sum_x = 0, sum_y = 0;
     for (int j = 0; j < POVRAY_WINDOWS; j++) {
-        struct povray_picture p = povray_window(&bright, 100, 50, j);
+        struct povray_picture p = povray_window(&bright, 100, 50, j, 0);
         double x = p.variant.shift_x * p.grid * 100 + .5, y = p.variant.shift_y * p.grid * 50 + .5;
         assert_true(x > 0 && x < 1 && y > 0 && y < 1);
         assert_false(column[(int)(32 * x)] || row[(int)(32 * y)]);
         column[(int)(32 * x)] = row[(int)(32 * y)] = true;
         sum_x += x;
         sum_y += y;
-        assert_true(!p.variant.indirect && !p.variant.lamp_jitter && p.variant.roulette == 0);
+        assert_true(!p.variant.indirect && p.variant.rule == POVRAY_GAUSS &&
+                    p.variant.roulette == 0);
     }
     assert_near(sum_x, 16, 1e-9);
     assert_near(sum_y, 16, 1e-9);
@@ -98,7 +104,7 @@ static double sum_of_component(int n, int row, int column, double power)
     double sum = 0;
     for (int i = 0; i < n; i++) {
         struct povray_picture p =
-            povray_replicate(&bright, 8, 8, 1, i, replicate_seed(20261121, i), true);
+            povray_replicate(&bright, 8, 8, 1, i, replicate_seed(20261121, i), 0, true);
         sum += pow(p.variant.rotation[row][column], power);
     }
     return sum;
