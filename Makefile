@@ -61,8 +61,7 @@ bvh-table: $(BUILD)/pathtracer
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
 	  $(addprefix --only ,$(ONLY))
-	$(BUILD)/assay golden approve --new --golden golden --from $(BUILD)/golden-candidate \
-	  $(or $(ONLY),--all)
+	$(BUILD)/assay golden approve --all --new --golden golden --from $(BUILD)/golden-candidate $(ONLY)
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json

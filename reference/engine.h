@@ -63,7 +63,7 @@ bool engine_argv(const struct engine *en, const char *key, const char *const *va
                  struct err *e) __attribute__((warn_unused_result));
 
 /* True if the engine can render the scene: it has all features, and the scene can be written in its
- * format. Else `why` is one line. Writes below dir, which exists, and leaves no more than that. */
+ * format. Else `why` is one line. Tries it in a directory below dir, which exists. */
 bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
                       struct err *why) __attribute__((warn_unused_result));
 

@@ -128,7 +128,7 @@ static bool check_material(const struct material *m, struct err *e)
         why = "shadowing and masking that are correlated";
     else if (!rgb_is_zero(m->radiance) && m->radiance_both_sides)
         why = "emission on both sides";
-    return why == NULL || err_set(e, "Mitsuba has no %s (material '%s')", why, m->name);
+    return why == NULL || err_set(e, "Mitsuba does not have %s (material '%s')", why, m->name);
 }
 
 static bool put_material(struct writer *w, uint32_t index, struct err *e)

@@ -91,7 +91,7 @@ static bool put_material(const struct writer *w, uint32_t index, struct err *e)
     const struct material *m = &w->s->materials[index];
     const char *missing = what_is_missing(m);
     if (missing != NULL)
-        return err_set(e, "pbrt has no %s (material '%s')", missing, m->name);
+        return err_set(e, "pbrt does not have %s (material '%s')", missing, m->name);
     fprintf(w->f, "MakeNamedMaterial \"material_%u\" \"string type\" ", index);
     switch (m->kind) {
     case MATERIAL_DIFFUSE:

@@ -1,17 +1,16 @@
 #include "export_povray.h"
 
-#include "../renderer/sampler.h"
+#include "export_povray_priv.h"
+#include "povray_glass.h"
+#include "povray_lamp.h"
+
+#include "../renderer/bsdf.h"
 
 #include <assert.h>
-#include <gsl/gsl_math.h>
 
 /* Of the extent: the distance of the black sheet behind a one-sided emitter. mesh2 vertices are
  * float32, 1e-7 of the extent. */
 #define BACKING 2e-5
-/* Of the extent: the distance at which a light source stops growing. POV-Ray's falloff is
- * 2 / (1 + (r/d)^2), so the inverse square law is wrong by (d/r)^2. */
-#define FADE 1e-6
-
 struct povray_variant povray_variant_plain(void)
 {
     return (struct povray_variant){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
@@ -21,32 +20,8 @@ struct povray_variant povray_variant_plain(void)
                                    .scale = 1};
 }
 
-/* What the writers below share. */
-struct writer {
-    FILE *f;
-    const struct scene *s;
-    const struct povray_variant *v;
-    const struct povray_plan *plan;
-    bool radiosity;
-    double roulette;
-};
-
-struct point {
-    double x, y, z;
-};
-
-static struct point at(vec3 p)
-{
-    return (struct point){p.x, p.y, p.z};
-}
-
-static struct point moved(struct point p, double s, vec3 d)
-{
-    return (struct point){p.x + s * d.x, p.y + s * d.y, p.z + s * d.z};
-}
-
 /* The last zero is there so that no coordinate reads -0. */
-static void put(const struct writer *w, struct point p)
+void povray_put(const struct povray_writer *w, struct povray_point p)
 {
     const double(*r)[3] = w->v->rotation;
     fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z + 0.0,
@@ -54,41 +29,85 @@ static void put(const struct writer *w, struct point p)
             r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z + 0.0);
 }
 
-static void put_rgb(const struct writer *w, const char *before, double r, double g, double b,
+void povray_put_rgb(const struct povray_writer *w, const char *before, double r, double g, double b,
                     const char *after)
 {
     fprintf(w->f, "%s<%.9g,%.9g,%.9g>%s", before, r, g, b, after);
 }
 
 /* Emission is multiplied by the pigment, so it is divided by it here. */
-static void put_surface(const struct writer *w, rgb albedo, rgb radiance, double boost)
+static void put_surface(const struct povray_writer *w, rgb albedo, rgb radiance, double boost)
 {
     double r = albedo.r * boost, g = albedo.g * boost, b = albedo.b * boost;
     if (rgb_is_zero(albedo) || boost == 0) {
         fputs("pigment { rgb 1 } finish { diffuse 0", w->f);
         r = g = b = 1;
     } else {
-        put_rgb(w, "pigment { rgb ", r, g, b, " } finish { diffuse 1");
+        povray_put_rgb(w, "pigment { rgb ", r, g, b, " } finish { diffuse 1");
     }
     if (!rgb_is_zero(radiance))
-        put_rgb(w, " emission S*", radiance.r > 0 ? radiance.r / r : 0,
-                radiance.g > 0 ? radiance.g / g : 0, radiance.b > 0 ? radiance.b / b : 0, "");
+        povray_put_rgb(w, " emission S*", radiance.r > 0 ? radiance.r / r : 0,
+                       radiance.g > 0 ? radiance.g / g : 0, radiance.b > 0 ? radiance.b / b : 0,
+                       "");
     fputs(" }", w->f);
 }
 
-static void put_texture(const struct writer *w, rgb albedo, rgb radiance)
+/* How a shape looks. */
+struct look {
+    const struct material *specular; /* mirror, refraction, glass; NULL: diffuse */
+    rgb albedo;                      /* diffuse */
+    rgb radiance;
+    const char *flags;
+};
+
+static void put_mirror(const struct povray_writer *w, const struct look *l)
+{
+    rgb r = l->specular->reflectance, e = l->radiance;
+    povray_put_rgb(w, "  texture { pigment { rgb 1 } finish { diffuse 0 reflection { rgb ",
+                   (double)r.r, (double)r.g, (double)r.b, " }");
+    if (!rgb_is_zero(e))
+        povray_put_rgb(w, " emission S*", (double)e.r, (double)e.g, (double)e.b, "");
+    fputs(" } }\n", w->f);
+}
+
+/* The fresnel keyword wants conserve_energy to take from the refracted ray what is reflected. */
+static void put_glass(const struct povray_writer *w, const struct material *m)
+{
+    fprintf(w->f,
+            "  texture { pigment { rgbf <%.9g,%.9g,%.9g,1> } finish { diffuse 0%s } }\n"
+            "  interior { ior %.9g }\n",
+            (double)m->transmittance.r, (double)m->transmittance.g, (double)m->transmittance.b,
+            m->kind == MATERIAL_GLASS ? " reflection { rgb 0, rgb 1 fresnel on } conserve_energy"
+                                      : "",
+            (double)m->ior);
+}
+
+static void put_diffuse(const struct povray_writer *w, const struct look *l)
 {
     fputs("  texture { ", w->f);
-    if (w->roulette > 0 && !rgb_is_zero(albedo)) {
+    if (w->roulette > 0 && !rgb_is_zero(l->albedo)) {
         fprintf(w->f, "function { Fate(x,y,z) } texture_map {\n    [%.9g ", w->roulette);
-        put_surface(w, albedo, radiance, 0);
+        put_surface(w, l->albedo, l->radiance, 0);
         fprintf(w->f, "]\n    [%.9g ", w->roulette);
-        put_surface(w, albedo, radiance, 1 / (1 - w->roulette));
+        put_surface(w, l->albedo, l->radiance, 1 / (1 - w->roulette));
         fputs("] }", w->f);
     } else {
-        put_surface(w, albedo, radiance, 1);
+        put_surface(w, l->albedo, l->radiance, 1);
     }
     fputs(" }\n", w->f);
+}
+
+static void put_look(const struct povray_writer *w, const struct look *l)
+{
+    if (l->specular == NULL)
+        put_diffuse(w, l);
+    else if (povray_is_glass(l->specular))
+        put_glass(w, l->specular);
+    else
+        put_mirror(w, l);
+    if (w->hide_reflections)
+        fputs("  no_reflection\n", w->f);
+    fprintf(w->f, "%s}\n", l->flags);
 }
 
 static vec3 geometric_normal(const vec3 *p)
@@ -97,7 +116,7 @@ static vec3 geometric_normal(const vec3 *p)
 }
 
 /* mesh2 of an object, its vertices moved by `offset` along the geometric normals. */
-static void put_mesh(const struct writer *w, const struct object *o, double offset)
+static void put_mesh(const struct povray_writer *w, const struct object *o, double offset)
 {
     const struct scene *s = w->s;
     bool smooth = false;
@@ -107,7 +126,7 @@ static void put_mesh(const struct writer *w, const struct object *o, double offs
         vec3 n = geometric_normal(p);
         for (int k = 0; k < 3; k++) {
             fputs(k == 0 ? ",\n    " : ",", w->f);
-            put(w, moved(at(p[k]), offset, n));
+            povray_put(w, povray_moved(povray_at(p[k]), offset, n));
             smooth |= dot(n, s->normal[3 * (size_t)i + (size_t)k]) < 1 - 1e-6f;
         }
     }
@@ -116,7 +135,7 @@ static void put_mesh(const struct writer *w, const struct object *o, double offs
         for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++)
             for (int k = 0; k < 3; k++) {
                 fputs(k == 0 ? ",\n    " : ",", w->f);
-                put(w, at(s->normal[3 * (size_t)i + (size_t)k]));
+                povray_put(w, povray_at(s->normal[3 * (size_t)i + (size_t)k]));
             }
     }
     fprintf(w->f, " }\n  face_indices { %u", o->num_triangles);
@@ -125,156 +144,133 @@ static void put_mesh(const struct writer *w, const struct object *o, double offs
     fputs(" }\n", w->f);
 }
 
-static void put_sphere(const struct writer *w, const struct sphere *b, double offset)
+static void put_sphere(const struct povray_writer *w, const struct sphere *b, double offset)
 {
     fputs("sphere { ", w->f);
-    put(w, at(b->centre));
+    povray_put(w, povray_at(b->centre));
     fprintf(w->f, ", %.9g\n", b->radius + b->normal_out * offset);
+    /* A ray that begins inside a body makes POV-Ray take the inner reflections of glass in there for
+     * zero; `inverse` has the eye outside. */
+    if (length(sub(w->eye, b->centre)) < b->radius)
+        fputs("  inverse\n", w->f);
 }
 
-/* The object's shapes, each with that texture and those flags. */
-static void put_shapes(const struct writer *w, const struct object *o, double offset, rgb albedo,
-                       rgb radiance, const char *flags)
+/* What becomes one POV-Ray object: the triangles of an object or one of its spheres. */
+struct shape {
+    const struct object *object;
+    const struct sphere *ball; /* NULL: the triangles */
+    int32_t light;             /* index into lights, -1 if it does not emit */
+};
+
+static void put_shape(const struct povray_writer *w, const struct shape *s, double offset,
+                      const struct look *l)
 {
-    if (o->num_triangles > 0) {
-        put_mesh(w, o, offset);
-        put_texture(w, albedo, radiance);
-        fprintf(w->f, "%s}\n", flags);
+    if (s->ball != NULL)
+        put_sphere(w, s->ball, offset);
+    else
+        put_mesh(w, s->object, offset);
+    put_look(w, l);
+}
+
+/* A lamp. The light sources do the lighting, so diffuse surfaces must not see the glow; what stops
+ * them from it is not there for reflected and refracted rays. */
+static void put_lamp(const struct povray_writer *w, const struct shape *s, rgb radiance)
+{
+    double sheet = BACKING * w->plan->extent;
+    struct look glow = {.radiance = radiance, .flags = "  no_shadow no_radiosity\n"};
+    const struct look black = {.flags = ""};
+    const struct look shield = {.flags = "  no_image no_reflection no_shadow\n"};
+    if (w->pass->glow) {
+        fputs("// lamp: spotlights do the lighting, the glow is for the camera", w->f);
+        fputs(w->plan->specular ? ", mirrors and glass\n" : "\n", w->f);
+        if (w->plan->specular)
+            glow.flags = "  no_shadow\n";
+        put_shape(w, s, 0, &glow);
+        if (w->plan->specular)
+            put_shape(w, s, sheet, &shield);
     }
-    for (uint32_t i = 0; i < o->num_spheres; i++) {
-        put_sphere(w, &w->s->spheres[o->first_sphere + i], offset);
-        put_texture(w, albedo, radiance);
-        fprintf(w->f, "%s}\n", flags);
+    put_shape(w, s, -sheet, &black);
+}
+
+/* POV-Ray's light comes straight through glass; ours does not come through, it is found by paths. */
+static void put_glass_body(const struct povray_writer *w, const struct shape *s,
+                           const struct material *m)
+{
+    const struct look glass = {.specular = m, .flags = w->pass->sources ? "  no_shadow\n" : ""};
+    const struct look shadow = {.flags = "  no_image no_reflection no_radiosity\n"};
+    put_shape(w, s, 0, &glass);
+    if (w->pass->sources) {
+        fputs("// its shadow\n", w->f);
+        put_shape(w, s, 0, &shadow);
+    }
+}
+
+static void put_part(const struct povray_writer *w, const struct shape *s)
+{
+    const struct material *m = &w->s->materials[s->object->material];
+    struct povray_lamp lamp;
+    if (s->light >= 0 && povray_lamp(w->s, &w->s->lights[s->light], &lamp)) {
+        put_lamp(w, s, m->radiance);
+        return;
+    }
+    if (povray_is_glass(m) && !bsdf_is_black(m)) {
+        put_glass_body(w, s, m);
+        return;
+    }
+    struct look look = {.albedo = m->reflectance, .flags = ""};
+    if (m->kind != MATERIAL_DIFFUSE)
+        look = (struct look){.specular = bsdf_is_black(m) ? NULL : m, .flags = ""};
+    bool glows = w->pass->glow && !rgb_is_zero(m->radiance);
+    if (glows)
+        look.radiance = m->radiance;
+    put_shape(w, s, 0, &look);
+    if (glows && !m->radiance_both_sides) {
+        look.radiance = grey(0);
+        fputs("// its back, which does not glow\n", w->f);
+        put_shape(w, s, -BACKING * w->plan->extent, &look);
     }
 }
 
 /* Names come from the file and end up in a comment line. */
-static void put_name(const struct writer *w, const char *name)
+static void put_name(const struct povray_writer *w, const char *name)
 {
     for (; *name != '\0'; name++)
         fputc((unsigned char)*name < ' ' ? ' ' : *name, w->f);
 }
 
-static void put_object(const struct writer *w, const struct object *o)
+static void put_object(const struct povray_writer *w, const struct object *o)
 {
-    const struct material *m = &w->s->materials[o->material];
-    const rgb black = {0};
-    double behind = -BACKING * w->plan->extent;
     fputs("\n// ", w->f);
     put_name(w, o->name);
     fputc('\n', w->f);
-    if (rgb_is_zero(m->radiance)) {
-        put_shapes(w, o, 0, m->reflectance, black, "");
-    } else if (w->plan->sources) {
-        fputs("// lamp: the glow is for the camera only, the spotlights below do the lighting\n",
-              w->f);
-        put_shapes(w, o, 0, black, m->radiance, "  no_shadow no_radiosity\n");
-        put_shapes(w, o, behind, black, black, "");
-    } else {
-        put_shapes(w, o, 0, m->reflectance, m->radiance, "");
-        if (!m->radiance_both_sides) {
-            fputs("// its back, which does not glow\n", w->f);
-            put_shapes(w, o, behind, m->reflectance, black, "");
-        }
-    }
+    if (o->num_triangles > 0)
+        put_part(w, &(struct shape){.object = o, .light = w->s->tri_light[o->first_triangle]});
+    for (uint32_t i = o->first_sphere; i < o->first_sphere + o->num_spheres; i++)
+        put_part(w, &(struct shape){
+                        .object = o, .ball = &w->s->spheres[i], .light = w->s->sphere_light[i]});
 }
 
-/* Position of node i of n on [0,1]: pairs of cells with the 2-point Gauss rule. */
-static double gauss2(int i, int n)
+static void put_header(const struct povray_writer *w, const struct camera *c)
 {
-    return (2 * (i / 2) + 1 + (i % 2 == 0 ? -1 : 1) / sqrt(3.0)) / n;
-}
-
-static void put_lamp(const struct writer *w, const struct povray_lamp *l, uint32_t index)
-{
-    int n = w->v->lamp_cells;
-    double d = FADE * w->plan->extent;
-    double c = l->area / ((double)n * n) / (2 * M_PI * d * d);
-    fprintf(w->f, "\n// rectangle of radiance <%g,%g,%g>, area %.9g, as %d x %d spotlights\n",
-            l->radiance.r, l->radiance.g, l->radiance.b, l->area, n, n);
-    fprintf(w->f, "#macro Lamp%u(P)\n  light_source { P ", index);
-    put_rgb(w, "rgb S*", c * l->radiance.r, c * l->radiance.g, c * l->radiance.b,
-            " spotlight point_at P+");
-    put(w, at(l->normal));
-    fprintf(w->f,
-            "\n    tightness 1 radius 90 falloff 90 fade_distance %.9g fade_power 2 }\n#end\n", d);
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            double u = gauss2(i, n), v = gauss2(j, n);
-            if (w->v->lamp_jitter) {
-                struct sample4 r =
-                    sampler_get(w->v->lamp_seed, index, (uint32_t)(i * n + j), 0, PURPOSE_LIGHT);
-                u = (i + (double)r.u[0]) / n;
-                v = (j + (double)r.u[1]) / n;
-            }
-            fprintf(w->f, "Lamp%u(", index);
-            put(w, moved(moved(at(l->corner), u, l->edge1), v, l->edge2));
-            fputs(j == n - 1 ? ")\n" : ") ", w->f);
-        }
-}
-
-static void put_light(const struct writer *w, uint32_t index)
-{
-    const struct light *l = &w->s->lights[index];
-    struct povray_lamp lamp;
-    switch (l->kind) {
-    case LIGHT_POINT: {
-        bool constant = l->attenuation[0] > 0;
-        double d = FADE * w->plan->extent;
-        double c =
-            constant ? 1 / (M_PI * l->attenuation[0]) : 1 / (2 * M_PI * d * d * l->attenuation[2]);
-        fputs(constant ? "\n// point light without falloff\nlight_source { "
-                       : "\n// point light\nlight_source { ",
-              w->f);
-        put(w, at(l->position));
-        put_rgb(w, " rgb S*", c * l->value.r, c * l->value.g, c * l->value.b, "");
-        if (!constant)
-            fprintf(w->f, " fade_distance %.9g fade_power 2", d);
-        fputs(" }\n", w->f);
-        break;
-    }
-    case LIGHT_DIRECTIONAL: {
-        vec3 middle = scale(add(w->s->bounds_min, w->s->bounds_max), 0.5f);
-        fputs("\n// directional light\nlight_source { ", w->f);
-        put(w, moved(at(middle), 10 * w->plan->extent, l->to_light));
-        put_rgb(w, " rgb S*", l->value.r / M_PI, l->value.g / M_PI, l->value.b / M_PI,
-                " parallel point_at ");
-        put(w, at(middle));
-        fputs(" }\n", w->f);
-        break;
-    }
-    case LIGHT_SPOT:
-    case LIGHT_ENVIRONMENT: assert(false); break; /* the plan has refused them */
-    case LIGHT_TRIANGLES:
-    case LIGHT_SPHERE: {
-        bool ok = povray_lamp(w->s, l, &lamp);
-        assert(ok);
-        if (ok)
-            put_lamp(w, &lamp, index);
-        break;
-    }
-    }
-}
-
-static void put_header(const struct writer *w, const struct camera *c)
-{
+    bool deep = w->radiosity || w->v->indirect_levels;
     fprintf(w->f,
             "// Render linear: povray +Iscene.pov +Oscene.exr +FE +W%d +H%d -A -D -P +WT1 "
             "File_Gamma=1.0\n"
             "// Numbers are radiance times S, right-handed, Y up.\n"
             "#version 3.7;\n#declare S = %.17g;\n"
-            "global_settings { assumed_gamma 1.0 max_trace_level 60 adc_bailout 1e-9",
-            c->width, c->height, w->v->scale);
+            "global_settings { assumed_gamma 1.0 max_trace_level %d adc_bailout %g",
+            c->width, c->height, w->v->scale, deep ? w->pass->levels_indirect : w->pass->levels,
+            deep ? w->pass->bailout_indirect : 1e-9);
     if (w->radiosity)
         fprintf(w->f,
                 "\n  // a path tracer: no sample is kept, one of the five rays is followed\n"
                 "  radiosity { pretrace_start 1 pretrace_end 1 count 5,100003 recursion_limit %d\n"
                 "    nearest_count 1 error_bound 1e-3 low_error_factor 1 gray_threshold 0 "
                 "brightness 1\n"
-                "    adc_bailout 1e-9 always_sample on normal off media off\n"
+                "    adc_bailout %g always_sample on normal off media off\n"
                 "    maximum_reuse 1e30 minimum_reuse 0 }\n}\n#default { radiosity { importance "
                 "0.01 } }\n",
-                w->plan->recursion);
+                w->pass->recursion, w->pass->bailout_indirect);
     else
         fputs(" }\n", w->f);
     if (w->roulette > 0)
@@ -287,43 +283,48 @@ static void put_header(const struct writer *w, const struct camera *c)
     fputs("#default { finish { ambient 0 } }\n", w->f);
 }
 
-static void put_camera(const struct writer *w, const struct camera *c)
+static void put_camera(const struct povray_writer *w, const struct camera *c)
 {
     double width = 2 * (double)c->tan_h, height = 2 * (double)c->tan_v;
     fputs("camera { location ", w->f);
-    put(w, at(c->eye));
+    povray_put(w, povray_at(c->eye));
     fputs("\n  direction ", w->f);
-    put(w, moved(moved(moved((struct point){0}, -1, c->backward), w->v->shift_x * width, c->right),
-                 w->v->shift_y * height, c->up));
+    povray_put(w, povray_moved(povray_moved(povray_moved((struct povray_point){0}, -1, c->backward),
+                                            w->v->shift_x * width, c->right),
+                               w->v->shift_y * height, c->up));
     fputs("\n  right ", w->f);
-    put(w, moved((struct point){0}, width, c->right));
+    povray_put(w, povray_moved((struct povray_point){0}, width, c->right));
     fputs("\n  up ", w->f);
-    put(w, moved((struct point){0}, height, c->up));
+    povray_put(w, povray_moved((struct povray_point){0}, height, c->up));
     fputs(" }\n", w->f);
 }
 
 bool export_povray(const struct scene *s, const struct camera *c, int depth,
                    const struct povray_variant *v, FILE *f, struct err *e)
 {
-    assert(v->lamp_cells >= 1 && (v->lamp_jitter || v->lamp_cells % 2 == 0));
+    assert(v->lamp_cells >= 1 && (v->rule != POVRAY_GAUSS || v->lamp_cells % 2 == 0));
     assert(v->roulette >= 0 && v->roulette < 1 && v->scale > 0);
     struct povray_plan plan;
     if (!povray_plan(s, c, depth, &plan, e))
         return false;
-    bool radiosity = v->indirect && plan.recursion > 0;
-    struct writer w = {.f = f,
-                       .s = s,
-                       .v = v,
-                       .plan = &plan,
-                       .radiosity = radiosity,
-                       .roulette = plan.recursion > 0 && !plan.constant ? v->roulette : 0};
+    assert(v->pass >= 0 && v->pass < plan.num_passes);
+    const struct povray_pass *pass = &plan.pass[v->pass];
+    struct povray_writer w = {.f = f,
+                              .s = s,
+                              .v = v,
+                              .plan = &plan,
+                              .pass = pass,
+                              .eye = c->eye,
+                              .radiosity = v->indirect && pass->recursion > 0,
+                              .hide_reflections = povray_hides_total_reflection(s),
+                              .roulette = pass->recursion > 0 && !plan.constant ? v->roulette : 0};
     put_header(&w, c);
     put_camera(&w, c);
     for (uint32_t i = 0; i < s->num_objects; i++)
         put_object(&w, &s->objects[i]);
-    if (plan.sources && depth > 0)
-        for (uint32_t i = 0; i < s->num_lights; i++)
-            put_light(&w, i);
+    if (pass->sources)
+        povray_put_lights(&w);
+    povray_put_sky(&w);
     if (ferror(f))
         return err_set(e, "cannot write the POV-Ray scene");
     return true;

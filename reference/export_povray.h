@@ -8,19 +8,31 @@
 
 #include <stdio.h>
 
+/* Where the spotlights of a lamp are. Lamps that are no rectangles have evenly spread points
+ * (povray_lamp_points()) by every rule. */
+enum povray_rule {
+    POVRAY_GAUSS, /* rectangles: pairs of cells hold the 2-point Gauss rule (lamp_cells is even) */
+    POVRAY_SHIFT, /* rectangles: one point in each cell, at the same place in all of them. The place
+                     is lamp_shift[0..1], plus a golden-ratio step for each further lamp */
+    POVRAY_JITTER /* rectangles: one random point in each cell, a function of lamp_seed (sampler.h) */
+};
+
 /* What differs between two pictures of one scene. */
 struct povray_variant {
     /* The whole scene and camera, turned about the origin: v' = rotation v. Row-major, orthonormal,
      * determinant +1. The picture stays; POV-Ray's directions relative to the scene do not. */
     double rotation[3][3];
-    int lamp_cells; /* a rectangular lamp is lamp_cells x lamp_cells spotlights */
-    /* false: pairs of cells hold the 2-point Gauss rule (lamp_cells is even); true: one random
-     * point in each cell, a function of lamp_seed (sampler.h). */
-    bool lamp_jitter;
-    uint64_t lamp_seed;
+    int pass;       /* of the plan */
+    int lamp_cells; /* a lamp is lamp_cells x lamp_cells spotlights */
+    enum povray_rule rule;
+    double lamp_shift[3]; /* in [0,1); of POVRAY_GAUSS for lamps that are no rectangles */
+    uint64_t lamp_seed;   /* of POVRAY_JITTER */
     /* Moves the window right and up; 1 is the width, the height of the whole picture. */
     double shift_x, shift_y;
-    bool indirect; /* false: paths end after the direct light (depth 1) */
+    bool indirect; /* false: no light from diffuse surface to diffuse surface */
+    /* Mirrors and glass are followed as far as the pass with indirect light follows them, so that a
+     * picture without it can be subtracted. */
+    bool indirect_levels;
     /* Probability in [0,1) that a reflecting point absorbs all light; the others reflect
      * 1/(1-roulette) times as much. Keeps the depths of a path apart where no path could end
      * otherwise. Used only where there is indirect light and it is noisy. */
@@ -28,7 +40,7 @@ struct povray_variant {
     double scale; /* POV-Ray's number = scale x radiance */
 };
 
-/* The variant for people: unrotated, 16 x 16 Gauss lamps, whole depth, scale 1. */
+/* The variant for people: first pass, unrotated, 16 x 16 Gauss lamps, whole depth, scale 1. */
 struct povray_variant povray_variant_plain(void);
 
 /* Writes the scene file; the first lines say with which command line to render it. Fails as

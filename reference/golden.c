@@ -85,6 +85,28 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     return ok;
 }
 
+bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+{
+    char exr[PATH_SIZE], path[PATH_SIZE];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    if (access(path, F_OK) != 0 && access(exr, F_OK) != 0)
+        return true;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e);
+    bool ok = all != NULL;
+    if (ok && json_object_del(all, engine) == 0)
+        ok = json_write(path, all, e);
+    if (ok && unlink(exr) != 0 && errno != ENOENT)
+        ok = err_set(e, "%s: cannot remove: %s", exr, strerror(errno));
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
 static bool check_number(const json_t *entry, const char *key, int want, const char *where,
                          struct err *e)
 {

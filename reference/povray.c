@@ -29,15 +29,15 @@ struct crew {
     struct err first; /* of the failures */
 };
 
-static struct povray_picture window(const struct crew *w, int j)
+static struct povray_picture window(const struct crew *w, int j, int pass)
 {
-    return povray_window(w->plan, w->job->suite->width, w->job->suite->height, j);
+    return povray_window(w->plan, w->job->suite->width, w->job->suite->height, j, pass);
 }
 
-static struct povray_picture replicate(const struct crew *w, int i, bool indirect)
+static struct povray_picture replicate(const struct crew *w, int i, int pass, bool indirect)
 {
     return povray_replicate(w->plan, w->job->suite->width, w->job->suite->height,
-                            w->job->ref->subgrid, i, replicate_seed(w->job->opt->seed, i),
+                            w->job->ref->subgrid, i, replicate_seed(w->job->opt->seed, i), pass,
                             indirect);
 }
 
@@ -146,7 +146,7 @@ static bool render(struct crew *w, const struct povray_picture *p, float sign, f
     command_line(w, p, text, argv);
     struct process run = {
         .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
-    bool radiosity = p->variant.indirect && w->plan->recursion > 0;
+    bool radiosity = p->variant.indirect && w->plan->pass[p->variant.pass].recursion > 0;
     return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
            add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
 }
@@ -154,13 +154,18 @@ static bool render(struct crew *w, const struct povray_picture *p, float sign, f
 static bool run_task(struct crew *w, int t, struct err *e)
 {
     float *out = w->result + (size_t)t * w->size;
-    if (t < POVRAY_WINDOWS) {
-        struct povray_picture fine = window(w, t);
-        return render(w, &fine, 1, out, e);
+    bool ok = true;
+    for (int pass = 0; ok && pass < w->plan->num_passes; pass++) {
+        if (t < POVRAY_WINDOWS) {
+            struct povray_picture fine = window(w, t, pass);
+            ok = render(w, &fine, 1, out, e);
+        } else if (w->plan->pass[pass].recursion > 0) {
+            struct povray_picture indirect = replicate(w, t - POVRAY_WINDOWS, pass, true);
+            struct povray_picture direct = replicate(w, t - POVRAY_WINDOWS, pass, false);
+            ok = render(w, &indirect, 1, out, e) && render(w, &direct, -1, out, e);
+        }
     }
-    struct povray_picture indirect = replicate(w, t - POVRAY_WINDOWS, true);
-    struct povray_picture direct = replicate(w, t - POVRAY_WINDOWS, false);
-    return render(w, &indirect, 1, out, e) && render(w, &direct, -1, out, e);
+    return ok;
 }
 
 static void *work(void *arg)
@@ -235,24 +240,33 @@ static bool describe(const struct crew *w, json_t *manifest, struct err *e)
     int replicates = w->num_tasks - POVRAY_WINDOWS;
     if (!engine_version(w, version, e) || !sha256_file(w->program, sha256, e))
         return false;
-    struct povray_picture first = replicates > 0 ? replicate(w, 0, true) : window(w, 0);
+    struct povray_picture first = replicates > 0 ? replicate(w, 0, 0, true) : window(w, 0, 0);
     command_line(w, &first, text, argv);
     for (int i = 1; argv[i] != NULL; i++)
         snprintf(command + strlen(command), sizeof command - strlen(command), " %s", argv[i]);
     json_t *seeds = json_array(), *blocks = json_array();
     for (int i = 0; i < replicates; i++) {
         json_array_append_new(seeds, json_integer(replicate_seed(w->job->opt->seed, i)));
-        json_array_append_new(blocks, json_integer(replicate(w, i, true).block));
+        json_array_append_new(blocks, json_integer(replicate(w, i, 0, true).block));
     }
     double top = POVRAY_TOP_VALUE / w->plan->radiance;
-    json_t *settings = json_pack("{s:s, s:i, s:[f,f], s:{s:i, s:i, s:i}}", "lit_by",
-                                 w->plan->sources ? "light sources" : "geometry", "recursion_limit",
-                                 w->plan->recursion, "scale", top, 2 * top, "fine", "windows",
-                                 (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
-                                 "gauss2_lamp_cells", (int)POVRAY_WINDOW_CELLS);
+    json_t *passes = json_array();
+    for (int i = 0; i < w->plan->num_passes; i++) {
+        const struct povray_pass *pass = &w->plan->pass[i];
+        json_array_append_new(
+            passes, json_pack("{s:b, s:b, s:i, s:i, s:i}", "light_sources", pass->sources, "glow",
+                              pass->glow, "recursion_limit", pass->recursion, "max_trace_level",
+                              pass->levels, "max_trace_level_indirect", pass->levels_indirect));
+    }
+    struct povray_picture fine = window(w, 0, 0);
+    json_t *settings =
+        json_pack("{s:o, s:[f,f], s:{s:i, s:i, s:i, s:s}}", "passes", passes, "scale", top, 2 * top,
+                  "fine", "windows", (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
+                  "lamp_cells", fine.variant.lamp_cells, "rule",
+                  fine.variant.rule == POVRAY_GAUSS ? "gauss2" : "shifted grid");
     json_t *scheme = replicates > 0
                          ? json_pack("{s:i, s:i, s:f, s:O}", "subgrid", w->job->ref->subgrid,
-                                     "jittered_lamp_cells", (int)POVRAY_JITTER_CELLS, "roulette",
+                                     "jittered_lamp_cells", first.variant.lamp_cells, "roulette",
                                      POVRAY_ROULETTE, "block_sizes", blocks)
                          : json_string("none: the picture has no noise");
     bool ok = json_object_set(settings, "replicate", scheme) == 0 &&
@@ -331,7 +345,7 @@ bool povray_render(const struct reference_job *job, struct moments *out, json_t 
         return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
     if (!povray_plan(job->scene, job->camera, job->suite->depth, &plan, e))
         return false;
-    bool exact = plan.recursion == 0 || plan.constant;
+    bool exact = !povray_plan_is_noisy(&plan);
     assert(exact || (job->ref->replicates > 1 && job->ref->subgrid > 0));
     struct crew w = {.job = job,
                      .plan = &plan,

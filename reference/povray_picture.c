@@ -36,14 +36,29 @@ static double scale_within_octave(const struct povray_plan *plan, double u)
     return POVRAY_TOP_VALUE / plan->radiance * exp2(u);
 }
 
-struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j)
+/* As many cells a side as keep all lamps together below `most` spotlights. */
+static int cells(const struct povray_plan *plan, const int *choice, int most)
+{
+    while (choice[1] != 0 && plan->num_lamps * *choice * *choice > most)
+        choice++;
+    return *choice;
+}
+
+struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j,
+                                    int pass)
 {
     assert(j >= 0 && j < POVRAY_WINDOWS);
     static_assert(POVRAY_WINDOWS == 32, "reverse5() is for 32");
     struct povray_picture p = {
         .grid = POVRAY_WINDOW_GRID, .block = 32, .variant = povray_variant_plain()};
-    snprintf(p.name, sizeof p.name, "fine_%02d", j);
-    p.variant.lamp_cells = POVRAY_WINDOW_CELLS;
+    snprintf(p.name, sizeof p.name, "fine_%02d_%d", j, pass);
+    p.variant.pass = pass;
+    p.variant.lamp_cells = cells(plan, (const int[]){POVRAY_WINDOW_CELLS, 8, 4, 2, 0}, 320);
+    p.variant.rule = p.variant.lamp_cells == POVRAY_WINDOW_CELLS ? POVRAY_GAUSS : POVRAY_SHIFT;
+    /* Each an order of its own of the same 32 places; multiplying by an odd number permutes them. */
+    p.variant.lamp_shift[0] = (13 * j % 32 + 0.5) / POVRAY_WINDOWS;
+    p.variant.lamp_shift[1] = (reverse5(13 * j % 32) + 0.5) / POVRAY_WINDOWS;
+    p.variant.lamp_shift[2] = (11 * j % 32 + 0.5) / POVRAY_WINDOWS;
     p.variant.indirect = plan->constant;
     p.variant.roulette = 0;
     p.variant.scale = scale_within_octave(plan, (j + 0.5) / POVRAY_WINDOWS);
@@ -52,20 +67,23 @@ struct povray_picture povray_window(const struct povray_plan *plan, int width, i
 }
 
 struct povray_picture povray_replicate(const struct povray_plan *plan, int width, int height,
-                                       int grid, int i, uint32_t seed, bool indirect)
+                                       int grid, int i, uint32_t seed, int pass, bool indirect)
 {
     assert(grid > 0 && i >= 0);
     struct sample4 a = sampler_get(seed, 0, 0, 0, PURPOSE_CAMERA);
     struct sample4 b = sampler_get(seed, 0, 1, 0, PURPOSE_CAMERA);
-    struct povray_picture p = {.grid = grid,
-                               .block = 4 + (int)(17 * (long)i % 61), /* all of 4 .. 64 in turn */
-                               .variant = {.lamp_cells = POVRAY_JITTER_CELLS,
-                                           .lamp_jitter = true,
-                                           .lamp_seed = seed,
-                                           .indirect = indirect,
-                                           .roulette = POVRAY_ROULETTE,
-                                           .scale = scale_within_octave(plan, (double)a.u[3])}};
-    snprintf(p.name, sizeof p.name, "%s_%03d", indirect ? "indirect" : "direct", i);
+    struct povray_picture p = {
+        .grid = grid,
+        .block = 4 + (int)(17 * (long)i % 61), /* all of 4 .. 64 in turn */
+        .variant = {.pass = pass,
+                    .lamp_cells = cells(plan, (const int[]){POVRAY_JITTER_CELLS, 2, 1, 0}, 40),
+                    .rule = POVRAY_JITTER,
+                    .lamp_seed = seed,
+                    .indirect = indirect,
+                    .indirect_levels = true,
+                    .roulette = POVRAY_ROULETTE,
+                    .scale = scale_within_octave(plan, (double)a.u[3])}};
+    snprintf(p.name, sizeof p.name, "%s_%03d_%d", indirect ? "indirect" : "direct", i, pass);
     random_rotation(a.u, p.variant.rotation);
     set_shift(&p, width, height, (double)b.u[0], (double)b.u[1]);
     return p;

@@ -2,6 +2,7 @@
  *
  *     total_i = fine + (indirect_i - direct_i)
  *
+ * where each of the three is the sum over the plan's passes.
  * fine, the same for all replicates, is the mean of POVRAY_WINDOWS pictures without noise: shifted
  * sub-pixel grids, a fine quadrature of the lamps, no radiosity unless the scene is a constant
  * furnace. indirect_i and direct_i differ in nothing but radiosity, so their difference is the
@@ -19,8 +20,9 @@
 enum {
     POVRAY_WINDOWS = 32,
     POVRAY_WINDOW_GRID = 2,   /* sub-pixels a side */
-    POVRAY_WINDOW_CELLS = 16, /* spotlights a side for one lamp, 2-point Gauss rule */
-    POVRAY_JITTER_CELLS = 3   /* the same in a replicate, one random point in each cell */
+    POVRAY_WINDOW_CELLS = 16, /* spotlights a side for one lamp, 2-point Gauss rule; with more lamps
+                                 fewer, at random points that each window has of its own */
+    POVRAY_JITTER_CELLS = 3   /* the same in a replicate, at most; one random point in each cell */
 };
 /* Probability of the roulette in a replicate's two pictures. */
 #define POVRAY_ROULETTE 0.1
@@ -29,17 +31,19 @@ enum {
 #define POVRAY_TOP_VALUE 16.0
 
 struct povray_picture {
-    char name[32]; /* "fine_07", "indirect_012", "direct_012" */
+    char name[32]; /* "fine_07_0", "indirect_012_0", "direct_012_0"; the last number is the pass */
     int grid;      /* rendered grid times as wide and high, then averaged */
     int block;     /* 4 .. 64 pixels */
     struct povray_variant variant;
 };
 
-/* Window j, 0 <= j < POVRAY_WINDOWS, of a picture of width x height. The shifts are a Hammersley set
+/* Both are of pass `pass` of the plan.
+ * Window j, 0 <= j < POVRAY_WINDOWS, of a picture of width x height. The shifts are a Hammersley set
  * over one sub-pixel. */
-struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j);
+struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j,
+                                    int pass);
 /* One of the two pictures of replicate i, of which everything random follows from seed. */
 struct povray_picture povray_replicate(const struct povray_plan *plan, int width, int height,
-                                       int grid, int i, uint32_t seed, bool indirect);
+                                       int grid, int i, uint32_t seed, int pass, bool indirect);
 
 #endif

@@ -1,10 +1,18 @@
 #include "povray_plan.h"
 
+#include "povray_glass.h"
+#include "povray_lamp.h"
+
+#include "../renderer/bsdf.h"
+#include "../renderer/environment.h"
+
 #include <assert.h>
 #include <gsl/gsl_math.h>
 
 /* Furnaces agree to 3e-5 up to here; beyond, nobody has looked. */
 #define MAX_RECURSION 20
+/* max_trace_level: mirrors and glass agree up to here, at 250 POV-Ray runs out of stack. */
+#define MAX_LEVELS 60
 /* POV-Ray ignores hits nearer than 1e-4, shadows nearer than 1e-3 and anything beyond 1e7. Extents
  * of 0.05 to 5e5 were seen to be right; at 5e-3 direct light was 9 % wrong. */
 #define MIN_EXTENT 0.05
@@ -49,7 +57,7 @@ static double nearest_geometry(const struct scene *s, vec3 eye)
 
 static bool reflects(const struct material *m)
 {
-    return !rgb_is_zero(m->reflectance);
+    return !bsdf_is_black(m);
 }
 
 /* A plane does not see itself: there is no indirect light to wait for. */
@@ -76,44 +84,12 @@ static bool one_plane_reflects(const struct scene *s, double extent)
     return true;
 }
 
-bool povray_lamp(const struct scene *s, const struct light *l, struct povray_lamp *out)
-{
-    if (l->kind != LIGHT_TRIANGLES || l->count != 2)
-        return false;
-    const struct material *m = &s->materials[s->tri_material[l->first]];
-    if (reflects(m) || m->radiance_both_sides ||
-        s->tri_material[l->first + 1] != s->tri_material[l->first])
-        return false;
-    const vec3 *p = &s->position[3 * (size_t)l->first], *q = p + 3;
-    vec3 n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
-    float size = length(sub(p[1], p[0])) + length(sub(p[2], p[0]));
-    /* One corner of each triangle is its own; the fourth corner mirrors it in the middle of the
-     * shared edge. */
-    for (int i = 0; i < 3; i++) {
-        vec3 own = p[i], b = p[(i + 1) % 3], c = p[(i + 2) % 3];
-        vec3 fourth = sub(add(b, c), own);
-        for (int j = 0; j < 3; j++) {
-            vec3 e = sub(q[j], fourth), f = sub(q[(j + 1) % 3], c), g = sub(q[(j + 2) % 3], b);
-            if (length(e) + length(f) + length(g) > 1e-5f * size)
-                continue;
-            *out = (struct povray_lamp){.corner = own,
-                                        .edge1 = sub(b, own),
-                                        .edge2 = sub(c, own),
-                                        .normal = normalize(n),
-                                        .radiance = m->radiance,
-                                        .area = length(n)};
-            return true;
-        }
-    }
-    return false;
-}
-
 static bool check_material(const struct material *m, struct err *e)
 {
+    if (m->kind == MATERIAL_MICROFACET)
+        return err_set(e, "POV-Ray has no microfacets: material '%s'", m->name);
     if (m->kind != MATERIAL_DIFFUSE)
-        return err_set(e,
-                       "POV-Ray: material '%s' is not diffuse, which this version does not export",
-                       m->name);
+        return true;
     rgb a = m->reflectance, l = m->radiance;
     if (reflects(m) && ((a.r == 0 && l.r > 0) || (a.g == 0 && l.g > 0) || (a.b == 0 && l.b > 0)))
         return err_set(
@@ -160,53 +136,154 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
     return true;
 }
 
-static bool plan_lights(const struct scene *s, struct povray_plan *p, struct err *e)
+/* What there is in a scene, of objects that reflect and of lights. */
+struct census {
+    bool diffuse, specular;
+    bool sources; /* point, spot, directional lights and lamps */
+    bool glow;    /* emitters that are no lamps, and the environment */
+    int lamps;
+};
+
+static void count_materials(const struct scene *s, struct census *n)
 {
-    int delta = 0, other = 0;
-    double radiance = 0;
+    for (uint32_t i = 0; i < s->num_objects; i++) {
+        const struct material *m = &s->materials[s->objects[i].material];
+        n->diffuse |= reflects(m) && m->kind == MATERIAL_DIFFUSE;
+        n->specular |= reflects(m) && m->kind != MATERIAL_DIFFUSE;
+    }
+}
+
+static bool plan_falloff(const struct light *l, struct povray_plan *p, struct err *e)
+{
+    bool constant = l->attenuation[0] > 0 && l->attenuation[1] == 0 && l->attenuation[2] == 0;
+    bool square = l->attenuation[0] == 0 && l->attenuation[1] == 0 && l->attenuation[2] > 0;
+    if (!constant && !square)
+        return err_set(e, "POV-Ray cannot express a light whose falloff is neither constant nor "
+                          "purely quadratic");
+    double r = 0.5 * p->extent;
+    double falloff = constant ? (double)l->attenuation[0] : (double)l->attenuation[2] * r * r;
+    p->radiance = fmax(p->radiance, (double)rgb_max(l->value) / falloff / M_PI);
+    return true;
+}
+
+static bool plan_environment(const struct environment *env, struct povray_plan *p, struct err *e)
+{
+    struct environment_parts sky = environment_parts(env);
+    if (environment_is_hidden(env))
+        return err_set(e, "POV-Ray cannot express ambient light that only diffuse surfaces see");
+    if (sky.width > POVRAY_MOST_TEXELS || sky.height > POVRAY_MOST_TEXELS)
+        return err_set(e, "POV-Ray: the environment is %u x %u, of which 254 x 254 is the most",
+                       sky.width, sky.height);
+    p->radiance = fmax(p->radiance, (double)rgb_max(sky.radiance));
+    for (size_t i = 0; i < (size_t)sky.width * sky.height; i++)
+        p->radiance = fmax(p->radiance, (double)rgb_max(sky.texel[i]));
+    return true;
+}
+
+static bool plan_lights(const struct scene *s, struct povray_plan *p, struct census *n,
+                        struct err *e)
+{
     for (uint32_t i = 0; i < s->num_lights; i++) {
         const struct light *l = &s->lights[i];
         struct povray_lamp lamp;
         switch (l->kind) {
-        case LIGHT_POINT: {
-            bool constant =
-                l->attenuation[0] > 0 && l->attenuation[1] == 0 && l->attenuation[2] == 0;
-            bool square = l->attenuation[0] == 0 && l->attenuation[1] == 0 && l->attenuation[2] > 0;
-            if (!constant && !square)
-                return err_set(e, "POV-Ray cannot express a point light whose falloff is neither "
-                                  "constant nor purely quadratic");
-            double r = 0.5 * p->extent;
-            double falloff = constant ? l->attenuation[0] : l->attenuation[2] * r * r;
-            radiance = fmax(radiance, rgb_max(l->value) / falloff / M_PI);
-            delta++;
+        case LIGHT_POINT:
+        case LIGHT_SPOT:
+            if (!plan_falloff(l, p, e))
+                return false;
+            n->sources = true;
+            break;
+        case LIGHT_DIRECTIONAL:
+            p->radiance = fmax(p->radiance, (double)rgb_max(l->value) / M_PI);
+            n->sources = true;
+            break;
+        case LIGHT_ENVIRONMENT:
+            if (!plan_environment(s->environment, p, e))
+                return false;
+            n->glow = true;
+            break;
+        case LIGHT_TRIANGLES:
+        case LIGHT_SPHERE: {
+            bool ball = l->kind == LIGHT_SPHERE;
+            uint32_t material = ball ? s->sphere_material[l->first] : s->tri_material[l->first];
+            if (povray_lamp(s, l, &lamp))
+                n->lamps++;
+            else
+                n->glow = true;
+            p->radiance = fmax(p->radiance, (double)rgb_max(s->materials[material].radiance));
             break;
         }
-        case LIGHT_DIRECTIONAL:
-            radiance = fmax(radiance, rgb_max(l->value) / M_PI);
-            delta++;
-            break;
-        case LIGHT_SPOT:
-        case LIGHT_ENVIRONMENT:
-            return err_set(e, "POV-Ray: light %u: %s is not matched yet", i,
-                           l->kind == LIGHT_SPOT ? "a spot light" : "an environment");
-        case LIGHT_TRIANGLES:
-        case LIGHT_SPHERE:
-            if (!povray_lamp(s, l, &lamp))
-                other++;
-            radiance =
-                fmax(radiance, rgb_max(l->kind == LIGHT_SPHERE
-                                           ? s->materials[s->sphere_material[l->first]].radiance
-                                           : s->materials[s->tri_material[l->first]].radiance));
-            break;
         }
     }
-    if (delta > 0 && other > 0)
-        return err_set(e, "POV-Ray counts the bounces of light sources and of glowing geometry "
-                          "differently: point or directional lights cannot be mixed with emitters "
-                          "that are not black one-sided parallelograms");
-    p->sources = other == 0;
-    p->radiance = radiance > 0 ? radiance : 1;
+    n->sources |= n->lamps > 0;
+    p->num_lamps = n->lamps;
+    if (p->radiance == 0)
+        p->radiance = 1;
     return true;
+}
+
+/* surfaces: of the longest path, the one that emits included. A path that leaves its j-th diffuse
+ * surface begins at level 3j/2 and has surfaces - 1 - j mirrors at most before it. */
+static void set_levels(struct povray_pass *pass, bool specular, int surfaces)
+{
+    pass->levels = specular ? surfaces : MAX_LEVELS;
+    pass->bailout_indirect =
+        specular && pass->recursion > 0 ? fmin(1e-4, 0.2 * exp2(-pass->recursion)) : 1e-9;
+    pass->levels_indirect =
+        specular && pass->recursion > 0 ? surfaces + surfaces / 2 : pass->levels;
+}
+
+static void plan_passes(const struct scene *s, const struct census *n, int depth,
+                        struct povray_plan *p)
+{
+    struct povray_pass lit = {.sources = true}, seen = {.glow = true};
+    bool lone = one_plane_reflects(s, p->extent);
+    if (depth > 1 && !lone)
+        lit.recursion = depth - 1;
+    if (n->diffuse && n->glow)
+        seen.recursion = depth;
+    else if (n->diffuse && n->specular && n->lamps > 0 && depth > 1)
+        seen.recursion =
+            depth - 1; /* a mirror or glass is the last, or the lamp has been sampled */
+    bool needs_lit = n->sources && n->diffuse && depth > 0;
+    bool needs_seen = !needs_lit || n->glow || n->lamps > 0;
+    set_levels(&lit, n->specular, depth);
+    set_levels(&seen, n->specular, depth + 1);
+    if (needs_lit && needs_seen && seen.recursion == 0 && !n->specular) {
+        lit.glow = true;
+        needs_seen = false;
+    }
+    if (needs_lit)
+        p->pass[p->num_passes++] = lit;
+    if (needs_seen)
+        p->pass[p->num_passes++] = seen;
+    p->specular = n->specular;
+}
+
+static bool check_depth(const struct povray_plan *p, const struct census *n, int depth,
+                        struct err *e)
+{
+    for (int i = 0; i < p->num_passes; i++) {
+        const struct povray_pass *pass = &p->pass[i];
+        if (pass->recursion > MAX_RECURSION || pass->levels > MAX_LEVELS)
+            return err_set(e, "POV-Ray is verified to depth %d only, not %d",
+                           pass->recursion > 0 ? MAX_RECURSION + (n->glow ? 0 : 1) : MAX_LEVELS - 1,
+                           depth);
+        if (pass->recursion > 0 && n->specular && depth < POVRAY_LEAST_MIXED_DEPTH)
+            return err_set(e,
+                           "POV-Ray cannot end paths that mix diffuse surfaces with mirrors or "
+                           "glass at depth %d: it needs %d at least",
+                           depth, POVRAY_LEAST_MIXED_DEPTH);
+    }
+    return true;
+}
+
+bool povray_plan_is_noisy(const struct povray_plan *p)
+{
+    bool indirect = false;
+    for (int i = 0; i < p->num_passes; i++)
+        indirect |= p->pass[i].recursion > 0;
+    return indirect && !p->constant;
 }
 
 bool povray_plan(const struct scene *s, const struct camera *c, int depth, struct povray_plan *out,
@@ -214,20 +291,21 @@ bool povray_plan(const struct scene *s, const struct camera *c, int depth, struc
 {
     assert(depth >= 0);
     struct povray_plan p = {0};
+    struct census n = {0};
     p.extent = length(sub(s->bounds_max, s->bounds_min));
     for (uint32_t i = 0; i < s->num_materials; i++)
         if (!check_material(&s->materials[i], e))
             return false;
-    if (!check_normals(s, e) || !check_camera(s, c, p.extent, e) || !plan_lights(s, &p, e))
+    count_materials(s, &n);
+    if (!check_normals(s, e) || !check_camera(s, c, p.extent, e) ||
+        !povray_check_glass(s, c, p.extent, e) || !plan_lights(s, &p, &n, e))
         return false;
-    p.recursion = p.sources ? (depth > 1 ? depth - 1 : 0) : depth;
-    if (s->num_lights == 0 || (p.sources && one_plane_reflects(s, p.extent)))
-        p.recursion = 0;
-    if (p.recursion > MAX_RECURSION)
-        return err_set(e, "POV-Ray is verified to depth %d only, not %d",
-                       MAX_RECURSION + (p.sources ? 1 : 0), depth);
-    p.constant = s->num_triangles == 0 && s->num_spheres == 1 && s->spheres[0].normal_out < 0 &&
-                 length(sub(c->eye, s->spheres[0].centre)) < s->spheres[0].radius && !p.sources;
+    plan_passes(s, &n, depth, &p);
+    if (!check_depth(&p, &n, depth, e))
+        return false;
+    p.constant = s->num_triangles == 0 && s->num_spheres == 1 && s->num_lights == 1 &&
+                 s->spheres[0].normal_out < 0 && n.diffuse && n.glow &&
+                 length(sub(c->eye, s->spheres[0].centre)) < s->spheres[0].radius;
     *out = p;
     return true;
 }

@@ -38,6 +38,9 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
+/* The entry first, then the image. True also where there is none. */
+bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+    __attribute__((warn_unused_result));
 /* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the
  * EXR's hash differs from the manifest's, or if size, depth, spp, replicates are not those of the
  * suite. *manifest is a new reference. */

@@ -25,15 +25,24 @@ static bool hash_binary(const char *name, char hex[65], struct err *e)
 static bool hash_cycles(const struct reference_job *job, const char *path, char hex[3][65],
                         struct err *e)
 {
-    char script[4096];
-    if (snprintf(script, sizeof script, "%s/cycles.py", job->opt->share_dir) >= (int)sizeof script)
-        return err_set(e, "%.64s...: path too long", job->opt->share_dir);
-    return hash_binary("blender", hex[0], e) && sha256_file(script, hex[1], e) &&
+    static const char *const scripts[] = {"cycles", "cycles_blender", "cycles_geometry",
+                                          "cycles_light", "cycles_material"};
+    char all[65 * 5] = "";
+    for (size_t i = 0; i < sizeof scripts / sizeof *scripts; i++) {
+        char script[4096];
+        if (snprintf(script, sizeof script, "%s/%s.py", job->opt->share_dir, scripts[i]) >=
+            (int)sizeof script)
+            return err_set(e, "%.64s...: path too long", job->opt->share_dir);
+        if (!sha256_file(script, all + 64 * i, e))
+            return false;
+    }
+    sha256_text(all, hex[1]);
+    return hash_binary("blender", hex[0], e) &&
            export_cycles(job->scene, job->camera, job->suite->depth, path, e) &&
            sha256_file(path, hex[2], e);
 }
 
-/* One picture of each of the three kinds; the others differ from them by the seed. */
+/* One picture of each of the three kinds in each pass; the others differ from them by the seed. */
 static bool hash_povray(const struct reference_job *job, const char *path, char hex[3][65],
                         struct err *e)
 {
@@ -43,17 +52,17 @@ static bool hash_povray(const struct reference_job *job, const char *path, char 
         !povray_plan(job->scene, job->camera, s->depth, &plan, e))
         return false;
     uint32_t seed = replicate_seed(job->opt->seed, 0);
-    const struct povray_picture picture[3] = {
-        povray_window(&plan, s->width, s->height, 0),
-        povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed, true),
-        povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed, false)};
     FILE *f = fopen(path, "w");
     if (f == NULL)
         return err_set(e, "%s: cannot write: %s", path, strerror(errno));
     bool ok = true;
-    for (int i = 0; ok && i < 3; i++) {
-        fprintf(f, "// grid %d, block %d\n", picture[i].grid, picture[i].block);
-        ok = export_povray(job->scene, job->camera, s->depth, &picture[i].variant, f, e);
+    for (int i = 0; ok && i < 3 * plan.num_passes; i++) {
+        struct povray_picture p =
+            i % 3 == 0 ? povray_window(&plan, s->width, s->height, 0, i / 3)
+                       : povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed,
+                                          i / 3, i % 3 == 1);
+        fprintf(f, "// grid %d, block %d\n", p.grid, p.block);
+        ok = export_povray(job->scene, job->camera, s->depth, &p.variant, f, e);
     }
     fprintf(f, "// %d windows\n", POVRAY_WINDOWS);
     if (fclose(f) != 0 && ok)

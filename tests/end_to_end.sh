@@ -254,6 +254,18 @@ expect "report of claims and convergence" 0 "joined.html" "$san_assay" report \
 # export.
 expect "export to POV-Ray" 0 "c.pov" "$san_assay" export -o "$tmp/c.pov" $scene
 expect "export to Cycles" 0 "c.json" "$san_assay" export -o "$tmp/c.json" $scene
+expect "export to Mitsuba" 0 "c.xml" \
+    "$san_assay" export -o "$tmp/c.xml" -m 3 -b 0.1 -d 2 -e "$tmp/a.exr" $scene
+if xmllint --noout "$tmp/c.xml" && grep -q 'thinlens' "$tmp/c.xml" && [ -s "$tmp/c_environment.exr" ] &&
+    [ "$(grep -c 'type="ply"' "$tmp/c.xml")" -eq "$(ls "$tmp"/c_object_*.ply | wc -l)" ]; then
+    ok "the Mitsuba scene is XML, with its files"
+else not_ok "the Mitsuba scene is XML, with its files" "$(ls "$tmp"/c[._]*)"; fi
+expect "export to pbrt" 0 "c.pbrt" "$san_assay" export -o "$tmp/c.pbrt" -b 0.1 -d 2 $scene
+expect "export: what pbrt has not" 3 "no environment picture" \
+    "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene
+if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
+    ok "a refused export leaves no file"
+fi
 expect "export: unknown kind" 3 "neither" "$san_assay" export -o "$tmp/c.txt" $scene
 
 # validate, against the goldens.
@@ -286,6 +298,64 @@ expect "a program that writes nothing is not judged" 3 "pathtracer.exr" \
 expect "a missing program is not judged" 3 "nothing-here" \
     $validate --only 11_furnace --pathtracer "$tmp/nothing-here"
 
+# Further renderers. student_tracer shares no code with ours; it reads the exported Mitsuba scene.
+engine_path=$build:$build/tests:$PATH
+student="$validate --only 12_point_plane --engine-spp 16 --engine-replicates 8"
+expect "another renderer is judged" 0 "student *pathtracer .*EQUIVALENT *EQUIVALENT" \
+    env PATH="$engine_path" $student --engine student
+# engine COMMAND [EXPRESSES]: the description of fake.sh, which is beside it.
+engine() {
+    cat >"$tmp/fake.json" <<EOF
+{"name": "fake", "format": "mitsuba", "output": "mean", "image": "pfm", "command": [$1],
+ "expresses": [${2:-"\"diffuse\", \"point\""}]}
+EOF
+}
+# fake SCRIPT: a renderer that gets scene, spp, seed and out.
+fake() {
+    printf '#!/bin/sh\n%s\n' "$1" >"$tmp/fake.sh"
+    chmod +x "$tmp/fake.sh"
+}
+command='"./fake.sh", "{scene}", "{spp}", "{seed}", "{out}"'
+engine "$command"
+fake 'exec student_tracer "$@" 1.05'
+expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
+    env PATH="$engine_path" $student --engine "$tmp/fake.json"
+bad_engine() { # NAME PATTERN SCRIPT
+    fake "$3"
+    expect "a renderer that $1 is not judged" 3 "$2" $student --engine "$tmp/fake.json" --timeout 15
+}
+pfm='printf "PF\n64 64\n-1.0\n";'
+bad_engine "exits with 1" "exit status 1: no light" 'echo no light; exit 1'
+bad_engine "hangs" "no end after 15 s" 'sleep 100'
+bad_engine "writes nothing" "replicate_0000.pfm: cannot read" ':'
+bad_engine "writes garbage" "replicate_0000.pfm" 'echo garbage >$4'
+bad_engine "writes another size" "3 x 1 pixels, not 64 x 64" \
+    'printf "PF\n3 1\n-1.0\n123456789012123456789012123456789012" >$4'
+bad_engine "writes NaN" "is not finite" "($pfm head -c 49152 /dev/zero | tr '\\0' '\\377') >\$4"
+bad_engine "ignores its seed" "the seed has no effect" "($pfm yes abcdefg | head -c 49152) >\$4"
+rm "$tmp/fake.sh"
+expect "a renderer that is not there is not judged" 3 "fake.sh: no such program" \
+    $student --engine "$tmp/fake.json"
+bad_description() { # NAME PATTERN
+    expect "description: $1" 3 "fake.json: .*$2" \
+        "$san_assay" validate --only 12_point_plane --engine "$tmp/fake.json"
+}
+engine "$command, \"{samples}\""
+bad_description "unknown placeholder" "'command' \[5\]: unknown placeholder '{samples}'"
+engine '"x", "{scene}", "{out}"'
+bad_description "no seed" "no {seed}"
+engine "$command" '"magic"'
+bad_description "unknown feature" "'magic' is no feature"
+echo '{"name": "fake", "colour": 1}' >"$tmp/fake.json"
+bad_description "unknown key" "unknown key 'colour'"
+engine "$command" '"diffuse"'
+expect "a renderer that can express nothing" 3 "fake can express none .*does not list: point" \
+    $student --engine "$tmp/fake.json"
+sed 's/"point", //' reference/engines/student.json >"$tmp/no_points.json"
+expect "what a renderer cannot express is listed" 0 "student cannot express 12_point_plane" \
+    env PATH="$engine_path" $validate --only 11_furnace --only 12_point_plane \
+    --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
+
 # Missing, stale and damaged goldens are never a pass.
 expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
 cp -R golden "$tmp/golden"
@@ -311,6 +381,8 @@ expect "golden approve: the same again" 0 "1 unchanged" \
     $golden approve --from golden --golden "$tmp/store" 11_furnace/cycles
 expect "golden approve: no candidate" 3 "no candidate in" \
     $golden approve --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve --all: none needed" 0 "0 approved, 0 unchanged" \
+    $golden approve --all --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
 expect "golden approve: not in the suite" 3 "no such reference" \
     $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
 cp -R golden/41_cornell "$tmp/store/98_deleted"

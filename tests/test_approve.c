@@ -276,6 +276,14 @@ static void states_have_names_and_orphans_are_found(void **state)
     assert_int_equal(json_object_size(names), 1);
     assert_true(json_is_true(json_object_get(names, "12_plane/povray")));
     json_decref(names);
+    assert_true(golden_remove(f->golden, "12_plane", "povray", &e));
+    assert_true(golden_remove(f->golden, "12_plane", "povray", &e)); /* gone: fine */
+    assert_true(golden_remove(f->golden, "12_other", "povray", &e));
+    struct golden g;
+    golden_inspect(f->golden, &f->scene, &f->ref, &g);
+    assert_int_equal(g.state, GOLDEN_MISSING);
+    golden_free(&g);
+    render(f, f->golden, 1, 1);
     suite.num_scenes = 0;
     assert_true(golden_orphans(f->golden, &suite, &names, &e));
     assert_int_equal(json_object_size(names), 2);
@@ -296,8 +304,8 @@ static void render_twice(struct fixture *f, const char *program, struct suite_sc
                                               .timeout_s = 600,
                                               .work_dir = f->dir,
                                               .share_dir = "reference"};
-        struct moments m;
-        json_t *manifest;
+        struct moments m = {0};
+        json_t *manifest = NULL;
         struct err e;
         if (!reference_key(&scene, &ref, &opt, key[i], &e) ||
             !reference_render(&scene, &ref, &opt, &m, &manifest, &e) ||

@@ -140,7 +140,7 @@ static void equal_replicates_are_refused(void **state)
 
 /* 16 x 16 pixels of noise, uniform in 1 .. 2; a replicate that shares all but `own` of its pixels with the
  * one before it. */
-static void write_noise(struct fixture *f, int k, size_t own, uint64_t *random, struct image *im)
+static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, struct image *im)
 {
     char path[128];
     struct err e;
@@ -149,13 +149,13 @@ static void write_noise(struct fixture *f, int k, size_t own, uint64_t *random, 
         im->data[i] = 1 + (float)(*random >> 40) * 0x1p-24f;
     }
     snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
-    fail_on(image_write_exr(path, im, &e), &e);
+    probe_ok(image_write_exr(path, im, &e), &e);
 }
 
 /* Different pictures all, but two were made with the same random numbers up to the last row. */
 static void replicates_that_share_their_noise_are_refused(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     static const char *const names[] = {"R", "G", "B"};
     struct image im;
     struct moments m;
@@ -166,10 +166,10 @@ static void replicates_that_share_their_noise_are_refused(void **state)
     f->ref.replicates = 4;
     plain_scene(f);
     stand_in(f, OK);
-    fail_on(image_alloc(&im, 16, 16, 3, names, &e), &e);
+    probe_ok(image_alloc(&im, 16, 16, 3, names, &e), &e);
     for (int k = 0; k < 4; k++)
         write_noise(f, k, 256, &random, &im);
-    fail_on(cycles_render(&f->job, &m, manifest, &e), &e); /* these are independent */
+    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e); /* these are independent */
     const json_t *test = json_object_get(manifest, "independence");
     assert_true(json_is_true(json_object_get(test, "tested")));
     assert_true(json_is_true(json_object_get(test, "passed")));

@@ -367,8 +367,8 @@ static void mirror_with_tilted_normals(void **state)
     set_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), 120);
     probe_render(f, &m);
-    /* Cycles moves reflections nearer than 0.01 to the true surface up to there: here a quarter of
-     * the view's diagonal runs along that line. */
+    /* Cycles moves reflections nearer than 0.01 to the true surface up to there: the line along which
+     * they graze it crosses the whole picture. */
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, tilted_mirror_radiance, &sky), 3e-3,
                 false);
 }

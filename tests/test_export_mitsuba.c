@@ -50,7 +50,7 @@ static const char *path_of(const char *name)
 static struct camera finish(struct scene *s)
 {
     struct err e;
-    struct camera c;
+    struct camera c = {0};
     if (!scene_finish(s, "test", &e) || !camera_init(&c, s, 40, 30, &e))
         fail_msg("%s", e.msg);
     return c;

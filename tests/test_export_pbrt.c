@@ -253,7 +253,7 @@ static void export(const struct scene *s, const struct camera *c, int depth)
 static struct camera finish(struct scene *s)
 {
     struct err e;
-    struct camera c;
+    struct camera c = {0};
     if (!scene_finish(s, "test", &e) || !camera_init(&c, s, 40, 30, &e))
         fail_msg("%s", e.msg);
     return c;

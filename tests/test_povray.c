@@ -1,13 +1,11 @@
 /* The POV-Ray driver: the pictures of a replicate, an engine that fails (a shell script that is
  * called povray), and POV-Ray itself against closed forms and against our own renderer. */
 #include "build_scene.h"
+#include "povray_fixture.h"
 
-#include "../reference/job.h"
 #include "../reference/povray_picture.h"
-#include "../reference/process.h"
 #include "../reference/truth.h"
 #include "../renderer/fs.h"
-#include "../renderer/render.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
@@ -25,14 +23,19 @@
 #define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
 
 static const struct povray_plan bright = {
-    .sources = true, .recursion = 4, .extent = 3, .radiance = 10};
+    .pass = {{.sources = true, .glow = true, .recursion = 4, .levels = 60, .levels_indirect = 60}},
+    .num_passes = 1,
+    .num_lamps = 1,
+    .extent = 3,
+    .radiance = 10};
 
 static bool same_variant(const struct povray_variant *a, const struct povray_variant *b)
 {
-    return memcmp(a->rotation, b->rotation, sizeof a->rotation) == 0 &&
-           a->lamp_cells == b->lamp_cells && a->lamp_jitter == b->lamp_jitter &&
-           a->lamp_seed == b->lamp_seed && a->shift_x == b->shift_x && a->shift_y == b->shift_y &&
-           a->roulette == b->roulette && a->scale == b->scale;
+    return memcmp(a->rotation, b->rotation, sizeof a->rotation) == 0 && a->pass == b->pass &&
+           a->lamp_cells == b->lamp_cells && a->rule == b->rule &&
+           a->indirect_levels == b->indirect_levels && a->lamp_seed == b->lamp_seed &&
+           a->shift_x == b->shift_x && a->shift_y == b->shift_y && a->roulette == b->roulette &&
+           a->scale == b->scale;
 }
 
 /* The pair differs in radiosity only; two replicates differ in all that stands for a seed. */
@@ -42,10 +45,10 @@ static void test_replicate_pair(void **state)
     bool seen[65] = {false};
     for (int i = 0; i < 61; i++) {
         uint32_t seed = replicate_seed(3, i);
-        struct povray_picture a = povray_replicate(&bright, 128, 64, 4, i, seed, true);
-        struct povray_picture b = povray_replicate(&bright, 128, 64, 4, i, seed, false);
+        struct povray_picture a = povray_replicate(&bright, 128, 64, 4, i, seed, 0, true);
+        struct povray_picture b = povray_replicate(&bright, 128, 64, 4, i, seed, 0, false);
         struct povray_picture c =
-            povray_replicate(&bright, 128, 64, 4, i + 1, replicate_seed(3, i + 1), true);
+            povray_replicate(&bright, 128, 64, 4, i + 1, replicate_seed(3, i + 1), 0, true);
         assert_true(a.variant.indirect && !b.variant.indirect);
         assert_true(same_variant(&a.variant, &b.variant));
         assert_true(a.block == b.block && a.grid == 4 && b.grid == 4);
@@ -79,14 +82,15 @@ static void test_windows(void **state)
     bool column[32] = {false}, row[32] = {false};
     double sum_x = 0, sum_y = 0;
     for (int j = 0; j < POVRAY_WINDOWS; j++) {
-        struct povray_picture p = povray_window(&bright, 100, 50, j);
+        struct povray_picture p = povray_window(&bright, 100, 50, j, 0);
         double x = p.variant.shift_x * p.grid * 100 + .5, y = p.variant.shift_y * p.grid * 50 + .5;
         assert_true(x > 0 && x < 1 && y > 0 && y < 1);
         assert_false(column[(int)(32 * x)] || row[(int)(32 * y)]);
         column[(int)(32 * x)] = row[(int)(32 * y)] = true;
         sum_x += x;
         sum_y += y;
-        assert_true(!p.variant.indirect && !p.variant.lamp_jitter && p.variant.roulette == 0);
+        assert_true(!p.variant.indirect && p.variant.rule == POVRAY_GAUSS &&
+                    p.variant.roulette == 0);
     }
     assert_near(sum_x, 16, 1e-9);
     assert_near(sum_y, 16, 1e-9);
@@ -98,7 +102,7 @@ static double sum_of_component(int n, int row, int column, double power)
     double sum = 0;
     for (int i = 0; i < n; i++) {
         struct povray_picture p =
-            povray_replicate(&bright, 8, 8, 1, i, replicate_seed(20261121, i), true);
+            povray_replicate(&bright, 8, 8, 1, i, replicate_seed(20261121, i), 0, true);
         sum += pow(p.variant.rotation[row][column], power);
     }
     return sum;
@@ -123,68 +127,6 @@ static void test_rotations_are_uniform(void **state)
     for (int i = 0; i < n; i++)
         sum += pow(cos(2 * M_PI * (i + .5) / n), 2);
     assert_true(fabs((sum - n / 3.0) / sqrt(n * 4 / 45.0)) > 4.89);
-}
-
-/* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
-enum { THREADS = 8 };
-
-/* What povray_render() is given, in a directory that goes with it. */
-struct fixture {
-    char dir[64];
-    struct scene s;
-    struct camera c;
-    struct suite_scene suite;
-    struct suite_reference ref;
-    struct reference_options opt;
-    struct reference_job job;
-};
-
-static void fixture_init(struct fixture *f, struct scene s, int size, int depth)
-{
-    struct err e;
-    *f = (struct fixture){.dir = "/tmp/test_povray.XXXXXX",
-                          .s = s,
-                          .suite = {.width = size, .height = size, .depth = depth},
-                          .ref = {.replicates = 2, .subgrid = 1},
-                          .opt = {.seed = 1, .threads = THREADS, .timeout_s = 60}};
-    assert_non_null(mkdtemp(f->dir));
-    if (!scene_finish(&f->s, "test", &e) || !camera_init(&f->c, &f->s, size, size, &e))
-        fail_msg("%s", e.msg);
-    f->job = (struct reference_job){.suite = &f->suite,
-                                    .ref = &f->ref,
-                                    .opt = &f->opt,
-                                    .scene = &f->s,
-                                    .camera = &f->c,
-                                    .dir = f->dir};
-}
-
-static void fixture_free(struct fixture *f)
-{
-    struct err e;
-    assert_true(remove_tree(f->dir, &e));
-    scene_free(&f->s);
-}
-
-static struct moments must_render(struct fixture *f, json_t *manifest)
-{
-    struct err e;
-    struct moments m;
-    if (!povray_render(&f->job, &m, manifest, &e))
-        fail_msg("%s", e.msg);
-    return m;
-}
-
-/* Looks straight down at the plane y = 0 from height h; the picture is 2 h x 2 h wide. */
-static void look_down(struct scene *s, float h)
-{
-    s->camera = (struct scene_camera){.present = true,
-                                      .right = {1, 0, 0},
-                                      .up = {0, 0, -1},
-                                      .backward = {0, 1, 0},
-                                      .eye = {0, h, 0},
-                                      .hfov = PI_F / 2,
-                                      .near = 1e-3f,
-                                      .far = 1e3f};
 }
 
 static const rgb plane_albedo = {.8f, .5f, .3f};
@@ -346,15 +288,6 @@ static void test_implausible_pictures(void **state)
     unlink(large);
 }
 
-static bool have_povray(void)
-{
-    char path[4096];
-    if (process_find("povray", path, sizeof path))
-        return true;
-    print_message("SKIPPED: povray is not in PATH; POV-Ray itself was not tested\n");
-    return false;
-}
-
 /* Largest relative difference of a picture from a closed form, and that of the mean. The picture
  * shows [-1/2, 1/2]^2; a pixel is the mean of 8 x 8 points. */
 static void compare(const struct moments *m, double (*irradiance)(double, double), rgb light,
@@ -475,44 +408,6 @@ static void test_furnace(void **state)
         json_decref(manifest);
         fixture_free(&f);
     }
-}
-
-static double image_mean(const struct moments *m, int channel)
-{
-    double sum = 0;
-    for (int i = 0; i < m->width * m->height; i++)
-        sum += m->mean[3 * i + channel];
-    return sum / (m->width * m->height);
-}
-
-/* Our own renderer: image means of paths of up to `depth` bounces, and their variances. */
-static void render_ours(struct fixture *f, int depth, double mean[3], double variance[3])
-{
-    struct err e;
-    struct progress quiet;
-    struct render_stats stats;
-    struct moments m;
-    progress_start(&quiet, "test", NULL, true);
-    struct bvh *bvh = bvh_build(&f->s, BVH_SAH, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = {.kind = INTEGRATE_PATHS,
-                                              .direct = DIRECT_MIS,
-                                              .max_bounces = depth,
-                                              .light_samples = 1,
-                                              .sampler = {SAMPLER_INDEPENDENT, 5}},
-                               .width = f->suite.width,
-                               .height = f->suite.height,
-                               .num_samples = 4096,
-                               .threads = 2};
-    assert_true(render(&f->s, &f->c, bvh, &o, &quiet, &m, &stats, &e));
-    for (int k = 0; k < 3; k++) {
-        mean[k] = image_mean(&m, k);
-        variance[k] = 0;
-        for (int i = 0; i < m.width * m.height; i++)
-            variance[k] += moments_var_of_mean(&m, (size_t)i, k) / pow(m.width * m.height, 2);
-    }
-    moments_free(&m);
-    bvh_free(bvh);
 }
 
 /* H0: POV-Ray's image mean is ours, to five bounces. 6 independent calls with a seed each give 6

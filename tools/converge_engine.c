@@ -1,7 +1,7 @@
 #include "converge_engine.h"
 
 #include "../reference/job.h"
-#include "../reference/process.h"
+#include "ours.h"
 
 #include <assert.h>
 #include <math.h>
@@ -30,46 +30,23 @@ static uint32_t seed_of(const struct converge_job *job, int engine, int rung, in
 static bool run_pathtracer(const struct converge_job *job, const char *sampler, int spp,
                            uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
 {
-    const struct suite_scene *s = job->scene;
-    char path[4224], log[4224], text[7][32];
+    char path[4224], log[4224];
+    const char *const options[] = {"--sampler", sampler, NULL};
     snprintf(path, sizeof path, "%.4096s/pathtracer.exr", job->dir);
     snprintf(log, sizeof log, "%.4096s/pathtracer.log", job->dir);
-    snprintf(text[0], sizeof text[0], "%d", s->width);
-    snprintf(text[1], sizeof text[1], "%d", s->height);
-    snprintf(text[2], sizeof text[2], "%d", spp);
-    snprintf(text[3], sizeof text[3], "%d", s->depth);
-    snprintf(text[4], sizeof text[4], "%d", job->threads);
-    snprintf(text[5], sizeof text[5], "%u", (unsigned)seed);
-    char lens[32], focus[32];
-    snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
-    snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
-    const char *argv[32] = {
-        job->pathtracer, "-r",     text[0], text[1],     "-s",    text[2], "-m", text[3], "-t",
-        text[4],         "--seed", text[5], "--sampler", sampler, "-f",    path, s->dae};
-    int argc = 17;
-    if (s->environment[0] != '\0') {
-        argv[argc++] = "-e";
-        argv[argc++] = s->environment;
-    }
-    if (s->lens_radius > 0) {
-        argv[argc++] = "-b";
-        argv[argc++] = lens;
-        argv[argc++] = "-d";
-        argv[argc++] = focus;
-    }
-    const struct process p = {.argv = argv, .log = log, .timeout_s = job->timeout_s};
-    struct process_usage usage;
-    if (!process_run(&p, &usage, e) || !moments_read(path, out, NULL, e))
-        return false;
-    *cpu_s = usage.cpu_s;
+    const struct ours_job ours = {.program = job->pathtracer,
+                                  .scene = job->scene,
+                                  .spp = spp,
+                                  .seed = seed,
+                                  .options = options,
+                                  .threads = job->threads,
+                                  .timeout_s = job->timeout_s,
+                                  .picture = path,
+                                  .log = log};
+    bool ok = ours_render(&ours, out, cpu_s, e);
     unlink(path);
     unlink(log);
-    if (out->width == s->width && out->height == s->height)
-        return true;
-    err_set(e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d", s->name, out->width,
-            out->height, s->width, s->height);
-    moments_free(out);
-    return false;
+    return ok;
 }
 
 static bool render_ours(const struct converge_job *job, enum converge_engine engine, int rung,

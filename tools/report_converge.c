@@ -171,16 +171,15 @@ static void write_plot(FILE *f, const json_t *scene, bool against_time)
     write_legend(f, engines);
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text></svg>",
             LEFT + PLOT_WIDTH / 2, BOTTOM + 34, what);
-    fputs(
-        against_time
-            ? "<figcaption><b>Error against time.</b> Further left is better: the same error for "
-              "less work. Times are this machine's.</figcaption></figure>\n"
-            : "<figcaption><b>Error against samples.</b> The RMS error of one picture, in per cent "
-              "of the mean radiance, with the noise of the reference taken out. The dashed line "
-              "falls as the square root of the samples does, which is what independent samples "
-              "must do; stratified ones may fall faster. A line that bends flat has a bias. "
-              "Upright strokes are intervals.</figcaption></figure>\n",
-        f);
+    fputs(against_time
+              ? "<figcaption><b>Error against time.</b> Further left is better: the same error for "
+                "less work. Times are this machine's.</figcaption></figure>\n"
+              : "<figcaption><b>Error against samples.</b> The RMS over the pixels of the relative "
+                "error of one picture, with the noise of the reference taken out. The dashed line "
+                "falls as the square root of the samples does, which is what independent samples "
+                "must do; stratified ones may fall faster. A line that bends flat has a bias. "
+                "Upright strokes are intervals.</figcaption></figure>\n",
+          f);
 }
 
 static void write_badge(FILE *f, const char *verdict, enum outcome outcome)
@@ -245,8 +244,8 @@ static void write_rungs(FILE *f, const json_t *scene)
         }
     }
     fputs(
-        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Variance</b>: of one picture, mean over "
-        "the pixels, in units of the squared mean radiance. <b>RMS bias</b>: what is left of the "
+        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Variance</b>: of one picture, relative, mean over "
+        "the pixels. <b>RMS bias</b>: what is left of the "
         "error when noise is taken out; negative where the noise, by chance, was more. "
         "<b>CPU s</b>: of one picture, its share of the engine's start included. "
         "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out.</p>\n",
@@ -285,11 +284,12 @@ static void write_scene(FILE *f, const json_t *scene)
 
 void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
 {
-    size_t judged = 0, wrong = 0, errors = 0;
+    size_t num = 0, judged = 0, wrong = 0, errors = 0;
     if (convergence == NULL)
         return;
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
+        num += json_array_size(engines);
         for (size_t k = 0; k < json_array_size(engines); k++) {
             const json_t *j = json_array_get(engines, k);
             enum outcome o = convergence_outcome(j);
@@ -301,12 +301,13 @@ void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
     const char *tag = alone ? "h1" : "p";
     fprintf(f, "<%s class=\"%s\">", tag, !alone ? "lede" : errors + wrong == 0 ? "good" : "bad");
     if (errors > 0)
-        fprintf(f, "Convergence: %zu ladders could not be judged, %zu failed.", errors, wrong);
+        fprintf(f, "Convergence: %zu of %zu engines could not be judged, %zu failed.", errors, num,
+                wrong);
     else if (wrong > 0)
-        fprintf(f, "Convergence: %zu of %zu judged ladders did not converge as they must.", wrong,
+        fprintf(f, "Convergence: %zu of %zu judged engines did not converge as they must.", wrong,
                 judged);
     else
-        fprintf(f, "Convergence: all %zu judged ladders converge as they must.", judged);
+        fprintf(f, "Convergence: %zu of %zu judged engines converge as they must.", judged, judged);
     fprintf(f, "</%s>\n", tag);
 }
 

@@ -5,6 +5,7 @@
  *     "command": "assay validate ...", "version": "0.1 (commit)", "date": "2026-..Z",
  *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
  *     "seconds": 98.1,
+ *     "consistency": [ ... ],             consistency_run.h; absent where `assay validate` has not run
  *     "convergence": [ ... ],             convergence.h; absent where `assay converge` has not run
  *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
@@ -23,6 +24,8 @@
  * "data/41_cornell/z_cycles.exr", "relative": "data/41_cornell/rel_cycles.exr"}, "rerun": "assay
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
  * false, "error": "one line" } ] }
+ *
+ * With --engine the root also has "not_expressible": [{"scene":, "engine":, "reason": "one line"}].
  *
  * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where

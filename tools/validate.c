@@ -6,7 +6,9 @@
 #include "../renderer/fs.h"
 #include "../renderer/progress.h"
 #include "claim.h"
+#include "consistency_run.h"
 #include "import_lines.h"
+#include "ours.h"
 #include "results.h"
 
 #include <math.h>
@@ -32,7 +34,7 @@ struct validation {
     struct suite suite;
     const struct suite_scene **order;         /* in which scenes are judged */
     struct side (*reference)[MAX_REFERENCES]; /* per scene: 9x scenes share those of another */
-    json_t *claims;
+    json_t *claims, *consistency;
     bool *engine_can; /* per scene: the further engine can express it */
     double alpha;     /* of one claim */
     int num_claims, done;
@@ -67,7 +69,8 @@ static int count_claims(const struct validation *v, const struct suite_scene *s)
 {
     bool has_truth = find_reference(s, "truth") != NULL;
     return s->num_references + (has_truth ? s->num_references - 1 : 0) +
-           (v->engine_can[s - v->suite.scene] ? s->num_references + 1 : 0);
+           (v->engine_can[s - v->suite.scene] ? s->num_references + 1 : 0) + s->num_variants +
+           (s->consistency.renders > 0);
 }
 
 static void data_path(const struct validation *v, char *path, const char *scene, const char *file)
@@ -81,48 +84,29 @@ static void say(const struct validation *v, const char *scene, const char *what)
         fprintf(stderr, "[%2d/%d] %s: %s\n", v->done, v->num_claims, scene, what);
 }
 
-static void render_ours(const struct validation *v, const struct suite_scene *s, struct side *out)
+static void render_ours(const struct validation *v, const struct suite_scene *s, const char *name,
+                        const struct suite_variant *variant, struct side *out)
 {
-    char path[MAX_PATH], log[MAX_PATH], width[16], height[16], spp[16], depth[16], threads[16];
-    char seed[32], lens[32], focus[32];
-    data_path(v, path, s->name, "pathtracer.exr");
-    data_path(v, log, s->name, "pathtracer.log");
-    snprintf(width, sizeof width, "%d", s->width);
-    snprintf(height, sizeof height, "%d", s->height);
-    snprintf(spp, sizeof spp, "%d", s->spp);
-    snprintf(depth, sizeof depth, "%d", s->depth);
-    snprintf(threads, sizeof threads, "%d", v->opt->threads);
-    snprintf(seed, sizeof seed, "%llu", (unsigned long long)v->opt->seed);
-    snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
-    snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
-    const char *argv[24] = {
-        v->opt->pathtracer, "-r", width, height, "-s",  spp, "-m", depth, "-t", threads,
-        "--seed",           seed, "-f",  path,   s->dae};
-    int argc = 15;
-    if (s->environment[0] != '\0') {
-        argv[argc++] = "-e";
-        argv[argc++] = s->environment;
-    }
-    if (s->lens_radius > 0) {
-        argv[argc++] = "-b";
-        argv[argc++] = lens;
-        argv[argc++] = "-d";
-        argv[argc++] = focus;
-    }
-    const struct process p = {.argv = argv, .log = log, .timeout_s = v->opt->timeout_s};
-    struct process_usage usage;
-    say(v, s->name, "rendering with pathtracer");
+    char path[MAX_PATH], log[MAX_PATH], file[96];
+    snprintf(file, sizeof file, "%s.exr", name);
+    data_path(v, path, s->name, file);
+    snprintf(file, sizeof file, "%s.log", name);
+    data_path(v, log, s->name, file);
+    const struct ours_job job = {.program = v->opt->pathtracer,
+                                 .scene = s,
+                                 .spp = variant != NULL ? variant->spp : s->spp,
+                                 .seed = v->opt->seed,
+                                 .options = variant != NULL ? variant->options : NULL,
+                                 .threads = v->opt->threads,
+                                 .timeout_s = v->opt->timeout_s,
+                                 .picture = path,
+                                 .log = log};
+    char note[128];
+    snprintf(note, sizeof note, "rendering with %s", name);
+    say(v, s->name, note);
     *out = (struct side){0};
-    out->present = make_parent_dirs(path, &out->e) && process_run(&p, &usage, &out->e) &&
-                   moments_read(path, &out->m, NULL, &out->e);
-    if (!out->present)
-        return;
-    out->seconds = usage.cpu_s;
-    if (out->m.width != s->width || out->m.height != s->height) {
-        out->present = err_set(&out->e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d",
-                               s->name, out->m.width, out->m.height, s->width, s->height);
-        moments_free(&out->m);
-    }
+    out->present =
+        make_parent_dirs(path, &out->e) && ours_render(&job, &out->m, &out->seconds, &out->e);
 }
 
 static bool load_reference(const struct validation *v, const struct suite_scene *s,
@@ -301,13 +285,42 @@ static void judge_engine(struct validation *v, const struct suite_scene *s,
     side_free(&engine);
 }
 
+/* Our other ways to the same picture, against the closed form or else the first reference. */
+static void judge_variants(struct validation *v, const struct suite_scene *s,
+                           const struct suite_scene *from)
+{
+    const struct suite_reference *truth = find_reference(s, "truth");
+    int against = truth != NULL ? (int)(truth - s->reference) : 0;
+    for (int i = 0; i < s->num_variants; i++) {
+        struct side ours;
+        struct suite_reference ref = s->reference[against];
+        ref.margin_global = s->variant[i].margin_global;
+        ref.margin_tile = s->variant[i].margin_tile;
+        render_ours(v, s, s->variant[i].name, &s->variant[i], &ours);
+        judge(v, s, from, s->variant[i].name, &ours, &ref, get_reference(v, from, against));
+        side_free(&ours);
+    }
+}
+
+static void judge_consistency(struct validation *v, const struct suite_scene *s)
+{
+    if (s->consistency.renders == 0)
+        return;
+    say(v, s->name, "rendering with seeds of their own");
+    v->done++;
+    json_t *c = consistency_run(v->opt, s, v->alpha);
+    const char *error = member_text(c, "error");
+    say(v, s->name, error != NULL ? error : member_text(c, "verdict"));
+    json_array_append_new(v->consistency, c);
+}
+
 static void validate_scene(struct validation *v, const struct suite_scene *s)
 {
     const struct suite_scene *from = suite_find(&v->suite, s->references_of);
     const struct side *truth_side = NULL;
     const struct suite_reference *truth = find_reference(s, "truth");
     struct side ours;
-    render_ours(v, s, &ours);
+    render_ours(v, s, "pathtracer", NULL, &ours);
     for (int i = 0; i < s->num_references; i++) {
         const struct side *reference = get_reference(v, from, i);
         if (&s->reference[i] == truth)
@@ -320,6 +333,8 @@ static void validate_scene(struct validation *v, const struct suite_scene *s)
     if (v->engine_can[s - v->suite.scene])
         judge_engine(v, s, from, &ours);
     side_free(&ours);
+    judge_variants(v, s, from);
+    judge_consistency(v, s);
 }
 
 static bool check_selection(const struct validation *v, struct err *e)
@@ -330,15 +345,18 @@ static bool check_selection(const struct validation *v, struct err *e)
     return true;
 }
 
-static bool differs_unexpectedly(const json_t *claims)
+static bool differs_unexpectedly(const struct validation *v)
 {
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const json_t *c = json_array_get(claims, i);
+    for (size_t i = 0; i < json_array_size(v->claims); i++) {
+        const json_t *c = json_array_get(v->claims, i);
         const char *verdict = member_text(c, "verdict");
-        if (strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
-            strcmp(member_text(c, "expected"), verdict) != 0)
+        if (verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
+            claim_outcome(c) == OUTCOME_OPPOSITE)
             return true;
     }
+    for (size_t i = 0; i < json_array_size(v->consistency); i++)
+        if (consistency_outcome(json_array_get(v->consistency, i)) == OUTCOME_OPPOSITE)
+            return true;
     return false;
 }
 
@@ -420,6 +438,8 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         goto done;
     }
     v.claims = json_object_get(root, "claims");
+    v.consistency = json_array();
+    json_object_set_new(root, "consistency", v.consistency);
     if (opt->engine != NULL)
         json_object_set(root, "not_expressible", cannot);
     json_object_set_new(root, "mode", json_string(opt->live ? "live" : "golden"));
@@ -438,7 +458,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     for (int i = 0; i < v.suite.num_scenes; i++)
         if (is_selected(opt, v.order[i]->name)) {
             validate_scene(&v, v.order[i]);
-            if (opt->until_different && differs_unexpectedly(v.claims))
+            if (opt->until_different && differs_unexpectedly(&v))
                 break;
         }
     json_object_set_new(root, "seconds", json_real(now_seconds() - start));

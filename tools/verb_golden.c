@@ -11,7 +11,9 @@ enum { MAX_NAMES = 256 };
 enum option { OPT_ALL, OPT_FROM, OPT_GOLDEN, OPT_SUITE, OPT_NEW, OPT_ACCEPT, OPT_ALPHA, OPT_HELP };
 
 static const struct cli_option options[] = {
-    [OPT_ALL] = {0, "all", 0, "", "approve: every reference of the suite"},
+    [OPT_ALL] = {0, "all", 0, "",
+                 "approve every reference of the suite, or of the names given, but\n"
+                 "those that are up to date and have no candidate"},
     [OPT_FROM] = {0, "from", 1, "DIR", "candidates (build/golden-candidate)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
     [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
@@ -34,7 +36,7 @@ static void print_usage(void)
     puts(
         "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
         "       assay golden status [options]          what is stored, and what is wrong with it\n"
-        "       assay golden approve [options] --all | SCENE | SCENE/ENGINE ...\n");
+        "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE] ...\n");
     cli_print_options(stdout, options);
 }
 
@@ -98,13 +100,13 @@ static bool is_selected(const struct settings *s, const struct suite_scene *scen
     for (int i = 0; i < s->num_names; i++)
         if (is_named(s->names[i], scene, ref))
             return true;
-    return s->all;
+    return s->num_names == 0;
 }
 
 /* Every name has to be that of a reference. */
 static bool check_names(const struct settings *s, const struct suite *suite, struct err *e)
 {
-    if (s->all == (s->num_names > 0))
+    if (!s->all && s->num_names == 0)
         return err_set(e, "approve takes --all or names of references (see --help)");
     for (int n = 0; n < s->num_names; n++) {
         const struct suite_scene *scene;
@@ -224,7 +226,8 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     const char *first = "";
     size_t orphans = 0;
     struct err why = {0};
-    if (s->all && !count_orphans(s->opt.from_dir, suite, true, &orphans, &first, &names, &why) &&
+    if (s->num_names == 0 &&
+        !count_orphans(s->opt.from_dir, suite, true, &orphans, &first, &names, &why) &&
         count[APPROVE_IMPOSSIBLE]++ == 0)
         *e = why;
     printf(

@@ -34,7 +34,7 @@ static const struct cli_option options[] = {
     [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
     [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
     [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/work)"},
-    [OPT_SEED] = {0, "seed", 1, "N", "seed of all replicates (1)"},
+    [OPT_SEED] = {0, "seed", 1, "N", "seed of all replicates (that of what is stored, else 1)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for one engine and scene (7200)"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
@@ -44,7 +44,7 @@ struct settings {
     const char *only[MAX_SCENES], *engine, *out, *golden, *suite, *work;
     int num_only;
     struct reference_options opt;
-    bool fresh, done;
+    bool fresh, has_seed, done;
 };
 
 static bool parse(int argc, char **argv, struct settings *s, struct err *e)
@@ -78,6 +78,7 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         case OPT_SEED:
             ok = cli_int("--seed", v, 0, INT32_MAX, &n, e);
             s->opt.seed = ok ? (uint32_t)n : 0;
+            s->has_seed = true;
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &s->opt.threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &s->opt.timeout_s, e); break;
@@ -102,6 +103,18 @@ static bool is_up_to_date(const char *dir, const struct suite_scene *scene,
     return same;
 }
 
+/* What is stored was made with; otherwise a golden approved with another seed would never be up to date. */
+static uint32_t stored_seed(const struct settings *s, const struct suite_scene *scene,
+                            const struct suite_reference *ref)
+{
+    struct golden g;
+    golden_inspect(s->golden, scene, ref, &g);
+    const json_t *seed = json_object_get(g.manifest, "seed");
+    json_int_t n = json_is_integer(seed) ? json_integer_value(seed) : s->opt.seed;
+    golden_free(&g);
+    return n >= 0 && n <= UINT32_MAX ? (uint32_t)n : s->opt.seed;
+}
+
 static bool make_golden(const struct settings *s, const struct suite_scene *scene,
                         const struct suite_reference *ref, struct err *e)
 {
@@ -109,16 +122,26 @@ static bool make_golden(const struct settings *s, const struct suite_scene *scen
     json_t *manifest;
     char key[65];
     double start = now_seconds();
-    if (!reference_key(scene, ref, &s->opt, key, e))
+    struct reference_options opt = s->opt;
+    if (!s->has_seed && s->golden != NULL)
+        opt.seed = stored_seed(s, scene, ref);
+    if (!reference_key(scene, ref, &opt, key, e))
         return false;
-    const char *dirs[2] = {s->golden, s->out};
-    for (int i = 0; !s->fresh && i < 2; i++)
-        if (dirs[i] != NULL && is_up_to_date(dirs[i], scene, ref, key)) {
-            printf("%s/%s/%s.exr: up to date\n", dirs[i], scene->name, ref->engine);
-            return true;
-        }
+    const char *there = NULL;
+    if (!s->fresh && s->golden != NULL && is_up_to_date(s->golden, scene, ref, key))
+        there = s->golden;
+    bool has_candidate = !s->fresh && is_up_to_date(s->out, scene, ref, key);
+    /* An older candidate must not be approved over what is stored by now. */
+    if (there != NULL && !has_candidate && !golden_remove(s->out, scene->name, ref->engine, e))
+        return false;
+    if (there == NULL && has_candidate)
+        there = s->out;
+    if (there != NULL) {
+        printf("%s/%s/%s.exr: up to date\n", there, scene->name, ref->engine);
+        return true;
+    }
     fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
-    if (!reference_render(scene, ref, &s->opt, &m, &manifest, e))
+    if (!reference_render(scene, ref, &opt, &m, &manifest, e))
         return false;
     bool ok =
         json_object_set_new(manifest, "key", json_string(key)) == 0 || err_set(e, "out of memory");

@@ -1,4 +1,5 @@
 #include "../renderer/cli.h"
+#include "consistency_run.h"
 #include "convergence.h"
 #include "report.h"
 #include "results.h"
@@ -28,6 +29,8 @@ static bool print_markdown(const char *path, struct err *e)
     bool ok = !has_claims || results_print_table(results, true, &table, e);
     if (ok && has_claims)
         fputs(table, stdout);
+    if (ok)
+        consistency_print(stdout, json_object_get(results, "consistency"), true);
     if (ok && has_claims && convergence != NULL)
         putchar('\n');
     if (ok && convergence != NULL)

@@ -1,6 +1,7 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "places.h"
+#include "consistency_run.h"
 #include "import_lines.h"
 #include "report.h"
 #include "results.h"
@@ -158,6 +159,7 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
         return false;
     fputs(table, stdout);
     free(table);
+    consistency_print(stdout, json_object_get(results, "consistency"), false);
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
         puts("");
