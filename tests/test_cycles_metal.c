@@ -32,7 +32,7 @@ static struct optics_metal channel_of(const struct metal *a, int k)
 {
     struct optics_metal o = {.ggx = a->ggx, .separable = a->separable, .alpha = a->alpha};
     if (a->conductor)
-        o.n = ETA[k] + K[k] * I;
+        o.n = ETA[k] + K[k] * _Complex_I;
     return o;
 }
 
