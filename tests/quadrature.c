@@ -44,8 +44,8 @@ static double over_x(double x, void *p)
     return value;
 }
 
-double integrate_between(double (*f)(double, double, const void *), const void *ctx,
-                         const double x[2], const double z[2])
+double integrate_plane(double (*f)(double, double, const void *), const void *ctx,
+                       const double x[2], const double z[2])
 {
     gsl_integration_cquad_workspace *outer = gsl_integration_cquad_workspace_alloc(1000);
     struct integrand in = {f, ctx, {z[0], z[1]}, 0, gsl_integration_cquad_workspace_alloc(1000)};

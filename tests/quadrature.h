@@ -14,8 +14,8 @@ bool same(double a, double b);
 /* Integral of f over x[0]..x[1] by z[0]..z[1], nested and adaptive (GSL's CQUAD, which stands
  * kinks), to about 1e-11.
  * Fails the test where it does not converge. */
-double integrate_between(double (*f)(double x, double z, const void *ctx), const void *ctx,
-                         const double x[2], const double z[2]);
+double integrate_plane(double (*f)(double x, double z, const void *ctx), const void *ctx,
+                       const double x[2], const double z[2]);
 
 /* The closed form of a scene of the suite at another size. The caller frees. */
 void render_truth(const char *name, int width, int height, struct moments *out);

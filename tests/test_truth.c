@@ -122,7 +122,7 @@ static double rectangle_by_quadrature(const struct rectangle *r, double x, doubl
                                       enum mistake mistake)
 {
     struct receiver p = {r, x, z, mistake};
-    return integrate_between(transfer, &p, r->x, r->z);
+    return integrate_plane(transfer, &p, r->x, r->z);
 }
 
 /* Lambert's formula: E = L/2 |sum over edges of (angle the edge subtends) (unit normal of the plane
@@ -292,8 +292,8 @@ static void pixels_are_box_filtered(void **state)
         for (size_t i = 0; i < COUNT(pixels); i++) {
             int col = pixels[i][0], row = pixels[i][1];
             double side = 2.0 / 64, x = p->left + side * col, z = p->top + side * row;
-            double mean = integrate_between(p->irradiance, NULL, (double[2]){x, x + side},
-                                            (double[2]){z, z + side}) /
+            double mean = integrate_plane(p->irradiance, NULL, (double[2]){x, x + side},
+                                          (double[2]){z, z + side}) /
                           (side * side);
             for (int c = 0; c < 3; c++)
                 assert_true(

@@ -58,7 +58,7 @@ static void mean_share_matches_quadrature(void **state)
         const struct ramp *r = &ramps[i];
         double unit[2] = {0, 1};
         double mean = truth_disc_share_mean(r->k0, r->a, r->b);
-        assert_true(same(mean, integrate_between(ramp_share, r, unit, unit)));
+        assert_true(same(mean, integrate_plane(ramp_share, r, unit, unit)));
         /* The value in the middle is not the mean. */
         assert_false(same(mean, truth_disc_share(r->k0 + r->a / 2 + r->b / 2)));
     }
@@ -142,7 +142,7 @@ static double over_lens(double u, double v, const void *ctx)
 static double lens_share(const struct pixel *p)
 {
     const double range[2] = {-1, 1};
-    return integrate_between(over_lens, p, range, range);
+    return integrate_plane(over_lens, p, range, range);
 }
 
 static void pixels_match_rays(void **state)

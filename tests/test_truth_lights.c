@@ -432,8 +432,8 @@ static void pixels_are_box_filtered(void **state)
         for (size_t i = 0; i < COUNT(pixels); i++) {
             int col = pixels[i][0], row = pixels[i][1];
             double side = p->side / 64, x = p->left + side * col, z = p->top + side * row;
-            double mean = integrate_between(p->irradiance, NULL, (double[2]){x, x + side},
-                                            (double[2]){z, z + side}) /
+            double mean = integrate_plane(p->irradiance, NULL, (double[2]){x, x + side},
+                                          (double[2]){z, z + side}) /
                           (side * side);
             for (int c = 0; c < 3; c++)
                 assert_true(
