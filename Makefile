@@ -35,7 +35,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_mesh.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -47,17 +47,30 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%)
+check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%) \
+  $(BUILD)/tests/student_tracer
 	tests/run.sh $(BUILD)
+
+# Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
+mutants: all $(BUILD)/libassay.a
+	tests/mutants.sh $(BUILD) $(ONLY)
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
 golden: all $(BUILD)/deps-live
-	$(BUILD)/assay reference --out golden --work $(BUILD)/work $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
+	  $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden approve --all --new --golden golden --from $(BUILD)/golden-candidate $(ONLY)
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
+
+# For tests/mutants.sh.
+print-compile:
+	@echo $(CC) $(filter-out -g,$(cflags))
+print-libs:
+	@echo $(LIBS)
 
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
@@ -66,8 +79,8 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -m 644 reference/cycles.py $(DESTDIR)$(PREFIX)/share/assay
-	cp -R reference/scenes golden $(DESTDIR)$(PREFIX)/share/assay
+	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
+	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
 
 format:
 	clang-format -i $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])
@@ -80,8 +93,10 @@ help:
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
-	@echo 'make golden     render the stored references again (ONLY=SCENE: of one scene)'
+	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
+	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'
@@ -145,8 +160,15 @@ $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
+	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
-programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c))
+programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
+  $(wildcard tests/make_*.c))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -183,7 +205,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

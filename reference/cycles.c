@@ -3,6 +3,7 @@
 #include "job.h"
 
 #include "export_cycles.h"
+#include "independence.h"
 #include "process.h"
 
 #include "../renderer/sha256.h"
@@ -104,7 +105,8 @@ static bool is_constant(const float *pixels_rgb, size_t pixels)
 /* All replicates into *out. Two that are the same betray a seed that was ignored. The exception is
  * light without noise: every pixel has random numbers of its own, so if all pixels of all
  * replicates agree to the bit, no random number matters, and the answer is exact. */
-static bool fold(const struct reference_job *job, struct moments *out, struct err *e)
+static bool fold(const struct reference_job *job, struct moments *out, json_t *manifest,
+                 struct err *e)
 {
     int count = job->ref->replicates, num_constant = 0, num_first = 0;
     uint8_t(*digest)[SHA256_DIGEST_SIZE] = malloc((size_t)count * sizeof *digest);
@@ -115,6 +117,9 @@ static bool fold(const struct reference_job *job, struct moments *out, struct er
         return false;
     }
     size_t pixels = (size_t)out->width * (size_t)out->height;
+    struct replicates all = {0};
+    if (!replicates_alloc(&all, out->width, out->height, count, e))
+        goto fail;
     strcpy(out->unit, "replicate");
     out->spp = job->ref->spp;
     int same = -1;
@@ -134,6 +139,9 @@ static bool fold(const struct reference_job *job, struct moments *out, struct er
         num_first += memcmp(digest[0], digest[k], SHA256_DIGEST_SIZE) == 0;
         num_constant += is_constant(px, pixels);
         moments_add_image(out, px);
+        if (job->opt->on_replicate != NULL)
+            job->opt->on_replicate(job->opt->on_replicate_ctx, k, px);
+        replicates_add(&all, px);
         free(px);
     }
     if (num_constant == count && num_first == count) {
@@ -145,11 +153,16 @@ static bool fold(const struct reference_job *job, struct moments *out, struct er
                 "Cycles: replicate %d is the same image as an earlier one: the seed has no effect",
                 same);
         goto fail;
+    } else if (!independence_check(&all, manifest, e)) {
+        err_prefix(e, "Cycles");
+        goto fail;
     }
+    replicates_free(&all);
     free(digest);
     return true;
 fail:
     moments_free(out);
+    replicates_free(&all);
     free(digest);
     return false;
 }
@@ -202,7 +215,7 @@ bool cycles_render(const struct reference_job *job, struct moments *out, json_t 
             &(struct process){
                 .argv = argv, .cwd = job->dir, .log = log, .timeout_s = job->opt->timeout_s},
             NULL, e) ||
-        !read_report(log, &report, e) || !fold(job, out, e))
+        !read_report(log, &report, e) || !fold(job, out, manifest, e))
         goto out;
 
     for (int i = 0; argv[i] != NULL; i++)

@@ -166,16 +166,14 @@ static void put_entry(const struct povray_writer *w, double at, rgb c)
 
 /* A row of texels as a map around the circle, linear between their centres; its two ends meet half
  * way between the last and the first. */
-static void put_sky_row(const struct povray_writer *w, const struct environment *env, uint32_t row,
-                        uint32_t width)
+static void put_sky_row(const struct povray_writer *w, const rgb *texel, uint32_t width)
 {
-    rgb first = environment_texel(env, 0, row), last = environment_texel(env, width - 1, row);
-    rgb seam = rgb_scale(rgb_add(first, last), 0.5f);
+    rgb seam = rgb_scale(rgb_add(texel[0], texel[width - 1]), 0.5f);
     fputs("function { (atan2(-z,x) + pi)/(2*pi) } color_map {\n      ", w->f);
     put_entry(w, 0, seam);
     for (uint32_t c = 0; c < width; c++) {
         fputs(c % 4 == 3 ? "\n      " : " ", w->f);
-        put_entry(w, (c + 0.5) / width, environment_texel(env, c, row));
+        put_entry(w, (c + 0.5) / width, texel[c]);
     }
     fputc(' ', w->f);
     put_entry(w, 1, seam);
@@ -184,24 +182,22 @@ static void put_sky_row(const struct povray_writer *w, const struct environment 
 
 void povray_put_sky(const struct povray_writer *w)
 {
-    const struct environment *env = w->s->environment;
     const double(*r)[3] = w->v->rotation;
-    uint32_t width, height;
-    if (env == NULL || !w->pass->glow)
+    if (w->s->environment == NULL || !w->pass->glow)
         return;
-    if (!environment_size(env, &width, &height)) {
-        rgb l = environment_radiance(env, v3(0, 1, 0));
-        povray_put_rgb(w, "\n// environment\nbackground { rgb S*", (double)l.r, (double)l.g,
-                       (double)l.b, " }\n");
+    struct environment_parts sky = environment_parts(w->s->environment);
+    if (sky.kind != ENVIRONMENT_IMAGE) {
+        povray_put_rgb(w, "\n// environment\nbackground { rgb S*", (double)sky.radiance.r,
+                       (double)sky.radiance.g, (double)sky.radiance.b, " }\n");
         return;
     }
     fprintf(w->f,
             "\n// environment, %u x %u texels\nsky_sphere { pigment {\n"
             "  function { atan2(sqrt(x*x + z*z),y)/pi } pigment_map {\n",
-            width, height);
-    for (uint32_t row = 0; row < height; row++) {
-        fprintf(w->f, "    [%.9g ", (row + 0.5) / height);
-        put_sky_row(w, env, row, width);
+            sky.width, sky.height);
+    for (uint32_t row = 0; row < sky.height; row++) {
+        fprintf(w->f, "    [%.9g ", (row + 0.5) / sky.height);
+        put_sky_row(w, sky.texel + (size_t)row * sky.width, sky.width);
         fputs("]\n", w->f);
     }
     fputs("  } }\n  matrix <", w->f);

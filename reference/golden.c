@@ -5,6 +5,7 @@
 #include "../renderer/fs.h"
 #include "json_file.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -84,6 +85,28 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     return ok;
 }
 
+bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+{
+    char exr[PATH_SIZE], path[PATH_SIZE];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    if (access(path, F_OK) != 0 && access(exr, F_OK) != 0)
+        return true;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e);
+    bool ok = all != NULL;
+    if (ok && json_object_del(all, engine) == 0)
+        ok = json_write(path, all, e);
+    if (ok && unlink(exr) != 0 && errno != ENOENT)
+        ok = err_set(e, "%s: cannot remove: %s", exr, strerror(errno));
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
 static bool check_number(const json_t *entry, const char *key, int want, const char *where,
                          struct err *e)
 {
@@ -128,50 +151,166 @@ static bool check_entry(const json_t *entry, const struct suite_scene *scene,
 }
 
 /* The image is what its manifest says. */
-static bool check_moments(const struct moments *m, const json_t *entry,
-                          const struct suite_scene *scene, const struct suite_reference *ref,
-                          const char *exr, struct err *e)
+static bool check_moments(const struct moments *m, const json_t *entry, const char *exr,
+                          struct err *e)
 {
-    if (m->width != scene->width || m->height != scene->height)
-        return err_set(e, "%s: %d x %d pixels, its manifest says %d x %d", exr, m->width, m->height,
-                       scene->width, scene->height);
+    json_int_t width = json_integer_value(json_object_get(entry, "width"));
+    json_int_t height = json_integer_value(json_object_get(entry, "height"));
+    if (m->width != width || m->height != height)
+        return err_set(e, "%s: %d x %d pixels, its manifest says %lld x %lld", exr, m->width,
+                       m->height, (long long)width, (long long)height);
     if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
         return false;
-    double n = strcmp(m->unit, "exact") == 0 ? 1 : ref->replicates;
+    double n =
+        strcmp(m->unit, "exact") == 0 ? 1 : json_number_value(json_object_get(entry, "replicates"));
     for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
         if (m->n[p] != n)
             return err_set(e, "%s: pixel %zu holds %g observations, not %g", exr, p, m->n[p], n);
     return true;
 }
 
+/* Image and entry belong together, whatever they are of. */
+static bool read_pair(const char *exr, const json_t *entry, struct moments *out, struct err *e)
+{
+    char sha256[65];
+    struct moments m = {0};
+    if (!sha256_file(exr, sha256, e) ||
+        !check_string(entry, "exr_sha256", sha256, exr, "not the image that its manifest describes",
+                      e) ||
+        !moments_read(exr, &m, NULL, e))
+        return false;
+    if (!check_moments(&m, entry, exr, e)) {
+        moments_free(&m);
+        return false;
+    }
+    *out = m;
+    return true;
+}
+
+void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
+                    const struct suite_reference *ref, struct golden *out)
+{
+    char exr[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32];
+    *out = (struct golden){.state = GOLDEN_DAMAGED};
+    struct err *e = &out->why;
+    if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
+        !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
+        return;
+    json_t *all = load_manifest(path, e);
+    if (all == NULL)
+        return;
+    snprintf(where, sizeof where, "%s: %s", path, ref->engine);
+    json_t *entry = json_object_get(all, ref->engine);
+    struct err stale = {0};
+    if (!json_is_object(entry)) {
+        out->state = GOLDEN_MISSING;
+        err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
+    } else {
+        bool fits = check_entry(entry, scene, ref, where, &stale);
+        if (read_pair(exr, entry, &out->m, e)) {
+            out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
+            out->manifest = json_incref(entry);
+        }
+        if (!fits)
+            *e = stale;
+    }
+    json_decref(all);
+}
+
+void golden_free(struct golden *g)
+{
+    moments_free(&g->m);
+    json_decref(g->manifest);
+    *g = (struct golden){.state = GOLDEN_MISSING};
+}
+
+const char *golden_state_name(enum golden_state state)
+{
+    static const char *const names[] = {[GOLDEN_CURRENT] = "current",
+                                        [GOLDEN_STALE] = "stale",
+                                        [GOLDEN_MISSING] = "missing",
+                                        [GOLDEN_DAMAGED] = "damaged"};
+    return names[state];
+}
+
 bool golden_read(const char *golden_dir, const struct suite_scene *scene,
                  const struct suite_reference *ref, struct moments *out, json_t **manifest,
                  struct err *e)
 {
-    char exr[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32], sha256[65];
-    if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
-        !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
+    struct golden g;
+    golden_inspect(golden_dir, scene, ref, &g);
+    if (g.state != GOLDEN_CURRENT) {
+        *e = g.why;
+        golden_free(&g);
         return false;
-    json_t *all = load_manifest(path, e);
-    if (all == NULL)
-        return false;
-    snprintf(where, sizeof where, "%s: %s", path, ref->engine);
-    json_t *entry = json_object_get(all, ref->engine);
-    struct moments m = {0};
-    bool ok = json_is_object(entry) ||
-              err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
-    ok = ok && check_entry(entry, scene, ref, where, e) && sha256_file(exr, sha256, e) &&
-         check_string(entry, "exr_sha256", sha256, exr, "not the image that its manifest describes",
-                      e) &&
-         moments_read(exr, &m, NULL, e);
-    if (ok && !check_moments(&m, entry, scene, ref, exr, e)) {
-        moments_free(&m);
-        ok = false;
     }
-    if (ok) {
-        *out = m;
-        *manifest = json_incref(entry);
+    *out = g.m;
+    *manifest = g.manifest;
+    return true;
+}
+
+static bool is_wanted(const struct suite *suite, const char *scene, const char *engine)
+{
+    const struct suite_scene *s = suite_find(suite, scene);
+    for (int i = 0; s != NULL && strcmp(s->references_of, s->name) == 0 && i < s->num_references;
+         i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return true;
+    return false;
+}
+
+/* What one scene's directory holds, by manifest and by image. */
+static bool add_orphans(const char *golden_dir, const struct suite *suite, const char *scene,
+                        json_t *found, struct err *e)
+{
+    char dir[PATH_SIZE], path[PATH_SIZE], name[PATH_SIZE + 300];
+    if (!golden_path(dir, golden_dir, scene, "", "", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    DIR *d = opendir(dir);
+    if (d == NULL)
+        return errno == ENOTDIR || err_set(e, "%s: %s", dir, strerror(errno));
+    struct dirent *entry;
+    while ((entry = readdir(d)) != NULL) {
+        const char *dot = strrchr(entry->d_name, '.');
+        if (dot == NULL || strcmp(dot, ".exr") != 0)
+            continue;
+        snprintf(name, sizeof name, "%.*s", (int)(dot - entry->d_name), entry->d_name);
+        if (is_wanted(suite, scene, name))
+            continue;
+        snprintf(name, sizeof name, "%s/%.*s", scene, (int)(dot - entry->d_name), entry->d_name);
+        json_object_set_new(found, name, json_true());
+    }
+    closedir(d);
+    json_t *all = load_manifest(path, e);
+    const char *engine;
+    json_t *value;
+    json_object_foreach(all, engine, value)
+    {
+        snprintf(name, sizeof name, "%s/%s", scene, engine);
+        if (!is_wanted(suite, scene, engine))
+            json_object_set_new(found, name, json_true());
     }
     json_decref(all);
+    return all != NULL;
+}
+
+bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
+                    struct err *e)
+{
+    *names = json_object();
+    DIR *d = opendir(golden_dir);
+    if (d == NULL)
+        return errno == ENOENT || err_set(e, "%s: %s", golden_dir, strerror(errno));
+    bool ok = *names != NULL || err_set(e, "out of memory");
+    struct dirent *entry;
+    while (ok && (entry = readdir(d)) != NULL)
+        if (entry->d_name[0] != '.')
+            ok = add_orphans(golden_dir, suite, entry->d_name, *names, e);
+    closedir(d);
+    if (!ok) {
+        json_decref(*names);
+        *names = NULL;
+    }
     return ok;
 }

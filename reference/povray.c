@@ -1,6 +1,7 @@
 /* Drives POV-Ray: the pictures of povray_picture.h, rendered side by side and folded. */
 #include "job.h"
 
+#include "independence.h"
 #include "povray_picture.h"
 #include "process.h"
 
@@ -294,18 +295,18 @@ static bool check_different(const struct crew *w, struct err *e)
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
-static bool fold(const struct crew *w, struct moments *out, struct err *e)
+static bool fold(const struct crew *w, struct moments *out, json_t *manifest, struct err *e)
 {
     const struct suite_scene *suite = w->job->suite;
     bool exact = w->num_tasks == POVRAY_WINDOWS;
     struct moments m = {0};
+    struct replicates all = {0};
     double *fine = calloc(w->size, sizeof *fine);
-    if (fine == NULL)
-        return err_set(e, "POV-Ray pictures: out of memory");
-    if (!check_different(w, e) || !moments_alloc(&m, suite->width, suite->height, e)) {
-        free(fine);
-        return false;
-    }
+    bool ok = fine != NULL || err_set(e, "POV-Ray pictures: out of memory");
+    ok = ok && check_different(w, e) && moments_alloc(&m, suite->width, suite->height, e) &&
+         (exact || replicates_alloc(&all, m.width, m.height, w->num_tasks - POVRAY_WINDOWS, e));
+    if (!ok)
+        goto out;
     for (int t = 0; t < POVRAY_WINDOWS; t++)
         for (size_t i = 0; i < w->size; i++)
             fine[i] += (double)w->result[(size_t)t * w->size + i] / POVRAY_WINDOWS;
@@ -316,14 +317,23 @@ static bool fold(const struct crew *w, struct moments *out, struct err *e)
         for (size_t i = 0; i < w->size; i++)
             sum[i] = (float)(fine[i] + (double)sum[i]);
         moments_add_image(&m, sum);
+        if (w->job->opt->on_replicate != NULL)
+            w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, t - POVRAY_WINDOWS, sum);
+        replicates_add(&all, sum);
     }
+    ok = exact || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray");
     for (size_t i = 0; exact && i < w->size; i++) {
         m.mean[i] = fine[i];
         m.n[i / 3] = 1;
     }
+out:
     free(fine);
-    *out = m;
-    return true;
+    replicates_free(&all);
+    if (ok)
+        *out = m;
+    else
+        moments_free(&m);
+    return ok;
 }
 
 bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
@@ -345,7 +355,7 @@ bool povray_render(const struct reference_job *job, struct moments *out, json_t 
     w.result = calloc((size_t)w.num_tasks * w.size, sizeof *w.result);
     if (w.result == NULL)
         return err_set(e, "POV-Ray pictures: out of memory");
-    bool ok = run_crew(&w, e) && describe(&w, manifest, e) && fold(&w, out, e);
+    bool ok = run_crew(&w, e) && describe(&w, manifest, e) && fold(&w, out, manifest, e);
     free(w.result);
     return ok;
 }

@@ -168,19 +168,15 @@ static bool plan_falloff(const struct light *l, struct povray_plan *p, struct er
 
 static bool plan_environment(const struct environment *env, struct povray_plan *p, struct err *e)
 {
-    uint32_t width, height;
+    struct environment_parts sky = environment_parts(env);
     if (environment_is_hidden(env))
         return err_set(e, "POV-Ray cannot express ambient light that only diffuse surfaces see");
-    if (!environment_size(env, &width, &height)) {
-        p->radiance = fmax(p->radiance, (double)rgb_max(environment_radiance(env, v3(0, 1, 0))));
-        return true;
-    }
-    if (width > POVRAY_MOST_TEXELS || height > POVRAY_MOST_TEXELS)
+    if (sky.width > POVRAY_MOST_TEXELS || sky.height > POVRAY_MOST_TEXELS)
         return err_set(e, "POV-Ray: the environment is %u x %u, of which 254 x 254 is the most",
-                       width, height);
-    for (uint32_t r = 0; r < height; r++)
-        for (uint32_t c = 0; c < width; c++)
-            p->radiance = fmax(p->radiance, (double)rgb_max(environment_texel(env, c, r)));
+                       sky.width, sky.height);
+    p->radiance = fmax(p->radiance, (double)rgb_max(sky.radiance));
+    for (size_t i = 0; i < (size_t)sky.width * sky.height; i++)
+        p->radiance = fmax(p->radiance, (double)rgb_max(sky.texel[i]));
     return true;
 }
 

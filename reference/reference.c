@@ -107,12 +107,12 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
         json_decref(m);
         return err_prefix(e, "%s, %s", scene->name, ref->engine);
     }
-    json_t *common = json_pack("{ss,ss,ss,ss,ss,sf,si,si,si,si,si,si,sf,sf}", "scene", scene->name,
-                               "scene_sha256", scene->sha256, "engine", ref->engine, "date", date,
-                               "unit", out->unit, "spp_of_unit", out->spp, "width", scene->width,
-                               "height", scene->height, "depth", scene->depth, "replicates",
-                               ref->replicates, "spp", ref->spp, "subgrid", ref->subgrid, "cpu_s",
-                               cpu_s() - cpu0, "wall_s", clock_s(CLOCK_MONOTONIC) - wall0);
+    json_t *common = json_pack(
+        "{ss,ss,ss,ss,ss,sf,si,si,si,si,si,si,sI,sf,sf}", "scene", scene->name, "scene_sha256",
+        scene->sha256, "engine", ref->engine, "date", date, "unit", out->unit, "spp_of_unit",
+        out->spp, "width", scene->width, "height", scene->height, "depth", scene->depth,
+        "replicates", ref->replicates, "spp", ref->spp, "subgrid", ref->subgrid, "seed",
+        (json_int_t)opt->seed, "cpu_s", cpu_s() - cpu0, "wall_s", clock_s(CLOCK_MONOTONIC) - wall0);
     bool ok = common != NULL && json_object_update(m, common) == 0;
     if (ok && is_truth)
         ok = json_object_set_new(m, "kind", json_string(ref->kind)) == 0 &&

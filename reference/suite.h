@@ -10,6 +10,10 @@
  *     "expect": "EQUIVALENT",
  *     "environment": "sky.exr",                  (optional: the file beside this one that lights it)
  *     "lens_radius": 0.1, "focal_distance": 2,   (optional, both or none: a thin lens)
+ *     "variants": [{"name": "hemisphere", "options": ["--direct", "hemisphere"], "spp": 4096,
+ *                   "margin_global": 0.01, "margin_tile": 0.05}],
+ *                                                (optional: ours by other means, judged too)
+ *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1},  (optional: tools/consistency.h)
  *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
  *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
  *     "references": {
@@ -44,6 +48,16 @@ struct suite_reference {
     json_t *values;       /* truth: its numbers; borrowed from the suite */
 };
 
+/* Another way of ours to the same picture: further options of pathtracer. */
+struct suite_variant {
+    char name[64]; /* "pathtracer-hemisphere" */
+    int spp;
+    double margin_global, margin_tile; /* as of a reference: its noise is its own */
+    const char *options[9];            /* NULL at the end; borrowed from the suite */
+};
+
+enum { MAX_VARIANTS = 8 };
+
 struct suite_scene {
     char name[64];                      /* "41_cornell" */
     char dae[4096];                     /* path of the .dae */
@@ -57,6 +71,14 @@ struct suite_scene {
     int spp;   /* of our render */
     int tile;  /* side of a reporting tile, pixels; divides width and height */
     enum verdict expect;
+    struct suite_variant variant[MAX_VARIANTS];
+    int num_variants;
+    /* Renders with seeds of their own that must err as much as they say (tools/consistency.h); 0
+     * renders: not asked. */
+    struct {
+        int renders, spp;
+        double margin;
+    } consistency;
     json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
     char references_of[64];  /* name of the scene whose references are used; its own name by default
                              */

@@ -88,6 +88,68 @@ static bool read_lens(const struct json_node *n, struct suite_scene *s, struct e
            json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e);
 }
 
+static bool read_variant(const char *file, int i, json_t *object, struct suite_variant *v,
+                         struct err *e)
+{
+    static const char *const keys[] = {"name",          "options",     "spp",
+                                       "margin_global", "margin_tile", NULL};
+    const size_t most = sizeof v->options / sizeof *v->options - 1;
+    char at[32], name[32];
+    snprintf(at, sizeof at, "variants[%d].", i);
+    struct json_node n = {file, at, object};
+    json_t *options, *option;
+    size_t k;
+    if (!json_is_object(object))
+        return err_set(e, "%s: 'variants[%d]' is not an object", file, i);
+    if (!json_only_keys(&n, keys, e) || !json_get_text(&n, "name", name, sizeof name, e) ||
+        !json_get_int(&n, "spp", 2, 1 << 24, &v->spp, e) ||
+        !json_get_number(&n, "margin_global", 0, 1, &v->margin_global, e) ||
+        !json_get_number(&n, "margin_tile", 0, 1, &v->margin_tile, e) ||
+        !json_get(&n, "options", &options, e))
+        return false;
+    if (name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_")] != '\0')
+        return err_set(e, "%s: '%sname' is '%s': only a-z, 0-9 and _", file, at, name);
+    snprintf(v->name, sizeof v->name, "pathtracer-%s", name);
+    if (json_array_size(options) == 0 || json_array_size(options) > most)
+        return err_set(e, "%s: '%soptions' is not an array of 1 to %zu texts", file, at, most);
+    json_array_foreach(options, k, option)
+    {
+        v->options[k] = json_string_value(option);
+        if (v->options[k] == NULL)
+            return err_set(e, "%s: '%soptions' holds what is not a text", file, at);
+    }
+    return true;
+}
+
+static bool read_variants(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    json_t *array = json_object_get(n->object, "variants"), *value;
+    size_t i;
+    if (array == NULL)
+        return true;
+    if (json_array_size(array) == 0 || json_array_size(array) > MAX_VARIANTS)
+        return err_set(e, "%s: 'variants' is not an array of 1 to %d", n->file, MAX_VARIANTS);
+    json_array_foreach(array, i, value)
+    {
+        if (!read_variant(n->file, (int)i, value, &s->variant[i], e))
+            return false;
+        s->num_variants++;
+    }
+    return true;
+}
+
+static bool read_consistency(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    static const char *const keys[] = {"renders", "spp", "margin", NULL};
+    struct json_node c = {n->file, "consistency.", NULL};
+    if (json_object_get(n->object, "consistency") == NULL)
+        return true;
+    return json_get_object(n, "consistency", &c.object, e) && json_only_keys(&c, keys, e) &&
+           json_get_int(&c, "renders", 4, 256, &s->consistency.renders, e) &&
+           json_get_int(&c, "spp", 2, 1 << 16, &s->consistency.spp, e) &&
+           json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e);
+}
+
 /* An engine either has a reference or a reason, not both. */
 static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
@@ -120,7 +182,8 @@ bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
         "title",      "detects",         "blind_to",    "width",
         "height",     "depth",           "spp",         "tile",
         "expect",     "environment",     "lens_radius", "focal_distance",
-        "references", "not_expressible", NULL};
+        "references", "not_expressible", "variants",    "consistency",
+        NULL};
     static const char *const keys_9x[] = {
         "title", "detects", "blind_to",    "width",       "height",         "depth",         "spp",
         "tile",  "expect",  "environment", "lens_radius", "focal_distance", "references_of", NULL};
@@ -147,7 +210,8 @@ bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
     if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
         return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,
                        s->name[0], verdict_name(wanted));
-    if (!read_environment(&n, s, e) || !read_lens(&n, s, e))
+    if (!read_environment(&n, s, e) || !read_lens(&n, s, e) || !read_variants(&n, s, e) ||
+        !read_consistency(&n, s, e))
         return false;
     if (must_differ)
         return json_get_text(&n, "references_of", s->references_of, sizeof s->references_of, e);

@@ -62,6 +62,8 @@ static bool read_corner(struct loader *ld, const xmlNode *p, const struct source
         out->normal[0] = (float)n.x;
         out->normal[1] = (float)n.y;
         out->normal[2] = (float)n.z;
+    } else {
+        ld->scene.num_zero_normals++;
     }
     return true;
 }

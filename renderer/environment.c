@@ -3,14 +3,11 @@
 #include "discrete.h"
 #include "warp.h"
 
-#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 static const double PI = 3.14159265358979323846;
-
-enum environment_kind { ENVIRONMENT_CONSTANT, ENVIRONMENT_UPPER_HALF, ENVIRONMENT_IMAGE };
 
 struct environment {
     enum environment_kind kind;
@@ -303,17 +300,13 @@ bool environment_is_hidden(const struct environment *env)
     return env->kind == ENVIRONMENT_UPPER_HALF;
 }
 
-bool environment_size(const struct environment *env, uint32_t *width, uint32_t *height)
+struct environment_parts environment_parts(const struct environment *env)
 {
-    *width = env->width;
-    *height = env->height;
-    return env->kind == ENVIRONMENT_IMAGE;
-}
-
-rgb environment_texel(const struct environment *env, uint32_t column, uint32_t row)
-{
-    assert(env->kind == ENVIRONMENT_IMAGE && column < env->width && row < env->height);
-    return env->texel[(size_t)row * env->width + column];
+    return (struct environment_parts){.kind = env->kind,
+                                      .radiance = env->radiance,
+                                      .width = env->width,
+                                      .height = env->height,
+                                      .texel = env->texel};
 }
 
 double environment_total(const struct environment *env)

@@ -18,6 +18,16 @@
 
 struct environment; /* opaque; const once made */
 
+enum environment_kind { ENVIRONMENT_CONSTANT, ENVIRONMENT_UPPER_HALF, ENVIRONMENT_IMAGE };
+
+/* What one is made of, for exporters. */
+struct environment_parts {
+    enum environment_kind kind;
+    rgb radiance; /* not image */
+    uint32_t width, height;
+    const rgb *texel; /* image: width x height by rows from the top; the environment's own */
+};
+
 /* The same from everywhere. All four of these return NULL on failure, and the caller frees. */
 struct environment *environment_constant(rgb radiance, struct err *e)
     __attribute__((warn_unused_result));
@@ -52,10 +62,7 @@ float environment_pdf_w(const struct environment *env, vec3 w);
 
 /* Lights rough surfaces only: neither the camera nor a mirror sees it. */
 bool environment_is_hidden(const struct environment *env);
-/* Its image's size; false, and 0 x 0, if it is not an image. */
-bool environment_size(const struct environment *env, uint32_t *width, uint32_t *height);
-/* Texel of an image; row 0 is the top one. */
-rgb environment_texel(const struct environment *env, uint32_t column, uint32_t row);
+struct environment_parts environment_parts(const struct environment *env);
 /* Luminance summed over directions, W m^-2: of an image, as the mean over each cell's corners. */
 double environment_total(const struct environment *env);
 

@@ -16,10 +16,10 @@ bool identity_make(const struct options *o, struct identity *id, struct err *e)
     /* The dialect by number: 0 stands for auto, which the scene file decides. */
     snprintf(id->settings, sizeof id->settings,
              "integrator %s; direct %s; max-bounces %d; first-bounce %d; light-samples %d; "
-             "roulette %s; accel %s; dialect %d; lens-radius %.17g; focal-distance %.17g; "
+             "roulette %d %.17g; accel %s; dialect %d; lens-radius %.17g; focal-distance %.17g; "
              "camera %s; environment %s; fresnel %d; sampler %s",
              integrator_kind_names[o->kind], direct_kind_names[o->direct], o->max_bounces,
-             o->first_bounce, o->light_samples, o->roulette ? "on" : "off",
+             o->first_bounce, o->light_samples, (int)o->roulette, o->survival,
              bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
              environment, o->fresnel, sampler_kind_names[o->sampler]);
     if (o->adaptive_batch > 0)

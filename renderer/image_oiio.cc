@@ -136,6 +136,8 @@ extern "C" bool image_write_exr(const char *path, const struct image *im, struct
         for (int c = 0; c < im->channels; c++)
             spec.channelnames[size_t(c)] = im->names[c];
         spec.attribute("compression", "zip");
+        /* Else the time of writing goes in, and the same picture has other bytes each time. */
+        spec.attribute("DateTime", "");
         for (int i = 0; i < im->num_attrs; i++)
             spec.attribute(im->attr[2 * i], im->attr[2 * i + 1]);
         if (!out->open(temp, spec) || !out->write_image(OIIO::TypeDesc::FLOAT, im->data) ||

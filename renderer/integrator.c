@@ -8,11 +8,25 @@
 const char *const integrator_kind_names[] = {"path", "normals", NULL};
 const char *const direct_kind_names[] = {"hemisphere", "light", "bsdf", "mis", NULL};
 
-enum { ROULETTE_FROM_VERTEX = 2 };
+/* Chance to go on from this vertex (0: the first that the camera sees). */
+static float survival(const struct integrator_options *o, int vertex, rgb throughput, float eta2)
+{
+    switch (o->roulette) {
+    case ROULETTE_OFF: break;
+    case ROULETTE_THROUGHPUT: return vertex >= 2 ? minf(1, rgb_max(throughput) * eta2) : 1;
+    case ROULETTE_FIXED: return vertex >= 1 ? o->survival : 1;
+    }
+    return 1;
+}
 
-/* A shadow ray ends this part of its length before the light, so that it does not meet the light.
- */
-#define SHADOW_SHORTENING 1e-4f
+/* Where a shadow ray ends: before the light, so that it does not meet it. Off by this part of the
+ * distance, and by the rounding of the surface's coordinates twice: once because the ray starts that
+ * far off the surface, once because the light lies about as far from the origin. Far from the
+ * origin, or in a small scene, the second is more. */
+static float shadow_end(float distance, float eps)
+{
+    return distance * (1 - 1e-4f) - 2 * eps;
+}
 
 /* a^2/(a^2 + b^2) by way of b/a: the squares of densities of small lights overflow. */
 static float power_heuristic(float a, float b)
@@ -198,7 +212,7 @@ static void connect_light(const struct integrator *it, struct batch *b, int num_
             w = power_heuristic((float)count * ls.pdf_w, pdf_bsdf);
         rgb light = rgb_mul(rgb_mul(rgbs_get(&b->throughput, i), f), ls.radiance);
         rgbs_set(&b->shadow_light, i, rgb_scale(light, w / ((float)count * ls.pdf_w)));
-        rays_set(&b->shadow, i, leaving(b, i, ls.wi, ls.distance * (1 - SHADOW_SHORTENING)));
+        rays_set(&b->shadow, i, leaving(b, i, ls.wi, shadow_end(ls.distance, b->eps[i])));
         b->shadow.ignore[i] = ls.sphere;
         b->shadow_lane[n++] = (uint16_t)i;
     }
@@ -324,11 +338,11 @@ static int scatter(const struct integrator *it, struct batch *b, int num_active,
             continue;
         rgb throughput = rgb_mul(rgbs_get(&b->throughput, i), s.weight);
         float eta2 = b->eta2[i] * s.eta2;
-        if (it->opt.roulette && vertex >= ROULETTE_FROM_VERTEX) {
-            float survival = minf(1, rgb_max(throughput) * eta2);
-            if (u.u[3] >= survival)
+        float go_on = survival(&it->opt, vertex, throughput, eta2);
+        if (go_on < 1) {
+            if (u.u[3] >= go_on)
                 continue;
-            throughput = rgb_scale(throughput, 1 / survival);
+            throughput = rgb_scale(throughput, 1 / go_on);
         }
         rgbs_set(&b->throughput, i, throughput);
         b->eta2[i] = eta2;

@@ -31,6 +31,15 @@ enum many_lights {
     LIGHTS_ONE   /* light_samples times one light, chosen by power */
 };
 
+/* How paths end before max_bounces, without changing a mean [Arvo90]. */
+enum roulette_kind {
+    ROULETTE_OFF,
+    ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the largest component of the
+                            throughput, 1 at most */
+    ROULETTE_FIXED       /* from the second vertex on: survive with the same probability each time,
+                            as in the assignment */
+};
+
 struct integrator_options {
     enum integrator_kind kind;
     enum direct_kind direct;
@@ -39,7 +48,8 @@ struct integrator_options {
     int light_samples; /* per area light and vertex; hemisphere: directions per area light, of which
                           no more than MANY_LIGHTS count */
     enum many_lights many_lights;
-    bool roulette; /* end paths by their throughput from the third vertex on [Arvo90] */
+    enum roulette_kind roulette;
+    float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
     struct sampler sampler;
     bool first_hits; /* fill the batch's `first`; changes nothing else */
 };

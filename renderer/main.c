@@ -89,6 +89,9 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_degenerate > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u triangles without area left out\n", o->scene,
                 scene->num_degenerate);
+    if (scene->num_zero_normals > 0 && !o->quiet)
+        fprintf(stderr, "pathtracer: note: %s: %u corners with a normal of no length, flat there\n",
+                o->scene, scene->num_zero_normals);
     for (uint32_t i = 0; i < scene->num_materials; i++)
         scene->materials[i].schlick = o->fresnel == FRESNEL_SCHLICK;
     if (scene->num_dark_lights > 0 && !o->quiet)
@@ -111,6 +114,7 @@ static struct render_options render_options_of(const struct options *o)
                                                   .first_bounce = o->first_bounce,
                                                   .light_samples = o->light_samples,
                                                   .roulette = o->roulette,
+                                                  .survival = (float)o->survival,
                                                   .sampler = sampler},
                                    .x = o->cell[0],
                                    .y = o->height - o->cell[1] - o->cell[3],

@@ -67,7 +67,9 @@ static const struct cli_option options[] = {
     [OPT_ONLY] = {0, "only", 1, "PART", "direct: at most one bounce; indirect: two or more"},
     [OPT_HEMISPHERE] = {'H', "hemisphere", 0, "", "short for --direct hemisphere"},
     [OPT_DIRECT] = {0, "direct", 1, "HOW", "hemisphere, light, bsdf or mis (mis)"},
-    [OPT_ROULETTE] = {0, "roulette", 1, "on|off", "end dim paths at random, without bias (on)"},
+    [OPT_ROULETTE] = {0, "roulette", 1, "on|off|P",
+                      "end paths at random, without bias: dim ones, or all, which\n"
+                      "go on with probability P, 0.7 in the assignment (on)"},
     [OPT_ADAPTIVE] = {'a', "adaptive", 2, "N TOL",
                       "every N samples a pixel stops if its 95 % interval\n"
                       "is within TOL of its mean; biased (off)"},
@@ -156,14 +158,14 @@ static bool parse_only(struct options *s, const char *text, struct err *e)
     return true;
 }
 
-static bool parse_switch(const char *what, const char *text, bool *out, struct err *e)
+static bool parse_roulette(const char *text, struct options *s, struct err *e)
 {
-    static const char *const words[] = {"off", "on", NULL};
-    int i;
-    if (!cli_choice(what, text, words, &i, e))
-        return false;
-    *out = i == 1;
-    return true;
+    s->roulette = strcmp(text, "off") == 0  ? ROULETTE_OFF
+                  : strcmp(text, "on") == 0 ? ROULETTE_THROUGHPUT
+                                            : ROULETTE_FIXED;
+    return s->roulette != ROULETTE_FIXED ||
+           (cli_double("--roulette", text, 0.01, 1, &s->survival, e) ||
+            err_set(e, "--roulette: '%s' is neither on, off, nor a probability in 0.01..1", text));
 }
 
 static bool add_output(struct options *s, const char *path, struct err *e)
@@ -236,7 +238,7 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_ONLY: return parse_only(s, v, e);
     case OPT_HEMISPHERE: s->direct = DIRECT_HEMISPHERE; return true;
     case OPT_DIRECT: return cli_choice("--direct", v, direct_kind_names, &s->direct, e);
-    case OPT_ROULETTE: return parse_switch("--roulette", v, &s->roulette, e);
+    case OPT_ROULETTE: return parse_roulette(v, s, e);
     case OPT_ADAPTIVE:
         return cli_int("--adaptive", v, 1, 1 << 24, &s->adaptive_batch, e) &&
                cli_double("--adaptive", c->value[1], 0, 1e6, &s->adaptive_tolerance, e);
@@ -328,7 +330,7 @@ bool options_parse(int argc, char **argv, struct options *s, struct err *e)
                           .direct = DIRECT_MIS,
                           .light_samples = 1,
                           .max_bounces = 5,
-                          .roulette = true,
+                          .roulette = ROULETTE_THROUGHPUT,
                           .seed = 1,
                           .pilot = 32,
                           .pilot_tolerance = -1,

@@ -20,7 +20,9 @@ struct options {
     int spp;         /* of the whole picture, the most if adaptive */
     int first, last; /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
-    bool roulette, quiet, aov, keep_state;
+    bool quiet, aov, keep_state;
+    enum roulette_kind roulette;
+    double survival; /* of ROULETTE_FIXED */
     uint64_t seed;
     int adaptive_batch; /* 0: off */
     double adaptive_tolerance;

@@ -124,9 +124,11 @@ struct scene {
     /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
      * lights, with the meshes that gave way to them; else the bounds. */
     vec3 frame_min, frame_max;
-    unsigned num_degenerate;  /* triangles without area that were dropped at loading */
-    unsigned num_dark_lights; /* point, spot and directional lights of zero power */
-    char note[256];           /* what the dialect merged, one line for the user; else empty */
+    unsigned num_degenerate;   /* triangles without area that were dropped at loading */
+    unsigned num_zero_normals; /* corners whose normal in the file had no length; they got the
+                                  triangle's own */
+    unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
+    char note[256];            /* what the dialect merged, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */

@@ -51,6 +51,7 @@ expect "negative samples" 3 "not a whole number" "$san_pathtracer" -s -1 -f "$tm
 expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $scene $scene
 expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
 expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
+expect "roulette" 3 "neither on, off, nor" "$san_pathtracer" --roulette 1.5 -f "$tmp/x.exr" $scene
 expect "unknown Fresnel" 3 "fresnel" "$san_pathtracer" --fresnel guess -f "$tmp/x.exr" $scene
 expect "environment map that is not there" 3 "nosky.exr: cannot read" \
     "$san_pathtracer" $small -e nosky.exr -f "$tmp/x.exr" $scene
@@ -215,9 +216,56 @@ expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/res
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 
+# Convergence. The controls are our own program with a fault: a slope that is not -1/2, a bias, a seed
+# without effect.
+converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16 --alpha 0.01 --slope-margin 0.25"
+expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
+    $converge --margin 0.2 -o "$tmp/conv" 41_cornell
+expect "converge: results have all rungs" 0 "^3$" grep -c '"spp"' "$tmp/conv/results.json"
+expect "converge: too few samples to tell a bias" 2 "RMS bias.*INCONCLUSIVE" \
+    $converge --margin 0.001 -o "$tmp/conv2" 41_cornell
+expect "converge: against a long run of our own" 0 "pathtracer, 1024 samples" \
+    $converge --margin 0.2 --reference own -o "$tmp/conv3" 41_cornell
+expect "converge: against a closed form" 0 "closed form" \
+    $converge --margin 0.2 -o "$tmp/conv4" 13_square_patch
+faulty() {
+    printf '#!/bin/bash\n%s\n' "$1" >"$tmp/faulty"
+    chmod +x "$tmp/faulty"
+}
+faulty "exec $pathtracer \"\$@\" -s 4"
+expect "converge: samples without effect" 1 "slope of RMSE.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv5" 41_cornell
+faulty "exec $pathtracer \"\$@\" -m 1"
+expect "converge: a bias" 1 "RMS bias.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv6" 41_cornell
+faulty "exec $pathtracer \"\$@\" --seed 7"
+expect "converge: a seed without effect" 3 "the seed has no effect" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv7" 41_cornell
+expect "converge: no scene" 3 "name of a scene" "$san_assay" converge
+expect "converge: unknown scene" 3 "no scene 'x'" "$san_assay" converge -o "$tmp/conv8" x
+expect "converge: two rungs" 3 "three rungs" "$san_assay" converge --ladder 1,4 x
+expect "converge: a ladder that falls" 3 "does not ascend" "$san_assay" converge --ladder 4,1,16 x
+expect "converge: size" 3 "3 times smaller" "$san_assay" converge --shrink 3 -o "$tmp/conv8" 41_cornell
+expect "report of convergence as Markdown" 0 "| slope of RMSE |" \
+    "$san_assay" report --markdown "$tmp/conv/results.json"
+expect "report of claims and convergence" 0 "joined.html" "$san_assay" report \
+    --converge "$tmp/conv/results.json" -o "$tmp/joined.html" "$tmp/cmp/results.json"
+
 # export.
 expect "export to POV-Ray" 0 "c.pov" "$san_assay" export -o "$tmp/c.pov" $scene
 expect "export to Cycles" 0 "c.json" "$san_assay" export -o "$tmp/c.json" $scene
+expect "export to Mitsuba" 0 "c.xml" \
+    "$san_assay" export -o "$tmp/c.xml" -m 3 -b 0.1 -d 2 -e "$tmp/a.exr" $scene
+if xmllint --noout "$tmp/c.xml" && grep -q 'thinlens' "$tmp/c.xml" && [ -s "$tmp/c_environment.exr" ] &&
+    [ "$(grep -c 'type="ply"' "$tmp/c.xml")" -eq "$(ls "$tmp"/c_object_*.ply | wc -l)" ]; then
+    ok "the Mitsuba scene is XML, with its files"
+else not_ok "the Mitsuba scene is XML, with its files" "$(ls "$tmp"/c[._]*)"; fi
+expect "export to pbrt" 0 "c.pbrt" "$san_assay" export -o "$tmp/c.pbrt" -b 0.1 -d 2 $scene
+expect "export: what pbrt has not" 3 "no environment picture" \
+    "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene
+if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
+    ok "a refused export leaves no file"
+fi
 expect "export: unknown kind" 3 "neither" "$san_assay" export -o "$tmp/c.txt" $scene
 
 # validate, against the goldens.
@@ -250,6 +298,64 @@ expect "a program that writes nothing is not judged" 3 "pathtracer.exr" \
 expect "a missing program is not judged" 3 "nothing-here" \
     $validate --only 11_furnace --pathtracer "$tmp/nothing-here"
 
+# Further renderers. student_tracer shares no code with ours; it reads the exported Mitsuba scene.
+engine_path=$build:$build/tests:$PATH
+student="$validate --only 12_point_plane --engine-spp 16 --engine-replicates 8"
+expect "another renderer is judged" 0 "student *pathtracer .*EQUIVALENT *EQUIVALENT" \
+    env PATH="$engine_path" $student --engine student
+# engine COMMAND [EXPRESSES]: the description of fake.sh, which is beside it.
+engine() {
+    cat >"$tmp/fake.json" <<EOF
+{"name": "fake", "format": "mitsuba", "output": "mean", "image": "pfm", "command": [$1],
+ "expresses": [${2:-"\"diffuse\", \"point\""}]}
+EOF
+}
+# fake SCRIPT: a renderer that gets scene, spp, seed and out.
+fake() {
+    printf '#!/bin/sh\n%s\n' "$1" >"$tmp/fake.sh"
+    chmod +x "$tmp/fake.sh"
+}
+command='"./fake.sh", "{scene}", "{spp}", "{seed}", "{out}"'
+engine "$command"
+fake 'exec student_tracer "$@" 1.05'
+expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
+    env PATH="$engine_path" $student --engine "$tmp/fake.json"
+bad_engine() { # NAME PATTERN SCRIPT
+    fake "$3"
+    expect "a renderer that $1 is not judged" 3 "$2" $student --engine "$tmp/fake.json" --timeout 15
+}
+pfm='printf "PF\n64 64\n-1.0\n";'
+bad_engine "exits with 1" "exit status 1: no light" 'echo no light; exit 1'
+bad_engine "hangs" "no end after 15 s" 'sleep 100'
+bad_engine "writes nothing" "replicate_0000.pfm: cannot read" ':'
+bad_engine "writes garbage" "replicate_0000.pfm" 'echo garbage >$4'
+bad_engine "writes another size" "3 x 1 pixels, not 64 x 64" \
+    'printf "PF\n3 1\n-1.0\n123456789012123456789012123456789012" >$4'
+bad_engine "writes NaN" "is not finite" "($pfm head -c 49152 /dev/zero | tr '\\0' '\\377') >\$4"
+bad_engine "ignores its seed" "the seed has no effect" "($pfm yes abcdefg | head -c 49152) >\$4"
+rm "$tmp/fake.sh"
+expect "a renderer that is not there is not judged" 3 "fake.sh: no such program" \
+    $student --engine "$tmp/fake.json"
+bad_description() { # NAME PATTERN
+    expect "description: $1" 3 "fake.json: .*$2" \
+        "$san_assay" validate --only 12_point_plane --engine "$tmp/fake.json"
+}
+engine "$command, \"{samples}\""
+bad_description "unknown placeholder" "'command' \[5\]: unknown placeholder '{samples}'"
+engine '"x", "{scene}", "{out}"'
+bad_description "no seed" "no {seed}"
+engine "$command" '"magic"'
+bad_description "unknown feature" "'magic' is no feature"
+echo '{"name": "fake", "colour": 1}' >"$tmp/fake.json"
+bad_description "unknown key" "unknown key 'colour'"
+engine "$command" '"diffuse"'
+expect "a renderer that can express nothing" 3 "fake can express none .*does not list: point" \
+    $student --engine "$tmp/fake.json"
+sed 's/"point", //' reference/engines/student.json >"$tmp/no_points.json"
+expect "what a renderer cannot express is listed" 0 "student cannot express 12_point_plane" \
+    env PATH="$engine_path" $validate --only 11_furnace --only 12_point_plane \
+    --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
+
 # Missing, stale and damaged goldens are never a pass.
 expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
 cp -R golden "$tmp/golden"
@@ -258,6 +364,30 @@ expect "a damaged golden is not judged" 3 "cycles" $validate --only 11_furnace -
 cp -R reference/scenes "$tmp/scenes"
 echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
 expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace --suite "$tmp/scenes"
+
+# golden: what may be stored. The stored goldens stand in for candidates.
+golden="$san_assay golden"
+expect "golden status" 0 "current  41_cornell/cycles" $golden status
+expect "golden status of damaged goldens" 3 "damaged  11_furnace/cycles" \
+    $golden status --golden "$tmp/golden"
+expect "golden status of another scene" 3 "stale    11_furnace/cycles" \
+    $golden status --suite "$tmp/scenes"
+expect "golden approve needs names" 3 "takes --all or names" $golden approve --from golden
+expect "golden approve: nothing is stored" 3 "approve it with --new" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace
+expect "golden approve --new" 0 "2 approved" \
+    $golden approve --from golden --golden "$tmp/store" --new 11_furnace
+expect "golden approve: the same again" 0 "1 unchanged" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: no candidate" 3 "no candidate in" \
+    $golden approve --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve --all: none needed" 0 "0 approved, 0 unchanged" \
+    $golden approve --all --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: not in the suite" 3 "no such reference" \
+    $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
+cp -R golden/41_cornell "$tmp/store/98_deleted"
+expect "golden status: an orphan" 3 "orphan   .*98_deleted/cycles" $golden status --golden "$tmp/store"
+expect "golden: unknown" 3 "none of render" $golden forget
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

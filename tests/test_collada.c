@@ -280,6 +280,7 @@ static void normals_go_by_the_inverse_transpose(void **state)
     assert_vec(s.normal[0], 0, 0, 1);
     assert_vec(s.normal[1], 1 / sqrt(5), 2 / sqrt(5), 0);
     assert_vec(s.normal[2], 0, -1, 0);
+    assert_int_equal(s.num_zero_normals, 1);
     scene_free(&s);
 }
 
@@ -295,6 +296,7 @@ static void normals_against_the_winding_are_turned(void **state)
         DIALECT_AUTO);
     for (int k = 0; k < 3; k++)
         assert_vec(s.normal[k], 0, 0, 1);
+    assert_int_equal(s.num_zero_normals, 0);
     scene_free(&s);
 }
 

@@ -1,9 +1,7 @@
 /* The driver of Blender: with a stand-in that misbehaves in every way, then, where there is a
  * Blender, with the real one against closed forms. */
-#include "build_scene.h"
+#include "cycles_probe.h"
 
-#include "../reference/job.h"
-#include "../reference/process.h"
 #include "../renderer/fs.h"
 
 #include <setjmp.h>
@@ -17,79 +15,17 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-#include <gsl/gsl_cdf.h>
 
-struct fixture {
-    char dir[64], work[80], bin[80], path[4096];
-    struct scene s;
-    struct camera c;
-    struct suite_scene suite;
-    struct suite_reference ref;
-    struct reference_options opt;
-    struct reference_job job;
-};
-
-static void fail_on(bool ok, const struct err *e)
-{
-    if (!ok)
-        fail_msg("%s", e->msg);
-}
-
-/* A job of 3 replicates of 4 x 4 pixels, and an empty directory first in PATH. */
-static int setup(void **state)
-{
-    struct fixture *f = calloc(1, sizeof *f);
-    struct err e;
-    strcpy(f->dir, "/tmp/test_cycles.XXXXXX");
-    assert_non_null(mkdtemp(f->dir));
-    snprintf(f->work, sizeof f->work, "%s/work", f->dir);
-    snprintf(f->bin, sizeof f->bin, "%s/bin", f->dir);
-    fail_on(make_dirs(f->work, &e) && make_dirs(f->bin, &e), &e);
-    snprintf(f->path, sizeof f->path, "%s", getenv("PATH"));
-    f->s = build_scene();
-    f->suite = (struct suite_scene){.name = "test", .width = 4, .height = 4, .depth = 1};
-    f->ref = (struct suite_reference){.engine = "cycles", .replicates = 3, .spp = 16};
-    f->opt = (struct reference_options){
-        .seed = 7, .threads = 1, .timeout_s = 300, .work_dir = f->dir, .share_dir = "reference"};
-    f->job = (struct reference_job){.suite = &f->suite,
-                                    .ref = &f->ref,
-                                    .opt = &f->opt,
-                                    .scene = &f->s,
-                                    .camera = &f->c,
-                                    .dir = f->work};
-    *state = f;
-    return 0;
-}
-
-static int teardown(void **state)
-{
-    struct fixture *f = *state;
-    struct err e;
-    bool ok = remove_tree(f->dir, &e) && setenv("PATH", f->path, 1) == 0;
-    scene_free(&f->s);
-    free(f);
-    return ok ? 0 : -1;
-}
-
-/* A plane below the eye; `depth`, size and camera are those of the fixture. */
-static void finish(struct fixture *f)
-{
-    struct err e;
-    fail_on(scene_finish(&f->s, "test", &e) &&
-                camera_init(&f->c, &f->s, f->suite.width, f->suite.height, &e),
-            &e);
-}
-
-static void plain_scene(struct fixture *f)
+static void plain_scene(struct probe *f)
 {
     build_quad(&f->s, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0),
                build_material(&f->s, grey(.5f), grey(1)));
     build_camera(&f->s, v3(0, 0, 0), 60);
-    finish(f);
+    probe_finish(f);
 }
 
 /* Puts a shell script in Blender's place. */
-static void stand_in(struct fixture *f, const char *script)
+static void stand_in(struct probe *f, const char *script)
 {
     char path[128], dirs[4096 + 128];
     snprintf(path, sizeof path, "%s/blender", f->bin);
@@ -105,22 +41,22 @@ static void stand_in(struct fixture *f, const char *script)
 #define OK "echo 'ASSAY OK {\"version\": \"Blender 0\", \"settings\": {\"a\": 1}}'"
 
 /* What Blender would have written: replicate k is `value` plus k `step`, in the first pixel more. */
-static void write_replicate(struct fixture *f, int k, int width, float value, float first)
+static void write_replicate(struct probe *f, int k, int width, float value, float first)
 {
     static const char *const names[] = {"R", "G", "B"};
     char path[128];
     struct image im;
     struct err e;
     snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
-    fail_on(image_alloc(&im, width, 4, 3, names, &e), &e);
+    probe_ok(image_alloc(&im, width, 4, 3, names, &e), &e);
     for (int i = 0; i < width * 4 * 3; i++)
         im.data[i] = value;
     im.data[0] = first;
-    fail_on(image_write_exr(path, &im, &e), &e);
+    probe_ok(image_write_exr(path, &im, &e), &e);
     image_free(&im);
 }
 
-static void assert_fails(struct fixture *f, const char *why)
+static void assert_fails(struct probe *f, const char *why)
 {
     struct err e = {""};
     struct moments m;
@@ -135,7 +71,7 @@ static void assert_fails(struct fixture *f, const char *why)
 
 static void replicates_are_folded_and_described(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest = json_object();
@@ -143,7 +79,7 @@ static void replicates_are_folded_and_described(void **state)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, (float)(k * k), 9);
     stand_in(f, "echo \"$@\" > args; " OK);
-    fail_on(cycles_render(&f->job, &m, manifest, &e), &e);
+    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e);
     assert_string_equal(m.unit, "replicate");
     assert_true(m.spp == 16);
     /* 0, 1, 4: mean 5/3, M2 = 26/3 by hand. */
@@ -172,7 +108,7 @@ static void replicates_are_folded_and_described(void **state)
 /* All pixels of all replicates alike: no random number had any effect. */
 static void light_without_noise_is_exact(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest = json_object();
@@ -180,7 +116,7 @@ static void light_without_noise_is_exact(void **state)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, .25f, .25f);
     stand_in(f, OK);
-    fail_on(cycles_render(&f->job, &m, manifest, &e), &e);
+    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e);
     assert_string_equal(m.unit, "exact");
     for (int p = 0; p < 16; p++)
         assert_true(m.n[p] == 1 && m.mean[3 * p] == .25 && m.m2[3 * p] == 0);
@@ -190,7 +126,7 @@ static void light_without_noise_is_exact(void **state)
 
 static void equal_replicates_are_refused(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     plain_scene(f);
     write_replicate(f, 0, 4, 1, 2);
     write_replicate(f, 1, 4, 1, 3);
@@ -202,9 +138,52 @@ static void equal_replicates_are_refused(void **state)
     assert_fails(f, "Cycles: replicate 2 is the same image as an earlier one");
 }
 
+/* 16 x 16 pixels of noise, uniform in 1 .. 2; a replicate that shares all but `own` of its pixels with the
+ * one before it. */
+static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, struct image *im)
+{
+    char path[128];
+    struct err e;
+    for (size_t i = 0; i < 3 * own; i++) {
+        *random = *random * 6364136223846793005u + 1442695040888963407u;
+        im->data[i] = 1 + (float)(*random >> 40) * 0x1p-24f;
+    }
+    snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
+    probe_ok(image_write_exr(path, im, &e), &e);
+}
+
+/* Different pictures all, but two were made with the same random numbers up to the last row. */
+static void replicates_that_share_their_noise_are_refused(void **state)
+{
+    struct probe *f = *state;
+    static const char *const names[] = {"R", "G", "B"};
+    struct image im;
+    struct moments m;
+    struct err e;
+    uint64_t random = 1;
+    json_t *manifest = json_object();
+    f->suite.width = f->suite.height = 16;
+    f->ref.replicates = 4;
+    plain_scene(f);
+    stand_in(f, OK);
+    probe_ok(image_alloc(&im, 16, 16, 3, names, &e), &e);
+    for (int k = 0; k < 4; k++)
+        write_noise(f, k, 256, &random, &im);
+    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e); /* these are independent */
+    const json_t *test = json_object_get(manifest, "independence");
+    assert_true(json_is_true(json_object_get(test, "tested")));
+    assert_true(json_is_true(json_object_get(test, "passed")));
+    moments_free(&m);
+    json_decref(manifest);
+    for (int k = 0; k < 4; k++)
+        write_noise(f, k, k == 3 ? 16 : 256, &random, &im);
+    assert_fails(f, "Cycles: replicates 2 and 3 are not independent");
+    image_free(&im);
+}
+
 static void unusable_images_are_refused(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     plain_scene(f);
     stand_in(f, OK);
     assert_fails(f, "/replicate_0000.exr");
@@ -219,7 +198,7 @@ static void unusable_images_are_refused(void **state)
 
 static void a_blender_that_fails_is_quoted(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     plain_scene(f);
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, (float)k, 9);
@@ -238,7 +217,7 @@ static void a_blender_that_fails_is_quoted(void **state)
 
 static void what_is_missing_is_named(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     plain_scene(f);
     setenv("PATH", f->bin, 1);
     assert_fails(f, "blender: no such program in PATH");
@@ -246,120 +225,20 @@ static void what_is_missing_is_named(void **state)
     f->opt.share_dir = "/assay/none";
     assert_fails(f, "/assay/none/cycles.py: ");
     f->opt.share_dir = "reference";
-    f->c.lens_radius = 1;
-    assert_fails(f, "Cycles: a thin lens");
+    f->suite.depth = 2000;
+    assert_fails(f, "Cycles: depth 2000");
     char path[128];
     snprintf(path, sizeof path, "%s/started", f->work);
     assert_int_equal(access(path, F_OK), -1);
 }
 
 /* From here on the real program. */
-static void need_blender(void)
-{
-    char path[4096];
-    if (process_find("blender", path, sizeof path))
-        return;
-    print_message("SKIPPED: blender is not installed, so Cycles itself was not tested\n");
-    skip();
-}
-
-/* Statistics of a part of the picture: the sum over its pixels of the mean, and its standard error;
- * pixels are independent (box filter of one pixel, random numbers of their own). */
-struct part {
-    double sum, variance, truth;
-};
-
-static struct part take(const struct moments *m, const double *truth, int x0, int x1, int y0,
-                        int y1, int channel)
-{
-    struct part p = {0};
-    for (int y = y0; y < y1; y++)
-        for (int x = x0; x < x1; x++) {
-            size_t pixel = (size_t)y * (size_t)m->width + (size_t)x;
-            p.sum += m->mean[3 * pixel + (size_t)channel];
-            p.variance += moments_var_of_mean(m, pixel, channel);
-            p.truth += truth[3 * pixel + (size_t)channel];
-        }
-    return p;
-}
-
-/* H0: each quadrant's mean radiance is the closed form's, up to a relative error of `allowed` that
- * the comment beside each number explains. 12 Student tests of K - 1 = 7 degrees of freedom at 1e-6
- * each, two-sided: alpha < 1.2e-5. Power: the standard errors are below 2e-4, so that an error of
- * 1 % is more than 50 of them. */
-static bool quadrants_agree(const struct moments *m, const double *truth, double allowed)
-{
-    double t = gsl_cdf_tdist_Qinv(5e-7, m->n[0] - 1);
-    int w = m->width, h = m->height;
-    bool agree = true;
-    for (int q = 0; q < 4; q++)
-        for (int c = 0; c < 3; c++) {
-            struct part p = take(m, truth, q % 2 * w / 2, (q % 2 + 1) * w / 2, q / 2 * h / 2,
-                                 (q / 2 + 1) * h / 2, c);
-            agree = agree && fabs(p.sum - p.truth) <= t * sqrt(p.variance) + allowed * p.truth;
-        }
-    return agree;
-}
-
-/* Mean of f over each pixel, midpoint rule. The ray is formed here, not by the renderer's camera. */
-static double *expect(const struct fixture *f, double tan_h,
-                      void (*radiance)(const double d[3], double out[3]))
-{
-    enum { SUB = 16 };
-    int w = f->suite.width, h = f->suite.height;
-    double *truth = calloc((size_t)(3 * w * h), sizeof *truth);
-    assert_non_null(truth);
-    for (int i = 0; i < w * h * SUB * SUB; i++) {
-        int pixel = i / (SUB * SUB), sub = i % (SUB * SUB);
-        double x = pixel % w + (sub % SUB + 0.5) / SUB, y = pixel / w + (sub / SUB + 0.5) / SUB;
-        double d[3] = {(2 * x / w - 1) * tan_h, (1 - 2 * y / h) * tan_h * h / w, -1}, out[3];
-        radiance(d, out);
-        for (int c = 0; c < 3; c++)
-            truth[3 * pixel + c] += out[c] / (SUB * SUB);
-    }
-    return truth;
-}
-
-static void render(struct fixture *f, struct moments *m)
-{
-    struct err e;
-    json_t *manifest = json_object();
-    f->ref.replicates = 8;
-    f->ref.spp = 64;
-    finish(f);
-    bool ok = cycles_render(&f->job, m, manifest, &e);
-    json_decref(manifest);
-    fail_on(ok, &e);
-}
-
-/* Agrees as it is; the negative controls: 1 % brighter, and left and right exchanged. */
-static void judge(struct fixture *f, struct moments *m, double *truth, double allowed,
-                  bool symmetric)
-{
-    int w = f->suite.width;
-    size_t count = 3 * (size_t)w * (size_t)f->suite.height;
-    bool agrees = quadrants_agree(m, truth, allowed), brighter, mirrored;
-    for (size_t i = 0; i < count; i++)
-        truth[i] *= 1.01;
-    brighter = quadrants_agree(m, truth, allowed);
-    double *flipped = malloc(count * sizeof *flipped);
-    for (size_t i = 0; i < count; i++) {
-        size_t x = i / 3 % (size_t)w;
-        flipped[i] = truth[i + 3 * ((size_t)w - 1 - 2 * x)] / 1.01;
-    }
-    mirrored = quadrants_agree(m, flipped, allowed);
-    free(flipped);
-    free(truth);
-    moments_free(m);
-    assert_true(agrees);
-    assert_false(brighter);
-    assert_int_equal(mirrored, symmetric);
-}
 
 /* A wall of albedo (.5, .25, .8) at z = -2, seen from the origin; a point light of intensity
  * (7, 5, 3) at (.7, .4, -1.2): L = albedo/pi I cos / r^2 with cos = .8 / r. */
-static void point_light_radiance(const double d[3], double out[3])
+static void point_light_radiance(const double d[3], double out[3], const void *data)
 {
+    (void)data;
     static const double albedo[3] = {.5, .25, .8}, intensity[3] = {7, 5, 3};
     double x = 2 * d[0] - .7, y = 2 * d[1] - .4, r2 = x * x + y * y + .8 * .8;
     for (int c = 0; c < 3; c++)
@@ -368,9 +247,9 @@ static void point_light_radiance(const double d[3], double out[3])
 
 static void point_light_on_a_wall(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct moments m;
-    need_blender();
+    probe_need_blender();
     f->suite.width = 24;
     f->suite.height = 16;
     build_quad(&f->s, v3(-5, -5, -2), v3(10, 0, 0), v3(0, 10, 0),
@@ -380,17 +259,18 @@ static void point_light_on_a_wall(void **state)
                                       .position = {.7f, .4f, -1.2f},
                                       .attenuation = {0, 0, 2}});
     build_camera(&f->s, v3(0, 0, 0), 60);
-    render(f, &m);
+    probe_render(f, &m);
     /* float32, and the midpoint rule */
-    judge(f, &m, expect(f, tan(M_PI / 6), point_light_radiance), 1e-4, false);
+    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 16, point_light_radiance, NULL), 1e-4, false);
 }
 
 /* The same wall but smaller; an emitter of radiance 10, x = .5 (its plane stands on the wall), y in -.4 .. .4,
  * z in -1.3 .. -.7, emits towards -x. Irradiance by Lambert's contour formula: half the sum over the
  * edges of the angle they subtend times the z component of the unit normal of edge and receiver.
  * Nothing arrives behind it. */
-static void standing_emitter_radiance(const double d[3], double out[3])
+static void standing_emitter_radiance(const double d[3], double out[3], const void *data)
 {
+    (void)data;
     static const double albedo[3] = {.5, .25, .8};
     static const double corner[4][2] = {{-.4, -1.3}, {.4, -1.3}, {.4, -.7}, {-.4, -.7}};
     double p[3] = {2 * d[0], 2 * d[1], -2}, sum = 0;
@@ -410,9 +290,9 @@ static void standing_emitter_radiance(const double d[3], double out[3])
 
 static void emitter_that_stands_on_the_wall(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct moments m;
-    need_blender();
+    probe_need_blender();
     f->suite.width = 24;
     f->suite.height = 16;
     build_quad(&f->s, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0),
@@ -422,15 +302,16 @@ static void emitter_that_stands_on_the_wall(void **state)
     /* The wall is small, so that the emitter is large against the scene and an emitter that is not
      * cut is sampled wrongly. The view is narrow enough not to see the emitter, whose near edge is at .5 / 1.3 = .38. */
     build_camera(&f->s, v3(0, 0, 0), (float)(2 * atan(.36) * 180 / M_PI));
-    render(f, &m);
+    probe_render(f, &m);
     /* the midpoint rule, and the strip of 1.5e-5 of the emitter's edge of MATCH_CYCLES.md */
-    judge(f, &m, expect(f, .36, standing_emitter_radiance), 1e-4, false);
+    probe_judge(f, &m, probe_expect(f, .36, 16, standing_emitter_radiance, NULL), 1e-4, false);
 }
 
 /* Inside a sphere that emits (1, 2, 3) and reflects (.5, .8, .2): at depth 3 each pixel is
  * emission * (1 + a + a^2 + a^3). */
-static void furnace_radiance(const double d[3], double out[3])
+static void furnace_radiance(const double d[3], double out[3], const void *data)
 {
+    (void)data;
     static const double albedo[3] = {.5, .8, .2};
     (void)d;
     for (int c = 0; c < 3; c++)
@@ -439,18 +320,18 @@ static void furnace_radiance(const double d[3], double out[3])
 
 static void furnace_inside_a_sphere(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct moments m;
-    need_blender();
+    probe_need_blender();
     f->suite.width = 24;
     f->suite.height = 16;
     f->suite.depth = 3;
     build_sphere(&f->s, v3(.1f, .2f, .3f), 1.5f, -1,
                  build_material(&f->s, (rgb){.5f, .8f, .2f}, (rgb){1, 2, 3}));
     build_camera(&f->s, v3(0, 0, 0), 60);
-    render(f, &m);
+    probe_render(f, &m);
     /* the icosphere's edges: 1.8e-4 was measured at depth 5 */
-    judge(f, &m, expect(f, tan(M_PI / 6), furnace_radiance), 3e-4, true);
+    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 16, furnace_radiance, NULL), 3e-4, true);
 }
 
 /* Depth 0, half of the view an emitter's front and half an emitter's back, which also reflects. The
@@ -458,9 +339,9 @@ static void furnace_inside_a_sphere(void **state)
  * at that distance, so that two thirds of it are the front. */
 static void only_fronts_emit(void **state)
 {
-    struct fixture *f = *state;
+    struct probe *f = *state;
     struct moments m;
-    need_blender();
+    probe_need_blender();
     f->suite.width = 25;
     f->suite.height = 40;
     f->suite.depth = 0;
@@ -470,7 +351,7 @@ static void only_fronts_emit(void **state)
     build_light(&f->s, (struct light){
                            .kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 0, 1}});
     build_camera(&f->s, v3(0, 0, 0), 60);
-    render(f, &m);
+    probe_render(f, &m);
     bool ok = true;
     for (int i = 0; i < 3 * 25 * 40; i++) {
         int x = i / 3 % 25, c = i % 3;
@@ -483,11 +364,12 @@ static void only_fronts_emit(void **state)
 
 int main(void)
 {
-#define WITH_JOB(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
+#define WITH_JOB(f) cmocka_unit_test_setup_teardown(f, probe_setup, probe_teardown)
     const struct CMUnitTest tests[] = {
         WITH_JOB(replicates_are_folded_and_described),
         WITH_JOB(light_without_noise_is_exact),
         WITH_JOB(equal_replicates_are_refused),
+        WITH_JOB(replicates_that_share_their_noise_are_refused),
         WITH_JOB(unusable_images_are_refused),
         WITH_JOB(a_blender_that_fails_is_quoted),
         WITH_JOB(what_is_missing_is_named),

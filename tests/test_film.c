@@ -72,13 +72,15 @@ static void rare_bright_samples(struct fixture *f)
 
 static struct render_options options_of(int spp)
 {
-    return (struct render_options){
-        .integrator = {.direct = DIRECT_MIS, .light_samples = 1, .roulette = true, .sampler = {SAMPLER_INDEPENDENT, 77}},
-        .width = SIZE,
-        .height = SIZE,
-        .num_samples = (uint32_t)spp,
-        .threads = 2,
-        .pilot_max = (uint32_t)spp};
+    return (struct render_options){.integrator = {.direct = DIRECT_MIS,
+                                                  .light_samples = 1,
+                                                  .roulette = ROULETTE_THROUGHPUT,
+                                                  .sampler = {SAMPLER_INDEPENDENT, 77}},
+                                   .width = SIZE,
+                                   .height = SIZE,
+                                   .num_samples = (uint32_t)spp,
+                                   .threads = 2,
+                                   .pilot_max = (uint32_t)spp};
 }
 
 static struct render_stats go_on(const struct fixture *f, const struct render_options *o,

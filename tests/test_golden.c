@@ -112,6 +112,20 @@ static void what_was_written_comes_back(void **state)
     json_decref(manifest);
 }
 
+/* No clock gets into the image: dates are the manifest's. */
+static void the_same_moments_have_the_same_bytes(void **state)
+{
+    struct fixture *f = *state;
+    struct err e;
+    char first[65], second[65];
+    write_golden(f);
+    assert_true(sha256_file(f->exr, first, &e));
+    sleep(1);
+    write_golden(f);
+    assert_true(sha256_file(f->exr, second, &e));
+    assert_string_equal(first, second);
+}
+
 static void engines_share_a_manifest(void **state)
 {
     struct fixture *f = *state;
@@ -338,6 +352,7 @@ int main(void)
 #define WITH_FILES(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
         WITH_FILES(what_was_written_comes_back),
+        WITH_FILES(the_same_moments_have_the_same_bytes),
         WITH_FILES(engines_share_a_manifest),
         WITH_FILES(a_missing_golden_is_named),
         WITH_FILES(a_golden_of_another_scene_or_setting_is_refused),

@@ -2,8 +2,7 @@
  * closed form. Two-sided at alpha = 1e-6 (|z| < 4.89), one seed, fixed n, no retry. With n = 4e4 or
  * more samples of moderate skew the normal limit is good to a factor of two there. Each group has a
  * negative control: a value that a known bug would give must be rejected by the same test. */
-#include "../renderer/render.h"
-#include "build_scene.h"
+#include "render_check.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,7 +17,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .direct = DIRECT_MIS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
-                                                       .roulette = true,
+                                                       .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260101}};
 
 static struct moments render_scene(struct scene *s, struct integrator_options io, int width,
@@ -43,42 +42,6 @@ static struct moments render_scene(struct scene *s, struct integrator_options io
     return m;
 }
 
-static void finish(struct scene *s)
-{
-    struct err e = {0};
-    if (!scene_finish(s, "test", &e))
-        fail_msg("%s", e.msg);
-}
-
-/* Mean and standard error over all pixels, each an equal estimate of the same number. */
-static void pooled(const struct moments *m, int channel, double *mean, double *std_error)
-{
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    double sum = 0, var = 0;
-    for (size_t p = 0; p < pixels; p++) {
-        sum += m->mean[3 * p + (size_t)channel];
-        var += moments_var_of_mean(m, p, channel);
-    }
-    *mean = sum / (double)pixels;
-    *std_error = sqrt(var) / (double)pixels;
-}
-
-/* Float rounding along a path allows 2e-5 relative where there is no noise at all. */
-static bool agrees(const struct moments *m, int channel, double expected)
-{
-    double mean, se;
-    pooled(m, channel, &mean, &se);
-    return fabs(mean - expected) <= Z_LIMIT * se + 2e-5 * fabs(expected);
-}
-
-static void check_mean(const struct moments *m, int channel, double expected, const char *what)
-{
-    double mean, se;
-    pooled(m, channel, &mean, &se);
-    if (!agrees(m, channel, expected))
-        fail_msg("%s: %.7g +- %.2g, expected %.7g", what, mean, se, expected);
-}
-
 /* A sphere seen from inside that reflects rho and emits E: L = E sum_{k=0..m} rho^k for every m,
  * because every point sees the same radiance in all directions. */
 static void furnace_at_every_depth(void **state)
@@ -89,7 +52,7 @@ static void furnace_at_every_depth(void **state)
     uint32_t m = build_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
     build_sphere(&s, v3(0.1f, -0.2f, 0.3f), 1, -1, m);
     build_camera(&s, v3(0.3f, 0, 0.5f), 60);
-    finish(&s);
+    check_finish(&s);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int depth = 0; depth <= 6; depth += depth < 2 ? 1 : 4) {
             struct integrator_options io = path_options;
@@ -104,7 +67,7 @@ static void furnace_at_every_depth(void **state)
                 /* Negative control: depth counted one too high. Hemisphere sampling is too noisy to
                  * see that in the deep sums; everything else has to. */
                 if (term > 1e-3 * sum && (direct != DIRECT_HEMISPHERE || depth < 2))
-                    assert_false(agrees(&film, c, sum + term));
+                    assert_false(check_agrees(&film, c, sum + term));
             }
             moments_free(&film);
         }
@@ -159,7 +122,7 @@ static void rectangle_light(void **state)
             build_quad(&s, p, v, u, lamp);
         else
             build_quad(&s, p, u, v, lamp);
-        finish(&s);
+        check_finish(&s);
         double corner[4][3] = {{p.x, p.y, p.z},
                                {p.x + u.x, p.y + u.y, p.z + u.z},
                                {p.x + u.x + v.x, p.y + u.y + v.y, p.z + u.z + v.z},
@@ -174,7 +137,7 @@ static void rectangle_light(void **state)
                 check_mean(&film, 1, expected, direct_kind_names[direct]);
                 /* Negative control: the assignment's pdf lacks 1/d, so its image is brighter by a
                  * mean distance of about 1.1 here; 5 % would already be rejected. */
-                assert_false(agrees(&film, 1, 1.05 * expected));
+                assert_false(check_agrees(&film, 1, 1.05 * expected));
                 moments_free(&film);
             }
         scene_free(&s);
@@ -192,7 +155,7 @@ static void sphere_light(void **state)
         uint32_t lamp = build_material(&s, grey(0), grey(3));
         vec3 c = v3(centre[q][0], centre[q][1], centre[q][2]);
         build_sphere(&s, c, 0.25f, 1, lamp);
-        finish(&s);
+        check_finish(&s);
         double d2 = (double)dot(c, c), cos_theta = c.y / sqrt(d2);
         double expected = 0.5 / M_PI * (M_PI * 3 * 0.0625 / d2 * cos_theta);
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
@@ -200,7 +163,7 @@ static void sphere_light(void **state)
             io.direct = (enum direct_kind)direct;
             struct moments film = render_scene(&s, io, 8, 8, 4096, 1, BVH_SAH);
             check_mean(&film, 0, expected, direct_kind_names[direct]);
-            assert_false(agrees(&film, 0, expected / cos_theta * 0.9));
+            assert_false(check_agrees(&film, 0, expected / cos_theta * 0.9));
             moments_free(&film);
         }
         scene_free(&s);
@@ -219,7 +182,7 @@ static void delta_lights(void **state)
     vec3 sun = normalize(v3(-1, 2, 0.5f));
     build_light(&s,
                 (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
-    finish(&s);
+    check_finish(&s);
     struct moments film = render_scene(&s, path_options, 4, 4, 64, 1, BVH_SAH);
     double d2 = 0.36 + 0.64 + 0.25, cos_point = 0.8 / sqrt(d2);
     double cos_sun = 2 / sqrt(1 + 4 + 0.25);
@@ -227,7 +190,7 @@ static void delta_lights(void **state)
     for (int c = 0; c < 3; c++) {
         double expected = 0.7 / M_PI * (intensity[c] * cos_point / d2 + irradiance[c] * cos_sun);
         check_mean(&film, c, expected, "delta lights");
-        assert_false(agrees(&film, c, expected * 1.001));
+        assert_false(check_agrees(&film, c, expected * 1.001));
     }
     moments_free(&film);
     scene_free(&s);
@@ -246,7 +209,7 @@ static void shadow(void **state)
                                        .value = {1, 1, 1},
                                        .position = {0, 1, 0},
                                        .attenuation = {0, 0, 1}});
-        finish(&s);
+        check_finish(&s);
         struct moments film = render_scene(&s, path_options, 4, 4, 16, 1, BVH_SAH);
         check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
         moments_free(&film);
@@ -269,7 +232,7 @@ static struct scene box_scene(float radiance)
     build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
     build_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, red);
     build_camera(&s, v3(0, 0.75f, 3), 49);
-    finish(&s);
+    check_finish(&s);
     return s;
 }
 
@@ -392,15 +355,6 @@ static void twice_the_light_twice_the_image(void **state)
     scene_free(&two);
 }
 
-/* Luminance means of two independent pictures, in units of their standard error. */
-static double z_between(const struct moments *a, const struct moments *b)
-{
-    double ma, mb, sa, sb;
-    pooled(a, 0, &ma, &sa);
-    pooled(b, 0, &mb, &sb);
-    return (ma - mb) / sqrt(sa * sa + sb * sb);
-}
-
 /* All estimators, roulette or not, have the same mean. Cornell-like box, depth 4, 64 x 48 pixels,
  * 64 samples: relative standard error about 0.3 % (light, mis), so a loss of 3 % is found. */
 static void estimators_agree(void **state)
@@ -409,15 +363,16 @@ static void estimators_agree(void **state)
     struct scene s = box_scene(10);
     struct integrator_options io = path_options;
     io.max_bounces = 4;
-    io.roulette = false;
+    io.roulette = ROULETTE_OFF;
     struct moments reference = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
-        for (int roulette = 0; roulette < 2; roulette++) {
+        for (int roulette = ROULETTE_OFF; roulette <= ROULETTE_FIXED; roulette++) {
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
-            io.roulette = roulette != 0;
+            io.roulette = (enum roulette_kind)roulette;
+            io.survival = 0.7f;
             struct moments film = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);
-            double z = z_between(&film, &reference);
+            double z = check_z(&film, &reference, 0);
             if (fabs(z) > Z_LIMIT)
                 fail_msg("%s, roulette %d: z = %.2f", direct_kind_names[direct], roulette, z);
             moments_free(&film);
@@ -425,7 +380,7 @@ static void estimators_agree(void **state)
     /* Negative control: one bounce less. */
     io.max_bounces = 3;
     struct moments shallow = render_scene(&s, io, 64, 48, 256, 2, BVH_SAH);
-    assert_true(fabs(z_between(&shallow, &reference)) > Z_LIMIT);
+    assert_true(fabs(check_z(&shallow, &reference, 0)) > Z_LIMIT);
     moments_free(&shallow);
     moments_free(&reference);
     scene_free(&s);

@@ -18,7 +18,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .direct = DIRECT_MIS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
-                                                       .roulette = true,
+                                                       .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260202}};
 
 static void look(struct scene *s, vec3 eye, vec3 backward, vec3 up)
@@ -205,7 +205,7 @@ static void seen_directly_and_in_mirrors(void **state)
                 struct integrator_options io = path_options;
                 io.direct = (enum direct_kind)direct;
                 io.max_bounces = 2;
-                io.roulette = false;
+                io.roulette = ROULETTE_OFF;
                 struct moments film = check_render(&s, io, 2, 2, 256);
                 double theta = acos((double)w.y), phi = atan2(-(double)w.z, w.x) + M_PI;
                 double le = sky_radiance(&sky, phi / (2 * M_PI) * 16, theta / M_PI * 8);

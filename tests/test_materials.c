@@ -22,7 +22,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .direct = DIRECT_MIS,
                                                        .max_bounces = 1,
                                                        .light_samples = 1,
-                                                       .roulette = true,
+                                                       .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260204}};
 
 struct result {
@@ -136,7 +136,7 @@ static void corridor_of_mirrors(void **state)
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
                 struct integrator_options io = options(direct, n);
                 io.first_bounce = n;
-                io.roulette = false;
+                io.roulette = ROULETTE_OFF;
                 struct result r = look(&s, io, 4, 4);
                 for (int c = 0; c < 3; c++) {
                     double expected = emitted;

@@ -245,7 +245,9 @@ static void refusals(void **state)
         {{{.x = 0, 0, 4, 2, 0, 7, .samples = "0:7x"}, {.x = 0, 0, 4, 2, 7, 9}},
          2,
          "not sample ranges"},
-        {{{.x = 0, 0, 4, 2, 0, 7, .samples = ":"}, {.x = 0, 0, 4, 2, 7, 9}}, 2, "not sample ranges"},
+        {{{.x = 0, 0, 4, 2, 0, 7, .samples = ":"}, {.x = 0, 0, 4, 2, 7, 9}},
+         2,
+         "not sample ranges"},
         {{{.x = 1, 0, 4, 2, 0, 7}, {.x = 0, 0, 4, 2, 7, 9}}, 2, "which part of which picture"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

@@ -50,7 +50,7 @@ static struct moments picture(const struct scene *s, struct how how, struct rend
                                               .direct = DIRECT_MIS,
                                               .max_bounces = how.bounces,
                                               .light_samples = 1,
-                                              .roulette = true,
+                                              .roulette = ROULETTE_THROUGHPUT,
                                               .sampler = how.sampler},
                                .width = WIDTH,
                                .height = HEIGHT,

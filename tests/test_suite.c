@@ -174,6 +174,27 @@ static void turn_is_half_a_pixel(const char *line_a, const char *line_b)
     assert_true(a == 0 && b > 0.16115 && b < 0.16116);
 }
 
+static void index_is_3_percent_less(const char *line_a, const char *line_b)
+{
+    double a, b;
+    assert_int_equal(sscanf(line_a, " <ior>%lf</ior>", &a), 1);
+    assert_int_equal(sscanf(line_b, " <ior>%lf</ior>", &b), 1);
+    assert_true(b > 0.9699999 * a && b < 0.9700001 * a);
+}
+
+static void alphas_are_10_percent_apart(const char *line_a, const char *line_b)
+{
+    double a, b;
+    assert_int_equal(sscanf(line_a, " <alpha>%lf</alpha>", &a), 1);
+    assert_int_equal(sscanf(line_b, " <alpha>%lf</alpha>", &b), 1);
+    assert_true(b > 1.0999999 * a && b < 1.1000001 * a);
+}
+
+static void no_line_differs(const char *line_a, const char *line_b)
+{
+    fail_msg("%s differs from %s", line_b, line_a);
+}
+
 /* A 9x scene must be the named scene but for the stated change, or its verdict says nothing. */
 static void scenes_that_differ_differ_as_stated(void **state)
 {
@@ -181,6 +202,26 @@ static void scenes_that_differ_differ_as_stated(void **state)
     assert_int_equal(
         differing_lines("41_cornell", "91_albedo_2_percent", albedos_are_2_percent_apart), 4);
     assert_int_equal(differing_lines("41_cornell", "92_half_pixel", turn_is_half_a_pixel), 1);
+    assert_int_equal(
+        differing_lines("42_cornell_glass", "93_glass_ior_3_percent", index_is_3_percent_less), 1);
+    assert_int_equal(
+        differing_lines("43_cornell_metal", "94_rough_10_percent", alphas_are_10_percent_apart), 3);
+    assert_int_equal(differing_lines("41_cornell", "95_one_bounce_less", no_line_differs), 0);
+    assert_int_equal(differing_lines("46_sky", "96_sky_turned", no_line_differs), 0);
+
+    /* The skies: tests/test_suite_scenes.c. */
+    struct suite s;
+    load_shipped(&s);
+    for (int i = 0; i < s.num_scenes; i++) {
+        const struct suite_scene *scene = &s.scene[i], *base = suite_find(&s, scene->references_of);
+        int missing = strcmp(scene->name, "95_one_bounce_less") == 0;
+        assert_int_equal(scene->depth, base->depth - missing);
+        assert_true(scene->lens_radius == base->lens_radius);
+        assert_true(scene->focal_distance == base->focal_distance);
+        assert_int_equal(strcmp(scene->environment, base->environment) != 0,
+                         strcmp(scene->name, "96_sky_turned") == 0);
+    }
+    suite_free(&s);
 }
 
 /* Test vectors of FIPS 180-2, appendix B.1 and B.3, and of the empty message. */
@@ -314,6 +355,20 @@ static const struct fault {
      "42_good.json: 'povray' is both a reference and not expressible"},
     {false, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {\"truth\": \"why\"}",
      "42_good.json: unknown key 'not_expressible.truth'"},
+    {false, "\"spp\": 16", "\"spp\": 16, \"variants\": []", "'variants' is not an array of 1 to 8"},
+    {false, "\"spp\": 16", "\"spp\": 16, \"variants\": [{\"name\": \"h\"}]",
+     "missing key 'variants[0].spp'"},
+    {false, "\"spp\": 16",
+     "\"spp\": 16, \"variants\": [{\"name\": \"H\", \"options\": [\"-H\"], \"spp\": 4, "
+     "\"margin_global\": 0.1, \"margin_tile\": 0.1}]",
+     "'variants[0].name' is 'H': only a-z"},
+    {false, "\"spp\": 16",
+     "\"spp\": 16, \"variants\": [{\"name\": \"h\", \"options\": [4], \"spp\": 4, "
+     "\"margin_global\": 0.1, \"margin_tile\": 0.1}]",
+     "'variants[0].options' holds what is not a text"},
+    {false, "\"spp\": 16",
+     "\"spp\": 16, \"consistency\": {\"renders\": 3, \"spp\": 4, \"margin\": 1}",
+     "'consistency.renders' is 3, not in 4..256"},
     {true, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {}", "unknown key 'not_expressible'"},
     {false, "  }\n}", "  }\n", "42_good.json:14: '}' expected near end of file"},
     {true, "DIFFERENT", "EQUIVALENT", "93_good.json: 'expect' is 'EQUIVALENT', but scenes of"},

@@ -14,17 +14,20 @@ static const struct {
 } verbs[] = {
     {"validate", verb_validate, "render the suite and judge it against its references"},
     {"compare", verb_compare, "judge two moments images"},
+    {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
     {"report", verb_report, "make the HTML page of a results.json"},
-    {"reference", verb_reference, "render references with Cycles and POV-Ray into golden/"},
+    {"golden", verb_golden, "render, inspect and approve the stored references"},
+    {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
+    {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
-    {"export", verb_export, "write a scene for Cycles or POV-Ray"},
+    {"export", verb_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
 };
 
 static void print_help(void)
 {
     puts("usage: assay VERB [options]\n");
     for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++)
-        printf("  %-10s %s\n", verbs[i].name, verbs[i].help);
+        printf("  %-12s %s\n", verbs[i].name, verbs[i].help);
     puts("\n`assay VERB --help` lists its options.\n"
          "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive,\n"
          "3 could not judge, with one line on stderr.");

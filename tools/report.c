@@ -1,6 +1,7 @@
 #include "report.h"
 
 #include "../renderer/fs.h"
+#include "report_converge.h"
 #include "report_html.h"
 #include "report_page.h"
 #include "report_parts.h"
@@ -114,7 +115,9 @@ static void write_fact(FILE *f, const char *label, const char *text)
 static void write_header(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
 {
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
-    write_verdict(f, claim, num);
+    if (num > 0)
+        write_verdict(f, claim, num);
+    report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
             "<p class=\"lede\">The chance that noise alone makes any claim of this page "
             "DIFFERENT is at most %.3g (family-wise alpha), and so is the chance of any wrong "
@@ -272,20 +275,46 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     html_text(f, member_text(root, "date"));
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
     write_header(f, root, claim, num);
-    write_table(f, claim, num);
+    if (num > 0)
+        write_table(f, claim, num);
     for (size_t done = 0; done < num;) {
         size_t of_scene = gather_scene(claim + done, num - done);
         if (!report_scene(p, claim + done, of_scene, e))
             return false;
         done += of_scene;
     }
+    report_convergence(f, json_object_get(root, "convergence"));
     fputs("</main>\n", f);
     write_layers(p);
     fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
     return true;
 }
 
+/* Moves the convergence of another results.json into root. */
+static bool add_convergence(json_t *root, const char *results_path, const char *path, struct err *e)
+{
+    json_t *other;
+    if (!results_read(path, &other, e))
+        return false;
+    json_t *convergence = json_object_get(other, "convergence");
+    bool ok = true;
+    if (convergence == NULL)
+        ok = err_set(e, "%s: has no 'convergence'", path);
+    else if (json_object_get(root, "convergence") != NULL)
+        ok = err_set(e, "%s: has a 'convergence' too", results_path);
+    else
+        json_object_set(root, "convergence", convergence);
+    json_decref(other);
+    return ok;
+}
+
 bool report_write(const char *results_path, const char *out_path, struct err *e)
+{
+    return report_write_with(results_path, NULL, out_path, e);
+}
+
+bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
+                       struct err *e)
 {
     bool ok = false;
     struct page page = {0};
@@ -300,9 +329,11 @@ bool report_write(const char *results_path, const char *out_path, struct err *e)
 
     if (!results_read(results_path, &root, e))
         return false;
+    if (converge_path != NULL && !add_convergence(root, results_path, converge_path, e))
+        goto done;
     const json_t *claims = json_object_get(root, "claims");
     size_t num = json_array_size(claims);
-    claim = calloc(num, sizeof *claim);
+    claim = calloc(num + 1, sizeof *claim);
     if (claim == NULL) {
         err_set(e, "out of memory for the report");
         goto done;

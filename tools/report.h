@@ -8,4 +8,9 @@
 bool report_write(const char *results_path, const char *out_path, struct err *e)
     __attribute__((warn_unused_result));
 
+/* The same with the "convergence" of another results.json (NULL: none), after the scenes. Fails if both
+ * files have some. */
+bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
+                       struct err *e) __attribute__((warn_unused_result));
+
 #endif

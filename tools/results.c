@@ -2,6 +2,8 @@
 
 #include "../reference/suite.h"
 #include "../renderer/fs.h"
+#include "consistency_run.h"
+#include "convergence.h"
 
 #include <assert.h>
 #include <math.h>
@@ -199,7 +201,13 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
     if (!check_members(root, root_members, LENGTH(root_members), path, "", e))
         return false;
     const json_t *claims = json_object_get(root, "claims");
-    if (!json_is_array(claims) || json_array_size(claims) == 0)
+    const json_t *convergence = json_object_get(root, "convergence");
+    if (convergence != NULL && !convergence_check(convergence, path, e))
+        return false;
+    const json_t *consistency = json_object_get(root, "consistency");
+    if (consistency != NULL && !consistency_check(consistency, path, e))
+        return false;
+    if (!json_is_array(claims) || (json_array_size(claims) == 0 && convergence == NULL))
         return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
@@ -260,7 +268,17 @@ int results_exit_code(const json_t *results)
     size_t count[4] = {0};
     for (size_t i = 0; i < json_array_size(claims); i++)
         count[claim_outcome(json_array_get(claims, i))]++;
-    if (json_array_size(claims) == 0 || count[OUTCOME_NOT_JUDGED] > 0)
+    const json_t *convergence = json_object_get(results, "convergence");
+    for (size_t i = 0; i < json_array_size(convergence); i++) {
+        const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
+        for (size_t k = 0; k < json_array_size(engines); k++)
+            count[convergence_outcome(json_array_get(engines, k))]++;
+    }
+    const json_t *consistency = json_object_get(results, "consistency");
+    for (size_t i = 0; i < json_array_size(consistency); i++)
+        count[consistency_outcome(json_array_get(consistency, i))]++;
+    if (json_array_size(claims) + json_array_size(convergence) == 0 ||
+        count[OUTCOME_NOT_JUDGED] > 0)
         return EXIT_NOT_JUDGED;
     if (count[OUTCOME_OPPOSITE] > 0)
         return EXIT_DIFFERENT;

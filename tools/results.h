@@ -1,10 +1,13 @@
-/* results.json: the record of one `assay validate` or `assay compare`, from which junit.xml and
+/* results.json: the record of one `assay validate`, `assay compare` or `assay converge`, from which junit.xml and
  * report.html are made and nothing else.
  *
  *   { "assay": 1,                       schema version
  *     "command": "assay validate ...", "version": "0.1 (commit)", "date": "2026-..Z",
  *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
  *     "seconds": 98.1,
+ *     "consistency": [ ... ],             consistency_run.h; absent where `assay validate` has not run
+ *     "convergence": [ ... ],             convergence.h; absent where `assay converge` has not run
+ *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
  *         "scene": "41_cornell", "title": "...", "detects": "...", "blind_to": "...",
  *         "quantity": "mean", "a": "pathtracer", "b": "cycles", "class": "exact",
@@ -22,12 +25,15 @@
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
  * false, "error": "one line" } ] }
  *
+ * With --engine the root also has "not_expressible": [{"scene":, "engine":, "reason": "one line"}].
+ *
  * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where
  * "verdict" equals "expected". An element of tile_log10_p and tile_t is null where a tile has no
  * noise at all and so no test.
  *
- * A reader may rely on: assay, command, version, date, alpha, claims (at least one); of each claim
+ * A reader may rely on: assay, command, version, date, alpha, claims (at least one, or none where there
+ * is convergence); of each claim
  * scene, a, b, expected, passed; of each judged claim everything above except title, detects,
  * blind_to, class, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, seed_a, seeds_b, version_b and
  * rerun, which are provenance and absent where the claim has none (two files compared). */
@@ -55,7 +61,7 @@ double member_number(const json_t *object, const char *name);
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
 enum outcome claim_outcome(const json_t *claim);
 
-/* 0 if every claim passed; else 3 if any could not be judged, else 1 if any verdict was the
+/* 0 if every claim and every engine of the convergence passed; else 3 if any could not be judged, else 1 if any verdict was the
  * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
 int results_exit_code(const json_t *results);
 

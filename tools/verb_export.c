@@ -1,27 +1,48 @@
 #include "../reference/export_cycles.h"
+#include "../reference/export_mitsuba.h"
+#include "../reference/export_pbrt.h"
 #include "../reference/export_povray.h"
 #include "../renderer/cli.h"
 #include "../renderer/collada.h"
+#include "../renderer/environment.h"
 #include "../renderer/fs.h"
 #include "results.h"
 #include "verbs.h"
 
 #include <string.h>
 
-enum option { OPT_OUT, OPT_ENGINE, OPT_RESOLUTION, OPT_BOUNCES, OPT_HELP };
+enum option {
+    OPT_OUT,
+    OPT_ENGINE,
+    OPT_RESOLUTION,
+    OPT_BOUNCES,
+    OPT_ENVIRONMENT,
+    OPT_LENS,
+    OPT_FOCUS,
+    OPT_HELP
+};
 
 static const struct cli_option options[] = {
-    [OPT_OUT] = {'o', "out", 1, "FILE", "required; .json: for cycles.py, .pov: for POV-Ray"},
-    [OPT_ENGINE] = {0, "engine", 1, "NAME", "cycles or povray (by the ending of --out)"},
+    [OPT_OUT] = {'o', "out", 1, "FILE",
+                 "required; .json: for cycles.py, .pov: for POV-Ray,\n"
+                 ".xml: for Mitsuba 3, with meshes beside it, .pbrt: for pbrt-v4"},
+    [OPT_ENGINE] = {0, "engine", 1, "NAME",
+                    "cycles, povray, mitsuba or pbrt (by the ending of --out)"},
     [OPT_RESOLUTION] = {'r', "resolution", 2, "W H", "pixels (480 360)"},
     [OPT_BOUNCES] = {'m', "max-bounces", 1, "N", "as pathtracer counts them (5)"},
+    [OPT_ENVIRONMENT] = {'e', "environment", 1, "FILE", "as pathtracer's"},
+    [OPT_LENS] = {'b', "lens-radius", 1, "R", "as pathtracer's; 0: pinhole (0)"},
+    [OPT_FOCUS] = {'d', "focal-distance", 1, "D", "as pathtracer's (4.7)"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
-static const char *const engine_names[] = {"cycles", "povray", NULL};
+enum engine { CYCLES, POVRAY, MITSUBA, PBRT };
+static const char *const engine_names[] = {"cycles", "povray", "mitsuba", "pbrt", NULL};
+static const char *const endings[] = {".json", ".pov", ".xml", ".pbrt", NULL};
 
 struct settings {
-    const char *scene, *out;
+    const char *scene, *out, *environment;
+    double lens_radius, focal_distance;
     int engine, width, height, depth;
     bool done;
 };
@@ -48,6 +69,11 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
                  cli_int("--resolution", c.value[1], 1, 65535, &s->height, e);
             break;
         case OPT_BOUNCES: ok = cli_int("--max-bounces", v, 0, 10000, &s->depth, e); break;
+        case OPT_ENVIRONMENT: s->environment = v; break;
+        case OPT_LENS: ok = cli_double("--lens-radius", v, 0, 1e6, &s->lens_radius, e); break;
+        case OPT_FOCUS:
+            ok = cli_double("--focal-distance", v, 1e-6, 1e9, &s->focal_distance, e);
+            break;
         case OPT_HELP:
             puts("usage: assay export [options] -o OUT SCENE.dae\n");
             cli_print_options(stdout, options);
@@ -60,43 +86,70 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
     if (s->scene == NULL || s->out == NULL)
         return err_set(e, "export needs a scene and --out (see --help)");
     const char *dot = strrchr(s->out, '.');
-    if (s->engine < 0 && dot != NULL && strcmp(dot, ".json") == 0)
-        s->engine = 0;
-    else if (s->engine < 0 && dot != NULL && strcmp(dot, ".pov") == 0)
-        s->engine = 1;
-    else if (s->engine < 0)
-        return err_set(e, "--out: '%s' ends neither in .json nor in .pov; give --engine", s->out);
+    for (int i = 0; s->engine < 0 && dot != NULL && endings[i] != NULL; i++)
+        if (strcmp(dot, endings[i]) == 0)
+            s->engine = i;
+    if (s->engine < 0)
+        return err_set(
+            e, "--out: '%s' ends in neither of .json, .pov, .xml and .pbrt; give --engine", s->out);
     return true;
 }
 
-static bool write_povray(const struct settings *s, const struct scene *scene,
-                         const struct camera *camera, struct err *e)
+static bool write_text(const struct settings *s, const struct scene *scene,
+                       const struct camera *camera, struct err *e)
 {
     struct out_file out;
     if (!out_open(&out, s->out, e))
         return false;
     struct povray_variant plain = povray_variant_plain();
-    if (!export_povray(scene, camera, s->depth, &plain, out.f, e)) {
+    if (s->engine == POVRAY ? !export_povray(scene, camera, s->depth, &plain, out.f, e)
+                            : !export_pbrt(scene, camera, s->depth, out.f, e)) {
         out_abandon(&out);
         return false;
     }
     return out_commit(&out, e);
 }
 
+static bool write_scene(const struct settings *s, const struct scene *scene,
+                        const struct camera *camera, struct err *e)
+{
+    if (s->engine == CYCLES)
+        return export_cycles(scene, camera, s->depth, s->out, e);
+    if (s->engine == MITSUBA)
+        return export_mitsuba(scene, camera, s->depth, s->out, e);
+    return write_text(s, scene, camera, e);
+}
+
+static bool add_environment(const struct settings *s, struct scene *scene, struct err *e)
+{
+    if (s->environment == NULL)
+        return true;
+    struct environment *env = environment_read(s->environment, e);
+    if (env == NULL || scene_add_environment(scene, env, e))
+        return env != NULL;
+    environment_free(env);
+    return err_prefix(e, "%s with %s", s->scene, s->environment);
+}
+
 int verb_export(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.engine = -1, .width = 480, .height = 360, .depth = 5};
+    struct settings s = {
+        .engine = -1, .width = 480, .height = 360, .depth = 5, .focal_distance = 4.7};
     struct scene scene = {0};
     struct camera camera;
     if (!parse(argc, argv, &s, e))
         return EXIT_NOT_JUDGED;
     if (s.done)
         return 0;
-    bool ok = make_parent_dirs(s.out, e) && collada_load(s.scene, DIALECT_AUTO, &scene, e);
+    bool ok = make_parent_dirs(s.out, e) && collada_load(s.scene, DIALECT_AUTO, &scene, e) &&
+              add_environment(&s, &scene, e);
     if (ok && !camera_init(&camera, &scene, s.width, s.height, e))
         ok = err_prefix(e, "%s", s.scene);
-    ok = ok && (s.engine == 0 ? export_cycles(&scene, &camera, s.depth, s.out, e)
-                              : write_povray(&s, &scene, &camera, e));
+    if (ok) {
+        camera.lens_radius = (float)s.lens_radius;
+        camera.focal_distance = (float)s.focal_distance;
+        ok = write_scene(&s, &scene, &camera, e);
+    }
     scene_free(&scene);
     if (ok)
         printf("%s\n", s.out);

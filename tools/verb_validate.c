@@ -1,5 +1,8 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
+#include "places.h"
+#include "consistency_run.h"
+#include "import_lines.h"
 #include "report.h"
 #include "results.h"
 #include "validate.h"
@@ -19,10 +22,14 @@ enum option {
     OPT_GOLDEN,
     OPT_SHARE,
     OPT_PATHTRACER,
+    OPT_ENGINE,
+    OPT_ENGINE_SPP,
+    OPT_ENGINE_REPLICATES,
     OPT_SEED,
     OPT_REFERENCE_SEED,
     OPT_THREADS,
     OPT_TIMEOUT,
+    OPT_UNTIL_DIFFERENT,
     OPT_QUIET,
     OPT_HELP
 };
@@ -38,34 +45,22 @@ static const struct cli_option options[] = {
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
     [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
     [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the program under test (beside this one)"},
+    [OPT_ENGINE] = {0, "engine", 1, "FILE",
+                    "also judge the renderer that this file describes: against\n"
+                    "references and ours; a NAME alone is SHARE/engines/NAME.json"},
+    [OPT_ENGINE_SPP] = {0, "engine-spp", 1, "N", "its samples per pixel (as in its file)"},
+    [OPT_ENGINE_REPLICATES] = {0, "engine-replicates", 1, "K", "its pictures (as in its file)"},
     [OPT_SEED] = {0, "seed", 1, "N", "seed of our render (1)"},
-    [OPT_REFERENCE_SEED] = {0, "reference-seed", 1, "N", "with --live (a fresh one)"},
+    [OPT_REFERENCE_SEED] = {0, "reference-seed", 1, "N",
+                            "with --live (a fresh one), of --engine otherwise (0)"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
+    [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
+                             "cheapest scenes first; stop at the first that differs where it\n"
+                             "should not"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
-
-/* A file beside this program, or below the installation's share directory. */
-static void beside_program(char *path, size_t size, const char *name)
-{
-    char self[3072];
-    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(self, '/');
-    if (slash != NULL)
-        *slash = '\0';
-    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
-}
-
-/* The checkout's directory if we stand in one, else the installed one. */
-static const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
-{
-    if (access("reference/scenes", R_OK) == 0)
-        return checkout;
-    beside_program(path, size, installed);
-    return path;
-}
 
 static bool fresh_seed(uint32_t *seed, struct err *e)
 {
@@ -74,8 +69,14 @@ static bool fresh_seed(uint32_t *seed, struct err *e)
     return true;
 }
 
-/* Sets *done where only the help was asked for. */
-static bool parse(int argc, char **argv, struct validate_options *o, bool *done, struct err *e)
+/* What the options say beyond validate_options. */
+struct wishes {
+    const char *engine; /* file or name; NULL: none */
+    bool done;          /* only the help was asked for */
+};
+
+static bool parse(int argc, char **argv, struct validate_options *o, struct wishes *w,
+                  struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true, has_seed = false;
@@ -99,6 +100,11 @@ static bool parse(int argc, char **argv, struct validate_options *o, bool *done,
         case OPT_GOLDEN: o->golden_dir = v; break;
         case OPT_SHARE: o->share_dir = v; break;
         case OPT_PATHTRACER: o->pathtracer = v; break;
+        case OPT_ENGINE: w->engine = v; break;
+        case OPT_ENGINE_SPP: ok = cli_int("--engine-spp", v, 1, 1 << 24, &o->engine_spp, e); break;
+        case OPT_ENGINE_REPLICATES:
+            ok = cli_int("--engine-replicates", v, 3, 4096, &o->engine_replicates, e);
+            break;
         case OPT_SEED: ok = cli_uint64("--seed", v, &o->seed, e); break;
         case OPT_REFERENCE_SEED:
             ok = cli_uint64("--reference-seed", v, &seed, e);
@@ -109,15 +115,37 @@ static bool parse(int argc, char **argv, struct validate_options *o, bool *done,
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
+        case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
             cli_print_options(stdout, options);
-            *done = true;
+            w->done = true;
             return true;
         }
     }
     return ok && (has_seed || !o->live || fresh_seed(&o->reference_seed, e));
+}
+
+/* A name alone is one of those that came with us. */
+static bool load_engine(const char *wish, const char *share_dir, struct engine *out, struct err *e)
+{
+    char path[4096];
+    bool is_name = strpbrk(wish, "./") == NULL;
+    int n = snprintf(path, sizeof path, "%s%s%s%s", is_name ? share_dir : "",
+                     is_name ? "/engines/" : "", wish, is_name ? ".json" : "");
+    if (n < 0 || (size_t)n >= sizeof path)
+        return err_set(e, "%.64s...: path too long", wish);
+    return engine_load(path, out, e);
+}
+
+static void print_not_expressible(const json_t *results)
+{
+    size_t i;
+    const json_t *entry;
+    json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
+        printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
+               member_text(entry, "scene"), member_text(entry, "reason"));
 }
 
 static bool write_all(const json_t *results, const char *out_dir, struct err *e)
@@ -131,6 +159,13 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
         return false;
     fputs(table, stdout);
     free(table);
+    consistency_print(stdout, json_object_get(results, "consistency"), false);
+    const json_t *loader = json_object_get(results, "loader");
+    if (loader != NULL) {
+        puts("");
+        import_print(stdout, loader);
+    }
+    print_not_expressible(results);
     printf("\n%s\n", html);
     return true;
 }
@@ -152,6 +187,17 @@ static void tell_not_judged(const json_t *results, struct err *e)
             member_text(first, "b"), member_text(first, "error"));
 }
 
+/* Not judged counts most, then a difference, then an inconclusive claim. */
+static int with_loader(int code, const json_t *results, struct err *e)
+{
+    int loader = import_exit_code(json_object_get(results, "loader"));
+    if (loader == EXIT_NOT_JUDGED && code != EXIT_NOT_JUDGED)
+        err_set(e, "Blender's importer: a scene could not be judged, see above");
+    return loader == EXIT_NOT_JUDGED || (loader == EXIT_DIFFERENT && code != EXIT_NOT_JUDGED)
+               ? loader
+               : code;
+}
+
 int verb_validate(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], golden[4096], share[4096];
@@ -165,21 +211,28 @@ int verb_validate(int argc, char **argv, struct err *e)
         .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
         .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
         .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
-    bool done = false;
+    struct wishes wish = {0};
+    struct engine engine = {0};
     json_t *results = NULL;
-    if (!parse(argc, argv, &o, &done, e))
+    if (!parse(argc, argv, &o, &wish, e))
         return EXIT_NOT_JUDGED;
-    if (done)
+    if (wish.done)
         return 0;
+    if (wish.engine != NULL) {
+        if (!load_engine(wish.engine, o.share_dir, &engine, e))
+            return EXIT_NOT_JUDGED;
+        o.engine = &engine;
+    }
     if (o.threads == 0) {
         long n = sysconf(_SC_NPROCESSORS_ONLN);
         o.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
     }
     int code = EXIT_NOT_JUDGED;
     if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
-        code = results_exit_code(results);
+        code = with_loader(results_exit_code(results), results, e);
     if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
         tell_not_judged(results, e);
     json_decref(results);
+    engine_free(&engine);
     return code;
 }

@@ -7,8 +7,11 @@
 
 int verb_validate(int argc, char **argv, struct err *e);
 int verb_compare(int argc, char **argv, struct err *e);
+int verb_converge(int argc, char **argv, struct err *e);
 int verb_reference(int argc, char **argv, struct err *e);
+int verb_golden(int argc, char **argv, struct err *e);
 int verb_export(int argc, char **argv, struct err *e);
+int verb_import_check(int argc, char **argv, struct err *e);
 int verb_merge(int argc, char **argv, struct err *e);
 int verb_report(int argc, char **argv, struct err *e);
 

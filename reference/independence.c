@@ -1,0 +1,305 @@
+#include "independence.h"
+
+#include <assert.h>
+#include <gsl/gsl_cdf.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LARGEST_BLOCK = 8, FEWEST_BLOCKS = 64, FEWEST_REPLICATES = 4 };
+
+bool replicates_alloc(struct replicates *r, int width, int height, int count, struct err *e)
+{
+    assert(width > 0 && height > 0 && count > 0);
+    *r = (struct replicates){.width = width, .height = height};
+    r->capacity = count < MOST_REPLICATES ? count : MOST_REPLICATES;
+    r->luminance =
+        malloc((size_t)r->capacity * (size_t)width * (size_t)height * sizeof *r->luminance);
+    return r->luminance != NULL || err_set(e, "replicates: out of memory");
+}
+
+void replicates_add(struct replicates *r, const float *rgb)
+{
+    if (r->num == r->capacity)
+        return;
+    size_t pixels = (size_t)r->width * (size_t)r->height;
+    float *out = r->luminance + (size_t)r->num++ * pixels;
+    for (size_t p = 0; p < pixels; p++)
+        out[p] = .2126f * rgb[3 * p] + .7152f * rgb[3 * p + 1] + .0722f * rgb[3 * p + 2];
+}
+
+void replicates_free(struct replicates *r)
+{
+    free(r->luminance);
+    *r = (struct replicates){0};
+}
+
+/* Sums over blocks of what the moments over permutations are made of (see moments_of()). */
+struct sums {
+    size_t k;
+    double *g;     /* k x k, lower triangle: sum of G_b */
+    double *block; /* k x k, lower triangle: one G_b */
+    double s0, s0_squared, s1, s2;
+    int pixels, blocks;
+};
+
+/* e of one pixel, or false where it has no noise. */
+static bool standardize(const struct replicates *r, size_t pixel, double *e)
+{
+    size_t stride = (size_t)r->width * (size_t)r->height;
+    double mean = 0, m2 = 0;
+    for (int k = 0; k < r->num; k++)
+        mean += (double)r->luminance[(size_t)k * stride + pixel] / r->num;
+    for (int k = 0; k < r->num; k++) {
+        e[k] = r->luminance[(size_t)k * stride + pixel] - mean;
+        m2 += e[k] * e[k];
+    }
+    /* Equal floats leave only what rounding makes of their mean. */
+    if (!(m2 > 1e-28 * mean * mean * r->num))
+        return false;
+    for (int k = 0; k < r->num; k++)
+        e[k] *= sqrt((r->num - 1) / m2);
+    return true;
+}
+
+/* Lower triangle of e e', e being n pixels of k numbers each. */
+static void add_products(double *g, const double *e, size_t n, size_t k)
+{
+    for (size_t i = 0; i < k; i++) {
+        double *row = g + i * k;
+        for (size_t p = 0; p < n; p++) {
+            const double *x = e + p * k;
+            double xi = x[i];
+            for (size_t j = 0; j <= i; j++)
+                row[j] += xi * x[j];
+        }
+    }
+}
+
+static void add_block(struct sums *s, const double *e, size_t n)
+{
+    size_t k = s->k;
+    memset(s->block, 0, k * k * sizeof *s->block);
+    add_products(s->block, e, n, k);
+    double s0 = 0, s1 = 0, s2 = 0;
+    for (size_t i = 0; i < k; i++) {
+        for (size_t j = 0; j < i; j++) {
+            double x = s->block[i * k + j];
+            s0 += 2 * x;
+            s1 += 4 * x * x;
+            s->g[i * k + j] += x;
+        }
+        /* Residuals add up to 0, so the rest of row i is minus its diagonal. */
+        double diagonal = s->block[i * k + i];
+        s2 += 4 * diagonal * diagonal;
+    }
+    s->s0 += s0;
+    s->s0_squared += s0 * s0;
+    s->s1 += s1;
+    s->s2 += s2;
+    s->pixels += (int)n;
+    s->blocks++;
+}
+
+/* All blocks of the picture that have a noisy pixel; e holds a block. */
+static void add_blocks(struct sums *s, const struct replicates *r, int side, double *e)
+{
+    for (int y0 = 0; y0 < r->height; y0 += side)
+        for (int x0 = 0; x0 < r->width; x0 += side) {
+            size_t n = 0;
+            for (int y = y0; y < y0 + side && y < r->height; y++)
+                for (int x = x0; x < x0 + side && x < r->width; x++)
+                    n += standardize(r, (size_t)y * (size_t)r->width + (size_t)x, e + n * s->k);
+            if (n > 0)
+                add_block(s, e, n);
+        }
+}
+
+/* Of the weights w: S0 = sum w, S1 = 2 sum w^2, S2 = sum over rows of (2 row sum)^2. */
+struct weights {
+    double s0, s1, s2;
+};
+
+/* Mean and variance over permutations of T = sum over i != j of w_ij G_ij [CliffOrd81, eq. 2.27 ff.]:
+ * for one block
+ *   E T   = S0 W0 / (k)_2
+ *   E T^2 = S1 W1 / (2 (k)_2) + (S2 - 2 S1)(W2 - 2 W1) / (4 (k)_3)
+ *         + (S0^2 + S1 - S2)(W0^2 + W1 - W2) / (k)_4
+ * with (k)_m = k (k-1) .. (k-m+1); blocks are permuted independently, so both add up. */
+static double z_of(const struct sums *s, struct weights w, double t)
+{
+    double k = (double)s->k, k2 = k * (k - 1), k3 = k2 * (k - 2), k4 = k3 * (k - 3);
+    double mean = s->s0 * w.s0 / k2;
+    double square = s->s1 * w.s1 / (2 * k2) + (s->s2 - 2 * s->s1) * (w.s2 - 2 * w.s1) / (4 * k3) +
+                    (s->s0_squared + s->s1 - s->s2) * (w.s0 * w.s0 + w.s1 - w.s2) / k4;
+    double variance = square - s->s0_squared * w.s0 * w.s0 / (k2 * k2);
+    return variance > 0 ? (t - mean) / sqrt(variance) : 0;
+}
+
+static void test_pairs(const struct sums *s, struct independence *out)
+{
+    size_t k = s->k;
+    const struct weights one = {.s0 = 2, .s1 = 4, .s2 = 8};
+    for (size_t i = 0; i < k; i++)
+        for (size_t j = 0; j < i; j++) {
+            double z = z_of(s, one, 2 * s->g[i * k + j]);
+            if (fabs(z) > fabs(out->pair_z)) {
+                out->pair_z = z;
+                out->pair_r = s->g[i * k + j] / s->pixels;
+                out->pair[0] = (int)j;
+                out->pair[1] = (int)i;
+            }
+        }
+}
+
+static void test_neighbours(const struct sums *s, struct independence *out)
+{
+    size_t k = s->k;
+    double sum = 0;
+    for (size_t i = 1; i < k; i++)
+        sum += s->g[i * k + i - 1];
+    double n = (double)(k - 1);
+    const struct weights w = {.s0 = 2 * n, .s1 = 4 * n, .s2 = 4 * (4 * (n - 1) + 2)};
+    out->neighbours_r = sum / n / s->pixels;
+    out->neighbours_z = z_of(s, w, 2 * sum);
+}
+
+/* Whole batches only. With m batches of B, mean correlation r within them and mean correlation -1/K under
+ * H0, and as Var is estimated from all K: the variance of the mean of B, times B, over Var, is
+ * 1 + (B - 1)(r + 1/K) but for terms of 1/K^2. */
+static void test_batches(const struct sums *s, struct independence *out)
+{
+    size_t k = s->k, b = (size_t)fmax(2, floor(sqrt((double)k))), m = k / b;
+    double sum = 0;
+    for (size_t i = 0; i < m * b; i++)
+        for (size_t j = i / b * b; j < i; j++)
+            sum += s->g[i * k + j];
+    double pairs = (double)(m * b * (b - 1)) / 2, row = (double)(b - 1);
+    const struct weights w = {
+        .s0 = 2 * pairs, .s1 = 4 * pairs, .s2 = (double)(m * b) * 4 * row * row};
+    out->batch = (int)b;
+    out->batches_ratio = 1 + row * (sum / pairs / s->pixels + 1 / (double)k);
+    out->batches_z = z_of(s, w, 2 * sum);
+}
+
+/* Pairs of pixels p, q in one square: C = sum over k of e_k(p) e_k(q) has the mean 0 and, over permutations of one
+ * against the other, the variance (K-1)^2/(K-1); different pairs are uncorrelated. */
+static void measure_square(const struct replicates *r, int side, double *e, double *sum,
+                           double *mean, double *se)
+{
+    size_t k = (size_t)r->num;
+    double products = 0, pairs = 0;
+    for (int y0 = 0; y0 < r->height; y0 += side)
+        for (int x0 = 0; x0 < r->width; x0 += side) {
+            double n = 0;
+            memset(sum, 0, k * sizeof *sum);
+            for (int y = y0; y < y0 + side && y < r->height; y++)
+                for (int x = x0; x < x0 + side && x < r->width; x++)
+                    if (standardize(r, (size_t)y * (size_t)r->width + (size_t)x, e)) {
+                        n++;
+                        for (size_t i = 0; i < k; i++)
+                            sum[i] += e[i];
+                    }
+            for (size_t i = 0; i < k; i++)
+                products += sum[i] * sum[i] / 2;
+            products -= n * (double)(k - 1) / 2;
+            pairs += n * (n - 1) / 2;
+        }
+    *mean = pairs > 0 ? products / pairs / (double)(k - 1) : 0;
+    *se = pairs > 0 ? 1 / sqrt(pairs * (double)(k - 1)) : 0;
+}
+
+static int block_side(const struct replicates *r)
+{
+    int side = LARGEST_BLOCK;
+    while (side > 1 && (r->width / side) * (r->height / side) < FEWEST_BLOCKS)
+        side /= 2;
+    return side;
+}
+
+static void judge(const struct sums *s, double alpha, struct independence *out)
+{
+    double pairs = (double)s->k * (double)(s->k - 1) / 2;
+    test_pairs(s, out);
+    test_neighbours(s, out);
+    test_batches(s, out);
+    out->limit = gsl_cdf_ugaussian_Qinv(alpha / 3 / 2);
+    out->pair_limit = gsl_cdf_ugaussian_Qinv(alpha / 3 / 2 / pairs);
+    out->tested = true;
+    out->passed = fabs(out->pair_z) <= out->pair_limit && fabs(out->neighbours_z) <= out->limit &&
+                  fabs(out->batches_z) <= out->limit;
+}
+
+bool independence_test(const struct replicates *r, double alpha, struct independence *out,
+                       struct err *e)
+{
+    size_t k = (size_t)r->num, side = (size_t)block_side(r);
+    *out = (struct independence){.passed = true, .replicates = r->num, .block = (int)side};
+    if (k < FEWEST_REPLICATES)
+        return true;
+    struct sums s = {.k = k};
+    s.g = calloc(k * k, sizeof *s.g);
+    s.block = malloc(k * k * sizeof *s.block);
+    double *x = malloc(side * side * k * sizeof *x), *sum = malloc(k * sizeof *sum);
+    bool ok = s.g != NULL && s.block != NULL && x != NULL && sum != NULL;
+    if (ok) {
+        add_blocks(&s, r, (int)side, x);
+        out->pixels = s.pixels;
+        for (int i = 0; i < NUM_SQUARES; i++)
+            measure_square(r, 2 << i, x, sum, &out->square_r[i], &out->square_se[i]);
+        if (s.blocks >= FEWEST_BLOCKS)
+            judge(&s, alpha, out);
+    } else {
+        err_set(e, "independence of replicates: out of memory");
+    }
+    free(s.g);
+    free(s.block);
+    free(x);
+    free(sum);
+    return ok;
+}
+
+static json_t *to_json(const struct independence *t)
+{
+    if (!t->tested)
+        return json_pack("{s:b, s:i, s:i}", "tested", 0, "replicates", t->replicates,
+                         "noisy_pixels", t->pixels);
+    json_t *squares = json_array();
+    for (int i = 0; i < NUM_SQUARES; i++)
+        json_array_append_new(squares,
+                              json_pack("{s:i, s:f, s:f}", "side", 2 << i, "pixel_correlation",
+                                        t->square_r[i], "std_error", t->square_se[i]));
+    return json_pack(
+        "{s:b, s:b, s:f, s:i, s:i, s:i, s:{s:[i,i], s:f, s:f, s:f}, s:{s:f, s:f, s:f}, "
+        "s:{s:i, s:f, s:f, s:f}, s:o}",
+        "tested", 1, "passed", t->passed, "alpha", INDEPENDENCE_ALPHA, "replicates", t->replicates,
+        "noisy_pixels", t->pixels, "block", t->block, "worst_pair", "replicates", t->pair[0],
+        t->pair[1], "correlation", t->pair_r, "z", t->pair_z, "limit", t->pair_limit, "neighbours",
+        "correlation", t->neighbours_r, "z", t->neighbours_z, "limit", t->limit, "batches", "size",
+        t->batch, "variance_ratio", t->batches_ratio, "z", t->batches_z, "limit", t->limit,
+        "squares", squares);
+}
+
+bool independence_check(const struct replicates *r, json_t *manifest, struct err *e)
+{
+    struct independence t;
+    if (!independence_test(r, INDEPENDENCE_ALPHA, &t, e))
+        return false;
+    if (json_object_set_new(manifest, "independence", to_json(&t)) != 0)
+        return err_set(e, "independence of replicates: out of memory");
+    if (t.passed)
+        return true;
+    /* Of those that failed, the one that failed most clearly. */
+    double pair = fabs(t.pair_z) / t.pair_limit, neighbours = fabs(t.neighbours_z) / t.limit,
+           batches = fabs(t.batches_z) / t.limit;
+    if (pair > neighbours && pair > batches)
+        return err_set(e, "replicates %d and %d are not independent: correlation %.3f, z %.1f",
+                       t.pair[0], t.pair[1], t.pair_r, t.pair_z);
+    if (neighbours > batches)
+        return err_set(e, "successive replicates are not independent: correlation %.4f, z %.1f",
+                       t.neighbours_r, t.neighbours_z);
+    return err_set(e,
+                   "replicates are not independent: means of %d vary %.3f times as much as they "
+                   "should, z %.1f",
+                   t.batch, t.batches_ratio, t.batches_z);
+}

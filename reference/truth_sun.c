@@ -1,0 +1,96 @@
+#include "truth_sun.h"
+
+#include <math.h>
+
+/* Up the normal of the facet between the ridges k and k+1. */
+static void facet_normal(const struct truth_pyramid *p, int k, double n[3])
+{
+    double u[3], v[3];
+    for (int i = 0; i < 3; i++) {
+        u[i] = p->ridge[k][i] - p->apex[i];
+        v[i] = p->ridge[(k + 1) % 4][i] - p->apex[i];
+    }
+    n[0] = v[1] * u[2] - v[2] * u[1];
+    n[1] = v[2] * u[0] - v[0] * u[2];
+    n[2] = v[0] * u[1] - v[1] * u[0];
+}
+
+static double inner(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void truth_pyramid_cosines(const struct truth_pyramid *p, double cosine[4])
+{
+    for (int k = 0; k < 4; k++) {
+        double n[3];
+        facet_normal(p, k, n);
+        cosine[k] = inner(n, p->to_light) / sqrt(inner(n, n) * inner(p->to_light, p->to_light));
+    }
+}
+
+/* Facets that see each other would need another form. */
+static bool is_convex(const struct truth_pyramid *p)
+{
+    for (int k = 0; k < 4; k++) {
+        double n[3];
+        facet_normal(p, k, n);
+        for (int i = 0; i < 4; i++)
+            if (i != k && i != (k + 1) % 4 && !(inner(n, p->ridge[i]) < inner(n, p->apex)))
+                return false;
+    }
+    return true;
+}
+
+static bool read_pyramid(json_t *values, struct truth_pyramid *p, double irradiance[3],
+                         double albedo[3], double centre[2], struct err *e)
+{
+    double(*r)[3] = p->ridge;
+    json_error_t why;
+    if (json_unpack_ex(values, &why, JSON_STRICT,
+                       "{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F],"
+                       " s:[[F,F,F], [F,F,F], [F,F,F], [F,F,F]], s:[F,F]}",
+                       "irradiance", &irradiance[0], &irradiance[1], &irradiance[2], "albedo",
+                       &albedo[0], &albedo[1], &albedo[2], "to_light", &p->to_light[0],
+                       &p->to_light[1], &p->to_light[2], "apex", &p->apex[0], &p->apex[1],
+                       &p->apex[2], "ridges", &r[0][0], &r[0][1], &r[0][2], &r[1][0], &r[1][1],
+                       &r[1][2], &r[2][0], &r[2][1], &r[2][2], &r[3][0], &r[3][1], &r[3][2],
+                       "centre", &centre[0], &centre[1]) != 0)
+        return err_set(e, "%s", why.text);
+    double cosine[4];
+    truth_pyramid_cosines(p, cosine);
+    for (int k = 0; k < 4; k++)
+        if (!(cosine[k] > 0))
+            return err_set(e, "the facet behind ridge %d does not face the light", k);
+    return (is_convex(p) || err_set(e, "the pyramid is not convex")) &&
+           truth_check_triple("irradiance", irradiance, HUGE_VAL, e) &&
+           truth_check_triple("albedo", albedo, 1, e);
+}
+
+static double clamp01(double x)
+{
+    return fmin(fmax(x, 0), 1);
+}
+
+static bool fill_pyramid(const struct suite_scene *scene, json_t *values, struct moments *out,
+                         struct err *e)
+{
+    struct truth_pyramid p;
+    double irradiance[3], albedo[3], centre[2], facet[4];
+    if (!read_pyramid(values, &p, irradiance, albedo, centre, e) || !truth_check_depth(scene, e))
+        return false;
+    truth_pyramid_cosines(&p, facet);
+    for (int row = 0; row < out->height; row++)
+        for (int col = 0; col < out->width; col++) {
+            double right = clamp01(col + 1 - centre[0] * out->width);
+            double low = clamp01(row + 1 - centre[1] * out->height);
+            double mean = low * (right * facet[0] + (1 - right) * facet[1]) +
+                          (1 - low) * ((1 - right) * facet[2] + right * facet[3]);
+            size_t pixel = (size_t)row * (size_t)out->width + (size_t)col;
+            for (size_t c = 0; c < 3; c++)
+                out->mean[3 * pixel + c] = albedo[c] / M_PI * irradiance[c] * mean;
+        }
+    return true;
+}
+
+const struct truth_kind truth_sun[] = {{"sun_on_pyramid", fill_pyramid}, {NULL, NULL}};

@@ -1,0 +1,34 @@
+/* Claims of consistency (consistency.h): rendered, judged, and as "consistency" in results.json:
+ *
+ *   [ {"scene": "41_cornell", "engine": "pathtracer", "renders": 8, "spp": 32, "alpha": 1e-5,
+ *      "margin": .1, "verdict": "EQUIVALENT", "passed": true, "reason": "one sentence",
+ *      "pixels": 1.003, "pixels_ci": [.95, 1.06], "image": 1.2, "image_range": [.1, 4.1],
+ *      "seconds": 3.1}
+ *   | {"scene": , "engine": , "passed": false, "error": "one line"} ]
+ *
+ * pixels and image are 0 where two renders are the same. */
+#ifndef ASSAY_CONSISTENCY_RUN_H
+#define ASSAY_CONSISTENCY_RUN_H
+
+#include "results.h"
+#include "validate.h"
+
+#include "../reference/suite.h"
+
+#include <stdio.h>
+
+/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
+ * of memory. */
+json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
+                        double alpha);
+
+/* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
+bool consistency_check(const json_t *consistency, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+enum outcome consistency_outcome(const json_t *claim);
+
+/* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
+void consistency_print(FILE *f, const json_t *consistency, bool markdown);
+
+#endif

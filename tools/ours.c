@@ -1,0 +1,51 @@
+#include "ours.h"
+
+#include "../reference/process.h"
+
+#include <stdio.h>
+
+enum { MAX_ARGUMENTS = 64 };
+
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s, struct err *e)
+{
+    const struct suite_scene *s = job->scene;
+    char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
+    snprintf(width, sizeof width, "%d", s->width);
+    snprintf(height, sizeof height, "%d", s->height);
+    snprintf(spp, sizeof spp, "%d", job->spp);
+    snprintf(depth, sizeof depth, "%d", s->depth);
+    snprintf(threads, sizeof threads, "%d", job->threads);
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
+    snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
+    snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
+    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,       "-s",
+                                       spp,          "-m", depth, "-t",         threads,
+                                       "--seed",     seed, "-f",  job->picture, s->dae};
+    int argc = 15;
+    if (s->environment[0] != '\0') {
+        argv[argc++] = "-e";
+        argv[argc++] = s->environment;
+    }
+    if (s->lens_radius > 0) {
+        argv[argc++] = "-b";
+        argv[argc++] = lens;
+        argv[argc++] = "-d";
+        argv[argc++] = focus;
+    }
+    for (const char *const *o = job->options; o != NULL && *o != NULL; o++) {
+        if (argc == MAX_ARGUMENTS - 1)
+            return err_set(e, "%s: too many options", s->name);
+        argv[argc++] = *o;
+    }
+    const struct process p = {.argv = argv, .log = job->log, .timeout_s = job->timeout_s};
+    struct process_usage usage;
+    if (!process_run(&p, &usage, e) || !moments_read(job->picture, out, NULL, e))
+        return false;
+    *cpu_s = usage.cpu_s;
+    if (out->width == s->width && out->height == s->height)
+        return true;
+    err_set(e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d", s->name, out->width,
+            out->height, s->width, s->height);
+    moments_free(out);
+    return false;
+}

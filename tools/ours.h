@@ -1,0 +1,24 @@
+/* One run of the program under test on a scene of the suite. */
+#ifndef ASSAY_OURS_H
+#define ASSAY_OURS_H
+
+#include "../reference/suite.h"
+#include "../renderer/moments.h"
+
+struct ours_job {
+    const char *program; /* pathtracer, or what stands in for it */
+    const struct suite_scene *scene;
+    int spp;
+    uint64_t seed;
+    const char *const *options; /* further ones, NULL at the end; NULL: none */
+    int threads;
+    double timeout_s;
+    const char *picture, *log; /* files to write; their directory exists */
+};
+
+/* The picture's moments, and the CPU time it took. Fails with the program's last line if it fails, and
+ * on a picture of another size. */
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

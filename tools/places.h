@@ -1,0 +1,13 @@
+/* Where the program's own files are: in the checkout that one stands in, else where it is installed. */
+#ifndef ASSAY_PLACES_H
+#define ASSAY_PLACES_H
+
+#include <stddef.h>
+
+/* A file beside this program, or below the installation's share directory ("../share/assay/..."). */
+void beside_program(char *path, size_t size, const char *name);
+
+/* `checkout` if the current directory is a checkout, else `installed` beside the program, in path. */
+const char *find_dir(char *path, size_t size, const char *checkout, const char *installed);
+
+#endif
