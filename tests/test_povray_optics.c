@@ -4,6 +4,7 @@
 #include "povray_fixture.h"
 
 #include "../reference/truth.h"
+#include "../reference/truth_lights.h"
 #include "../renderer/environment.h"
 
 #include <gsl/gsl_cdf.h>
