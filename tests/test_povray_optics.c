@@ -5,6 +5,7 @@
 
 #include "../reference/truth_lights.h"
 #include "../reference/truth.h"
+#include "../reference/truth_lights.h"
 #include "../renderer/environment.h"
 
 #include <gsl/gsl_cdf.h>
