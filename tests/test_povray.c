@@ -6,7 +6,6 @@
 #include "../reference/truth_lights.h"
 #include "../reference/povray_picture.h"
 #include "../reference/truth.h"
-#include "../reference/truth_lights.h"
 #include "../renderer/fs.h"
 
 #include <gsl/gsl_cdf.h>
