@@ -4,6 +4,7 @@
 #include "optics.h"
 #include "sky.h"
 
+#include <complex.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -31,7 +32,7 @@ static struct optics_metal channel_of(const struct metal *a, int k)
 {
     struct optics_metal o = {.ggx = a->ggx, .separable = a->separable, .alpha = a->alpha};
     if (a->conductor)
-        o.n = CMPLX(ETA[k], K[k]);
+        o.n = ETA[k] + K[k] * _Complex_I;
     return o;
 }
 

@@ -3,6 +3,7 @@
 #include "build_scene.h"
 #include "povray_fixture.h"
 
+#include "../reference/truth_lights.h"
 #include "../reference/povray_picture.h"
 #include "../reference/truth.h"
 #include "../renderer/fs.h"

@@ -3,7 +3,9 @@
 #include "build_scene.h"
 #include "povray_fixture.h"
 
+#include "../reference/truth_lights.h"
 #include "../reference/truth.h"
+#include "../reference/truth_lights.h"
 #include "../renderer/environment.h"
 
 #include <gsl/gsl_cdf.h>
