@@ -3,16 +3,19 @@
 #include "convergence.h"
 #include "report.h"
 #include "results.h"
+#include "results_matrix.h"
 #include "verbs.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum option { OPT_OUT, OPT_MARKDOWN, OPT_CONVERGE, OPT_HELP };
+enum option { OPT_OUT, OPT_MARKDOWN, OPT_MATRIX, OPT_CONVERGE, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_OUT] = {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
     [OPT_MARKDOWN] = {0, "markdown", 0, "", "no page; print the verdict table as Markdown"},
+    [OPT_MATRIX] = {0, "matrix", 0, "",
+                    "the same, a row for each scene: ours against each reference"},
     [OPT_CONVERGE] = {0, "converge", 1, "FILE",
                       "results.json of `assay converge`, to go into the same page or table"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
@@ -52,7 +55,7 @@ int verb_report(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     const char *results = NULL, *converge = NULL, *out = NULL;
-    bool markdown = false;
+    bool markdown = false, matrix = false;
     for (int i; (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return EXIT_NOT_JUDGED;
@@ -62,6 +65,8 @@ int verb_report(int argc, char **argv, struct err *e)
             out = c.value[0];
         } else if (i == OPT_CONVERGE) {
             converge = c.value[0];
+        } else if (i == OPT_MATRIX) {
+            matrix = true;
         } else if (i == OPT_MARKDOWN) {
             markdown = true;
         } else if (i == OPT_HELP) {
@@ -76,6 +81,14 @@ int verb_report(int argc, char **argv, struct err *e)
     if (results == NULL) {
         err_set(e, "report needs a results.json (see --help)");
         return EXIT_NOT_JUDGED;
+    }
+    if (matrix) {
+        json_t *r;
+        if (!results_read(results, &r, e))
+            return EXIT_NOT_JUDGED;
+        results_print_matrix(stdout, r);
+        json_decref(r);
+        return 0;
     }
     if (markdown) {
         bool ok = print_markdown(results, e);
