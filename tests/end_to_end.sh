@@ -78,6 +78,13 @@ else
     ok "failures leave no files"
 fi
 
+# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds them.)
+stale=0
+for patch in tests/mutants/*.patch; do
+    patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
+done
+[ $stale -eq 0 ] && ok "mutants apply"
+
 # Pictures.
 expect "render" 0 "mean radiance" \
     "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
