@@ -2,11 +2,14 @@
  * light, of 16 x 16 pixels, n = 32 a pixel, K = 8 renders. Seeds are fixed; nothing is retried. */
 #include "../renderer/sampler.h"
 #include "../tools/consistency.h"
+#include "../tools/consistency_run.h"
+#include "../tools/report_consistency.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
@@ -141,13 +144,75 @@ static void bad_input_is_named(void **state)
         moments_free(&m[k]);
 }
 
+static const char record[] =
+    "[{\"scene\": \"12_<b>\", \"engine\": \"pathtracer\", \"renders\": 8, \"spp\": 32, \"alpha\": "
+    "1e-5, \"margin\": 0.4, \"verdict\": \"EQUIVALENT\", \"passed\": true, \"reason\": \"why\", "
+    "\"pixels\": 0.98, \"pixels_ci\": [0.8, 1.2], \"image\": 0.5, \"image_range\": [0.1, 5], "
+    "\"seconds\": 2},"
+    " {\"scene\": \"41\", \"engine\": \"pathtracer\", \"passed\": false, \"error\": \"no <file>\"}]";
+
+/* Edits of the record above and a part of the line that must come out; NULL: it is fine. */
+static void records_are_checked(void **state)
+{
+    (void)state;
+    static const char *const cases[][3] = {
+        {"why", "because", NULL},
+        {"\"pixels\": 0.98", "\"pixels\": \"1\"",
+         "results: consistency 1: 'pixels' is not a number"},
+        {"[0.8, 1.2]", "[0.8]", "'pixels_ci' or 'image_range' is not an interval"},
+        {"EQUIVALENT", "EQUAL", "'verdict' or 'reason' is missing or unknown"},
+        {"EQUIVALENT", "DIFFERENT", "'passed' contradicts 'verdict'"},
+        {"\"passed\": false", "\"passed\": true", "consistency 2: has an 'error' and yet 'passed'"},
+        {"\"scene\": \"41\"", "\"seen\": 41", "'scene' or 'engine' is missing"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[2048];
+        struct err e = {""};
+        const char *at = strstr(record, cases[i][0]);
+        assert_non_null(at);
+        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - record), record, cases[i][1],
+                 at + strlen(cases[i][0]));
+        json_t *c = json_loads(text, 0, NULL);
+        assert_non_null(c);
+        bool ok = consistency_check(c, "results", &e);
+        if (ok != (cases[i][2] == NULL) || (!ok && strstr(e.msg, cases[i][2]) == NULL))
+            fail_msg("case %zu: %s", i, e.msg);
+        json_decref(c);
+    }
+}
+
+/* What is printed and what is in the page; markup in names stays text. */
+static void records_are_shown(void **state)
+{
+    (void)state;
+    json_t *c = json_loads(record, 0, NULL);
+    assert_int_equal(consistency_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
+    assert_int_equal(consistency_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
+    char *text;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    consistency_print(f, c, false);
+    consistency_print(f, c, true);
+    report_consistency_headline(f, c);
+    report_consistency(f, c);
+    fclose(f);
+    assert_non_null(strstr(text, "8 x 32 spp  0.980 [0.800, 1.200]  0.50  EQUIVALENT"));
+    assert_non_null(strstr(text, "41  NOT JUDGED: no <file>"));
+    assert_non_null(strstr(text, "| 41 | | | | NOT JUDGED: no <file> |"));
+    assert_non_null(strstr(text, "1 of 2 scenes"));
+    assert_non_null(strstr(text, "12_&lt;b&gt;"));
+    assert_non_null(strstr(text, "no &lt;file&gt;"));
+    free(text);
+    json_decref(c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(independent_samples_pass),
-        cmocka_unit_test(faults_are_found),
-        cmocka_unit_test(verdicts_follow_the_margin),
-        cmocka_unit_test(bad_input_is_named),
+        cmocka_unit_test(independent_samples_pass),   cmocka_unit_test(faults_are_found),
+        cmocka_unit_test(verdicts_follow_the_margin), cmocka_unit_test(bad_input_is_named),
+        cmocka_unit_test(records_are_checked),        cmocka_unit_test(records_are_shown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

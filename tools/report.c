@@ -1,6 +1,7 @@
 #include "report.h"
 
 #include "../renderer/fs.h"
+#include "report_consistency.h"
 #include "report_converge.h"
 #include "report_html.h"
 #include "report_page.h"
@@ -117,6 +118,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
         write_verdict(f, claim, num);
+    report_consistency_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
             "<p class=\"lede\">The chance that noise alone makes any claim of this page "
@@ -283,6 +285,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
             return false;
         done += of_scene;
     }
+    report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     fputs("</main>\n", f);
     write_layers(p);
