@@ -1,11 +1,13 @@
 #!/bin/bash
-# tests/mutants.sh BUILD [NAME...]: builds each bug of tests/mutants into a renderer of its own, runs it
-# through the suite, and says which verdict gave it away. All must be caught, and the renderer as it is
-# must pass. A patch that does not apply, or a mutant that does not compile, is a failure.
+# tests/mutants.sh [--build-only] BUILD [NAME...]: builds each bug of tests/mutants into a renderer of its
+# own, BUILD/mutants/NAME/pathtracer, runs it through the suite, and says which verdict gave it away. A
+# patch that does not apply, or a mutant that does not compile, is a failure.
 # Prints a line for each and "N caught, N missed", and exits 1 if one was missed.
 set -u
 export LC_ALL=C
-build=$(realpath "${1:?usage: tests/mutants.sh BUILD [NAME...]}")
+build_only=
+[ "${1:-}" = --build-only ] && build_only=1 && shift
+build=$(realpath "${1:?usage: tests/mutants.sh [--build-only] BUILD [NAME...]}")
 shift
 names=("$@")
 [ ${#names[@]} -gt 0 ] || names=($(basename -s .patch -a tests/mutants/*.patch))
@@ -24,21 +26,28 @@ build_mutant() {
     changed=$(sed -n 's,^+++ b/,,p' "tests/mutants/$1.patch")
     # A header changes all that includes it: make's dependency files know.
     case $changed in
-    *.h) changed=$(grep -l "$changed" "$build"/renderer/*.c.o.d | sed "s,^$build/,,; s,\.o\.d$,,") ;;
+    *.h) changed=$(cd "$build" && grep -l "$changed" renderer/*.c.d | sed 's,\.d$,,') ;;
+    esac
+    [ -n "$changed" ] || return 1
+    case " $(echo $changed) " in
+    *" renderer/main.c "*) ;;
+    *) objects=("$build/renderer/main.c.o") ;;
     esac
     for file in $changed; do
         "${compile[@]}" -c -o "$dir/$(basename "$file").o" "$dir/$file" || return 1
         objects+=("$dir/$(basename "$file").o")
     done
-    g++ -o "$dir/pathtracer" "${objects[@]}" "$build/renderer/main.c.o" "$build/libassay.a" "${libs[@]}"
+    g++ -o "$dir/pathtracer" "${objects[@]}" "$build/libassay.a" "${libs[@]}"
 }
 
+mkdir -p "$build/mutants"
 for name in "${names[@]}"; do
     if ! build_mutant "$name" 2>"$build/mutants/$name.log"; then
         echo "$name: does not apply or compile (see $build/mutants/$name.log)"
         missed=$((missed + 1))
         continue
     fi
+    [ -n "$build_only" ] && continue
     before=$SECONDS
     "$build/assay" validate --until-different --pathtracer "$build/mutants/$name/pathtracer" \
         -o "$build/mutants/$name/report" -q >"$build/mutants/$name.out" 2>"$build/mutants/$name.log"
@@ -53,5 +62,5 @@ for name in "${names[@]}"; do
         printf '%-30s MISSED after %3d s (exit status %d)\n' "$name" $((SECONDS - before)) $status
     fi
 done
-echo "$caught caught, $missed missed"
+[ -n "$build_only" ] || echo "$caught caught, $missed missed"
 [ $missed -eq 0 ]
