@@ -2,6 +2,7 @@
 
 #include "../renderer/fs.h"
 #include "export_cycles_priv.h"
+#include "features.h"
 
 #include <assert.h>
 #include <math.h>
@@ -14,37 +15,6 @@ enum { MAX_DEPTH = 1025 }; /* Blender's limit of 1024 bounces is one less than o
 /* Blender's range of focal lengths for a 36 mm sensor, mm. */
 #define LENS_MIN 1.0
 #define LENS_MAX 5000.0
-
-/* Along one axis, from p to the interval of a, b, c. */
-static double gap(float p, float a, float b, float c)
-{
-    return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
-}
-
-/* Nearest and furthest distance of the scene from the eye. The nearest may be too small: for a
- * triangle it is the distance to its plane or its bounding box. */
-static void find_range(const struct scene *s, vec3 eye, double *nearest, double *furthest)
-{
-    *nearest = INFINITY;
-    *furthest = 0;
-    for (uint32_t i = 0; i < s->num_triangles; i++) {
-        const vec3 *p = s->position + 3 * (size_t)i;
-        dvec3 n = cycles_area_normal(p), to_eye = d3_sub(cycles_wide(eye), cycles_wide(p[0]));
-        double plane = fabs(d3_dot(n, to_eye)) / d3_length(n);
-        double box =
-            d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
-                         gap(eye.z, p[0].z, p[1].z, p[2].z)));
-        *nearest = fmin(*nearest, fmax(plane, box));
-        for (int k = 0; k < 3; k++)
-            *furthest = fmax(*furthest, d3_length(d3_sub(cycles_wide(p[k]), cycles_wide(eye))));
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++) {
-        double d = d3_length(d3_sub(cycles_wide(s->spheres[i].centre), cycles_wide(eye)));
-        double r = s->spheres[i].radius;
-        *nearest = fmin(*nearest, fabs(d - r));
-        *furthest = fmax(*furthest, d + r);
-    }
-}
 
 static json_t *numbers3(double x, double y, double z)
 {
@@ -103,7 +73,7 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         return NULL;
     }
     double nearest, furthest;
-    find_range(s, c->eye, &nearest, &furthest);
+    scene_distances(s, c->eye, &nearest, &furthest);
     nearest -= (double)c->lens_radius; /* where a ray may start */
     furthest += (double)c->lens_radius;
     if (!(nearest > c->near && nearest > 0)) {

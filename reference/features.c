@@ -54,27 +54,32 @@ static double gap(float p, float a, float b, float c)
     return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
 }
 
-/* The nearest distance is a lower bound: that of a triangle's plane or of its box. */
-static bool may_be_cut(const struct scene *s, const struct camera *c)
+void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
 {
-    double nearest = INFINITY, furthest = 0;
+    *nearest = INFINITY;
+    *furthest = 0;
     for (uint32_t i = 0; i < s->num_triangles; i++) {
         const vec3 *p = s->position + 3 * (size_t)i;
-        double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(c->eye), wide(p[0]))));
-        double box = d3_length(d3(gap(c->eye.x, p[0].x, p[1].x, p[2].x),
-                                  gap(c->eye.y, p[0].y, p[1].y, p[2].y),
-                                  gap(c->eye.z, p[0].z, p[1].z, p[2].z)));
-        nearest = fmin(nearest, fmax(plane, box));
+        double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(eye), wide(p[0]))));
+        double box =
+            d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
+                         gap(eye.z, p[0].z, p[1].z, p[2].z)));
+        *nearest = fmin(*nearest, fmax(plane, box));
         for (int k = 0; k < 3; k++)
-            furthest = fmax(furthest, d3_length(d3_sub(wide(p[k]), wide(c->eye))));
+            *furthest = fmax(*furthest, d3_length(d3_sub(wide(p[k]), wide(eye))));
     }
     for (uint32_t i = 0; i < s->num_spheres; i++) {
-        double d = d3_length(d3_sub(wide(s->spheres[i].centre), wide(c->eye)));
+        double d = d3_length(d3_sub(wide(s->spheres[i].centre), wide(eye)));
         double r = (double)s->spheres[i].radius;
-        nearest = fmin(nearest, fabs(d - r));
-        furthest = fmax(furthest, d + r);
+        *nearest = fmin(*nearest, fabs(d - r));
+        *furthest = fmax(*furthest, d + r);
     }
-    double lens = (double)c->lens_radius;
+}
+
+static bool may_be_cut(const struct scene *s, const struct camera *c)
+{
+    double nearest, furthest, lens = (double)c->lens_radius;
+    scene_distances(s, c->eye, &nearest, &furthest);
     return !(nearest - lens > (double)c->near && furthest + lens < (double)c->far);
 }
 

@@ -3,7 +3,6 @@
 #include "suite_json.h"
 
 #include "../renderer/collada.h"
-#include "../renderer/environment.h"
 #include "../renderer/sha256.h"
 
 #include <dirent.h>
@@ -201,24 +200,13 @@ fail:
     return false;
 }
 
-static bool add_environment(const struct suite_scene *s, struct scene *scene, struct err *e)
-{
-    struct environment *env = environment_read(s->environment, e);
-    if (env == NULL)
-        return false;
-    if (scene_add_environment(scene, env, e))
-        return true;
-    environment_free(env);
-    return err_prefix(e, "%s with %s", s->dae, s->environment);
-}
-
 bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
                 struct err *e)
 {
     *scene = (struct scene){0};
     if (!collada_load(s->dae, DIALECT_AUTO, scene, e))
         return false;
-    bool ok = (s->environment[0] == '\0' || add_environment(s, scene, e)) &&
+    bool ok = (s->environment[0] == '\0' || scene_read_environment(scene, s->environment, e)) &&
               (camera_init(camera, scene, s->width, s->height, e) || err_prefix(e, "%s", s->dae));
     if (!ok) {
         scene_free(scene);
@@ -242,5 +230,13 @@ const struct suite_scene *suite_find(const struct suite *s, const char *name)
     for (int i = 0; i < s->num_scenes; i++)
         if (strcmp(s->scene[i].name, name) == 0)
             return &s->scene[i];
+    return NULL;
+}
+
+const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return &s->reference[i];
     return NULL;
 }

@@ -103,6 +103,7 @@ bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera 
                 struct err *e) __attribute__((warn_unused_result));
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);
+const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
 bool verdict_parse(const char *name, enum verdict *out);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static int find_long(const struct cli_option *options, const char *name, size_t length)
 {
@@ -135,4 +136,10 @@ bool cli_choice(const char *what, const char *text, const char *const *words, in
         n = added < 0 || n + (size_t)added >= sizeof list ? sizeof list - 1 : n + (size_t)added;
     }
     return err_set(e, "%s: '%s' is none of: %s", what, text, list);
+}
+
+int cli_processors(void)
+{
+    long n = sysconf(_SC_NPROCESSORS_ONLN);
+    return n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
 }

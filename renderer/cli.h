@@ -43,6 +43,9 @@ bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e
 bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
                 struct err *e) __attribute__((warn_unused_result));
 
+/* What --threads is where nobody says: the processors of the machine, at most 1024. */
+int cli_processors(void);
+
 /* Index of `text` in a NULL-terminated list of words; fails naming the list. */
 bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                 struct err *e) __attribute__((warn_unused_result));

@@ -1,6 +1,5 @@
 /* pathtracer: options -> scene -> render -> pictures. */
 #include "collada.h"
-#include "environment.h"
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
@@ -69,17 +68,6 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
     return true;
 }
 
-static bool add_environment(const struct options *o, struct scene *scene, struct err *e)
-{
-    struct environment *env = environment_read(o->environment_file, e);
-    if (env == NULL)
-        return false;
-    if (scene_add_environment(scene, env, e))
-        return true;
-    environment_free(env);
-    return err_prefix(e, "-e %s with %s", o->environment_file, o->scene);
-}
-
 static bool load_scene(const struct options *o, struct scene *scene, struct err *e)
 {
     if (!collada_load(o->scene, (enum dialect)o->dialect, scene, e))
@@ -97,7 +85,7 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_dark_lights > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
                 scene->num_dark_lights);
-    if (o->environment_file != NULL && !add_environment(o, scene, e))
+    if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)
         return err_set(e, "%s: the scene has no light", o->scene);

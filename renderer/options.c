@@ -315,10 +315,8 @@ static bool complete(struct options *s, int accumulate, struct err *e)
         s->last = s->spp;
     if (s->last > s->spp)
         return err_set(e, "--samples: %d:%d goes past the %d of --spp", s->first, s->last, s->spp);
-    if (s->threads == 0) {
-        long n = sysconf(_SC_NPROCESSORS_ONLN);
-        s->threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
-    }
+    if (s->threads == 0)
+        s->threads = cli_processors();
     return true;
 }
 

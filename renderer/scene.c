@@ -294,3 +294,14 @@ bool scene_add_environment(struct scene *s, struct environment *env, struct err 
     lights[s->num_lights++] = (struct light){.kind = LIGHT_ENVIRONMENT};
     return true;
 }
+
+bool scene_read_environment(struct scene *s, const char *path, struct err *e)
+{
+    struct environment *env = environment_read(path, e);
+    if (env == NULL)
+        return false;
+    if (scene_add_environment(s, env, e))
+        return true;
+    environment_free(env);
+    return err_prefix(e, "%s", path);
+}

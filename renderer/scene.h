@@ -148,6 +148,9 @@ bool scene_finish(struct scene *s, const char *where, struct err *e)
  * it from then on; on failure (there is one already; out of memory) the caller still does. */
 bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)
     __attribute__((warn_unused_result));
+/* The same of a file (environment_read()); each failure is a line with its path. */
+bool scene_read_environment(struct scene *s, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
 
 static inline uint32_t scene_num_primitives(const struct scene *s)
 {

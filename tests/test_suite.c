@@ -51,14 +51,6 @@ static void load_shipped(struct suite *s)
         fail_msg("%s", e.msg);
 }
 
-static const struct suite_reference *reference_of(const struct suite_scene *s, const char *engine)
-{
-    for (int i = 0; i < s->num_references; i++)
-        if (strcmp(s->reference[i].engine, engine) == 0)
-            return &s->reference[i];
-    return NULL;
-}
-
 /* What the families promise: closed forms in 1x, each engine a reference or a reason why not, a page
  * for each scene. */
 static void shipped_suite_loads(void **state)
@@ -76,12 +68,12 @@ static void shipped_suite_loads(void **state)
         assert_int_equal(access(scene->dae, R_OK), 0);
         static const char *const engines[] = {"cycles", "povray"};
         for (size_t k = 0; k < COUNT(engines); k++)
-            if ((reference_of(scene, engines[k]) != NULL) ==
+            if ((suite_reference_of(scene, engines[k]) != NULL) ==
                 (json_object_get(scene->not_expressible, engines[k]) != NULL))
                 fail_msg("%s: needs either a reference or a reason for %s", scene->name,
                          engines[k]);
         if (scene->name[0] == '1')
-            assert_non_null(reference_of(scene, "truth"));
+            assert_non_null(suite_reference_of(scene, "truth"));
         if (i > 0)
             assert_true(strcmp(s.scene[i - 1].name, scene->name) < 0);
         assert_ptr_equal(suite_find(&s, scene->name), scene);
@@ -108,16 +100,16 @@ static void fields_are_those_of_the_file(void **state)
     assert_int_equal(c->spp, 4096);
     assert_int_equal(c->tile, 16);
     assert_int_equal(c->expect, VERDICT_EQUIVALENT);
-    const struct suite_reference *povray = reference_of(c, "povray");
+    const struct suite_reference *povray = suite_reference_of(c, "povray");
     assert_string_equal(povray->fidelity, "limit");
     assert_true(povray->margin_global == 0.005 && povray->margin_tile == 0.02);
     assert_int_equal(povray->replicates, 256);
     assert_int_equal(povray->subgrid, 3);
-    assert_int_equal(reference_of(c, "cycles")->spp, 256);
+    assert_int_equal(suite_reference_of(c, "cycles")->spp, 256);
 
     const struct suite_scene *f = suite_find(&s, "11_furnace");
-    assert_string_equal(reference_of(f, "truth")->kind, "furnace");
-    assert_non_null(json_object_get(reference_of(f, "truth")->values, "albedo"));
+    assert_string_equal(suite_reference_of(f, "truth")->kind, "furnace");
+    assert_non_null(json_object_get(suite_reference_of(f, "truth")->values, "albedo"));
 
     const struct suite_scene *d = suite_find(&s, "92_half_pixel");
     assert_int_equal(d->expect, VERDICT_DIFFERENT);

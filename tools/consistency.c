@@ -79,12 +79,13 @@ static bool any_equal(const struct moments *render, int num)
     return false;
 }
 
-static void judge_pixels(const struct moments *render, const struct totals *t, int num,
+static bool judge_pixels(const struct moments *render, const struct totals *t, int num,
                          double alpha, struct consistency *out)
 {
     double all = log_ratio(render, t, num, num), mean = 0, squares = 0;
     double *without = malloc((size_t)num * sizeof *without);
-    assert(without != NULL);
+    if (without == NULL)
+        return false;
     for (int k = 0; k < num; k++)
         mean += (without[k] = log_ratio(render, t, num, k)) / num;
     for (int k = 0; k < num; k++)
@@ -94,6 +95,7 @@ static void judge_pixels(const struct moments *render, const struct totals *t, i
     out->pixels = exp(all);
     out->pixels_lo = exp(all - half);
     out->pixels_hi = exp(all + half);
+    return true;
 }
 
 /* Keeps the channel whose S is furthest out, by its p. */
@@ -174,7 +176,7 @@ bool consistency_judge(const struct moments *render, int num, double margin, dou
         snprintf(out->reason, sizeof out->reason,
                  "two renders with seeds of their own are the same: the seed has no effect");
     } else if (ok) {
-        judge_pixels(render, t, num, alpha, out);
+        ok = judge_pixels(render, t, num, alpha, out) || err_set(e, "out of memory");
         judge_image(t, num, alpha, out);
         decide(out, margin);
     }

@@ -45,18 +45,10 @@ static bool is_judged(int engine)
     return engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL;
 }
 
-static const struct suite_reference *find_reference(const struct suite_scene *s, const char *engine)
-{
-    for (int i = 0; i < s->num_references; i++)
-        if (strcmp(s->reference[i].engine, engine) == 0)
-            return &s->reference[i];
-    return NULL;
-}
-
 static enum converge_against choose_reference(const struct suite_scene *s)
 {
     for (enum converge_against a = AGAINST_TRUTH; a < AGAINST_OWN; a++)
-        if (find_reference(s, converge_against_names[a]) != NULL)
+        if (suite_reference_of(s, converge_against_names[a]) != NULL)
             return a;
     return AGAINST_OWN;
 }
@@ -79,7 +71,7 @@ static bool load_reference(const struct run *r, const struct suite_scene *s,
         if (!converge_render_own(job, spp, &m, e))
             return false;
     } else {
-        const struct suite_reference *ref = find_reference(from, engine);
+        const struct suite_reference *ref = suite_reference_of(from, engine);
         if (ref == NULL)
             return err_set(e, "%s has no reference '%s'", from->name, engine);
         snprintf(name, 64, against == AGAINST_TRUTH ? "closed form" : "golden of %s", engine);

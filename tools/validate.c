@@ -55,19 +55,11 @@ static bool is_selected(const struct validate_options *o, const char *name)
     return o->num_only == 0;
 }
 
-static const struct suite_reference *find_reference(const struct suite_scene *s, const char *engine)
-{
-    for (int i = 0; i < s->num_references; i++)
-        if (strcmp(s->reference[i].engine, engine) == 0)
-            return &s->reference[i];
-    return NULL;
-}
-
 /* Ours against each reference; each engine against the closed form, where there is one: the probes
  * that show the engine to be set up right; and a further engine against all of these and ours. */
 static int count_claims(const struct validation *v, const struct suite_scene *s)
 {
-    bool has_truth = find_reference(s, "truth") != NULL;
+    bool has_truth = suite_reference_of(s, "truth") != NULL;
     return s->num_references + (has_truth ? s->num_references - 1 : 0) +
            (v->engine_can[s - v->suite.scene] ? s->num_references + 1 : 0) + s->num_variants +
            (s->consistency.renders > 0);
@@ -289,7 +281,7 @@ static void judge_engine(struct validation *v, const struct suite_scene *s,
 static void judge_variants(struct validation *v, const struct suite_scene *s,
                            const struct suite_scene *from)
 {
-    const struct suite_reference *truth = find_reference(s, "truth");
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
     int against = truth != NULL ? (int)(truth - s->reference) : 0;
     for (int i = 0; i < s->num_variants; i++) {
         struct side ours;
@@ -318,7 +310,7 @@ static void validate_scene(struct validation *v, const struct suite_scene *s)
 {
     const struct suite_scene *from = suite_find(&v->suite, s->references_of);
     const struct side *truth_side = NULL;
-    const struct suite_reference *truth = find_reference(s, "truth");
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
     struct side ours;
     render_ours(v, s, "pathtracer", NULL, &ours);
     for (int i = 0; i < s->num_references; i++) {

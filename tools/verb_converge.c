@@ -8,7 +8,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 enum option {
     OPT_ENGINE,
@@ -197,10 +196,8 @@ int verb_converge(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     if (done)
         return 0;
-    if (o.threads == 0) {
-        long n = sysconf(_SC_NPROCESSORS_ONLN);
-        o.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
-    }
+    if (o.threads == 0)
+        o.threads = cli_processors();
     int code = EXIT_NOT_JUDGED;
     if (converge_run(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
         code = results_exit_code(results);

@@ -4,7 +4,6 @@
 #include "../reference/export_povray.h"
 #include "../renderer/cli.h"
 #include "../renderer/collada.h"
-#include "../renderer/environment.h"
 #include "../renderer/fs.h"
 #include "results.h"
 #include "verbs.h"
@@ -120,17 +119,6 @@ static bool write_scene(const struct settings *s, const struct scene *scene,
     return write_text(s, scene, camera, e);
 }
 
-static bool add_environment(const struct settings *s, struct scene *scene, struct err *e)
-{
-    if (s->environment == NULL)
-        return true;
-    struct environment *env = environment_read(s->environment, e);
-    if (env == NULL || scene_add_environment(scene, env, e))
-        return env != NULL;
-    environment_free(env);
-    return err_prefix(e, "%s with %s", s->scene, s->environment);
-}
-
 int verb_export(int argc, char **argv, struct err *e)
 {
     struct settings s = {
@@ -142,7 +130,7 @@ int verb_export(int argc, char **argv, struct err *e)
     if (s.done)
         return 0;
     bool ok = make_parent_dirs(s.out, e) && collada_load(s.scene, DIALECT_AUTO, &scene, e) &&
-              add_environment(&s, &scene, e);
+              (s.environment == NULL || scene_read_environment(&scene, s.environment, e));
     if (ok && !camera_init(&camera, &scene, s.width, s.height, e))
         ok = err_prefix(e, "%s", s.scene);
     if (ok) {

@@ -6,7 +6,6 @@
 #include "verbs.h"
 
 #include <string.h>
-#include <unistd.h>
 
 enum { MAX_SCENES = 64 };
 
@@ -175,10 +174,8 @@ int verb_reference(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     if (s.done)
         return 0;
-    if (s.opt.threads == 0) {
-        long n = sysconf(_SC_NPROCESSORS_ONLN);
-        s.opt.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
-    }
+    if (s.opt.threads == 0)
+        s.opt.threads = cli_processors();
     s.opt.work_dir = s.work;
     if (!make_dirs(s.work, e) || !suite_load(s.suite, &suite, e))
         return EXIT_NOT_JUDGED;

@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
-#include <unistd.h>
 
 enum option {
     OPT_LIVE,
@@ -223,10 +222,8 @@ int verb_validate(int argc, char **argv, struct err *e)
             return EXIT_NOT_JUDGED;
         o.engine = &engine;
     }
-    if (o.threads == 0) {
-        long n = sysconf(_SC_NPROCESSORS_ONLN);
-        o.threads = n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
-    }
+    if (o.threads == 0)
+        o.threads = cli_processors();
     int code = EXIT_NOT_JUDGED;
     if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
         code = with_loader(results_exit_code(results), results, e);
