@@ -29,6 +29,7 @@ void moments_free(struct moments *m)
     free(m->mean);
     free(m->m2);
     free(m->m3);
+    free(m->tolerance);
     *m = (struct moments){0};
 }
 
@@ -61,6 +62,8 @@ bool moments_merge(struct moments *dst, const struct moments *src, struct err *e
     if (strcmp(dst->unit, src->unit) != 0 || dst->spp != src->spp)
         return err_set(e, "cannot merge moments over a %s of %g spp and a %s of %g spp", dst->unit,
                        dst->spp, src->unit, src->spp);
+    if (dst->tolerance != NULL || src->tolerance != NULL)
+        return err_set(e, "cannot merge moments of rounded numbers");
     size_t pixels = (size_t)dst->width * (size_t)dst->height;
     for (size_t p = 0; p < pixels; p++) {
         double na = dst->n[p], nb = src->n[p], n = na + nb;

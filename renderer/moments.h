@@ -19,6 +19,10 @@ struct moments {
      * M2 tells nothing about the error of the mean. */
     char unit[16];
     double spp; /* paths per pixel in one observation; 0 where that has no meaning */
+    /* How far the mean may be off on top of its variance, because its numbers were rounded: 3 per
+     * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
+     * memory only: no file has it, and moments_merge() refuses it. */
+    double *tolerance;
 };
 
 /* All zero, unit "sample", spp 1. */

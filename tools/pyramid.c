@@ -7,9 +7,9 @@
 
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-static struct estimate estimate(double mean, double v, double k3, double n)
+static struct estimate estimate(double mean, double v, double k3, double n, double tolerance)
 {
-    struct estimate est = {.mean = mean, .v = v, .k3 = k3};
+    struct estimate est = {.mean = mean, .v = v, .k3 = k3, .tolerance = tolerance};
     if (v > 0) {
         est.var_v = fmax(2 * v * v / (n - 1), k3 * k3 / v);
         est.var_k3 = 6 * v * v * v / ((n - 1) * (n - 2));
@@ -24,16 +24,19 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
     assert(exact || n >= 3);
     double v_scale = exact ? 0 : 1 / (n * (n - 1));
     double k_scale = exact ? 0 : v_scale / (n - 2);
+    const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
     const double *mean = m->mean + 3 * pixel, *m2 = m->m2 + 3 * pixel, *m3 = m->m3 + 3 * pixel;
     if (channel < CHANNEL_LUMINANCE)
-        return estimate(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
-    double sum = 0, deviation = 0, root = 0;
+        return estimate(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n,
+                        tolerance[channel]);
+    double sum = 0, deviation = 0, root = 0, rounding = 0;
     for (int c = 0; c < 3; c++) {
         sum += luminance_weight[c] * mean[c];
         deviation += luminance_weight[c] * sqrt(m2[c] * v_scale);
         root += luminance_weight[c] * cbrt(m3[c] * k_scale);
+        rounding += luminance_weight[c] * tolerance[c];
     }
-    return estimate(sum, deviation * deviation, root * root * root, n);
+    return estimate(sum, deviation * deviation, root * root * root, n, rounding);
 }
 
 void pyramid_add(struct cell *dst, const struct cell *src)
@@ -45,6 +48,7 @@ void pyramid_add(struct cell *dst, const struct cell *src)
     dst->k3 += src->k3;
     dst->var_v += src->var_v;
     dst->var_k3 += src->var_k3;
+    dst->tolerance += src->tolerance;
 }
 
 struct cell pyramid_pixel(const struct moments *a, const struct moments *b, size_t pixel,
@@ -59,6 +63,7 @@ struct cell pyramid_pixel(const struct moments *a, const struct moments *b, size
         .k3 = ea.k3 - eb.k3,
         .var_v = ea.var_v + eb.var_v,
         .var_k3 = ea.var_k3 + eb.var_k3,
+        .tolerance = ea.tolerance + eb.tolerance,
     };
 }
 

@@ -18,6 +18,7 @@ struct estimate {
     double var_v;  /* variance of v: the larger of 2 v^2/(n-1) (normal) and k3^2/v (Cauchy-Schwarz:
                       the covariance of mean and variance is k3) */
     double var_k3; /* variance of k3 if normal, 6 v^3/((n-1)(n-2)) */
+    double tolerance; /* of the mean (moments.h) */
 };
 
 /* Channel 3 is luminance, whose variance the moments do not hold: the bound for any correlation of
@@ -27,11 +28,12 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
 
 /* Sums over the pixels of a region. */
 struct cell {
-    double a, b;   /* means of A and B */
-    double va, vb; /* their variances */
-    double k3;     /* third cumulant of A - B */
-    double var_v;  /* variance of va + vb */
-    double var_k3; /* variance of k3 */
+    double a, b;      /* means of A and B */
+    double va, vb;    /* their variances */
+    double k3;        /* third cumulant of A - B */
+    double var_v;     /* variance of va + vb */
+    double var_k3;    /* variance of k3 */
+    double tolerance; /* of a and b together, from rounding */
 };
 
 /* The cell of one pixel, and dst += src. */

@@ -37,10 +37,11 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
     struct measured m = {.d = cell->a - cell->b, .margin = margin_of(j, r)};
     m.statistic = is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID;
     m.unit = fmax(cell->b, j->floor * r.width * r.height);
-    m.tolerance = float_tolerance * fmax(cell->a, cell->b);
+    double rounding = float_tolerance * fmax(cell->a, cell->b);
+    m.tolerance = rounding + cell->tolerance;
     m.v = cell->va + cell->vb;
     m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
-    m.noise_free = m.v <= m.tolerance * m.tolerance;
+    m.noise_free = m.v <= rounding * rounding;
     if (!m.noise_free) {
         m.dof = stats_dof(m.v, cell->var_v);
         m.skew = (fabs(cell->k3) + sqrt(cell->var_k3)) / (m.v * sqrt(m.v));
