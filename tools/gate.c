@@ -126,22 +126,22 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
             log10_p = p;
         }
     }
-    char own[sizeof second->reason];
-    memcpy(own, second->reason, sizeof own);
+    char text[1024];
     if (confirmed) {
         second->verdict = VERDICT_DIFFERENT;
         second->extra_factor = 1;
-        snprintf(second->reason, sizeof second->reason,
+        snprintf(text, sizeof text,
                  "%s:%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
                  "10^%.1f",
                  what, seen, stage, level, flagged, log10_p);
     } else {
         if (second->verdict == VERDICT_DIFFERENT)
             second->verdict = VERDICT_INCONCLUSIVE;
-        snprintf(second->reason, sizeof second->reason,
-                 "%s:%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %.110s", what,
-                 seen, log10_p, own);
+        snprintf(text, sizeof text,
+                 "%s:%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %s", what, seen,
+                 log10_p, second->reason);
     }
+    snprintf(second->reason, sizeof second->reason, "%.255s", text);
     return true;
 }
 
