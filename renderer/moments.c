@@ -173,7 +173,8 @@ bool moments_read(const char *path, struct moments *out, struct image *image, st
         goto fail;
     }
     if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
-        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0) {
+        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0 &&
+        strcmp(unit, "picture") != 0) {
         err_set(e, "%s: unknown unit of observation '%s'", path, unit);
         goto fail;
     }

@@ -103,6 +103,9 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     bool two = job->again[0] != NULL;
     bool ok = two ? gate_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
+    if (ok && p.in[0].is_guessed && opt.margin_variance > 0)
+        ok =
+            err_set(e, "--margin-variance: a picture without moments tells no variance of its own");
     if (ok)
         input_limit(&p.in[0], opt.tile, &out->r);
     keep_pair(job->path, &p, out);

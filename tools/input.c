@@ -63,6 +63,8 @@ static bool read_file(const char *path, char side, const struct input_options *o
     if (moments) {
         out->kind = INPUT_MOMENTS;
         ok = moments_read(path, &out->m, NULL, e);
+        if (ok && strcmp(out->m.unit, "picture") == 0)
+            ok = err_set(e, "%s: is one side of a comparison; its variance belongs to both", path);
     } else {
         ok = input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
     }

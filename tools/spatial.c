@@ -291,7 +291,7 @@ bool spatial_variance(struct moments *a, struct moments *b, const double *more_a
     free(d.v);
     for (size_t p = 0; p < pixels; p++)
         a->n[p] = b->n[p] = 3;
-    strcpy(a->unit, "sample");
-    strcpy(b->unit, "sample");
+    strcpy(a->unit, "picture");
+    strcpy(b->unit, "picture");
     return ok;
 }

@@ -28,7 +28,7 @@ struct spatial {
     double skew_error[3];
 };
 
-/* Sets n, M2 and M3 of both from their means, in units "sample": half of the variance to each side,
+/* Sets n, M2 and M3 of both from their means, in units "picture": half of the variance to each side,
  * written as 3 observations so that the comparison finds the variance, the degrees of freedom and
  * the skewness above; n is no count of anything. `more` (3 per pixel and side, or NULL) is variance
  * that the side has besides. Pixels with censored[p] != 0 take no part and get no noise. Fails with a
