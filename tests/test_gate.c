@@ -140,6 +140,7 @@ static void test_false_alarms(void **state)
                   num_flagged, different, again);
     assert_true(different <= 66);
     assert_true(again > 66);
+    free_world(&w);
 }
 
 static void test_check_fresh(void **state)

@@ -189,7 +189,7 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
 
 void input_limit(const struct input *a, int tile, struct comparison *c)
 {
-    if (a->censored == NULL || c->verdict != VERDICT_EQUIVALENT)
+    if (a->censored == NULL)
         return;
     double pixels = (double)a->m.width * a->m.height, share = (double)a->num_censored / pixels;
     double worst = 0;
@@ -206,7 +206,9 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
                 worst_y = y;
             }
         }
-    if (share <= most_censored && worst <= most_censored_tile)
+    if (worst > most_censored_tile)
+        c->mdb_tile = region_mdb_none;
+    if (c->verdict != VERDICT_EQUIVALENT || (share <= most_censored && worst <= most_censored_tile))
         return;
     c->verdict = VERDICT_INCONCLUSIVE;
     c->extra_factor = 1;

@@ -50,7 +50,8 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
     __attribute__((warn_unused_result));
 
 /* After compare_moments() on a pair: EQUIVALENT becomes INCONCLUSIVE, with the reason, if more than
- * 5 % of the picture or half of a reporting tile of that side is censored. */
+ * 5 % of the picture or half of a reporting tile is censored; in the latter case nothing is detectable
+ * in that tile, and mdb_tile says so. */
 void input_limit(const struct input *a, int tile, struct comparison *c);
 
 #endif
