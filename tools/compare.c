@@ -97,8 +97,8 @@ static void set_shares(struct judge *j)
         j->share[s] = applies[s] ? part[s] / sum : 0;
 }
 
-static bool check(const struct moments *a, const struct moments *b,
-                  const struct compare_options *opt, struct judge *j, struct err *e)
+bool judge_init(const struct moments *a, const struct moments *b, const struct compare_options *opt,
+                struct judge *j, struct err *e)
 {
     if (a->width != b->width || a->height != b->height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
@@ -274,7 +274,7 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
     struct cell image[NUM_CHANNELS];
     double squared = 0, mean = 0;
-    if (!check(a, b, opt, &j, e))
+    if (!judge_init(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
     for (int c = 0; c < NUM_CHANNELS; c++) {

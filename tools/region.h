@@ -18,6 +18,10 @@ struct judge {
     size_t num_tests[2]; /* set once known: for mdb */
 };
 
+/* compare_moments()'s hygiene, and all of j but z_guard and num_tests. For gate.c too. */
+bool judge_init(const struct moments *a, const struct moments *b, const struct compare_options *opt,
+                struct judge *j, struct err *e) __attribute__((warn_unused_result));
+
 /* A region's sums in the form the test needs. Sums over pixels, not means. */
 struct measured {
     double d;         /* A - B */
