@@ -51,7 +51,7 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
     r->cell[MARK] = mark[markdown][outcome];
     if (outcome == OUTCOME_NOT_JUDGED) {
         r->cell[DIFFERENCE] = r->cell[MDB] = r->cell[MARGIN] = "-";
-        r->cell[VERDICT] = "NOT JUDGED";
+        r->cell[VERDICT] = claim_lacks_time(claim) ? "INCONCLUSIVE" : "NOT JUDGED";
         return;
     }
     const json_t *ci = json_object_get(claim, "ci");

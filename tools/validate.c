@@ -28,22 +28,22 @@ void say(const struct validation *v, const char *scene, const char *what)
     fprintf(stderr, "] %s: %s\n", scene, what);
 }
 
-/* Where time matters: looks of one size after each other, so that every claim gets its first before any
- * gets its fifth, and of one size the cheapest first. A claim with a single look comes before the large
- * ones. */
-static double rank(const struct task *t)
-{
-    if (t->looks == &sequence_single)
-        return LOOK_DECLARED - 0.5;
-    return t->next;
-}
-
 static double cost(const struct task *t)
 {
     if (t->a == NULL)
         return (double)t->scene->width * t->scene->height * t->scene->consistency.renders *
                t->scene->consistency.spp;
     return side_cost(t->a, t->next) + side_cost(t->b, t->next);
+}
+
+/* Where time matters: looks of one size after each other, so that every claim gets its first before any
+ * gets its fifth, and of one size the cheapest first. A claim with a single look comes before the large
+ * looks of others, or at once if it costs nothing. */
+static double rank(const struct task *t)
+{
+    if (t->looks == &sequence_single)
+        return cost(t) > 0 ? LOOK_DECLARED - 0.5 : -1;
+    return t->next;
 }
 
 static struct task *choose(const struct validation *v)
