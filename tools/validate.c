@@ -36,14 +36,14 @@ static double cost(const struct task *t)
     return side_cost(t->a, t->next) + side_cost(t->b, t->next);
 }
 
-/* Where time matters: looks of one size after each other, so that every claim gets its first before any
- * gets its fifth, and of one size the cheapest first. A claim with a single look comes before the large
- * looks of others, or at once if it costs nothing. */
-static double rank(const struct task *t)
+/* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
+ * and in a round the cheapest first. A claim with a single look comes before the fifth round, or at
+ * once if it costs nothing. */
+static double round_of(const struct task *t)
 {
     if (t->looks == &sequence_single)
-        return cost(t) > 0 ? LOOK_DECLARED - 0.5 : -1;
-    return t->next;
+        return cost(t) > 0 ? 3.5 : -1;
+    return (double)json_array_size(t->history);
 }
 
 static struct task *choose(const struct validation *v)
@@ -55,7 +55,8 @@ static struct task *choose(const struct validation *v)
             continue;
         if (v->sequence == &sequence_single)
             return t;
-        if (best == NULL || rank(t) < rank(best) || (rank(t) == rank(best) && cost(t) < cost(best)))
+        if (best == NULL || round_of(t) < round_of(best) ||
+            (round_of(t) == round_of(best) && cost(t) < cost(best)))
             best = t;
     }
     return best;
@@ -72,21 +73,22 @@ static void tell_round(const struct validation *v, const struct task *t)
     say(v, t->scene->name, note);
 }
 
-/* Until all is decided, or the time is over, or the first that differs. True for the last. */
-static bool take_looks(struct validation *v)
+/* Until all is decided, or the time is over, or, for --until-different, one differs: what was not looked
+ * at by then stays without a result. */
+static void take_looks(struct validation *v)
 {
-    for (struct task *t; (t = choose(v)) != NULL;) {
-        if (time_left(v) <= 0)
-            break;
+    bool found = false;
+    for (struct task *t; !found && (t = choose(v)) != NULL && time_left(v) > 0;) {
         tell_round(v, t);
         task_look(v, t);
-        if (v->opt->until_different && task_differs(t))
-            return true;
+        found = v->opt->until_different && task_differs(t);
     }
-    for (int i = 0; i < v->num_tasks; i++)
-        if (v->task[i].result == NULL)
-            task_give_up(v, &v->task[i]);
-    return false;
+    for (int i = 0; i < v->num_tasks; i++) {
+        struct task *t = &v->task[i];
+        if (t->result == NULL && (t->seen || !found))
+            task_give_up(v, t,
+                         found ? "stopped at the difference of another claim" : "budget spent");
+    }
 }
 
 static const double small_alpha = 1e-5; /* of a run: below, no tail is known well enough */
@@ -109,7 +111,7 @@ static void describe_run(const struct validation *v, json_t *root)
         json_object_set_new(root, "budget_s", json_real(o->budget_s));
 }
 
-/* Claims that --until-different did not come to are not in the results. */
+/* Claims that --until-different did not look at are not in the results. */
 static void collect(const struct validation *v, json_t *root)
 {
     json_t *consistency = json_array();
@@ -154,7 +156,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
             goto done;
         json_object_set_new(root, "loader", loader);
     }
-    (void)take_looks(&v);
+    take_looks(&v);
     collect(&v, root);
     json_object_set_new(root, "seconds", json_real(now_seconds() - v.start));
     *results = root;

@@ -26,7 +26,8 @@ struct validate_options {
     bool quiet;
     /* Looks up to the declared samples (sequence_declared), the small ones of all scenes first, and stop
      * at the first claim that comes out DIFFERENT against expectation: to find out fast that a renderer
-     * is wrong. alpha is still divided by all claims; those not decided by then are not in the results. */
+     * is wrong. alpha is still divided by all claims; those undecided by then are
+     * INCONCLUSIVE, those not looked at are not in the results. */
     bool until_different;
     /* Wall time. Above 0: each claim is looked at again and again, with samples that double, until it is
      * decided or the time is over (sequence_open), and alpha is spent over the looks (sequence.h). 0: one

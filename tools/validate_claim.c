@@ -271,14 +271,14 @@ void task_look(struct validation *v, struct task *t)
     announce(v, t);
 }
 
-void task_give_up(struct validation *v, struct task *t)
+void task_give_up(struct validation *v, struct task *t, const char *why)
 {
     if (t->a == NULL)
         t->result = consistency_run(v->opt, t->scene, v->alpha, 0);
     if (t->a == NULL)
         announce(v, t);
     else if (t->seen)
-        finish(v, t, "budget spent");
+        finish(v, t, why);
     else
         finish_unseen(v, t, "budget spent before a first look was possible", true);
 }

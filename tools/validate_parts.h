@@ -108,8 +108,8 @@ bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
 void task_settle(struct task *t);
 /* Takes one look, of which t->result is set if it decides or was the last. */
 void task_look(struct validation *v, struct task *t);
-/* Ends it: INCONCLUSIVE for want of time. */
-void task_give_up(struct validation *v, struct task *t);
+/* Ends it, INCONCLUSIVE; why: what comes before the last look's reason. Without a look the time is over. */
+void task_give_up(struct validation *v, struct task *t, const char *why);
 /* DIFFERENT where EQUIVALENT should be. */
 bool task_differs(const struct task *t);
 void task_free(struct task *t);
