@@ -3,11 +3,13 @@
 #include "../reference/job.h"
 #include "../reference/truth_noise.h"
 #include "../renderer/fs.h"
+#include "../renderer/progress.h"
 #include "consistency.h"
 #include "efficiency.h"
 #include "ours.h"
 #include "stop_rule.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -16,9 +18,12 @@ enum { PATH_SIZE = 8192 };
 
 /* Render k of the scene with those samples and further options; the picture is removed. */
 static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
-                       int spp, const char *const *options, struct moments *out, double *seconds,
-                       struct err *e)
+                       int spp, const char *const *options, double deadline, struct moments *out,
+                       double *seconds, struct err *e)
 {
+    double left = deadline - now_seconds();
+    if (left <= 0)
+        return err_set(e, "the budget is spent");
     char picture[PATH_SIZE], log[PATH_SIZE];
     snprintf(picture, sizeof picture, "%s/data/%s/consistency.exr", opt->out_dir, s->name);
     snprintf(log, sizeof log, "%s/data/%s/consistency.log", opt->out_dir, s->name);
@@ -28,7 +33,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                  .options = options,
                                  .seed = replicate_seed((uint32_t)opt->seed, k),
                                  .threads = opt->threads,
-                                 .timeout_s = opt->timeout_s,
+                                 .timeout_s = fmin(left, opt->timeout_s),
                                  .picture = picture,
                                  .log = log};
     double cpu_s;
@@ -61,14 +66,15 @@ static bool judge_noise(const struct suite_scene *s, const struct moments *rende
 }
 
 static bool judge_stop(const struct validate_options *opt, const struct suite_scene *s,
-                       struct stop_rule *out, double *seconds, struct err *e)
+                       double deadline, struct stop_rule *out, double *seconds, struct err *e)
 {
     char batch[16], tolerance[32];
     snprintf(batch, sizeof batch, "%d", s->consistency.batch);
     snprintf(tolerance, sizeof tolerance, "%.17g", s->consistency.tolerance);
     const char *const options[] = {"-a", batch, tolerance, NULL};
     struct moments m;
-    if (!render_one(opt, s, s->consistency.renders, s->consistency.most, options, &m, seconds, e))
+    if (!render_one(opt, s, s->consistency.renders, s->consistency.most, options, deadline, &m,
+                    seconds, e))
         return false;
     *out = stop_rule_check(&m, s->consistency.batch, s->consistency.tolerance, s->consistency.most);
     moments_free(&m);
@@ -117,7 +123,7 @@ static json_t *judged(const struct suite_scene *s, double alpha, const struct fi
 }
 
 json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
-                        double alpha)
+                        double alpha, double deadline)
 {
     int num = s->consistency.renders, done = 0;
     bool asks_noise = s->consistency.noise_margin > 0;
@@ -128,13 +134,18 @@ json_t *consistency_run(const struct validate_options *opt, const struct suite_s
     double seconds = 0;
     bool ok = render != NULL || err_set(&e, "out of memory");
     for (; ok && done < num; done += ok)
-        ok = render_one(opt, s, done, s->consistency.spp, NULL, &render[done], &seconds, &e);
+        ok = render_one(opt, s, done, s->consistency.spp, NULL, deadline, &render[done], &seconds,
+                        &e);
     ok = ok && consistency_judge(render, num, s->consistency.margin, each, &f.c, &e) &&
          (!asks_noise || judge_noise(s, render, each, &f.noise, &e)) &&
-         (s->consistency.batch == 0 || judge_stop(opt, s, &f.stop, &seconds, &e));
+         (s->consistency.batch == 0 || judge_stop(opt, s, deadline, &f.stop, &seconds, &e));
     for (int k = 0; k < done; k++)
         moments_free(&render[k]);
     free(render);
+    if (!ok && now_seconds() >= deadline)
+        return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
+                         "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
+                         "budget spent before its renders were done");
     return ok ? judged(s, alpha, &f, seconds)
               : json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
                           "error", e.msg);
@@ -146,6 +157,13 @@ static bool is_interval(const json_t *v)
            json_is_number(json_array_get(v, 1));
 }
 
+/* Of a claim with an error. */
+static bool only_time_missing(const json_t *c)
+{
+    const char *verdict = member_text(c, "verdict");
+    return verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
 static bool check_one(const json_t *c, const char *where, struct err *e)
 {
     static const char *const numbers[] = {"renders", "spp",   "alpha",  "margin",
@@ -154,7 +172,8 @@ static bool check_one(const json_t *c, const char *where, struct err *e)
     if (member_text(c, "scene") == NULL || member_text(c, "engine") == NULL)
         return err_set(e, "%s: 'scene' or 'engine' is missing", where);
     if (member_text(c, "error") != NULL)
-        return !passed || err_set(e, "%s: has an 'error' and yet 'passed'", where);
+        return (!passed && only_time_missing(c)) ||
+               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!json_is_number(json_object_get(c, numbers[i])))
             return err_set(e, "%s: '%s' is not a number", where, numbers[i]);
@@ -232,8 +251,10 @@ void consistency_print(FILE *f, const json_t *consistency, bool markdown)
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
         if (member_text(c, "error") != NULL) {
-            fprintf(f, markdown ? "| %s | | | | | | NOT JUDGED: %s |\n" : "%s  NOT JUDGED: %s\n",
-                    member_text(c, "scene"), member_text(c, "error"));
+            fprintf(f, markdown ? "| %s | | | | | | %s: %s |\n" : "%s  %s: %s\n",
+                    member_text(c, "scene"),
+                    member_text(c, "verdict") != NULL ? member_text(c, "verdict") : "NOT JUDGED",
+                    member_text(c, "error"));
             continue;
         }
         fprintf(f,

@@ -6,7 +6,8 @@
  *      "seconds": 3.1,
  *      "noise": 1.002, "noise_ci": [.99, 1.01],       (where the scene asks for it: efficiency.h)
  *      "too_early": 0, "too_late": 0}                 (the same: stop_rule.h)
- *   | {"scene": , "engine": , "passed": false, "error": "one line"} ]
+ *   | {"scene": , "engine": , "passed": false, "error": "one line", "verdict": "INCONCLUSIVE" where
+ *      only the time was missing} ]
  *
  * pixels and image are 0 where two renders are the same. */
 #ifndef ASSAY_CONSISTENCY_RUN_H
@@ -20,9 +21,10 @@
 #include <stdio.h>
 
 /* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
- * of memory. */
+ * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
+ * an "error" that says so. */
 json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
-                        double alpha);
+                        double alpha, double deadline);
 
 /* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
 bool consistency_check(const json_t *consistency, const char *path, struct err *e)
