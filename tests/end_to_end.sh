@@ -78,7 +78,7 @@ else
     ok "failures leave no files"
 fi
 
-# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds them.)
+# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds all of them.)
 stale=0
 for patch in tests/mutants/*.patch; do
     patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
@@ -86,6 +86,11 @@ for patch in tests/mutants/*.patch; do
         { stale=1; not_ok "mutant $(basename "$patch")" "does not begin with the lines 'Bug: ' and 'Where: '"; }
 done
 [ $stale -eq 0 ] && ok "mutants apply and say what they are"
+# Three of them are built and found, and the renderer as it is passes the same scenes.
+if tests/mutants.sh --quick "$build" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
+    not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
+fi
+rm -f "$tmp/mutants.out"
 
 # Pictures.
 expect "render" 0 "mean radiance" \
@@ -129,7 +134,7 @@ interrupt() {
         timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
-    expect "$1: the picture has moments" 0 "EQUIVALENT" \
+    expect "$1: the picture has moments, and is not judged by itself" 3 "the same observations" \
         "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
     $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
         -f "$tmp/long.exr" >/dev/null
@@ -148,7 +153,7 @@ $pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" 
 for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
 kill -9 $!
 wait $! 2>/dev/null
-expect "--write-every: the picture of a killed render" 0 "EQUIVALENT" \
+expect "--write-every: the picture of a killed render has moments" 3 "the same observations" \
     "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
 if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
     not_ok "--write-every: its state" "none"
@@ -351,6 +356,25 @@ if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "ju
 expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
 expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
 
+# More and more samples: cheap scenes are decided with fewer than the 64 and 256 declared.
+expect "validate --budget" 0 "EQUIVALENT" \
+    $validate --budget 5m --only 10_furnace_one --only 12_point_plane --only 31_spot_plane
+# (Nine claims of ours, each with one look.)
+if [ "$(grep -c '"n_a": 16.0' "$out/results.json")" -eq 18 ]; then
+    ok "--budget decides with fewer samples than declared"
+else not_ok "--budget decides with fewer samples than declared" "$(grep '"n_a"' "$out/results.json" | head -40)"; fi
+expect "a spent budget is inconclusive" 2 "INCONCLUSIVE" $validate --budget 1s --only 41_cornell --only 45_many_lights
+if grep -q '"passed": true' "$out/results.json"; then not_ok "a spent budget passes nothing" "it does"; else
+    ok "a spent budget passes nothing"
+fi
+expect "a spent budget says so" 2 "budget spent" $validate --budget 0.001s --only 12_point_plane
+expect "validate: alpha 1e-9 means two stages" 0 "EQUIVALENT" $validate --alpha 1e-9 --only 31_spot_plane
+if [ "$(grep -c '"stages": 2' "$out/results.json")" -eq 2 ] && [ "$(grep -c '"stages": 1' "$out/results.json")" -eq 4 ]; then
+    ok "two stages against the closed form, one against goldens"
+else not_ok "two stages against the closed form, one against goldens" "$(grep '"stages"' "$out/results.json")"; fi
+expect "validate: --budget is no time" 3 "5d" $validate --budget 5d
+expect "validate: --stages" 3 "stages" $validate --stages 3
+
 # Negative controls: wrong programs under test.
 wrong() {
     printf '#!/bin/sh\n%s\n' "$1" >"$tmp/wrong"
@@ -358,6 +382,13 @@ wrong() {
 }
 wrong "exec $pathtracer \"\$@\" -m 4"
 expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails at the first look" 1 "DIFFERENT" \
+    $validate --until-different --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails twice, with fresh seeds" 1 "DIFFERENT" \
+    $validate --budget 5m --stages 2 --only 11_furnace --pathtracer "$tmp/wrong"
+if grep -q 'with fresh seeds, confirmed' "$out/results.json"; then ok "a second stage confirms"; else
+    not_ok "a second stage confirms" "$(grep '"reason"' "$out/results.json")"
+fi
 wrong "exit 5"
 expect "a program that dies is not judged" 3 "exit status 5" \
     $validate --only 11_furnace --pathtracer "$tmp/wrong"
