@@ -108,7 +108,7 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
             return false;
         }
         region_name(a2->width, a2->height, r, w->channel, what, sizeof what);
-        snprintf(seen, sizeof seen, " %+.3g %%, then %+.3g %%", 100 * w->difference,
+        snprintf(seen, sizeof seen, ": %+.3g %%, then %+.3g %%", 100 * w->difference,
                  100 * difference);
         confirmed = log10_p <= log10(level);
     }
@@ -132,14 +132,14 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
         second->verdict = VERDICT_DIFFERENT;
         second->extra_factor = 1;
         snprintf(text, sizeof text,
-                 "%s:%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
+                 "%s%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
                  "10^%.1f",
                  what, seen, stage, level, flagged, log10_p);
     } else {
         if (second->verdict == VERDICT_DIFFERENT)
             second->verdict = VERDICT_INCONCLUSIVE;
         snprintf(text, sizeof text,
-                 "%s:%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %s", what, seen,
+                 "%s%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %s", what, seen,
                  log10_p, second->reason);
     }
     snprintf(second->reason, sizeof second->reason, "%.255s", text);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK = 8, BIN = 4, FEWEST = 16 };
+enum { BLOCK = 8, FEWEST = 16 };
 static const double tail_factor = 4;    /* Var(sum r^2) / sum r^4 */
 static const double skew_factor = 6;    /* 1 / sum of the kernel cubed */
 static const double most_sd = 2.5;      /* of D where only its level is asked */
@@ -113,43 +113,53 @@ static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
     return true;
 }
 
-/* Mean of D over the blocks around one, which follow what the pictures differ by. */
-static double local_mean(const struct grid *d, int bx, int by)
+/* Mean of D over the blocks around one, which follows what the pictures differ by, and 1.25 times the
+ * mean distance from it, the sd of a normal law. */
+static void local_scale(const struct grid *d, int bx, int by, double *mean, double *sd)
 {
-    double sum = 0, num = 0;
-    for (int y = (by - 1) * BLOCK; y < (by + 2) * BLOCK; y++)
-        for (int x = (bx - 1) * BLOCK; x < (bx + 2) * BLOCK; x++)
-            if (x >= 0 && y >= 0 && x < d->width && y < d->height && !isnan(at(d, x, y))) {
-                sum += at(d, x, y);
-                num++;
-            }
-    return num > 0 ? sum / num : 0;
+    for (int pass = 0; pass < 2; pass++) {
+        double sum = 0, num = 0;
+        for (int y = (by - 1) * BLOCK; y < (by + 2) * BLOCK; y++)
+            for (int x = (bx - 1) * BLOCK; x < (bx + 2) * BLOCK; x++)
+                if (x >= 0 && y >= 0 && x < d->width && y < d->height && !isnan(at(d, x, y))) {
+                    sum += pass == 0 ? at(d, x, y) : fabs(at(d, x, y) - *mean);
+                    num++;
+                }
+        *(pass == 0 ? mean : sd) = num > 0 ? sum / num : 0;
+    }
+    *sd *= sqrt(M_PI / 2);
 }
 
-/* D less its local mean in standard deviations of its block, cut at +-most_sd: independent if D is,
- * and without the tails that would leave few degrees of freedom. NAN where nothing varies. */
-static void clip(const struct grid *d, const struct blocks *g, struct grid *out)
+/* D less its local mean, cut at +-most_sd: independent if D is, and without the tails that would leave
+ * few degrees of freedom. NAN where nothing varies. */
+static void clip(const struct grid *d, struct grid *out)
 {
-    for (int by = 0; by < g->ny; by++)
-        for (int bx = 0; bx < g->nx; bx++) {
-            double mean = local_mean(d, bx, by);
-            double sd = sqrt(g->v[(size_t)by * (size_t)g->nx + (size_t)bx]);
+    for (int by = 0; by * BLOCK < d->height; by++)
+        for (int bx = 0; bx * BLOCK < d->width; bx++) {
+            double mean = 0, sd = 0;
+            local_scale(d, bx, by, &mean, &sd);
             for (int y = by * BLOCK; y < (by + 1) * BLOCK && y < d->height; y++)
-                for (int x = bx * BLOCK; x < (bx + 1) * BLOCK && x < d->width; x++)
+                for (int x = bx * BLOCK; x < (bx + 1) * BLOCK && x < d->width; x++) {
+                    double z = at(d, x, y) - mean;
                     out->v[(size_t)y * (size_t)d->width + (size_t)x] =
-                        sd > 0 ? fmax(-most_sd, fmin(most_sd, (at(d, x, y) - mean) / sd)) : NAN;
+                        sd > 0 && !isnan(z) ? fmax(-most_sd, fmin(most_sd, z / sd)) : NAN;
+                }
         }
 }
 
-static void bin_means(const struct grid *d, struct grid *bins)
+/* Means of side x side values. */
+static bool bin_means(const struct grid *d, int side, struct grid *bins, struct err *e)
 {
+    if (!grid_alloc(bins, d->width / side, d->height / side, e))
+        return false;
     for (int y = 0; y < bins->height; y++)
         for (int x = 0; x < bins->width; x++) {
             double sum = 0;
-            for (int i = 0; i < BIN * BIN; i++)
-                sum += at(d, x * BIN + i % BIN, y * BIN + i / BIN);
-            bins->v[(size_t)y * (size_t)bins->width + (size_t)x] = sum / (BIN * BIN);
+            for (int i = 0; i < side * side; i++)
+                sum += at(d, x * side + i % side, y * side + i / side);
+            bins->v[(size_t)y * (size_t)bins->width + (size_t)x] = sum / (side * side);
         }
+    return true;
 }
 
 /* Sums of r^2 and r^4 over a grid. */
@@ -168,30 +178,32 @@ static struct block grid_sums(const struct grid *d)
     return s;
 }
 
-/* How much more variance a mean of BIN x BIN pixels has than if they were independent, and its upper
- * bound by chi-square with the degrees of freedom that both sums of squares leave. */
-static bool level(const struct grid *d, const struct blocks *g, double *factor, double *bound,
-                  struct err *e)
+/* How much more variance means of 4 x 4 have than if pixels were independent, and an upper bound of
+ * that of ever larger squares: by chi-square with the degrees of freedom that the sums of squares leave,
+ * and by as much again as from 2 x 2 to 4 x 4, as it nears its limit like 1/side. */
+static bool level(const struct grid *d, double *factor, double *bound, struct err *e)
 {
-    struct grid fine = {0}, bins = {0};
-    bool ok = grid_alloc(&fine, d->width, d->height, e) &&
-              grid_alloc(&bins, d->width / BIN, d->height / BIN, e);
+    struct grid fine = {0}, twos = {0}, fours = {0};
+    bool ok = grid_alloc(&fine, d->width, d->height, e);
     *factor = *bound = 1;
+    if (ok)
+        clip(d, &fine);
+    ok = ok && bin_means(&fine, 2, &twos, e) && bin_means(&fine, 4, &fours, e);
     if (ok) {
-        clip(d, g, &fine);
-        bin_means(&fine, &bins);
-        struct block f = grid_sums(&fine), b = grid_sums(&bins);
-        bool noisy = f.s2 > 0 && b.s2 > 0;
-        if (noisy && b.num < FEWEST)
+        struct block f = grid_sums(&fine), g = grid_sums(&twos), h = grid_sums(&fours);
+        bool noisy = f.s2 > 0;
+        if (noisy && h.num < FEWEST)
             ok = err_set(e, "too few pixels vary or are not saturated to tell their noise");
-        if (noisy && ok) {
-            double dof = 2 / (tail_factor * (f.s4 / (f.s2 * f.s2) + b.s4 / (b.s2 * b.s2)));
-            *factor = BIN * BIN * (b.s2 / b.num) / (f.s2 / f.num);
-            *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof);
+        if (noisy && ok && h.s2 > 0) {
+            double dof = 2 / (tail_factor * (f.s4 / (f.s2 * f.s2) + h.s4 / (h.s2 * h.s2)));
+            double two = 4 * (g.s2 / g.num) / (f.s2 / f.num);
+            *factor = 16 * (h.s2 / h.num) / (f.s2 / f.num);
+            *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) + fmax(0, *factor - two);
         }
     }
     free(fine.v);
-    free(bins.v);
+    free(twos.v);
+    free(fours.v);
     return ok;
 }
 
@@ -257,7 +269,7 @@ static bool one_channel(struct moments *a, struct moments *b, int c, struct grid
     }
     struct blocks g;
     double bound = 1;
-    bool ok = blocks_make(d, &g, e) && level(d, &g, &out->factor[c], &bound, e);
+    bool ok = blocks_make(d, &g, e) && level(d, &out->factor[c], &bound, e);
     if (ok) {
         skewness(&g, &out->skewness[c], &out->skew_error[c]);
         double skew = out->skewness[c] + copysign(out->skew_error[c], out->skewness[c]);
@@ -277,7 +289,7 @@ bool spatial_variance(struct moments *a, struct moments *b, const double *more_a
         same = (censored != NULL && censored[i / 3]) || a->mean[i] == b->mean[i];
     if (same)
         return err_set(e, "A and B are the same picture: nothing tells how noisy it is");
-    if (a->width < 8 * BIN || a->height < 8 * BIN)
+    if (a->width < 4 * BLOCK || a->height < 4 * BLOCK)
         return err_set(e,
                        "%d x %d pixels are too few to tell noise by its neighbours, 32 x 32 are "
                        "needed",

@@ -6,8 +6,9 @@
  * independent noise [Immerkaer96], and no sum f(x) + g(y) contributes. Blocks of 8 x 8 pixels share
  * one estimate. Its level is set by the same kernel on means of 4 x 4 pixels, which see noise that
  * neighbouring pixels share (filters wider than a pixel): the blocks' variances are multiplied by
- * the upper end of a one-sided 99.9 % interval of that factor, or 1 if that is larger. The factor is
- * that of D cut at 2.5 standard deviations: independence survives the cut, heavy tails do not.
+ * the upper end of a one-sided 99.9 % interval of that factor and what still larger squares would add,
+ * or by 1 if that is larger. The factor is that of D cut at 2.5 standard deviations: independence
+ * survives the cut, heavy tails do not.
  *
  * Degrees of freedom: Var(sum r^2) is at most 4 sum r^4, for normal noise (2.52: neighbouring r are
  * correlated) and for the heaviest tails alike; a picture of N pixels of normal noise has N/6.
