@@ -455,7 +455,7 @@ static void test_variance_ratio(void **state)
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     static double truth[3 * SIDE * SIDE];
     uint64_t seed = 111;
-    int known = 0, missed = 0, edge = 0, found = 0, level = 0;
+    int known = 0, missed = 0, edge = 0, found = 0, level = 0, tested = 0;
     fill_scene(truth, SIDE, 0.7);
     for (int i = 0; i < CLAIMS; i++) {
         render(&a, LAW_NORMAL, truth, N, true, &seed);
@@ -485,6 +485,7 @@ static void test_variance_ratio(void **state)
             const struct statistic *s = &c.statistic[STATISTIC_NOISE];
             assert_near(s->share, 0.1, 1e-12);
             *(k == 0 ? &edge : &found) += s->log10_p <= log10(0.01 * s->share);
+            tested += k == 1 && s->num_tests > 0;
             level += k == 0 && s->log10_p <= -2;
             comparison_free(&c);
         }
@@ -506,12 +507,14 @@ static void test_variance_ratio(void **state)
     }
     print_message(
         "ratio 2: interval misses %.2f %%; at the margin p <= 1 %% in %.2f %%; beyond it found %d of %d\n",
-        100.0 * missed / CLAIMS, 100.0 * level / CLAIMS, found, CLAIMS);
+        100.0 * missed / CLAIMS, 100.0 * level / CLAIMS, found, tested);
     assert_true(known > 0.95 * CLAIMS);
     assert_true(lower_bound(missed, known) <= 0.02);
     assert_true(lower_bound(level, CLAIMS) <= 0.01);
     assert_true(edge <= level);
-    assert_true(found > 0.95 * CLAIMS);
+    assert_true(tested >
+                CLAIMS / 2); /* the skewness of 1024 pixels is not always known well enough */
+    assert_int_equal(found, tested);
     moments_free(&a);
     moments_free(&b);
 }
