@@ -93,12 +93,12 @@ run_mutant() {
     { time "$build/assay" validate ${budget:-} $only_scenes --pathtracer "$build/mutants/$name/pathtracer" \
         --threads 1 -o "$build/mutants/$name/report" -q >"$build/mutants/$name.out" 2>"$build/mutants/$name.log"; } 2>"$build/mutants/$name.time"
     status=$?
-    cpu=$(awk '{ printf "%.1f", $1 + $2 }' "$build/mutants/$name.time")
+    cpu=$(tail -1 "$build/mutants/$name.time" | awk '{ printf "%.1f", $1 + $2 }')
     by=$(find_claim "$name" 2>/dev/null)
     rm -rf "$build/mutants/$name/report/data" "$build/mutants/$name/renderer"
     if [ "$name" = none ]; then
         # All as expected, or time was short for some.
-        [ -z "$by" ] && [ $status -ne 1 ] && [ $status -ne 3 ] && line="right|$cpu|||exit status $status" ||
+        [ -z "$by" ] && { [ $status -eq 0 ] || [ $status -eq 2 ]; } && line="right|$cpu|||exit status $status" ||
             line="accused|$cpu|${by:-||exit status $status}"
     elif [ -n "$by" ]; then
         line="caught|$cpu|$by"
