@@ -47,14 +47,14 @@ static double cost(const struct task *t)
 
 /* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
  * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
- * look of others, comes before that round, or at once if it costs nothing. --until-different goes by cost
- * alone; a scene that must differ cannot be what it waits for, and comes last. */
+ * look of others, comes before that round, or after the first if nothing is rendered for it. --until-different
+ * goes by cost alone; a scene that must differ cannot be what it waits for, and comes last. */
 static double round_of(const struct validation *v, const struct task *t)
 {
     if (v->opt->until_different)
         return t->scene->expect == VERDICT_DIFFERENT;
     if (t->looks == &sequence_single)
-        return cost(t) > 0 ? 1.5 : -1;
+        return cost(t) > 0 ? 1.5 : 0.5;
     return (double)json_array_size(t->history);
 }
 
