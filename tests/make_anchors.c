@@ -1,0 +1,376 @@
+/* make_anchors DIR | --page DIR | --quick DIR: what our gate and the rules of other renderers' tests
+ * find on the same pictures. Writes DIR/results.json, README.md and plots; --page makes the last two
+ * again; --quick measures two scenes with few pairs, to see that it runs. For `make anchors`. */
+#include "anchors.h"
+
+#include "../renderer/progress.h"
+#include "../renderer/version.h"
+#include "../tools/compare.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+/* What one thread judges with. */
+struct bench {
+    struct moments a; /* the wrong picture */
+    double *z;
+    uint8_t *a8, *b8;
+    const struct moments *in_b8; /* whose picture b8 is */
+};
+
+struct measurement {
+    const struct anchor_settings *set;
+    struct anchor_pool pool;
+    double threshold[NUM_ANCHOR_RULES];
+    double guess[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS];
+    bool *alarm;      /* num_pairs x NUM_ANCHOR_RULES */
+    double *smallest; /* num_pairs x NUM_ANCHOR_RULES x NUM_ANCHOR_ERRORS */
+    double bias[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS];
+    bool *found; /* as `smallest`, of `bias` */
+    double *tune[NUM_ANCHOR_RULES];
+    struct bench *bench; /* one a thread */
+    const char *stage;
+};
+
+enum { TUNE_PARTNERS = 3 }; /* renders for thresholds make so many pairs each, overlapping */
+static const double smallest_tried = 1e-5, largest_tried = 100;
+
+static void die(const char *what, const struct err *e)
+{
+    fprintf(stderr, "\nmake_anchors: %s: %s\n", what, e->msg);
+    exit(3);
+}
+
+static void show(const char *scene, const char *stage, double share)
+{
+    static double last;
+    double now = now_seconds();
+    if (share < 1 && now - last < (isatty(STDERR_FILENO) ? 0.3 : 20))
+        return;
+    last = now;
+    fprintf(stderr, isatty(STDERR_FILENO) ? "\r%s: %s %3.0f %%   " : "%s: %s %.0f %%\n", scene,
+            stage, 100 * share);
+}
+
+static const char *scene_shown;
+static void show_render(double share)
+{
+    show(scene_shown, "rendering", share);
+}
+
+/* -log10 of the gate's p, 0 if it found nothing; INFINITY for a verdict of DIFFERENT if `decide`. */
+static double gate(const struct moments *a, const struct moments *b, double alpha, bool decide)
+{
+    struct comparison c;
+    struct err e;
+    const struct compare_options opt = {.alpha = alpha, .tile = 16};
+    if (!compare_moments(a, b, &opt, &c, &e))
+        die("the gate cannot judge", &e);
+    double score = decide ? (c.verdict == VERDICT_DIFFERENT ? INFINITY : 0)
+                          : -(c.worst.log10_p + log10(c.num_tests));
+    comparison_free(&c);
+    return score;
+}
+
+static double score(const struct measurement *m, struct bench *t, enum anchor_rule rule,
+                    const struct moments *a, const struct moments *b)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height, count[256];
+    switch (rule) {
+    case RULE_GATE_STRICT: return gate(a, b, 1e-6, true);
+    case RULE_GATE: return gate(a, b, 1e-3, true);
+    case RULE_GATE_TUNED: return gate(a, b, m->set->tuned, false);
+    case RULE_MITSUBA:
+    case RULE_MITSUBA_SHARE_TUNED:
+        mitsuba_z(a, &m->pool.reference, t->z);
+        return (double)mitsuba_failures(t->z, pixels, mitsuba_critical_z(MITSUBA_LEVEL, pixels));
+    case RULE_MITSUBA_LEVEL_TUNED:
+        mitsuba_z(a, &m->pool.reference, t->z);
+        return mitsuba_score(t->z, pixels, mitsuba_allowed(MITSUBA_SHARE, pixels));
+    case RULE_WELCH:
+    case RULE_WELCH_STRICT:
+    case RULE_WELCH_TUNED: return -welch_log10_p(a, b);
+    case RULE_IDIFF:
+    case RULE_IDIFF_FAIL_TUNED:
+    case RULE_IDIFF_PERCENT_TUNED:
+        idiff_quantise(a, t->a8);
+        if (t->in_b8 != b)
+            idiff_quantise(b, t->b8);
+        t->in_b8 = b;
+        idiff_histogram(t->a8, t->b8, pixels, count);
+        return rule == RULE_IDIFF_FAIL_TUNED ? idiff_fail_score(count, pixels, BLENDER_PERCENT)
+                                             : idiff_percent_score(count, pixels, BLENDER_FAIL);
+    case NUM_ANCHOR_RULES: break;
+    }
+    abort();
+}
+
+/* Thresholds as published, and which rules have one to set. */
+static bool published_threshold(enum anchor_rule rule, size_t pixels, double *threshold)
+{
+    switch (rule) {
+    case RULE_GATE_STRICT: *threshold = 6; return true;
+    case RULE_GATE: *threshold = 3; return true;
+    case RULE_MITSUBA: *threshold = (double)mitsuba_allowed(MITSUBA_SHARE, pixels); return true;
+    case RULE_WELCH: *threshold = -log10(WELCH_LEVEL); return true;
+    case RULE_WELCH_STRICT: *threshold = 6; return true;
+    case RULE_IDIFF: *threshold = BLENDER_PERCENT; return true;
+    case RULE_GATE_TUNED:
+    case RULE_MITSUBA_LEVEL_TUNED:
+    case RULE_MITSUBA_SHARE_TUNED:
+    case RULE_WELCH_TUNED:
+    case RULE_IDIFF_FAIL_TUNED:
+    case RULE_IDIFF_PERCENT_TUNED:
+    case NUM_ANCHOR_RULES: break;
+    }
+    return false;
+}
+
+static bool one_sided(enum anchor_rule rule) /* judges A against the long reference */
+{
+    return rule == RULE_MITSUBA_LEVEL_TUNED || rule == RULE_MITSUBA_SHARE_TUNED;
+}
+
+static void tune_one(void *arg, int i, int thread)
+{
+    struct measurement *m = arg;
+    int n = m->set->num_tune;
+    const struct moments *a = &m->pool.render[i];
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; m->tune[r] != NULL && k < (one_sided(r) ? 1 : TUNE_PARTNERS); k++)
+            m->tune[r][k * n + i] =
+                score(m, &m->bench[thread], r, a, &m->pool.render[(i + k + 1) % n]);
+    if (thread == 0)
+        show(scene_shown, "thresholds", (double)(i + 1) / n);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The smallest score that at most the share `tuned` of the null scores exceeds. */
+static void set_thresholds(struct measurement *m, int threads)
+{
+    size_t pixels = (size_t)m->pool.side * (size_t)m->pool.side;
+    int n = m->set->num_tune;
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        if (!published_threshold(r, pixels, &m->threshold[r]))
+            m->tune[r] = calloc((size_t)(n * TUNE_PARTNERS), sizeof(double));
+    anchor_parallel(n, threads, tune_one, m);
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        if (m->tune[r] != NULL) {
+            int scores = one_sided(r) ? n : n * TUNE_PARTNERS;
+            qsort(m->tune[r], (size_t)scores, sizeof(double), by_value);
+            m->threshold[r] = m->tune[r][scores - 1 - (int)(m->set->tuned * scores)];
+            free(m->tune[r]);
+            m->tune[r] = NULL;
+        }
+}
+
+static const struct moments *side_of(const struct measurement *m, int pair, int b)
+{
+    return &m->pool.render[m->set->num_tune + 2 * pair + b];
+}
+
+static bool rejects(const struct measurement *m, struct bench *t, enum anchor_rule rule, int pair,
+                    enum anchor_error kind, double b)
+{
+    double threshold = rule == RULE_GATE_STRICT || rule == RULE_GATE ? 0 : m->threshold[rule];
+    anchor_make_wrong(&m->pool, side_of(m, pair, 0), kind, b, pair, &t->a);
+    return score(m, t, rule, &t->a, side_of(m, pair, 1)) > threshold;
+}
+
+/* The smallest error that the rule finds in this pair, to 1 %, from a guess: out from it by growing
+ * steps, then by halving. */
+static double smallest_found(const struct measurement *m, struct bench *t, enum anchor_rule rule,
+                             int pair, enum anchor_error kind, double guess)
+{
+    double lo = guess, hi = guess, step = 1.2;
+    if (rejects(m, t, rule, pair, kind, guess)) {
+        for (;; hi = lo, step *= step) {
+            lo = hi / step;
+            if (lo < smallest_tried)
+                return smallest_tried;
+            if (!rejects(m, t, rule, pair, kind, lo))
+                break;
+        }
+    } else {
+        for (;; lo = hi, step *= step) {
+            if (lo >= largest_tried)
+                return INFINITY;
+            hi = fmin(lo * step, largest_tried);
+            if (rejects(m, t, rule, pair, kind, hi))
+                break;
+        }
+    }
+    while (hi > 1.01 * lo) {
+        double b = sqrt(lo * hi);
+        *(rejects(m, t, rule, pair, kind, b) ? &hi : &lo) = b;
+    }
+    return hi;
+}
+
+static void measure_pair(void *arg, int pair, int thread)
+{
+    struct measurement *m = arg;
+    struct bench *t = &m->bench[thread];
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
+        m->alarm[pair * NUM_ANCHOR_RULES + r] = rejects(m, t, r, pair, ANCHOR_GLOBAL, 0);
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
+            double *out = &m->smallest[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
+            *out = smallest_found(m, t, r, pair, k, m->guess[r][k]);
+        }
+    }
+    if (thread == 0)
+        show(scene_shown, "judging", (double)(pair + 1) / m->set->num_pairs);
+}
+
+static void ask_again(void *arg, int pair, int thread)
+{
+    struct measurement *m = arg;
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+            m->found[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k] =
+                isfinite(m->bias[r][k]) && rejects(m, &m->bench[thread], r, pair, k, m->bias[r][k]);
+}
+
+/* Pair 0 alone first: its answers are where the search starts in all others, so that the record does
+ * not depend on which thread comes when. */
+static void measure_pairs(struct measurement *m, int threads, struct anchor_scene_result *out)
+{
+    int n = m->set->num_pairs, at, lo, hi;
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+            m->guess[r][k] = 0.1;
+    measure_pair(m, 0, 0);
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+            m->guess[r][k] = fmin(m->smallest[r * NUM_ANCHOR_ERRORS + k], largest_tried);
+    anchor_parallel(n, threads, measure_pair, m);
+    anchors_quantile_ranks(n, m->set->power, &at, &lo, &hi);
+    double *sorted = calloc((size_t)n, sizeof *sorted);
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
+            for (int i = 0; i < n; i++)
+                sorted[i] = m->smallest[(i * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
+            qsort(sorted, (size_t)n, sizeof *sorted, by_value);
+            m->bias[r][k] = sorted[at];
+            out->rule[r].bias[k] = (struct anchor_bias){
+                .b = sorted[at], .lo = sorted[lo], .hi = hi < n ? sorted[hi] : INFINITY};
+        }
+    free(sorted);
+    anchor_parallel(n, threads, ask_again, m);
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
+        out->rule[r].threshold = m->threshold[r];
+        for (int i = 0; i < n; i++) {
+            out->rule[r].false_alarms += m->alarm[i * NUM_ANCHOR_RULES + r];
+            for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+                out->rule[r].bias[k].found +=
+                    m->found[(i * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
+        }
+    }
+}
+
+static void measure_scene(const struct anchor_settings *set, int scene, int threads,
+                          struct anchor_scene_result *out)
+{
+    struct err e = {""};
+    struct measurement m = {.set = set};
+    size_t values = 3 * (size_t)set->side * (size_t)set->side;
+    size_t cells = (size_t)set->num_pairs * NUM_ANCHOR_RULES;
+    scene_shown = anchor_scenes[scene];
+    if (!anchor_render(anchor_scenes[scene], set->side, set->spp,
+                       set->num_tune + 2 * set->num_pairs, set->reference_spp,
+                       set->seed + 100000 * (uint64_t)scene, threads, show_render, &m.pool, &e))
+        die(anchor_scenes[scene], &e);
+    m.alarm = calloc(cells, sizeof *m.alarm);
+    m.smallest = calloc(cells * NUM_ANCHOR_ERRORS, sizeof *m.smallest);
+    m.found = calloc(cells * NUM_ANCHOR_ERRORS, sizeof *m.found);
+    m.bench = calloc((size_t)threads, sizeof *m.bench);
+    for (int t = 0; t < threads; t++) {
+        if (!moments_alloc(&m.bench[t].a, set->side, set->side, &e))
+            die("no memory", &e);
+        m.bench[t].z = calloc(values, sizeof(double));
+        m.bench[t].a8 = calloc(values, 1);
+        m.bench[t].b8 = calloc(values, 1);
+    }
+    snprintf(out->scene, sizeof out->scene, "%s", anchor_scenes[scene]);
+    snprintf(out->title, sizeof out->title, "%s", m.pool.title);
+    out->noise = anchor_noise(&m.pool);
+    out->num_places = m.pool.num_places;
+    set_thresholds(&m, threads);
+    measure_pairs(&m, threads, out);
+    for (int t = 0; t < threads; t++) {
+        moments_free(&m.bench[t].a);
+        free(m.bench[t].z);
+        free(m.bench[t].a8);
+        free(m.bench[t].b8);
+    }
+    free(m.bench);
+    free(m.alarm);
+    free(m.smallest);
+    free(m.found);
+    anchor_pool_free(&m.pool);
+}
+
+static double cpu_seconds(void)
+{
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
+           1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+static void measure(const struct anchor_settings *set, int num_scenes, struct anchor_results *out)
+{
+    int threads = (int)fmin(16, fmax(1, (double)sysconf(_SC_NPROCESSORS_ONLN)));
+    double start = now_seconds();
+    time_t now = time(NULL);
+    struct tm day;
+    *out = (struct anchor_results){.settings = *set, .num_scenes = num_scenes};
+    snprintf(out->version, sizeof out->version, "%s", assay_version);
+    strftime(out->date, sizeof out->date, "%Y-%m-%d", gmtime_r(&now, &day));
+    for (int s = 0; s < num_scenes; s++)
+        measure_scene(set, s, threads, &out->scene[s]);
+    fputc('\n', stderr);
+    out->wall_seconds = now_seconds() - start;
+    out->cpu_seconds = cpu_seconds();
+}
+
+int main(int argc, char **argv)
+{
+    struct anchor_results *r = calloc(1, sizeof *r);
+    struct err e = {""};
+    char path[4096];
+    bool page = argc == 3 && strcmp(argv[1], "--page") == 0;
+    bool quick = argc == 3 && strcmp(argv[1], "--quick") == 0;
+    if (r == NULL || (argc != 2 && !page && !quick)) {
+        fputs("usage: make_anchors [--page | --quick] DIRECTORY\n", stderr);
+        return 3;
+    }
+    const char *dir = argv[argc - 1];
+    snprintf(path, sizeof path, "%s/results.json", dir);
+    if (!page) {
+        struct anchor_settings set = anchor_settings;
+        if (quick) {
+            set.num_tune = 20;
+            set.num_pairs = 20;
+            set.reference_spp = 640;
+        }
+        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, r);
+        if (!anchors_save(path, r, &e))
+            die(path, &e);
+    }
+    if (!anchors_load(path, r, &e) || !anchors_write_page(dir, r, &e))
+        die(dir, &e);
+    free(r);
+    return 0;
+}
