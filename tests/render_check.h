@@ -13,6 +13,18 @@ void check_finish(struct scene *s);
 /* width x height pixels of spp paths, one thread. The caller frees the moments. */
 struct moments check_render(const struct scene *s, struct integrator_options io, int width,
                             int height, int spp);
+struct moments check_render_with(const struct scene *s, struct integrator_options io, int width,
+                                 int height, int spp, int threads, enum bvh_kind kind);
+
+/* The mean over all pixels, each an equal estimate of the same number, and its standard error. */
+struct check_result {
+    double mean[3], std_error[3];
+};
+struct check_result check_pool(const struct moments *m);
+bool check_result_agrees(const struct check_result *r, int channel, double expected);
+/* The same, or the test fails and says `what`. */
+void check_result_mean(const struct check_result *r, int channel, double expected,
+                       const char *what);
 
 /* Is the mean over all pixels, each an equal estimate of the same number, the expected one? Float
  * rounding along a path is allowed 2e-5 relative where there is no noise at all. */

@@ -20,28 +20,6 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260101}};
 
-static struct moments render_scene(struct scene *s, struct integrator_options io, int width,
-                                   int height, int spp, int threads, enum bvh_kind kind)
-{
-    struct err e = {0};
-    struct camera c;
-    struct moments m;
-    struct render_stats stats;
-    struct progress p;
-    progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, s, width, height, &e));
-    struct bvh *bvh = bvh_build(s, kind, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = io,
-                               .width = width,
-                               .height = height,
-                               .num_samples = (uint32_t)spp,
-                               .threads = threads};
-    assert_true(render(s, &c, bvh, &o, &p, &m, &stats, &e));
-    bvh_free(bvh);
-    return m;
-}
-
 /* A sphere seen from inside that reflects rho and emits E: L = E sum_{k=0..m} rho^k for every m,
  * because every point sees the same radiance in all directions. */
 static void furnace_at_every_depth(void **state)
@@ -58,7 +36,7 @@ static void furnace_at_every_depth(void **state)
             struct integrator_options io = path_options;
             io.direct = (enum direct_kind)direct;
             io.max_bounces = depth;
-            struct moments film = render_scene(&s, io, 8, 8, 1024, 1, BVH_SAH);
+            struct moments film = check_render(&s, io, 8, 8, 1024);
             for (int c = 0; c < 3; c++) {
                 double sum = 0, term = emitted[c];
                 for (int k = 0; k <= depth; k++, term *= rho[c])
@@ -133,7 +111,7 @@ static void rectangle_light(void **state)
                 struct integrator_options io = path_options;
                 io.direct = (enum direct_kind)direct;
                 io.light_samples = l;
-                struct moments film = render_scene(&s, io, 8, 8, 4096, 1, BVH_SAH);
+                struct moments film = check_render(&s, io, 8, 8, 4096);
                 check_mean(&film, 1, expected, direct_kind_names[direct]);
                 /* Negative control: the assignment's pdf lacks 1/d, so its image is brighter by a
                  * mean distance of about 1.1 here; 5 % would already be rejected. */
@@ -161,7 +139,7 @@ static void sphere_light(void **state)
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
             struct integrator_options io = path_options;
             io.direct = (enum direct_kind)direct;
-            struct moments film = render_scene(&s, io, 8, 8, 4096, 1, BVH_SAH);
+            struct moments film = check_render(&s, io, 8, 8, 4096);
             check_mean(&film, 0, expected, direct_kind_names[direct]);
             assert_false(check_agrees(&film, 0, expected / cos_theta * 0.9));
             moments_free(&film);
@@ -183,7 +161,7 @@ static void delta_lights(void **state)
     build_light(&s,
                 (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
     check_finish(&s);
-    struct moments film = render_scene(&s, path_options, 4, 4, 64, 1, BVH_SAH);
+    struct moments film = check_render(&s, path_options, 4, 4, 64);
     double d2 = 0.36 + 0.64 + 0.25, cos_point = 0.8 / sqrt(d2);
     double cos_sun = 2 / sqrt(1 + 4 + 0.25);
     const double intensity[3] = {2, 3, 4}, irradiance[3] = {1, 0, 0.5};
@@ -210,7 +188,7 @@ static void shadow(void **state)
                                        .position = {0, 1, 0},
                                        .attenuation = {0, 0, 1}});
         check_finish(&s);
-        struct moments film = render_scene(&s, path_options, 4, 4, 16, 1, BVH_SAH);
+        struct moments film = check_render(&s, path_options, 4, 4, 16);
         check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
         moments_free(&film);
         scene_free(&s);
@@ -251,15 +229,15 @@ static void same_bits_for_any_threads(void **state)
     struct scene s = box_scene(10);
     struct integrator_options io = path_options;
     io.max_bounces = 5;
-    struct moments one = render_scene(&s, io, 50, 38, 8, 1, BVH_SAH);
+    struct moments one = check_render(&s, io, 50, 38, 8);
     for (int threads = 2; threads <= 7; threads += 5) {
-        struct moments many = render_scene(&s, io, 50, 38, 8, threads, BVH_SAH);
+        struct moments many = check_render_with(&s, io, 50, 38, 8, threads, BVH_SAH);
         assert_true(same_bits(&one, &many));
         moments_free(&many);
     }
     /* Negative control: another seed is another picture. */
     io.sampler.seed++;
-    struct moments other = render_scene(&s, io, 50, 38, 8, 1, BVH_SAH);
+    struct moments other = check_render(&s, io, 50, 38, 8);
     assert_false(same_bits(&one, &other));
     moments_free(&other);
     moments_free(&one);
@@ -323,11 +301,11 @@ static void bounces_add_up(void **state)
         struct integrator_options io = path_options;
         io.direct = (enum direct_kind)direct;
         io.max_bounces = 4;
-        struct moments all = render_scene(&s, io, 16, 12, 16, 1, BVH_SAH);
+        struct moments all = check_render(&s, io, 16, 12, 16);
         double sum[16 * 12 * 3] = {0};
         for (int k = 0; k <= 4; k++) {
             io.first_bounce = io.max_bounces = k;
-            struct moments only = render_scene(&s, io, 16, 12, 16, 1, BVH_SAH);
+            struct moments only = check_render(&s, io, 16, 12, 16);
             for (size_t i = 0; i < 16 * 12 * 3; i++)
                 sum[i] += only.mean[i];
             moments_free(&only);
@@ -345,8 +323,8 @@ static void twice_the_light_twice_the_image(void **state)
     struct integrator_options io = path_options;
     io.max_bounces = 4;
     struct scene one = box_scene(5), two = box_scene(10);
-    struct moments a = render_scene(&one, io, 16, 12, 16, 1, BVH_SAH);
-    struct moments b = render_scene(&two, io, 16, 12, 16, 1, BVH_SAH);
+    struct moments a = check_render(&one, io, 16, 12, 16);
+    struct moments b = check_render(&two, io, 16, 12, 16);
     for (size_t i = 0; i < 16 * 12 * 3; i++)
         assert_true(b.mean[i] == 2 * a.mean[i]);
     moments_free(&a);
@@ -364,14 +342,14 @@ static void estimators_agree(void **state)
     struct integrator_options io = path_options;
     io.max_bounces = 4;
     io.roulette = ROULETTE_OFF;
-    struct moments reference = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);
+    struct moments reference = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int roulette = ROULETTE_OFF; roulette <= ROULETTE_FIXED; roulette++) {
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.roulette = (enum roulette_kind)roulette;
             io.survival = 0.7f;
-            struct moments film = render_scene(&s, io, 64, 48, 64, 2, BVH_SAH);
+            struct moments film = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
             double z = check_z(&film, &reference, 0);
             if (fabs(z) > Z_LIMIT)
                 fail_msg("%s, roulette %d: z = %.2f", direct_kind_names[direct], roulette, z);
@@ -379,7 +357,7 @@ static void estimators_agree(void **state)
         }
     /* Negative control: one bounce less. */
     io.max_bounces = 3;
-    struct moments shallow = render_scene(&s, io, 64, 48, 256, 2, BVH_SAH);
+    struct moments shallow = check_render_with(&s, io, 64, 48, 256, 2, BVH_SAH);
     assert_true(fabs(check_z(&shallow, &reference, 0)) > Z_LIMIT);
     moments_free(&shallow);
     moments_free(&reference);

@@ -1,10 +1,9 @@
 /* Mirrors, glass and metals in scenes with closed forms. H0 of every z-test: the mean of the pictures'
  * samples is the closed form. Two-sided at alpha = 1e-6 (|z| < 4.89), one seed, fixed n, no retry;
- * float rounding along a path allows 5e-5 relative where there is no noise at all. Each group has a
+ * float rounding along a path allows 2e-5 relative where there is no noise at all. Each group has a
  * negative control that the same test must reject. */
-#include "../renderer/render.h"
-#include "build_scene.h"
 #include "optics.h"
+#include "render_check.h"
 
 #include <gsl/gsl_integration.h>
 #include <setjmp.h>
@@ -12,9 +11,6 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <cmocka.h>
-
-#define Z_LIMIT  4.89
-#define ROUNDING 5e-5
 
 static const double DEGREE = M_PI / 180;
 
@@ -25,60 +21,14 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260204}};
 
-struct result {
-    double mean[3], std_error[3];
-};
-
 /* Mean over the picture and all samples of its pixels. */
-static struct result look(const struct scene *s, struct integrator_options io, int size, int spp)
+static struct check_result look(const struct scene *s, struct integrator_options io, int size,
+                                int spp)
 {
-    struct err e = {0};
-    struct camera c;
-    struct moments m;
-    struct render_stats stats;
-    struct progress p;
-    progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, s, size, size, &e));
-    struct bvh *bvh = bvh_build(s, BVH_SAH, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = io,
-                               .width = size,
-                               .height = size,
-                               .num_samples = (uint32_t)spp,
-                               .threads = 1};
-    assert_true(render(s, &c, bvh, &o, &p, &m, &stats, &e));
-    struct result r = {{0}, {0}};
-    size_t pixels = (size_t)size * (size_t)size;
-    for (size_t i = 0; i < pixels; i++)
-        for (int k = 0; k < 3; k++) {
-            r.mean[k] += m.mean[3 * i + (size_t)k] / (double)pixels;
-            r.std_error[k] += moments_var_of_mean(&m, i, k);
-        }
-    for (int k = 0; k < 3; k++)
-        r.std_error[k] = sqrt(r.std_error[k]) / (double)pixels;
+    struct moments m = check_render(s, io, size, size, spp);
+    struct check_result r = check_pool(&m);
     moments_free(&m);
-    bvh_free(bvh);
     return r;
-}
-
-static bool agrees(const struct result *r, int channel, double expected)
-{
-    return fabs(r->mean[channel] - expected) <=
-           Z_LIMIT * r->std_error[channel] + ROUNDING * fabs(expected);
-}
-
-static void check(const struct result *r, int channel, double expected, const char *what)
-{
-    if (!agrees(r, channel, expected))
-        fail_msg("%s, channel %d: %.7g +- %.2g, expected %.7g", what, channel, r->mean[channel],
-                 r->std_error[channel], expected);
-}
-
-static void finish(struct scene *s)
-{
-    struct err e = {0};
-    if (!scene_finish(s, "test", &e))
-        fail_msg("%s", e.msg);
 }
 
 /* A pinhole so narrow that the picture is one direction: (0, sin, -cos) of the angle. */
@@ -132,22 +82,23 @@ static void corridor_of_mirrors(void **state)
             build_quad(&s, v3(-5, 0, -10), v3(10, 0, 0), v3(0, 0.5f, 0), lamp(&s, grey(1)));
             build_quad(&s, v3(-5, 0.5f, -10), v3(10, 0, 0), v3(0, 0.5f, 0), lamp(&s, grey(3)));
             aim(&s, v3(0, 0.5f, 0), degrees);
-            finish(&s);
+            check_finish(&s);
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
                 struct integrator_options io = options(direct, n);
                 io.first_bounce = n;
                 io.roulette = ROULETTE_OFF;
-                struct result r = look(&s, io, 4, 4);
+                struct check_result r = look(&s, io, 4, 4);
                 for (int c = 0; c < 3; c++) {
                     double expected = emitted;
                     for (int k = 0; k < n; k++)
                         expected *= k % 2 ? lower[c] : upper[c];
-                    check(&r, c, expected, direct_kind_names[direct]);
+                    check_result_mean(&r, c, expected, direct_kind_names[direct]);
                     assert_true(r.std_error[c] < 1e-6);
                     /* Negative controls: the other half, and one mirror too many. */
-                    assert_false(agrees(&r, c, expected * (emitted > 2 ? 1.0 / 3 : 3)));
+                    assert_false(
+                        check_result_agrees(&r, c, expected * (emitted > 2 ? 1.0 / 3 : 3)));
                 }
-                assert_false(agrees(&r, 2, r.mean[2] * lower[2]));
+                assert_false(check_result_agrees(&r, 2, r.mean[2] * lower[2]));
                 /* With other depths there is nothing. */
                 io.max_bounces = io.first_bounce = n + 1;
                 assert_true(look(&s, io, 4, 4).mean[0] == 0);
@@ -161,7 +112,7 @@ static void corridor_of_mirrors(void **state)
                 double expected = emitted;
                 for (int k = 0; k < n; k++)
                     expected *= k % 2 ? lower[1] : upper[1];
-                check(&r, 1, expected, "roulette");
+                check_result_mean(&r, 1, expected, "roulette");
             }
             scene_free(&s);
         }
@@ -220,33 +171,34 @@ static void plate_of_glass(void **state)
             struct scene s = plate_scene((rgb){(float)r[0], (float)r[1], (float)r[2]},
                                          (rgb){(float)t[0], (float)t[1], (float)t[2]}, kind == 2);
             aim(&s, v3(50, (float)(-tan(angle[a] * DEGREE)), 1), angle[a]);
-            finish(&s);
+            check_finish(&s);
             double c = cos(angle[a] * DEGREE), back = sqrt(1 - (1 - c * c) / 2.25);
             double outside = kind == 2 ? schlick(c, 1.5) : optics_fresnel(c, 1.5);
             double inside = kind == 2 ? schlick(back, 1 / 1.5) : optics_fresnel(back, 1 / 1.5);
             for (size_t d = 0; d < sizeof depths / sizeof *depths; d++) {
                 struct integrator_options io = options((int)(a + d) % 4, depths[d]);
-                struct result got = look(&s, io, 16, 256);
+                struct check_result got = look(&s, io, 16, 256);
                 struct plate p[3];
                 for (int k = 0; k < 3; k++)
                     p[k] = plate(outside, inside, r[k], t[k], depths[d]);
-                check(&got, 0, 3 * p[0].transmitted, "transmitted");
-                check(&got, 1, 5 * p[1].reflected, "reflected");
-                check(&got, 2, p[2].transmitted + p[2].reflected, "both");
+                check_result_mean(&got, 0, 3 * p[0].transmitted, "transmitted");
+                check_result_mean(&got, 1, 5 * p[1].reflected, "reflected");
+                check_result_mean(&got, 2, p[2].transmitted + p[2].reflected, "both");
                 if (depths[d] == 60 && kind == 0) {
                     double closed = (1 - outside) / (1 + outside);
                     assert_true(fabs(p[0].transmitted - closed) < 1e-9);
-                    check(&got, 0, 3 * closed, "closed form");
+                    check_result_mean(&got, 0, 3 * closed, "closed form");
                     /* Negative control: one passage more, that is one face more. */
-                    assert_false(agrees(&got, 0, 3 * closed * (1 - outside)));
+                    assert_false(check_result_agrees(&got, 0, 3 * closed * (1 - outside)));
                 }
                 /* Negative controls at 80 degrees, where reflections inside count: one of them less;
                  * the other formula for R. */
                 if (angle[a] == 80 && depths[d] == 4 && kind != 2) {
                     struct plate less = plate(outside, inside, 1, 1, 2);
-                    assert_false(agrees(&got, 0, 3 * less.transmitted));
+                    assert_false(check_result_agrees(&got, 0, 3 * less.transmitted));
                     double other = schlick(c, 1.5);
-                    assert_false(agrees(&got, 0, 3 * plate(other, other, 1, 1, 4).transmitted));
+                    assert_false(
+                        check_result_agrees(&got, 0, 3 * plate(other, other, 1, 1, 4).transmitted));
                 }
             }
             scene_free(&s);
@@ -264,11 +216,11 @@ static struct scene furnace(void)
 static void check_furnace(const struct scene *s, double factor, const char *what, int depth)
 {
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-        struct result r = look(s, options(direct, depth), 16, 64);
+        struct check_result r = look(s, options(direct, depth), 16, 64);
         for (int c = 0; c < 3; c++)
-            check(&r, c, factor * (1 << c), what);
+            check_result_mean(&r, c, factor * (1 << c), what);
         /* Negative control. */
-        assert_false(agrees(&r, 0, factor * 1.01));
+        assert_false(check_result_agrees(&r, 0, factor * 1.01));
     }
 }
 
@@ -288,10 +240,10 @@ static void glass_ball_in_a_furnace(void **state)
                 if (hollow)
                     build_sphere(&s, v3(0.1f, 0.2f, 0), 0.5f, -1, glass);
                 build_camera(&s, v3(0, 0, 2.5f), 40);
-                finish(&s);
-                struct result r = look(&s, options(DIRECT_MIS, 1000), 16, 64);
+                check_finish(&s);
+                struct check_result r = look(&s, options(DIRECT_MIS, 1000), 16, 64);
                 for (int c = 0; c < 3; c++) {
-                    check(&r, c, 1 << c, "ball");
+                    check_result_mean(&r, c, 1 << c, "ball");
                     /* A path that circles inside for 1000 bounces would be noise, and roulette,
                      * which must see through eta^2, would. */
                     assert_true(r.std_error[c] < 1e-6);
@@ -315,7 +267,7 @@ static void camera_inside_glass(void **state)
             smooth(&s, kind ? MATERIAL_GLASS : MATERIAL_REFRACTION, grey(1), grey(1), 1.5f);
         build_sphere(&s, v3(0, 0, 0), 1, 1, glass);
         build_camera(&s, v3(0.1f, 0.2f, -0.2f), 100);
-        finish(&s);
+        check_finish(&s);
         check_furnace(&s, 2.25, "inside", kind ? 1000 : 1);
         scene_free(&s);
     }
@@ -336,7 +288,7 @@ static void warm_ball_inside_glass(void **state)
         build_sphere(&s, v3(0.05f, 0, 0.1f), 0.4f, 1,
                      build_material(&s, grey(rho[i]), (rgb){e, 2 * e, 4 * e}));
         build_camera(&s, v3(0, 0, 2.5f), 40);
-        finish(&s);
+        check_finish(&s);
         check_furnace(&s, 1, "warm ball", 1000);
         scene_free(&s);
     }
@@ -354,15 +306,15 @@ static void refraction_alone(void **state)
             s.materials[0].kind = MATERIAL_REFRACTION;
             float z = inside ? -0.25f : 1;
             aim(&s, v3(50, 0, z), angle[a]);
-            finish(&s);
+            check_finish(&s);
             bool total = inside && sin(angle[a] * DEGREE) > 1 / 1.5;
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-                struct result r = look(&s, options(direct, inside ? 1 : 2), 8, 16);
+                struct check_result r = look(&s, options(direct, inside ? 1 : 2), 8, 16);
                 double b = inside ? 2.25 * 0.8 : 0.64, red = inside ? 2.25 * 0.5 : 0.25;
-                check(&r, 0, total ? 0 : 3 * red, "refraction");
-                check(&r, 1, 0, "refraction");
-                check(&r, 2, total ? 0 : b, "refraction");
-                assert_false(agrees(&r, 2, total ? b : b / 2.25));
+                check_result_mean(&r, 0, total ? 0 : 3 * red, "refraction");
+                check_result_mean(&r, 1, 0, "refraction");
+                check_result_mean(&r, 2, total ? 0 : b, "refraction");
+                assert_false(check_result_agrees(&r, 2, total ? b : b / 2.25));
             }
             scene_free(&s);
         }
@@ -409,7 +361,7 @@ static void rough_plate_in_a_furnace(void **state)
         s.materials[m] = rough(i / 9 % 2, i / 36, alpha[i / 3 % 3], !white);
         build_quad(&s, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0), m);
         aim(&s, v3(0, (float)-sin(degrees * DEGREE), (float)cos(degrees * DEGREE)), degrees);
-        finish(&s);
+        check_finish(&s);
         double albedo[3];
         for (int c = 0; c < 3; c++) {
             struct optics_metal metal = metal_of(&s.materials[m], c);
@@ -419,12 +371,12 @@ static void rough_plate_in_a_furnace(void **state)
             /* Uniform directions and points of the furnace rarely meet a narrow lobe. */
             if (s.materials[m].alpha < 0.5f && direct < DIRECT_BSDF)
                 continue;
-            struct result r = look(&s, options(direct, 1), 16, 128);
+            struct check_result r = look(&s, options(direct, 1), 16, 128);
             for (int c = 0; c < 3; c++)
-                check(&r, c, (1 << c) * albedo[c], direct_kind_names[direct]);
+                check_result_mean(&r, c, (1 << c) * albedo[c], direct_kind_names[direct]);
             /* Negative control. */
             if (direct >= DIRECT_BSDF)
-                assert_false(agrees(&r, 1, 2 * albedo[1] * 1.05));
+                assert_false(check_result_agrees(&r, 1, 2 * albedo[1] * 1.05));
         }
         scene_free(&s);
     }
@@ -492,7 +444,7 @@ static void lamp_in_a_rough_plate(void **state)
         build_sphere(&s, v3((float)centre[0], (float)centre[1], (float)centre[2]), 0.4f, 1,
                      lamp(&s, grey(4)));
         aim(&s, v3(0, (float)wo[1], (float)wo[2]), 50);
-        finish(&s);
+        check_finish(&s);
         double expected[3], rougher[3], other[3];
         for (int c = 0; c < 3; c++) {
             struct optics_metal metal = metal_of(&s.materials[m], c);
@@ -504,14 +456,15 @@ static void lamp_in_a_rough_plate(void **state)
             other[c] = 4 * reflected_sphere(&metal, wo, centre, 0.4);
         }
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            struct result r = look(&s, options(direct, 1), 16, 512);
+            struct check_result r = look(&s, options(direct, 1), 16, 512);
             for (int c = 0; c < 3; c++) {
-                check(&r, c, expected[c], direct_kind_names[direct]);
+                check_result_mean(&r, c, expected[c], direct_kind_names[direct]);
                 /* Negative controls: the other distribution; a roughness 15 % off, which alpha = .15
                  * does not show at this place. */
                 if (direct == DIRECT_MIS || direct == DIRECT_LIGHT) {
-                    assert_false(agrees(&r, c, other[c]));
-                    assert_true(s.materials[m].alpha < 0.5f || !agrees(&r, c, rougher[c]));
+                    assert_false(check_result_agrees(&r, c, other[c]));
+                    assert_true(s.materials[m].alpha < 0.5f ||
+                                !check_result_agrees(&r, c, rougher[c]));
                 }
             }
         }
