@@ -64,16 +64,22 @@ static void show_render(double share)
     show(scene_shown, "rendering", share);
 }
 
-/* -log10 of the gate's p, 0 if it found nothing; INFINITY for a verdict of DIFFERENT if `decide`. */
+/* -log10 of the smallest alpha that the gate's p-values would be DIFFERENT at; with `decide` the verdict
+ * itself: INFINITY or 0. */
 static double gate(const struct moments *a, const struct moments *b, double alpha, bool decide)
 {
     struct comparison c;
     struct err e;
+    double score = -INFINITY;
     const struct compare_options opt = {.alpha = alpha, .tile = 16};
     if (!compare_moments(a, b, &opt, &c, &e))
         die("the gate cannot judge", &e);
-    double score = decide ? (c.verdict == VERDICT_DIFFERENT ? INFINITY : 0)
-                          : -(c.worst.log10_p + log10(c.num_tests));
+    for (int i = 0; i < NUM_STATISTICS; i++)
+        if (c.statistic[i].share > 0 && c.statistic[i].num_tests > 0)
+            score = fmax(score, log10(c.statistic[i].share) - c.statistic[i].log10_p);
+    assert((c.verdict == VERDICT_DIFFERENT) == (score >= -log10(alpha)));
+    if (decide)
+        score = c.verdict == VERDICT_DIFFERENT ? INFINITY : 0;
     comparison_free(&c);
     return score;
 }
