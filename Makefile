@@ -60,7 +60,7 @@ bvh-table: $(BUILD)/pathtracer
 
 # What our gate and the rules of other renderers' tests find on the same pictures: tests/anchors.
 anchors: $(BUILD)/tests/make_anchors
-	$(BUILD)/tests/make_anchors tests/anchors
+	$(BUILD)/tests/make_anchors tests/anchors $(BUILD)/anchors
 
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \

@@ -23,11 +23,21 @@ struct anchor_pool {
     int place[9][2];
 };
 
-/* Renders `scene` of reference/scenes in side x side pixels with its own depth; seeds count up from
- * `seed`. progress may be NULL: then called with a share from 0 to 1. The caller frees. */
-bool anchor_render(const char *scene, int side, int spp, int num_renders, int reference_spp,
-                   uint64_t seed, int threads, void (*progress)(double share),
-                   struct anchor_pool *out, struct err *e) __attribute__((warn_unused_result));
+struct anchor_job {
+    const char *scene; /* of reference/scenes, with its own depth */
+    int side, spp, num_renders, reference_spp;
+    uint64_t seed; /* of the reference; the renders' count up from there */
+    int threads;
+    /* A file that keeps the pictures, so that a change of a rule need not render again; NULL: none. It
+     * is believed if it was made for the same job and its first picture is still what the renderer
+     * draws, bit for bit; else it is written again. */
+    const char *kept;
+    void (*progress)(double share); /* from 0 to 1; NULL: none */
+};
+
+/* The caller frees. */
+bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct err *e)
+    __attribute__((warn_unused_result));
 void anchor_pool_free(struct anchor_pool *p);
 
 /* The standard deviation of one sample over the mean, of the picture's luminance: a scene's noise. */

@@ -1,6 +1,7 @@
-/* make_anchors DIR | --page DIR | --quick DIR: what our gate and the rules of other renderers' tests
- * find on the same pictures. Writes DIR/results.json, README.md and plots; --page makes the last two
- * again; --quick measures two scenes with few pairs, to see that it runs. For `make anchors`. */
+/* make_anchors DIR WORK | --page DIR | --quick DIR WORK: what our gate and the rules of other renderers'
+ * tests find on the same pictures. Writes DIR/results.json, README.md and plots; --page makes the last
+ * two again; --quick measures two scenes with few pairs, to see that it runs. The pictures are kept in
+ * WORK (900 MB). For `make anchors`. */
 #include "anchors.h"
 
 #include "../renderer/progress.h"
@@ -285,17 +286,26 @@ static void measure_pairs(struct measurement *m, int threads, struct anchor_scen
     }
 }
 
-static void measure_scene(const struct anchor_settings *set, int scene, int threads,
-                          struct anchor_scene_result *out)
+static void measure_scene(const struct anchor_settings *set, int scene, const char *work,
+                          int threads, struct anchor_scene_result *out)
 {
     struct err e = {""};
     struct measurement m = {.set = set};
     size_t values = 3 * (size_t)set->side * (size_t)set->side;
     size_t cells = (size_t)set->num_pairs * NUM_ANCHOR_RULES;
     scene_shown = anchor_scenes[scene];
-    if (!anchor_render(anchor_scenes[scene], set->side, set->spp,
-                       set->num_tune + 2 * set->num_pairs, set->reference_spp,
-                       set->seed + 100000 * (uint64_t)scene, threads, show_render, &m.pool, &e))
+    char kept[4096];
+    snprintf(kept, sizeof kept, "%s/%s.renders", work, anchor_scenes[scene]);
+    const struct anchor_job job = {.scene = anchor_scenes[scene],
+                                   .side = set->side,
+                                   .spp = set->spp,
+                                   .num_renders = set->num_tune + 2 * set->num_pairs,
+                                   .reference_spp = set->reference_spp,
+                                   .seed = set->seed + 100000 * (uint64_t)scene,
+                                   .threads = threads,
+                                   .kept = kept,
+                                   .progress = show_render};
+    if (!anchor_render(&job, &m.pool, &e))
         die(anchor_scenes[scene], &e);
     m.alarm = calloc(cells, sizeof *m.alarm);
     m.smallest = calloc(cells * NUM_ANCHOR_ERRORS, sizeof *m.smallest);
@@ -335,7 +345,8 @@ static double cpu_seconds(void)
            1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
-static void measure(const struct anchor_settings *set, int num_scenes, struct anchor_results *out)
+static void measure(const struct anchor_settings *set, int num_scenes, const char *work,
+                    struct anchor_results *out)
 {
     int threads = (int)fmin(16, fmax(1, (double)sysconf(_SC_NPROCESSORS_ONLN)));
     double start = now_seconds();
@@ -345,7 +356,7 @@ static void measure(const struct anchor_settings *set, int num_scenes, struct an
     snprintf(out->version, sizeof out->version, "%s", assay_version);
     strftime(out->date, sizeof out->date, "%Y-%m-%d", gmtime_r(&now, &day));
     for (int s = 0; s < num_scenes; s++)
-        measure_scene(set, s, threads, &out->scene[s]);
+        measure_scene(set, s, work, threads, &out->scene[s]);
     fputc('\n', stderr);
     out->wall_seconds = now_seconds() - start;
     out->cpu_seconds = cpu_seconds();
@@ -357,12 +368,12 @@ int main(int argc, char **argv)
     struct err e = {""};
     char path[4096];
     bool page = argc == 3 && strcmp(argv[1], "--page") == 0;
-    bool quick = argc == 3 && strcmp(argv[1], "--quick") == 0;
-    if (r == NULL || (argc != 2 && !page && !quick)) {
-        fputs("usage: make_anchors [--page | --quick] DIRECTORY\n", stderr);
+    bool quick = argc == 4 && strcmp(argv[1], "--quick") == 0;
+    if (r == NULL || (argc != 3 && !quick) || (!page && !quick && argv[1][0] == '-')) {
+        fputs("usage: make_anchors [--quick] DIRECTORY WORK | --page DIRECTORY\n", stderr);
         return 3;
     }
-    const char *dir = argv[argc - 1];
+    const char *dir = argv[page || quick ? 2 : 1], *work = argv[argc - 1];
     snprintf(path, sizeof path, "%s/results.json", dir);
     if (!page) {
         struct anchor_settings set = anchor_settings;
@@ -371,7 +382,7 @@ int main(int argc, char **argv)
             set.num_pairs = 20;
             set.reference_spp = 640;
         }
-        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, r);
+        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, work, r);
         if (!anchors_save(path, r, &e))
             die(path, &e);
     }
