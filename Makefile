@@ -99,7 +99,7 @@ help:
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
-	@echo '                (tests/anchors; 12 minutes)'
+	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'

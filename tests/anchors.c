@@ -16,8 +16,8 @@ const struct anchor_settings anchor_settings = {.side = 64,
                                                 .tuned = 0.01,
                                                 .power = 0.95};
 
-const char *const anchor_scenes[NUM_ANCHOR_SCENES] = {
-    "33_sphere_light", "41_cornell", "42_cornell_glass", "45_many_lights", "46_sky"};
+const char *const anchor_scenes[NUM_ANCHOR_SCENES] = {"33_sphere_light", "41_cornell", "46_sky",
+                                                      "42_cornell_glass", "45_many_lights"};
 
 const char *const anchor_error_id[NUM_ANCHOR_ERRORS] = {"global", "bounced", "region"};
 
@@ -84,11 +84,10 @@ bool anchors_save(const char *path, const struct anchor_results *r, struct err *
                                                 scene->num_places, "rules", rules));
     }
     json_t *root =
-        json_pack("{s{si si si si si sI sf sf} ss ss sf sf so}", "settings", "side", set->side,
-                  "spp", set->spp, "reference_spp", set->reference_spp, "num_tune", set->num_tune,
+        json_pack("{s{si si si si si sI sf sf} ss ss so}", "settings", "side", set->side, "spp",
+                  set->spp, "reference_spp", set->reference_spp, "num_tune", set->num_tune,
                   "num_pairs", set->num_pairs, "seed", (json_int_t)set->seed, "tuned", set->tuned,
-                  "power", set->power, "version", r->version, "date", r->date, "cpu_seconds",
-                  r->cpu_seconds, "wall_seconds", r->wall_seconds, "scenes", scenes);
+                  "power", set->power, "version", r->version, "date", r->date, "scenes", scenes);
     bool ok = root != NULL ? json_write(path, root, e) : err_set(e, "%s: out of memory", path);
     json_decref(root);
     return ok;
@@ -141,13 +140,13 @@ bool anchors_load(const char *path, struct anchor_results *r, struct err *e)
     json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &why), *scenes;
     if (root == NULL)
         return err_set(e, "%s:%d: %s", path, why.line, why.text);
-    bool ok = json_unpack_ex(
-                  root, &why, 0, "{s{si si si si si sI sF sF} ss ss sF sF so}", "settings", "side",
-                  &set->side, "spp", &set->spp, "reference_spp", &set->reference_spp, "num_tune",
-                  &set->num_tune, "num_pairs", &set->num_pairs, "seed", &seed, "tuned", &set->tuned,
-                  "power", &set->power, "version", &version, "date", &date, "cpu_seconds",
-                  &r->cpu_seconds, "wall_seconds", &r->wall_seconds, "scenes", &scenes) == 0 ||
-              err_set(e, "%s: %s", path, why.text);
+    bool ok =
+        json_unpack_ex(root, &why, 0, "{s{si si si si si sI sF sF} ss ss so}", "settings", "side",
+                       &set->side, "spp", &set->spp, "reference_spp", &set->reference_spp,
+                       "num_tune", &set->num_tune, "num_pairs", &set->num_pairs, "seed", &seed,
+                       "tuned", &set->tuned, "power", &set->power, "version", &version, "date",
+                       &date, "scenes", &scenes) == 0 ||
+        err_set(e, "%s: %s", path, why.text);
     if (ok) {
         set->seed = (uint64_t)seed;
         snprintf(r->version, sizeof r->version, "%s", version);

@@ -66,7 +66,7 @@ struct anchor_scene_result {
 struct anchor_results {
     struct anchor_settings settings;
     char version[64], date[32]; /* assay_version, day */
-    double cpu_seconds, wall_seconds;
+
     int num_scenes;
     struct anchor_scene_result scene[NUM_ANCHOR_SCENES];
 };

@@ -215,12 +215,13 @@ static void page(FILE *f, const struct anchor_results *r)
     fprintf(
         f,
         "# Our gate and other renderers' tests on the same pictures\n\n"
-        "Made by `make anchors` from [results.json](results.json), which it measures first "
-        "(%.0f CPU minutes, %.0f min here; Assay\n%s, %s). `tests/test_anchors.c` checks that this "
-        "page is what the record and the settings give.\n\n"
-        "![Smallest global bias found](global.svg)\n\n![Smallest bias of bounced light found](bounced.svg)\n\n"
+        "Made by `make anchors`, which measures [results.json](results.json) first (Assay %s, %s). "
+        "`tests/test_anchors.c` checks that\nthis page is what the record and the settings "
+        "give.\n\n"
+        "![Smallest global bias found](global.svg)\n\n"
+        "![Smallest bias of bounced light found](bounced.svg)\n\n"
         "![Smallest bias of a region found](region.svg)\n\n",
-        r->cpu_seconds / 60, r->wall_seconds / 60, r->version, r->date);
+        r->version, r->date);
     claims(f, r);
     method(f, r);
     tables(f, r);

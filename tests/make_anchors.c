@@ -8,12 +8,10 @@
 #include "../renderer/version.h"
 #include "../tools/compare.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -65,22 +63,23 @@ static void show_render(double share)
     show(scene_shown, "rendering", share);
 }
 
-/* -log10 of the smallest alpha that the gate's p-values would be DIFFERENT at; with `decide` the verdict
- * itself: INFINITY or 0. */
-static double gate(const struct moments *a, const struct moments *b, double alpha, bool decide)
+/* -log10 of the smallest alpha at which the gate's p-values, got with `alpha`, are DIFFERENT. */
+static double gate(const struct moments *a, const struct moments *b, double alpha)
 {
     struct comparison c;
     struct err e;
-    double score = -INFINITY;
+    double score = 0;
     const struct compare_options opt = {.alpha = alpha, .tile = 16};
     if (!compare_moments(a, b, &opt, &c, &e))
         die("the gate cannot judge", &e);
     for (int i = 0; i < NUM_STATISTICS; i++)
         if (c.statistic[i].share > 0 && c.statistic[i].num_tests > 0)
             score = fmax(score, log10(c.statistic[i].share) - c.statistic[i].log10_p);
-    assert((c.verdict == VERDICT_DIFFERENT) == (score >= -log10(alpha)));
-    if (decide)
-        score = c.verdict == VERDICT_DIFFERENT ? INFINITY : 0;
+    if ((c.verdict == VERDICT_DIFFERENT) != (score >= -log10(alpha) * (1 - 1e-12))) {
+        err_set(&e, "verdict %s, but the statistics say alpha 1e-%.9g", verdict_name(c.verdict),
+                score);
+        die("the gate contradicts itself", &e);
+    }
     comparison_free(&c);
     return score;
 }
@@ -90,9 +89,9 @@ static double score(const struct measurement *m, struct bench *t, enum anchor_ru
 {
     size_t pixels = (size_t)a->width * (size_t)a->height, count[256];
     switch (rule) {
-    case RULE_GATE_STRICT: return gate(a, b, 1e-6, true);
-    case RULE_GATE: return gate(a, b, 1e-3, true);
-    case RULE_GATE_TUNED: return gate(a, b, m->set->tuned, false);
+    case RULE_GATE_STRICT: return gate(a, b, 1e-6);
+    case RULE_GATE: return gate(a, b, 1e-3);
+    case RULE_GATE_TUNED: return gate(a, b, m->set->tuned);
     case RULE_MITSUBA:
     case RULE_MITSUBA_SHARE_TUNED:
         mitsuba_z(a, &m->pool.reference, t->z);
@@ -187,40 +186,52 @@ static const struct moments *side_of(const struct measurement *m, int pair, int 
     return &m->pool.render[m->set->num_tune + 2 * pair + b];
 }
 
-static bool rejects(const struct measurement *m, struct bench *t, enum anchor_rule rule, int pair,
-                    enum anchor_error kind, double b)
+/* How far the score is above the threshold (positive: the rule rejects), in roots: a score that is
+ * -log10 p grows with the square of the error. */
+static double excess(const struct measurement *m, struct bench *t, enum anchor_rule rule, int pair,
+                     enum anchor_error kind, double b)
 {
-    double threshold = rule == RULE_GATE_STRICT || rule == RULE_GATE ? 0 : m->threshold[rule];
+    double threshold = m->threshold[rule];
     anchor_make_wrong(&m->pool, side_of(m, pair, 0), kind, b, pair, &t->a);
-    return score(m, t, rule, &t->a, side_of(m, pair, 1)) > threshold;
+    double s = score(m, t, rule, &t->a, side_of(m, pair, 1));
+    if (rule == RULE_GATE_STRICT || rule == RULE_GATE) /* its own verdict includes equality */
+        threshold *= 1 - 1e-12;
+    double root = sqrt(fmax(0, s)) - sqrt(fmax(0, threshold));
+    return s > threshold ? fmax(root, 1e-9) : fmin(root, -1e-9);
 }
 
 /* The smallest error that the rule finds in this pair, to 1 %, from a guess: out from it by growing
- * steps, then by halving. */
+ * steps, then in by halving and interpolation in turn. */
 static double smallest_found(const struct measurement *m, struct bench *t, enum anchor_rule rule,
                              int pair, enum anchor_error kind, double guess)
 {
-    double lo = guess, hi = guess, step = 1.2;
-    if (rejects(m, t, rule, pair, kind, guess)) {
-        for (;; hi = lo, step *= step) {
-            lo = hi / step;
-            if (lo < smallest_tried)
-                return smallest_tried;
-            if (!rejects(m, t, rule, pair, kind, lo))
-                break;
-        }
-    } else {
-        for (;; lo = hi, step *= step) {
-            if (lo >= largest_tried)
-                return INFINITY;
-            hi = fmin(lo * step, largest_tried);
-            if (rejects(m, t, rule, pair, kind, hi))
-                break;
-        }
+    double lo = guess, hi = guess, step = 1.1, f = excess(m, t, rule, pair, kind, guess);
+    double f_lo = f, f_hi = f;
+    while (f_lo > 0) {
+        hi = lo;
+        f_hi = f_lo;
+        lo /= step;
+        step *= step;
+        if (lo < smallest_tried)
+            return smallest_tried;
+        f_lo = excess(m, t, rule, pair, kind, lo);
     }
-    while (hi > 1.01 * lo) {
-        double b = sqrt(lo * hi);
-        *(rejects(m, t, rule, pair, kind, b) ? &hi : &lo) = b;
+    while (f_hi <= 0) {
+        if (hi >= largest_tried)
+            return INFINITY;
+        lo = hi;
+        f_lo = f_hi;
+        hi = fmin(hi * step, largest_tried);
+        step *= step;
+        f_hi = excess(m, t, rule, pair, kind, hi);
+    }
+    for (int i = 0; hi > 1.01 * lo; i++) {
+        double b = sqrt(lo * hi), root = lo + (hi - lo) * -f_lo / (f_hi - f_lo);
+        if (i % 3 != 2) /* just beyond the root, then just before it, then halving */
+            b = fmin(hi / 1.002, fmax(lo * 1.002, root * (i % 3 == 0 ? 1.004 : 0.996)));
+        f = excess(m, t, rule, pair, kind, b);
+        *(f > 0 ? &hi : &lo) = b;
+        *(f > 0 ? &f_hi : &f_lo) = f;
     }
     return hi;
 }
@@ -230,7 +241,7 @@ static void measure_pair(void *arg, int pair, int thread)
     struct measurement *m = arg;
     struct bench *t = &m->bench[thread];
     for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
-        m->alarm[pair * NUM_ANCHOR_RULES + r] = rejects(m, t, r, pair, ANCHOR_GLOBAL, 0);
+        m->alarm[pair * NUM_ANCHOR_RULES + r] = excess(m, t, r, pair, ANCHOR_GLOBAL, 0) > 0;
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
             double *out = &m->smallest[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
             *out = smallest_found(m, t, r, pair, k, m->guess[r][k]);
@@ -246,7 +257,8 @@ static void ask_again(void *arg, int pair, int thread)
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
             m->found[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k] =
-                isfinite(m->bias[r][k]) && rejects(m, &m->bench[thread], r, pair, k, m->bias[r][k]);
+                isfinite(m->bias[r][k]) &&
+                excess(m, &m->bench[thread], r, pair, k, m->bias[r][k]) > 0;
 }
 
 /* Pair 0 alone first: its answers are where the search starts in all others, so that the record does
@@ -337,29 +349,23 @@ static void measure_scene(const struct anchor_settings *set, int scene, const ch
     anchor_pool_free(&m.pool);
 }
 
-static double cpu_seconds(void)
-{
-    struct rusage u;
-    getrusage(RUSAGE_SELF, &u);
-    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-           1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
 static void measure(const struct anchor_settings *set, int num_scenes, const char *work,
-                    struct anchor_results *out)
+                    const char *path, struct anchor_results *out)
 {
     int threads = (int)fmin(16, fmax(1, (double)sysconf(_SC_NPROCESSORS_ONLN)));
-    double start = now_seconds();
     time_t now = time(NULL);
     struct tm day;
-    *out = (struct anchor_results){.settings = *set, .num_scenes = num_scenes};
+    *out = (struct anchor_results){.settings = *set};
     snprintf(out->version, sizeof out->version, "%s", assay_version);
     strftime(out->date, sizeof out->date, "%Y-%m-%d", gmtime_r(&now, &day));
-    for (int s = 0; s < num_scenes; s++)
+    for (int s = 0; s < num_scenes; s++) {
+        struct err e = {""};
         measure_scene(set, s, work, threads, &out->scene[s]);
+        out->num_scenes = s + 1; /* a record after each scene: the rest may be interrupted */
+        if (!anchors_save(path, out, &e))
+            die(path, &e);
+    }
     fputc('\n', stderr);
-    out->wall_seconds = now_seconds() - start;
-    out->cpu_seconds = cpu_seconds();
 }
 
 int main(int argc, char **argv)
@@ -382,9 +388,7 @@ int main(int argc, char **argv)
             set.num_pairs = 20;
             set.reference_spp = 640;
         }
-        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, work, r);
-        if (!anchors_save(path, r, &e))
-            die(path, &e);
+        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, work, path, r);
     }
     if (!anchors_load(path, r, &e) || !anchors_write_page(dir, r, &e))
         die(dir, &e);
