@@ -7,6 +7,7 @@
  * confidence 0.999, does not exceed alpha. With 2000 claims and alpha = 0.01 it takes 36 wrong
  * verdicts to fail: a true rate of 0.01 fails with probability 7e-4, one of 0.025 with 0.98 (both
  * binomial). */
+#include "rates.h"
 #include "simulate.h"
 
 #include "../tools/compare.h"
@@ -18,23 +19,6 @@
 #include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 #include <string.h>
-
-/* Clopper-Pearson: the lower bound x solves P(Binomial(n, x) >= k) = I_x(k, n-k+1) = 0.001. (GSL's
- * own inverse gives up near 1.) */
-static double lower_bound(int k, int n)
-{
-    double lo = 0, hi = 1;
-    for (int i = 0; i < 60 && k > 0; i++) {
-        double x = (lo + hi) / 2;
-        *(gsl_cdf_beta_P(x, k, n - k + 1) < 0.001 ? &lo : &hi) = x;
-    }
-    return lo;
-}
-
-static double upper_bound(int k, int n)
-{
-    return 1 - lower_bound(n - k, n);
-}
 
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)

@@ -14,17 +14,21 @@ struct sums {
     double same;      /* w same, less the noise of d */
 };
 
-/* A and B in one pixel, its channels weighted. Their correlation is unknown: see pixel_estimate(). */
+/* A or B in one pixel, its channels weighted. Their correlation is unknown: see pixel_estimate(). Where
+ * weights have both signs the third cumulants of the channels are added all the same: that they cancel if
+ * the channels are perfectly correlated is no permission. */
 static struct estimate weighted(const struct base *base, int side, size_t i, const double w[3],
                                 double n)
 {
     const struct moments *m = side == 0 ? base->a : base->b;
-    double mean = 0, deviation = 0, root = 0;
+    double mean = 0, deviation = 0, root = 0, sign = 0;
     for (size_t c = 0; c < 3; c++) {
         mean += w[c] * m->mean[i + c];
         deviation += fabs(w[c]) * base->sd[side][i + c];
-        root += w[c] * base->root[side][i + c];
+        root += fabs(w[c]) * base->root[side][i + c];
+        sign += w[c] * base->sd[side][i + c];
     }
+    root = copysign(root, sign * root);
     struct estimate est = estimate_from(mean, deviation * deviation, root * root * root, n);
     /* With weights of both signs the third cumulants of a skewed law can cancel in the sample and not in
      * truth, or the reverse; their own squares bound the variance of each if it is of rare events. */
