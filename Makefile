@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -58,6 +58,10 @@ mutants: all $(BUILD)/libassay.a
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
+# What our gate and the rules of other renderers' tests find on the same pictures: tests/anchors.
+anchors: $(BUILD)/tests/make_anchors
+	$(BUILD)/tests/make_anchors tests/anchors $(BUILD)/anchors
+
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
 	  $(addprefix --only ,$(ONLY))
@@ -94,6 +98,8 @@ help:
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
+	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
+	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
@@ -164,6 +170,9 @@ $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c te
 	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
+  tests/anchors_plot.c tests/anchor_images.c tests/anchor_rules.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
@@ -205,7 +214,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
