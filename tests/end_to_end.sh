@@ -82,8 +82,10 @@ fi
 stale=0
 for patch in tests/mutants/*.patch; do
     patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
+    sed -n 1p "$patch" | grep -q '^Bug: .' && sed -n 2p "$patch" | grep -q '^Where: .' ||
+        { stale=1; not_ok "mutant $(basename "$patch")" "does not begin with the lines 'Bug: ' and 'Where: '"; }
 done
-[ $stale -eq 0 ] && ok "mutants apply"
+[ $stale -eq 0 ] && ok "mutants apply and say what they are"
 
 # Pictures.
 expect "render" 0 "mean radiance" \
