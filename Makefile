@@ -55,6 +55,11 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
 mutants: all $(BUILD)/libassay.a
 	tests/mutants.sh $(BUILD) $(ONLY)
 
+# Brings golden/diagnose/, by which `assay diagnose` names bugs, up to date with tests/mutants.
+catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
+	tests/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_catalogue $(BUILD) tests/mutants golden/diagnose
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
@@ -94,6 +99,7 @@ help:
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
+	@echo 'make catalogue   bring what assay diagnose knows of these bugs up to date'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
@@ -162,6 +168,8 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_catalogue: $(call obj,$(BUILD),tests/make_catalogue.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
@@ -205,7 +213,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants catalogue print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
