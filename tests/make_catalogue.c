@@ -11,11 +11,13 @@
  * LONG_FACTOR times the samples.
  *
  * What is there and up to date (the scene's and the patch's hash, the view's settings) is kept. */
+#include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "../tools/diagnose_render.h"
 
 #include <dirent.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,12 +32,12 @@ static const struct {
     bool fixed_spp;
 } views[] = {
     {"11_furnace", "pathtracer-adaptive", 32, 32, 256, 1, true},
-    {"11_furnace", "pathtracer-roulette", 32, 32, 256, 1, false},
+    {"11_furnace", "pathtracer-roulette", 32, 32, 128, 1, false},
     {"12_point_plane", "", 32, 32, 32, 6, false},
-    {"13_square_patch", "pathtracer-hemisphere", 32, 32, 256, 1, false},
+    {"13_square_patch", "pathtracer-hemisphere", 32, 32, 128, 1, false},
     {"13_square_patch", "pathtracer-four_light_samples", 32, 32, 64, 1, false},
     {"17_lens_step", "", 32, 32, 128, 1, false},
-    {"22_glass_sphere", "", 64, 64, 64, 1, false},
+    {"22_glass_sphere", "", 32, 32, 128, 1, false},
     {"24_beckmann", "", 32, 32, 128, 1, false},
     {"25_ggx_metal", "", 32, 32, 128, 1, false},
     {"27_smooth_normals", "", 32, 32, 128, 1, false},
@@ -43,8 +45,8 @@ static const struct {
     {"32_sun_plane", "", 32, 32, 64, 1, false},
     {"36_mesh_lamp", "", 32, 32, 128, 1, false},
     {"38_spot_edge", "", 64, 32, 64, 1, false},
-    {"41_cornell", "", 64, 64, 64, 1, false},
-    {"42_cornell_glass", "", 32, 32, 256, 1, false},
+    {"41_cornell", "", 32, 32, 128, 1, false},
+    {"42_cornell_glass", "", 32, 32, 128, 1, false},
     {"44_mesh", "", 32, 32, 128, 1, false},
     {"45_many_lights", "", 32, 32, 128, 1, false},
     {"46_sky", "", 32, 32, 128, 1, false},
@@ -261,6 +263,76 @@ static void take_over(struct maker *m, struct view *v, bool *missing)
     }
 }
 
+/* Bugs of one view, rendered by several threads: each takes the next one that is missing. */
+struct crew {
+    const struct maker *m;
+    const struct base *base;
+    struct view *view;
+    const bool *missing;
+    pthread_mutex_t lock;
+    int next;
+    bool ok;
+    struct err e;
+};
+
+struct worker {
+    struct crew *crew;
+    pthread_t thread;
+    char work[300];
+};
+
+static int next_bug(struct crew *c)
+{
+    pthread_mutex_lock(&c->lock);
+    while (c->next < c->m->made.num_bugs && !c->missing[c->next])
+        c->next++;
+    int b = c->ok && c->next < c->m->made.num_bugs ? c->next++ : -1;
+    pthread_mutex_unlock(&c->lock);
+    return b;
+}
+
+static void *work(void *arg)
+{
+    struct worker *w = arg;
+    struct base base = *w->crew->base;
+    struct err e = {""};
+    base.job.work_dir = w->work;
+    for (int b; (b = next_bug(w->crew)) >= 0;)
+        if (!make_effect(w->crew->m, &base, w->crew->view, b, &e)) {
+            pthread_mutex_lock(&w->crew->lock);
+            w->crew->ok = false;
+            w->crew->e = e;
+            pthread_mutex_unlock(&w->crew->lock);
+        }
+    return NULL;
+}
+
+static bool make_effects(const struct maker *m, const struct base *base, struct view *v,
+                         const bool *missing, struct err *e)
+{
+    enum { MOST = 64 };
+    static const struct worker none;
+    struct worker worker[MOST];
+    struct crew crew = {.m = m, .base = base, .view = v, .missing = missing, .ok = true};
+    int num = cli_processors() < MOST ? cli_processors() : MOST, started = 0;
+    pthread_mutex_init(&crew.lock, NULL);
+    for (int i = 0; i < num; i++) {
+        worker[i] = none;
+        worker[i].crew = &crew;
+        snprintf(worker[i].work, sizeof worker[i].work, "%s/%d", m->work, i);
+        if (!make_dirs(worker[i].work, e) ||
+            pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
+            break;
+        started++;
+    }
+    for (int i = 0; i < started; i++)
+        pthread_join(worker[i].thread, NULL);
+    pthread_mutex_destroy(&crew.lock);
+    if (!crew.ok)
+        *e = crew.e;
+    return crew.ok && (started > 0 || err_set(e, "no thread could be started"));
+}
+
 static bool make_view(struct maker *m, int i, struct err *e)
 {
     struct view *v = &m->made.view[m->made.num_views];
@@ -285,9 +357,7 @@ static bool make_view(struct maker *m, int i, struct err *e)
         any = any || missing[b];
     if (ok && any)
         ok = make_correct(m, base, v, e);
-    for (int b = 0; ok && b < m->made.num_bugs; b++)
-        if (missing[b])
-            ok = make_effect(m, base, v, b, e);
+    ok = ok && make_effects(m, base, v, missing, e);
     int seen = 0;
     for (int b = 0; ok && b < m->made.num_bugs; b++)
         seen += v->effect[b] != NULL;

@@ -29,6 +29,14 @@ static const double tie = 20;
 /* A number of samples has to be off by so many standard deviations. */
 static const double samples_z = 7;
 
+static double mean_of(const struct sight *s)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * s->columns * s->rows; i++)
+        sum += s->mean[i];
+    return sum / (3 * s->columns * s->rows);
+}
+
 struct tally {
     double log_likelihood;
     double chi2, chi2_mean, cells; /* of what is left; its mean if that is noise */
@@ -101,14 +109,6 @@ static void add_facts(const struct clue *clue, const struct effect *e, double am
     }
 }
 
-static double mean_of(const struct sight *s)
-{
-    double sum = 0;
-    for (int i = 0; i < 3 * s->columns * s->rows; i++)
-        sum += s->mean[i];
-    return sum / (3 * s->columns * s->rows);
-}
-
 /* e NULL: the bug does nothing here, or "correct". factor: inflation() of the bug. */
 static void add_view(const struct clue *clue, const struct effect *e, double amplitude,
                      double factor, struct tally *t)
@@ -168,21 +168,30 @@ static double log_likelihood_of(const struct hypotheses *h, int bug, double ampl
     return t.log_likelihood;
 }
 
-/* The amplitude of largest likelihood: the best of a ladder, then golden section around it. */
-static double fit_amplitude(const struct hypotheses *h, int bug)
+/* Least squares with the weights of "correct": where the search for the best amplitude begins. */
+static double first_amplitude(const struct hypotheses *h, int bug)
 {
-    enum { RUNGS = 16 };
-    double step = pow(largest_amplitude / least_amplitude, 1.0 / (RUNGS - 1)), best = -INFINITY;
-    double at = 1;
-    for (int i = 0; i < RUNGS; i++) {
-        double a = least_amplitude * pow(step, i), l = log_likelihood_of(h, bug, a);
-        if (l > best) {
-            best = l;
-            at = a;
+    double along = 0, norm = 0;
+    for (int k = 0; k < h->num_clues; k++) {
+        const struct effect *e = h->clue[k].view->effect[bug];
+        const struct sight *a = &h->clue[k].seen, *c = &h->clue[k].view->correct;
+        double tiny = rounding * mean_of(c);
+        for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
+            double effect = (double)e->mean[i];
+            double var = fmax(a->var[i], least_variance * c->var[i] * c->n / a->n) + c->var[i] +
+                         (double)e->var[i] + tiny * tiny + pow(model_error * effect, 2);
+            along += effect * (a->mean[i] - c->mean[i]) / var;
+            norm += effect * effect / var;
         }
     }
-    double lo = at / step, hi = at * step;
-    const double golden = 0.6180339887498949;
+    return norm > 0 ? fmin(fmax(along / norm, least_amplitude), largest_amplitude) : 1;
+}
+
+/* Golden section for the largest likelihood around a first guess. */
+static double refine_amplitude(const struct hypotheses *h, int bug, double at)
+{
+    const double golden = 0.6180339887498949, reach = 1.5;
+    double lo = fmax(at / reach, least_amplitude), hi = fmin(at * reach, largest_amplitude);
     for (int i = 0; i < 12; i++) {
         double x1 = hi - golden * (hi - lo), x2 = lo + golden * (hi - lo);
         if (log_likelihood_of(h, bug, x1) > log_likelihood_of(h, bug, x2))
@@ -252,7 +261,7 @@ static bool gate_mean(const struct clue *clue, double alpha, int num_tests, bool
         if (log10_p < out->log10_p || (*differs && out->gate[0] == '\0')) {
             out->log10_p = log10_p;
             if (*differs)
-                snprintf(out->gate, sizeof out->gate, "%s: %.220s", clue->view->name, r.reason);
+                snprintf(out->gate, sizeof out->gate, "%s: %.180s", clue->view->name, r.reason);
         }
         comparison_free(&r);
     }
@@ -308,21 +317,34 @@ static int excluded(const struct catalogue *c, const struct diagnose_options *op
     return opt->without != NULL ? catalogue_bug(c, opt->without) : -1;
 }
 
-/* Each bug at its full strength or at that which fits best, whichever is likelier. */
+static void keep_likelier(struct candidate *c, const struct candidate *other)
+{
+    if (other->log_likelihood > c->log_likelihood)
+        *c = *other;
+}
+
+/* Each bug at its full strength or, unless the best explains all that way, at the amplitude that fits best,
+ * whichever is likelier. */
 static int rank(const struct hypotheses *h, const struct diagnose_options *opt,
                 struct candidate *all)
 {
+    enum { REFINED = 6 };
     int num = 0;
     for (int b = 0; b < h->c->num_bugs; b++)
         if (b != excluded(h->c, opt))
             all[num++] = candidate_of(h, b, 1);
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
-    if (num > 0 && is_explanation(&all[0]) && all[0].excess <= largest_excess)
+    if (num > 0 && all[0].excess <= largest_excess)
         return num;
     for (int i = 0; i < num; i++) {
-        struct candidate free_one = candidate_of(h, all[i].bug, fit_amplitude(h, all[i].bug));
-        if (free_one.log_likelihood > all[i].log_likelihood)
-            all[i] = free_one;
+        struct candidate free_one = candidate_of(h, all[i].bug, first_amplitude(h, all[i].bug));
+        keep_likelier(&all[i], &free_one);
+    }
+    qsort(all, (size_t)num, sizeof *all, by_likelihood);
+    for (int i = 0; i < num && i < REFINED; i++) {
+        struct candidate refined =
+            candidate_of(h, all[i].bug, refine_amplitude(h, all[i].bug, all[i].amplitude));
+        keep_likelier(&all[i], &refined);
     }
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
     return num;

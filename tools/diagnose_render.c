@@ -37,6 +37,15 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
     return ok;
 }
 
+/* A black picture has no noise to judge; that it is black is for others to find. */
+static bool has_noise(const struct sight *s)
+{
+    double sum = 0;
+    for (int i = 0; i < s->columns * s->rows; i++)
+        sum += s->spread[i];
+    return sum > 0;
+}
+
 static bool judge(const struct moments *m, const struct diagnose_job *job, double alpha,
                   struct sight *s, bool *consistent, struct err *e)
 {
@@ -63,7 +72,7 @@ bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight 
         ok = render_one(job, done, &m[done], e) && sight_of(&m[done], job->spp, &s[done], e);
     if (ok)
         *out = sight_average(s, job->renders);
-    if (ok && job->renders >= FEWEST_CONSISTENT)
+    if (ok && job->renders >= FEWEST_CONSISTENT && has_noise(out))
         ok = judge(m, job, alpha, out, &judged, e);
     if (consistent != NULL)
         *consistent = judged;
