@@ -288,6 +288,25 @@ if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "ju
 expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
 expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
 
+# More and more samples: cheap scenes are decided with fewer than the 64 and 256 declared.
+expect "validate --budget" 0 "EQUIVALENT" \
+    $validate --budget 5m --only 10_furnace_one --only 12_point_plane --only 31_spot_plane
+# (Nine claims of ours, each with one look.)
+if [ "$(grep -c '"n_a": 16.0' "$out/results.json")" -eq 18 ]; then
+    ok "--budget decides with fewer samples than declared"
+else not_ok "--budget decides with fewer samples than declared" "$(grep '"n_a"' "$out/results.json" | head -40)"; fi
+expect "a spent budget is inconclusive" 2 "INCONCLUSIVE" $validate --budget 1s --only 41_cornell --only 45_many_lights
+if grep -q '"passed": true' "$out/results.json"; then not_ok "a spent budget passes nothing" "it does"; else
+    ok "a spent budget passes nothing"
+fi
+expect "a spent budget says so" 2 "budget spent" $validate --budget 0.001s --only 12_point_plane
+expect "validate: alpha 1e-9 means two stages" 0 "EQUIVALENT" $validate --alpha 1e-9 --only 31_spot_plane
+if [ "$(grep -c '"stages": 2' "$out/results.json")" -eq 2 ] && [ "$(grep -c '"stages": 1' "$out/results.json")" -eq 4 ]; then
+    ok "two stages against the closed form, one against goldens"
+else not_ok "two stages against the closed form, one against goldens" "$(grep '"stages"' "$out/results.json")"; fi
+expect "validate: --budget is no time" 3 "5d" $validate --budget 5d
+expect "validate: --stages" 3 "stages" $validate --stages 3
+
 # Negative controls: wrong programs under test.
 wrong() {
     printf '#!/bin/sh\n%s\n' "$1" >"$tmp/wrong"
@@ -295,6 +314,13 @@ wrong() {
 }
 wrong "exec $pathtracer \"\$@\" -m 4"
 expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails at the first look" 1 "DIFFERENT" \
+    $validate --until-different --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails twice, with fresh seeds" 1 "DIFFERENT" \
+    $validate --budget 5m --stages 2 --only 11_furnace --pathtracer "$tmp/wrong"
+if grep -q 'with fresh seeds, confirmed' "$out/results.json"; then ok "a second stage confirms"; else
+    not_ok "a second stage confirms" "$(grep '"reason"' "$out/results.json")"
+fi
 wrong "exit 5"
 expect "a program that dies is not judged" 3 "exit status 5" \
     $validate --only 11_furnace --pathtracer "$tmp/wrong"

@@ -60,7 +60,7 @@ static void test_by_hand(void **state)
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
     set_all(&a, 101, 1.01, 10100, 0);
     set_all(&b, 101, 1, 30300, 0);
-    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4});
+    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0});
     for (int i = 0; i < 4; i++) {
         const struct region *r = &c.global[i];
         assert_true(r->x == 0 && r->y == 0 && r->width == 8 && r->height == 8 && r->channel == i);
@@ -87,8 +87,10 @@ static void test_by_hand(void **state)
     assert_near(c.z.data[5], 0.01 / 2, 1e-7);
     assert_near(c.relative.data[5], 0.01, 1e-7);
     assert_true(c.rms_bias == 0);
-    /* MDB: (t at alpha/(2 tests) + t at 0.05) SE + tolerance. */
-    double reach = gsl_cdf_tdist_Qinv(0.025 / c.num_tests, 10240) + gsl_cdf_tdist_Qinv(0.05, 10240);
+    /* MDB: (t at alpha share/(2 tests) + t at 0.05) SE + tolerance; the image is tested in 4 channels.
+     */
+    double level = 0.05 * c.statistic[STATISTIC_IMAGE].share / 4;
+    double reach = gsl_cdf_tdist_Qinv(level / 2, 10240) + gsl_cdf_tdist_Qinv(0.05, 10240);
     assert_near(c.mdb_global, reach * 0.25 + 1e-5 * 1.01, 1e-4);
     assert_int_equal(c.verdict, VERDICT_INCONCLUSIVE); /* 5 % would have been missed */
     comparison_free(&c);
@@ -100,7 +102,7 @@ static void test_by_hand(void **state)
     strcpy(b.unit, "exact");
     for (int i = 0; i < 3 * 32; i++)
         a.mean[i] += 0.3;
-    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4});
+    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0});
     assert_near(c.rms_bias, 0.3 * sqrt(0.5) / 2, 1e-12);
     comparison_free(&c);
     moments_free(&a);
@@ -231,7 +233,7 @@ static void test_half_pixel_shift(void **state)
                 moments_add(&m[i], (size_t)p, (double[3]){value, value, value});
             }
     }
-    struct compare_options opt = {1e-3, 0, 0, 4};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0};
     assert_int_equal(verdict_of(&m[0], &m[1], opt), VERDICT_EQUIVALENT);
     struct comparison c = compare(&m[2], &m[0], opt);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
@@ -242,7 +244,7 @@ static void test_half_pixel_shift(void **state)
     comparison_free(&c);
     /* Inside the margins of an approximate engine the same shift is no EQUIVALENT either: a tile on
      * an edge differs by 10 % or more. */
-    assert_int_not_equal(verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4}),
+    assert_int_not_equal(verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4, 0}),
                          VERDICT_EQUIVALENT);
     for (int i = 0; i < 3; i++)
         moments_free(&m[i]);
@@ -254,7 +256,7 @@ static void test_noise_free(void **state)
 {
     (void)state;
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 4}, margin = {1e-3, 0.01, 0.02, 4};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0}, margin = {1e-3, 0.01, 0.02, 4, 0};
     constant(&a, 15, 64);
     constant(&b, 15 * (1 + 3e-6), 64);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_EQUIVALENT);
@@ -292,7 +294,7 @@ static void test_rounding_noise(void **state)
 {
     (void)state;
     struct moments a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 2};
+    struct compare_options opt = {1e-3, 0, 0, 2, 0};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
     set_all(&b, 1000, 0.5 * (1 + 1e-7), 1000 * 2.5e-17, 0);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_EQUIVALENT);
@@ -317,7 +319,7 @@ static void test_skew_guard(void **state)
         for (int skewed = 0; skewed < 2; skewed++) {
             double k3 = (skewed ? 2 : 0.001) * v * sqrt(v);
             set_all(&a, n, 1.01, m2, k3 * n * (n - 1) * (n - 2));
-            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4};
+            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0};
             struct comparison c = compare(&a, &b, opt);
             assert_true(c.skew_limited == (skewed == 1));
             if (skewed) {
@@ -346,7 +348,7 @@ static void test_skewed_tile(void **state)
     double m2 = v * n * (n - 1);
     constant(&b, 1, 1);
     set_all(&a, n, 1, m2, 0);
-    struct compare_options opt = {1e-3, 0.01, 0.02, 4};
+    struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0};
     struct comparison plain = compare(&a, &b, opt);
     for (int y = 0; y < 4; y++)
         for (int x = 0; x < 4; x++)
@@ -381,12 +383,12 @@ static void test_floor(void **state)
             a.mean[3 * p + c] = 0.0004;
             b.mean[3 * p + c] = 0;
         }
-    struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4});
+    struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4, 0});
     assert_near(c.worst_tile.difference, 0.032, 1e-12);
     assert_near(c.relative.data[0], 0.032, 1e-7);
     assert_int_equal(c.verdict, VERDICT_EQUIVALENT);
     comparison_free(&c);
-    c = compare(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4});
+    c = compare(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4, 0});
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     comparison_free(&c);
     moments_free(&a);
@@ -407,7 +409,7 @@ static void test_margin_between(void **state)
         for (int p = 0; p < 256; p++)
             for (int c = 0; p % 16 < 8 && p / 16 < 8 && c < 3; c++)
                 a.mean[3 * p + c] = over ? 1.021 : 1.019;
-        struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4});
+        struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0});
         assert_int_equal(c.verdict, over ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
         if (over) {
             assert_near(c.worst.margin, 0.02, 1e-12);
@@ -426,7 +428,7 @@ static void test_extra_factor(void **state)
 {
     (void)state;
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
-    struct compare_options opt = {1e-3, 0.02, 0.1, 8};
+    struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0};
     uint64_t seed = 21;
     simulate(&a, LAW_NORMAL, 1, 8, true, &seed);
     simulate(&b, LAW_NORMAL, 1, 8, true, &seed);
@@ -463,7 +465,7 @@ static void test_channels(void **state)
         a.mean[3 * p] = 1 + 0.1 / 0.2126;
         a.mean[3 * p + 1] = 1 - 0.1 / 0.7152;
     }
-    struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4});
+    struct comparison c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0});
     assert_near(c.global[3].difference, 0, 1e-12);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.worst.channel < 3);
@@ -557,7 +559,7 @@ static void test_hygiene(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct moments a = new_moments(4, 4, "sample");
         struct moments b = new_moments(4, cases[i].fault == FAULT_SIZE ? 8 : 4, "replicate");
-        struct compare_options opt = {1e-3, 0.01, 0.02, 2};
+        struct compare_options opt = {1e-3, 0.01, 0.02, 2, 0};
         set_all(&a, 64, 1, 0.5, 0);
         set_all(&b, 8, 1, 0.5, 0);
         inject(cases[i].fault, &b, &opt);

@@ -96,7 +96,7 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
             simulate(&b, k->law, 1, k->n_b, k->grey, &seed);
         else
             constant(&b, 1, 1);
-        struct comparison c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile});
+        struct comparison c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
         bool naive = false;
         for (int t = 0; t < tiles; t++) {
             naive = naive || fabs(c.tile_t[t]) > level;
@@ -180,7 +180,7 @@ static void test_power(void **state)
     (void)state;
     enum { CLAIMS = 1000 };
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
-    struct compare_options opt = {alpha, 0, 0, 4};
+    struct compare_options opt = {alpha, 0, 0, 4, 0};
     uint64_t seed = 77;
     double mdb = 0;
     for (int i = 0; i < 20; i++) {
@@ -198,7 +198,8 @@ static void test_power(void **state)
             for (size_t p = 0; p < 3 * 256; p++)
                 a.mean[p] += half ? mdb / 2 : mdb;
             struct comparison c = compare(&a, &b, opt);
-            image[half] += c.global[3].log10_p <= log10(opt.alpha / c.num_tests);
+            const struct statistic *s = &c.statistic[STATISTIC_IMAGE];
+            image[half] += c.global[3].log10_p <= log10(opt.alpha * s->share / s->num_tests);
             verdict[half] += c.verdict == VERDICT_DIFFERENT;
             comparison_free(&c);
         }
@@ -261,7 +262,7 @@ static void test_false_equivalent(void **state)
 {
     (void)state;
     enum { CLAIMS = 2000 };
-    struct compare_options opt = {0.05, 0.03, 0.15, 4};
+    struct compare_options opt = {0.05, 0.03, 0.15, 4, 0};
     const double edge = 1 + 1e-6;
     struct verdict_rate all = rate_with_bias(0.03 * edge, false, true, CLAIMS, opt, 31);
     assert_true(lower_bound(all.equivalent, CLAIMS) <= opt.alpha);

@@ -12,6 +12,8 @@
 
 static const double floor_fraction = 0.05; /* of the mean luminance of B */
 static const double largest_z = 1e4;
+const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense", "directed",
+                                                    "noise"};
 
 static bool check_options(const struct compare_options *opt, int width, int height, struct err *e)
 {
@@ -79,8 +81,24 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
     return true;
 }
 
-static bool check(const struct moments *a, const struct moments *b,
-                  const struct compare_options *opt, struct judge *j, struct err *e)
+/* Parts of alpha. What does not apply gives its part to the others, in proportion. That is a matter of
+ * options and kind of input: by the data it would be a choice among tests. */
+static void set_shares(struct judge *j)
+{
+    static const double part[NUM_STATISTICS] = {.25, .40, 0, 0, 0};
+    bool applies[NUM_STATISTICS] = {
+        [STATISTIC_IMAGE] = true,
+        [STATISTIC_PYRAMID] = j->width * j->height > 1,
+    };
+    double sum = 0;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        sum += applies[s] ? part[s] : 0;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        j->share[s] = applies[s] ? part[s] / sum : 0;
+}
+
+bool judge_init(const struct moments *a, const struct moments *b, const struct compare_options *opt,
+                struct judge *j, struct err *e)
 {
     if (a->width != b->width || a->height != b->height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
@@ -88,6 +106,7 @@ static bool check(const struct moments *a, const struct moments *b,
     if (!check_options(opt, a->width, a->height, e))
         return false;
     *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
+    set_shares(j);
     if (!check_side(a, j, e))
         return err_prefix(e, "A");
     if (!check_side(b, j, e))
@@ -105,6 +124,15 @@ static bool check(const struct moments *a, const struct moments *b,
     return true;
 }
 
+/* Skewness is judged where a statistic's part of alpha would be divided by all its regions. */
+static void set_guards(struct judge *j, size_t regions)
+{
+    double tests[2] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1)};
+    for (int s = 0; s < 2; s++)
+        if (j->share[s] > 0)
+            j->z_guard[s] = stats_normal_quantile(j->opt.alpha * j->share[s] / (2 * tests[s]));
+}
+
 /* The region with the smallest p so far. */
 struct worst {
     struct cell cell;
@@ -113,9 +141,9 @@ struct worst {
     double log10_p, z;
 };
 
-/* Tests every region of one channel. */
-static void scan(const struct judge *j, const struct pyramid *p, int channel, struct worst *worst,
-                 size_t *num_tests, struct comparison *out)
+/* Tests every region of one channel; worst, of the image and of all smaller ones. */
+static void scan(struct judge *j, const struct pyramid *p, int channel, struct worst worst_of[2],
+                 struct comparison *out)
 {
     for (int l = p->num_levels - 1; l >= 0; l--) {
         const struct pyramid_level *level = &p->level[l];
@@ -128,6 +156,7 @@ static void scan(const struct judge *j, const struct pyramid *p, int channel, st
             tested++;
             /* An exact p only for what may be the smallest: noise-free regions and those whose
              * normal equivalent, good to 3 %, comes near the largest. */
+            struct worst *worst = &worst_of[m.statistic];
             double z = m.noise_free ? INFINITY : stats_z_of_t(region_excess_t(&m), m.dof);
             if (!m.noise_free && (z <= 0 || z < 0.94 * worst->z))
                 continue;
@@ -137,7 +166,7 @@ static void scan(const struct judge *j, const struct pyramid *p, int channel, st
                                         m.noise_free ? worst->z : fmax(z, worst->z)};
             }
         }
-        *num_tests += tested;
+        j->num_tests[l == p->num_levels - 1 ? STATISTIC_IMAGE : STATISTIC_PYRAMID] += tested;
         if (l >= p->tile_level && tested < regions)
             out->skew_limited = true;
         if (channel == CHANNEL_LUMINANCE && 2 * tested >= regions)
@@ -215,6 +244,26 @@ static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct co
     return true;
 }
 
+static void fill_statistic(const struct judge *j, int s, const struct worst *worst,
+                           struct comparison *out)
+{
+    struct statistic *st = &out->statistic[s];
+    assert(j->num_tests[s] < 1u << 31);
+    st->num_tests = (int)j->num_tests[s];
+    out->num_tests += st->num_tests;
+    if (st->num_tests == 0)
+        return;
+    st->log10_p = fmin(0, worst->log10_p + log10(st->num_tests));
+    region_name(j->width, j->height, worst->rect, worst->channel, st->what, sizeof st->what);
+}
+
+/* How far below the level it is held to the smallest p of a statistic is; above 0: rejected. */
+static double evidence(const struct comparison *c, int s)
+{
+    return c->statistic[s].num_tests > 0 ? log10(c->statistic[s].share) - c->statistic[s].log10_p
+                                         : -INFINITY;
+}
+
 bool compare_moments(const struct moments *a, const struct moments *b,
                      const struct compare_options *opt, struct comparison *out, struct err *e)
 {
@@ -222,28 +271,27 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct judge j;
     struct pyramid p = {0};
     struct region *tiles = NULL;
-    struct worst worst = {.log10_p = 1};
+    struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
     struct cell image[NUM_CHANNELS];
     double squared = 0, mean = 0;
-    size_t num_tests = 0;
-    if (!check(a, b, opt, &j, e))
+    if (!judge_init(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
     for (int c = 0; c < NUM_CHANNELS; c++) {
         pyramid_free(&p);
         if (!pyramid_build(a, b, c, opt->tile, &p, e))
             goto fail;
-        if (c == 0) /* skewness is judged where alpha would be divided by all regions */
-            j.z_guard = stats_normal_quantile(opt->alpha /
-                                              (2.0 * NUM_CHANNELS * (double)pyramid_regions(&p)));
+        if (c == 0)
+            set_guards(&j, pyramid_regions(&p));
         image[c] = p.level[p.num_levels - 1].cell[0];
-        scan(&j, &p, c, &worst, &num_tests, out);
+        scan(&j, &p, c, worst, out);
         if (c < CHANNEL_LUMINANCE)
             squared += luminance_weight[c] * squared_bias(&p);
     }
-    assert(num_tests < 1u << 31);
-    j.num_tests = num_tests;
-    out->num_tests = (int)num_tests;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        out->statistic[s].share = j.share[s];
+    for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
+        fill_statistic(&j, s, &worst[s], out);
     if (!fill_images(&j, &p, out, e) || !fill_tiles(&j, &p, out, &tiles, e))
         goto fail;
     mean = image[CHANNEL_LUMINANCE].b;
@@ -254,12 +302,14 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         out->global[c].mdb = region_testable(&j, &m) ? region_mdb(&j, &m, c) : region_mdb_none;
     }
     out->mdb_global = out->global[CHANNEL_LUMINANCE].mdb;
-    if (worst.log10_p > 0) {
+    const struct worst *w =
+        &worst[evidence(out, STATISTIC_PYRAMID) > evidence(out, STATISTIC_IMAGE)];
+    if (w->log10_p > 0) {
         out->worst = out->global[CHANNEL_LUMINANCE];
     } else {
-        struct measured m = region_measure(&j, &worst.cell, worst.rect);
-        out->worst = region_fill(&j, &worst.cell, worst.rect, worst.channel);
-        out->worst.mdb = region_mdb(&j, &m, worst.channel);
+        struct measured m = region_measure(&j, &w->cell, w->rect);
+        out->worst = region_fill(&j, &w->cell, w->rect, w->channel);
+        out->worst.mdb = region_mdb(&j, &m, w->channel);
     }
     verdict_decide(out, opt, tiles);
     free(tiles);

@@ -7,12 +7,34 @@
 #include "../renderer/moments.h"
 
 struct compare_options {
-    double alpha;         /* in (0, 0.5): bounds the chance of a wrong DIFFERENT and of a wrong
+    double alpha;           /* in (0, 0.5): bounds the chance of a wrong DIFFERENT and of a wrong
                              EQUIVALENT, each, over all regions and channels of this one claim */
-    double margin_global; /* relative, in [0, 1); 0: any difference counts (a regression test) */
-    double margin_tile;   /* at least margin_global; both are 0 or none is */
-    int tile;             /* side of a reporting tile, pixels; divides width and height */
+    double margin_global;   /* relative, in [0, 1); 0: any difference counts (a regression test) */
+    double margin_tile;     /* at least margin_global; both are 0 or none is */
+    int tile;               /* side of a reporting tile, pixels; divides width and height */
+    double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
+                               as different estimators differ rightly */
 };
+
+/* The claim's tests in groups, each with its own part of alpha. */
+enum {
+    STATISTIC_IMAGE,    /* the image's mean: R, G, B, luminance */
+    STATISTIC_PYRAMID,  /* every smaller region */
+    STATISTIC_DENSE,    /* many small differences together */
+    STATISTIC_DIRECTED, /* known kinds of error */
+    STATISTIC_NOISE,    /* the variance of one observation */
+    NUM_STATISTICS
+};
+
+/* DIFFERENT if any log10_p <= log10(alpha * share). */
+struct statistic {
+    double share;   /* of alpha; 0 where it does not apply. Its share then goes to the others, by
+                       options and kind of input only, never by the data */
+    int num_tests;  /* 0: nothing could be tested */
+    double log10_p; /* of its smallest p, times num_tests (Bonferroni), at most 0 */
+    char what[96];  /* which test that was: "shift by x", "16 x 16 pixels at 32,48 (red)" */
+};
+extern const char *const statistic_name[NUM_STATISTICS]; /* "image", "pyramid", .. */
 
 /* A square region (or the image) in one channel (0..2 RGB, 3 luminance .2126 .7152 .0722). Relative
  * quantities are in units of the larger of mean_b and 5 % of the mean luminance of the image B.
@@ -34,10 +56,11 @@ struct region {
 
 struct comparison {
     enum verdict verdict;
-    char reason[256];         /* one sentence: what decided */
-    int num_tests;            /* over which alpha is divided (Bonferroni) */
+    char reason[256]; /* one sentence: what decided */
+    int num_tests;    /* of all statistics together */
+    struct statistic statistic[NUM_STATISTICS];
     struct region global[4];  /* per channel and luminance */
-    struct region worst;      /* smallest p of the whole pyramid */
+    struct region worst;      /* of all regions, smallest p in units of the level it is held to */
     struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
     double mdb_global;        /* of luminance */
     double mdb_tile;          /* largest over the reporting tiles, luminance */

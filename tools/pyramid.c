@@ -36,7 +36,7 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
     return estimate(sum, deviation * deviation, root * root * root, n);
 }
 
-static void add_cell(struct cell *dst, const struct cell *src)
+void pyramid_add(struct cell *dst, const struct cell *src)
 {
     dst->a += src->a;
     dst->b += src->b;
@@ -47,22 +47,27 @@ static void add_cell(struct cell *dst, const struct cell *src)
     dst->var_k3 += src->var_k3;
 }
 
+struct cell pyramid_pixel(const struct moments *a, const struct moments *b, size_t pixel,
+                          int channel)
+{
+    struct estimate ea = pixel_estimate(a, pixel, channel), eb = pixel_estimate(b, pixel, channel);
+    return (struct cell){
+        .a = ea.mean,
+        .b = eb.mean,
+        .va = ea.v,
+        .vb = eb.v,
+        .k3 = ea.k3 - eb.k3,
+        .var_v = ea.var_v + eb.var_v,
+        .var_k3 = ea.var_k3 + eb.var_k3,
+    };
+}
+
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
                         struct pyramid_level *level)
 {
     size_t pixels = (size_t)level->nx * (size_t)level->ny;
-    for (size_t p = 0; p < pixels; p++) {
-        struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
-        level->cell[p] = (struct cell){
-            .a = ea.mean,
-            .b = eb.mean,
-            .va = ea.v,
-            .vb = eb.v,
-            .k3 = ea.k3 - eb.k3,
-            .var_v = ea.var_v + eb.var_v,
-            .var_k3 = ea.var_k3 + eb.var_k3,
-        };
-    }
+    for (size_t p = 0; p < pixels; p++)
+        level->cell[p] = pyramid_pixel(a, b, p, channel);
 }
 
 /* Every region of `dst` is the sum of the regions of `src` that lie in it; src's side divides
@@ -72,8 +77,8 @@ static void fill_from(const struct pyramid_level *src, struct pyramid_level *dst
     int factor = dst->side / src->side;
     for (int y = 0; y < src->ny; y++)
         for (int x = 0; x < src->nx; x++)
-            add_cell(&dst->cell[(size_t)(y / factor) * (size_t)dst->nx + (size_t)(x / factor)],
-                     &src->cell[(size_t)y * (size_t)src->nx + (size_t)x]);
+            pyramid_add(&dst->cell[(size_t)(y / factor) * (size_t)dst->nx + (size_t)(x / factor)],
+                        &src->cell[(size_t)y * (size_t)src->nx + (size_t)x]);
 }
 
 static void add_level(struct pyramid *p, int side)

@@ -34,6 +34,11 @@ struct cell {
     double var_k3; /* variance of k3 */
 };
 
+/* The cell of one pixel, and dst += src. */
+struct cell pyramid_pixel(const struct moments *a, const struct moments *b, size_t pixel,
+                          int channel);
+void pyramid_add(struct cell *dst, const struct cell *src);
+
 struct pyramid_level {
     int side, nx, ny;
     struct cell *cell; /* ny rows of nx */

@@ -3,6 +3,7 @@
 #include "stats.h"
 
 #include <math.h>
+#include <stdio.h>
 
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
 static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
@@ -11,12 +12,17 @@ static const double smallest_log10_p = -1e6;
 static const double largest_t = 1e9;
 const double region_mdb_none = 1e6;
 
+static bool is_image(const struct judge *j, struct rect r)
+{
+    return r.width == j->width && r.height == j->height;
+}
+
 /* margin_global for the image, margin_tile up to a tile, between them linear in the logarithm of
  * the side (of the square of the same area). */
 static double margin_of(const struct judge *j, struct rect r)
 {
     const struct compare_options *opt = &j->opt;
-    if (r.width == j->width && r.height == j->height)
+    if (is_image(j, r))
         return opt->margin_global;
     if (r.width <= opt->tile && r.height <= opt->tile)
         return opt->margin_tile;
@@ -29,6 +35,7 @@ static double margin_of(const struct judge *j, struct rect r)
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
 {
     struct measured m = {.d = cell->a - cell->b, .margin = margin_of(j, r)};
+    m.statistic = is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID;
     m.unit = fmax(cell->b, j->floor * r.width * r.height);
     m.tolerance = float_tolerance * fmax(cell->a, cell->b);
     m.v = cell->va + cell->vb;
@@ -49,7 +56,8 @@ static double skew_factor(const struct measured *m, double x)
 
 bool region_testable(const struct judge *j, const struct measured *m)
 {
-    return m->noise_free || skew_factor(m, stats_t_of_z(j->z_guard, m->dof)) <= skew_limit;
+    return m->noise_free ||
+           skew_factor(m, stats_t_of_z(j->z_guard[m->statistic], m->dof)) <= skew_limit;
 }
 
 double region_excess_t(const struct measured *m)
@@ -94,12 +102,13 @@ double region_t(const struct measured *m)
 
 double region_mdb(const struct judge *j, const struct measured *m, int channel)
 {
-    double tests = (double)j->num_tests, reach;
+    double tests = (double)j->num_tests[m->statistic], reach;
+    double level = j->opt.alpha * j->share[m->statistic] / tests;
     if (m->noise_free)
-        reach = j->event[channel] / j->n_min * log(tests / j->opt.alpha);
+        reach = j->event[channel] / j->n_min * -log(level);
     else
-        reach = sqrt(m->v_margin) * (stats_t_quantile(j->opt.alpha / (2 * tests), m->dof) +
-                                     stats_t_quantile(0.05, m->dof));
+        reach = sqrt(m->v_margin) *
+                (stats_t_quantile(level / 2, m->dof) + stats_t_quantile(0.05, m->dof));
     return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
 }
 
@@ -118,6 +127,16 @@ static bool half_width(const struct judge *j, const struct measured *m, double *
         factor = fmin(skew_limit_widened, skew_factor(m, *x));
     }
     return factor < skew_limit_widened;
+}
+
+void region_name(int width, int height, struct rect r, int channel, char *text, size_t size)
+{
+    static const char *const channel_name[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
+    if (r.width == width && r.height == height)
+        snprintf(text, size, "the image (%s)", channel_name[channel]);
+    else
+        snprintf(text, size, "%d x %d pixels at %d,%d (%s)", r.width, r.height, r.x, r.y,
+                 channel_name[channel]);
 }
 
 struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,

@@ -9,12 +9,18 @@
 struct judge {
     struct compare_options opt;
     int width, height;
-    double floor;               /* lower bound of the unit of relative quantities, radiance */
-    double event[NUM_CHANNELS]; /* brightness of the brightest kind of single observation seen */
-    double n_min;               /* fewest observations of any pixel; INFINITY if both are exact */
-    double z_guard;             /* normal critical value at which skewness is judged */
-    size_t num_tests;           /* set once known: for mdb */
+    double floor;                 /* lower bound of the unit of relative quantities, radiance */
+    double event[NUM_CHANNELS];   /* brightness of the brightest kind of single observation seen */
+    double n_min;                 /* fewest observations of any pixel; INFINITY if both are exact */
+    double share[NUM_STATISTICS]; /* of alpha */
+    /* Of the image and of all smaller regions: */
+    double z_guard[2];   /* normal critical value at which skewness is judged */
+    size_t num_tests[2]; /* set once known: for mdb */
 };
+
+/* compare_moments()'s hygiene, and all of j but z_guard and num_tests. For gate.c too. */
+bool judge_init(const struct moments *a, const struct moments *b, const struct compare_options *opt,
+                struct judge *j, struct err *e) __attribute__((warn_unused_result));
 
 /* A region's sums in the form the test needs. Sums over pixels, not means. */
 struct measured {
@@ -27,6 +33,7 @@ struct measured {
     double dof;
     double skew;     /* of d: |g| plus one standard error */
     bool noise_free; /* the standard error is within the tolerance */
+    int statistic;   /* STATISTIC_IMAGE or STATISTIC_PYRAMID */
 };
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
@@ -54,6 +61,9 @@ extern const double region_mdb_none;
 
 /* The end of the interval that is further from 0. */
 double region_reach(const struct region *r);
+
+/* "the image (red)" or "16 x 16 pixels at 32,48 (luminance)". */
+void region_name(int width, int height, struct rect r, int channel, char *text, size_t size);
 
 /* All of a struct region but mdb, which is 0. */
 struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,

@@ -9,7 +9,6 @@
 
 static const double regression_mdb = 0.05; /* margins 0: a pass must have been able to see this */
 static const double largest_factor = 1e4;  /* of extra_factor */
-static const char *const channel_name[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
 
 static bool inside_margin(const struct region *r)
 {
@@ -18,11 +17,8 @@ static bool inside_margin(const struct region *r)
 
 static void place(const struct comparison *c, const struct region *r, char *text, size_t size)
 {
-    if (r->width == c->z.width && r->height == c->z.height)
-        snprintf(text, size, "the image (%s)", channel_name[r->channel]);
-    else
-        snprintf(text, size, "%d x %d pixels at %d,%d (%s)", r->width, r->height, r->x, r->y,
-                 channel_name[r->channel]);
+    struct rect rect = {r->x, r->y, r->width, r->height};
+    region_name(c->z.width, c->z.height, rect, r->channel, text, size);
 }
 
 /* How many times the samples would bring this interval inside its margin: planned for equal engines
@@ -103,8 +99,13 @@ static void judge_regression(struct comparison *c)
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles)
 {
+    bool rejected = false;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        rejected =
+            rejected || (c->statistic[s].num_tests > 0 &&
+                         c->statistic[s].log10_p <= log10(opt->alpha * c->statistic[s].share));
     c->extra_factor = 1;
-    if (c->num_tests > 0 && c->worst.log10_p <= log10(opt->alpha / c->num_tests)) {
+    if (rejected) {
         char where[96];
         place(c, &c->worst, where, sizeof where);
         c->verdict = VERDICT_DIFFERENT;
