@@ -41,6 +41,8 @@ static bool look_at(const struct rates *r, const struct look *look, const char *
     for (int i = 0; i < r->c.num_views; i++) {
         const struct view *v = &r->c.view[i];
         struct diagnose_job job = {.program = look->program,
+                                   .options = v->options[0] != NULL ? v->options : NULL,
+                                   .columns = v->correct.columns,
                                    .width = v->width * look->scale_percent / 100,
                                    .height = v->height * look->scale_percent / 100,
                                    .spp = v->fixed_spp ? v->spp : v->spp * look->spp_percent / 100,
@@ -54,8 +56,7 @@ static bool look_at(const struct rates *r, const struct look *look, const char *
             !diagnose_render(&job, alpha / (2 * r->c.num_views), &clue[i].seen,
                              &clue[i].is_consistent, e))
             return false;
-        if (v->renders >= 4)
-            sight_set_spread(&clue[i].seen, &v->correct);
+        sight_set_spread(&clue[i].seen, &v->correct);
     }
     return true;
 }
@@ -267,11 +268,11 @@ static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_
         while (taken[i]);
         taken[i] = true;
         chosen[k] = p->single[i];
-        if (!sight_of(&chosen[k], v->spp, &s[k], e))
+        if (!sight_of(&chosen[k], v->correct.columns, v->spp, &s[k], e))
             return false;
     }
-    if (!consistency_judge(chosen, v->renders, 0.3, DIAGNOSE_CONSISTENCY_ALPHA, &c, e) ||
-        !consistency_judge(chosen, v->renders, 0.3, alpha / (2 * r->c.num_views), &gate, e))
+    if (!consistency_judge(chosen, v->renders, 0.02, DIAGNOSE_CONSISTENCY_ALPHA, &c, e) ||
+        !consistency_judge(chosen, v->renders, 0.02, alpha / (2 * r->c.num_views), &gate, e))
         return false;
     *out = (struct clue){.view = v,
                          .seen = sight_average(s, v->renders),

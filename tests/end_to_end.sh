@@ -440,10 +440,10 @@ plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" && $plane -r 40 40 -f "$tmp/odd.exr"
 expect "diagnose: one picture, larger than the catalogue's" 0 "nothing wrong found" \
     "$san_assay" diagnose --scene 12_point_plane "$tmp/plane.exr"
-expect "diagnose: a size that is no multiple" 3 "40 x 40 pixels: the longer side has to be" \
+expect "diagnose: a size that is no multiple" 3 "40 x 40 pixels: the width has to be" \
     "$san_assay" diagnose --scene 12_point_plane "$tmp/odd.exr"
 expect "diagnose: another shape" 3 "width by height is not" \
-    "$san_assay" diagnose --scene 38_spot_edge "$tmp/plane.exr"
+    "$san_assay" diagnose --scene 39_three_lamps-four_light_samples "$tmp/plane.exr"
 expect "diagnose: unknown view" 3 "has no '99_none'" "$san_assay" diagnose --scene 99_none "$tmp/plane.exr"
 expect "diagnose: no picture" 3 "needs the picture" "$san_assay" diagnose --scene 12_point_plane
 expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --without x

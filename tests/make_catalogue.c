@@ -27,29 +27,29 @@ enum { BATCHES = 2, LONG = 4, LONG_FACTOR = 8, SEED = 20260, LONG_SEED = 30260 }
 /* The fewest and cheapest looks that tell the bugs apart; spp and renders are those of a diagnosis, which
  * takes as long as this list. */
 static const struct {
-    const char *scene, *variant;
-    int width, height, spp, renders;
+    const char *scene, *variant, *options, *name; /* name: what is added to the scene's */
+    int width, height, columns, spp, renders;
     bool fixed_spp;
 } views[] = {
-    {"11_furnace", "pathtracer-adaptive", 32, 32, 256, 1, true},
-    {"11_furnace", "pathtracer-roulette", 32, 32, 128, 1, false},
-    {"12_point_plane", "", 32, 32, 32, 6, false},
-    {"13_square_patch", "pathtracer-hemisphere", 32, 32, 128, 1, false},
-    {"13_square_patch", "pathtracer-four_light_samples", 32, 32, 64, 1, false},
-    {"17_lens_step", "", 32, 32, 128, 1, false},
-    {"22_glass_sphere", "", 32, 32, 128, 1, false},
-    {"24_beckmann", "", 32, 32, 64, 1, false},
-    {"25_ggx_metal", "", 32, 32, 64, 1, false},
-    {"27_smooth_normals", "", 32, 32, 64, 1, false},
-    {"31_spot_plane", "", 32, 32, 32, 1, false},
-    {"32_sun_plane", "", 32, 32, 32, 1, false},
-    {"36_mesh_lamp", "", 32, 32, 64, 1, false},
-    {"38_spot_edge", "", 64, 32, 32, 1, false},
-    {"41_cornell", "", 32, 32, 64, 1, false},
-    {"42_cornell_glass", "", 32, 32, 64, 1, false},
-    {"44_mesh", "", 32, 32, 64, 1, false},
-    {"45_many_lights", "", 32, 32, 64, 1, false},
-    {"46_sky", "", 32, 32, 64, 1, false},
+    {"12_point_plane", "", "", "", 64, 64, 16, 6, 12, false},
+    {"15_square_overhead", "pathtracer-hemisphere", "", "-hemisphere", 32, 32, 16, 64, 1, false},
+    {"16_snell_window", "", "", "", 32, 32, 16, 48, 1, false},
+    {"17_lens_step", "", "", "", 32, 32, 16, 64, 1, false},
+    {"22_glass_sphere", "", "", "", 32, 32, 16, 64, 1, false},
+    {"24_beckmann", "", "", "", 32, 32, 16, 48, 1, false},
+    {"25_ggx_metal", "", "", "", 32, 32, 16, 48, 1, false},
+    {"27_smooth_normals", "", "", "", 32, 32, 16, 48, 1, false},
+    {"32_sun_plane", "", "", "", 32, 32, 16, 24, 1, false},
+    {"33_sphere_light", "", "-a 32 0.05", "-adaptive", 32, 32, 16, 192, 1, true},
+    {"36_mesh_lamp", "", "", "", 32, 32, 16, 48, 1, false},
+    {"38_spot_edge", "", "", "", 32, 32, 16, 24, 1, false},
+    {"39_three_lamps", "pathtracer-four_light_samples", "", "-four_light_samples", 48, 32, 12, 48,
+     1, false},
+    {"41_cornell", "", "--roulette 0.7", "-roulette", 32, 32, 16, 48, 1, false},
+    {"41_cornell", "", "-b 0.15 -d 3", "-lens", 32, 32, 16, 48, 1, false},
+    {"44_mesh", "", "", "", 32, 32, 16, 32, 1, false},
+    {"45_many_lights", "", "", "", 32, 32, 16, 48, 1, false},
+    {"46_sky", "", "", "", 32, 32, 16, 48, 1, false},
 };
 enum { NUM_VIEWS = sizeof views / sizeof views[0] };
 
@@ -104,8 +104,14 @@ static bool set_view(struct maker *m, int i, struct view *v, struct err *e)
                        .seed = SEED};
     snprintf(v->scene, sizeof v->scene, "%s", views[i].scene);
     snprintf(v->variant, sizeof v->variant, "%s", views[i].variant);
-    snprintf(v->name, sizeof v->name, "%s%s", v->scene,
-             v->variant[0] != '\0' ? v->variant + strlen("pathtracer") : "");
+    snprintf(v->name, sizeof v->name, "%s%s", v->scene, views[i].name);
+    const char *rest = views[i].options;
+    for (int k = 0; *rest != '\0'; k++) {
+        snprintf(v->option[k], sizeof v->option[k], "%.*s", (int)strcspn(rest, " "), rest);
+        v->options[k] = v->option[k];
+        rest += strcspn(rest, " ");
+        rest += strspn(rest, " ");
+    }
     const struct suite_scene *s = suite_find(&m->suite, v->scene);
     if (s == NULL)
         return err_set(e, "no scene %s", v->scene);
@@ -117,8 +123,9 @@ static bool set_view(struct maker *m, int i, struct view *v, struct err *e)
 static bool is_same_view(const struct view *a, const struct view *b)
 {
     return strcmp(a->scene_sha256, b->scene_sha256) == 0 && strcmp(a->variant, b->variant) == 0 &&
-           a->width == b->width && a->height == b->height && a->spp == b->spp &&
-           a->renders == b->renders && a->seed == b->seed;
+           memcmp(a->option, b->option, sizeof a->option) == 0 && a->width == b->width &&
+           a->height == b->height && a->spp == b->spp && a->renders == b->renders &&
+           a->seed == b->seed;
 }
 
 static bool render(const struct base *base, const char *program, int batch, struct sight *out,
@@ -177,9 +184,10 @@ static bool make_correct(const struct maker *m, struct base *base, struct view *
     mean.fact[FACT_SAMPLES] = v->correct.fact[FACT_SAMPLES];
     mean.fact_sd[FACT_SAMPLES] = v->correct.fact_sd[FACT_SAMPLES];
     /* The facts have the values that a correct renderer should have, not those of these few pictures. */
+    mean.fact[FACT_SPREAD] = mean.fact_sd[FACT_SPREAD] = 0;
     if (v->renders >= 4) {
-        mean.fact[FACT_PIXELS] = mean.fact[FACT_IMAGE] = mean.fact[FACT_SPREAD] = 0;
-        mean.fact_sd[FACT_PIXELS] = mean.fact_sd[FACT_IMAGE] = mean.fact_sd[FACT_SPREAD] = 0;
+        mean.fact[FACT_PIXELS] = mean.fact[FACT_IMAGE] = 0;
+        mean.fact_sd[FACT_PIXELS] = mean.fact_sd[FACT_IMAGE] = 0;
     }
     v->correct = mean;
     return true;
@@ -216,9 +224,7 @@ static void set_effect(const struct base *base, const struct sight *bug, const s
         memset(out->mean, 0, sizeof out->mean);
         memset(out->var, 0, sizeof out->var);
     }
-    a.fact[FACT_SPREAD] = NAN;
-    if (v->renders >= 4)
-        sight_set_spread(&a, &c);
+    sight_set_spread(&a, &c);
     for (int f = 0; f < NUM_FACTS; f++) {
         out->fact[f] = a.fact[f];
         out->fact_sd[f] = a.fact_sd[f];
@@ -343,7 +349,9 @@ static bool make_view(struct maker *m, int i, struct err *e)
     if (ok) {
         m->made.num_views++;
         take_over(m, v, missing);
-        base->job = (struct diagnose_job){.width = v->width,
+        base->job = (struct diagnose_job){.options = v->options[0] != NULL ? v->options : NULL,
+                                          .columns = views[i].columns,
+                                          .width = v->width,
                                           .height = v->height,
                                           .spp = v->spp,
                                           .renders = v->renders,

@@ -154,7 +154,7 @@ static void test_a_sight_pools_pixels(void **state)
     uint64_t seed = 4;
     struct moments m = new_moments(48, 24, "sample");
     simulate(&m, LAW_EXPONENTIAL, 2, 9, false, &seed);
-    assert_true(sight_of(&m, 18, &s, &e));
+    assert_true(sight_of(&m, 16, 18, &s, &e));
     assert_int_equal(s.columns, 16);
     assert_int_equal(s.rows, 8);
     for (int cell = 0; cell < 128; cell += 37) {
@@ -172,11 +172,11 @@ static void test_a_sight_pools_pixels(void **state)
     assert_true(fabs(s.fact[FACT_SAMPLES] - log(0.5)) < 1e-12);
     moments_free(&m);
     m = new_moments(30, 30, "sample");
-    assert_false(sight_of(&m, 0, &s, &e));
+    assert_false(sight_of(&m, 16, 0, &s, &e));
     assert_non_null(strstr(e.msg, "30 x 30"));
     moments_free(&m);
     m = new_moments(32, 32, "stratified");
-    assert_false(sight_of(&m, 0, &s, &e));
+    assert_false(sight_of(&m, 16, 0, &s, &e));
     assert_non_null(strstr(e.msg, "does not state its error"));
     moments_free(&m);
 }
@@ -191,7 +191,7 @@ static void test_an_average_of_sights(void **state)
     for (int k = 0; k < 2; k++) {
         struct moments m = new_moments(16, 16, "sample");
         simulate(&m, LAW_NORMAL, 1, 50, true, &seed);
-        assert_true(sight_of(&m, 50, &s[k], &e));
+        assert_true(sight_of(&m, 16, 50, &s[k], &e));
         moments_free(&m);
     }
     struct sight a = sight_average(s, 2);

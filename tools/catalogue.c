@@ -199,6 +199,14 @@ static bool write_picture(const char *path, const struct view *v, int num_bugs, 
     return ok;
 }
 
+static json_t *options_json(const struct view *v)
+{
+    json_t *list = json_array();
+    for (int i = 0; v->option[i][0] != '\0'; i++)
+        json_array_append_new(list, json_string(v->option[i]));
+    return list;
+}
+
 static json_t *view_json(const struct view *v, const struct catalogue *c, const char *picture,
                          const char *sha256)
 {
@@ -208,11 +216,11 @@ static json_t *view_json(const struct view *v, const struct catalogue *c, const 
             json_object_set_new(bugs, c->bug[b].name,
                                 json_pack("{sb,so}", "pixels", v->effect[b]->pixels, "facts",
                                           facts_json(v->effect[b]->fact, v->effect[b]->fact_sd)));
-    return json_pack("{ss,ss,ss,ss,si,si,si,si,sb,sI,ss,ss,sf,so,so}", "name", v->name, "scene",
-                     v->scene, "variant", v->variant, "scene_sha256", v->scene_sha256, "width",
-                     v->width, "height", v->height, "spp", v->spp, "renders", v->renders,
-                     "fixed_spp", v->fixed_spp, "seed", (json_int_t)v->seed, "picture", picture,
-                     "picture_sha256", sha256, "n", v->correct.n, "correct",
+    return json_pack("{ss,ss,ss,so,ss,si,si,si,si,sb,sI,ss,ss,sf,so,so}", "name", v->name, "scene",
+                     v->scene, "variant", v->variant, "options", options_json(v), "scene_sha256",
+                     v->scene_sha256, "width", v->width, "height", v->height, "spp", v->spp,
+                     "renders", v->renders, "fixed_spp", v->fixed_spp, "seed", (json_int_t)v->seed,
+                     "picture", picture, "picture_sha256", sha256, "n", v->correct.n, "correct",
                      facts_json(v->correct.fact, v->correct.fact_sd), "bugs", bugs);
 }
 
@@ -344,6 +352,21 @@ static bool get_picture(const char *dir, struct view *v, const struct catalogue 
     return ok;
 }
 
+static bool get_options(struct view *v, const json_t *list)
+{
+    enum { MOST = sizeof v->option / sizeof v->option[0] - 1 };
+    if (!json_is_array(list) || json_array_size(list) > MOST)
+        return false;
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const char *text = json_string_value(json_array_get(list, i));
+        if (text == NULL ||
+            snprintf(v->option[i], sizeof v->option[i], "%s", text) >= (int)sizeof v->option[i])
+            return false;
+        v->options[i] = v->option[i];
+    }
+    return true;
+}
+
 static bool get_view(const char *dir, struct view *v, const struct catalogue *c, const json_t *json,
                      struct err *e)
 {
@@ -353,6 +376,7 @@ static bool get_view(const char *dir, struct view *v, const struct catalogue *c,
               copy_text(v->scene, sizeof v->scene, json, "scene") &&
               copy_text(v->variant, sizeof v->variant, json, "variant") &&
               copy_text(v->scene_sha256, sizeof v->scene_sha256, json, "scene_sha256") &&
+              get_options(v, json_object_get(json, "options")) &&
               json_unpack((json_t *)json, "{si,si,si,si,sb,sI,sF}", "width", &v->width, "height",
                           &v->height, "spp", &v->spp, "renders", &v->renders, "fixed_spp", &fixed,
                           "seed", &seed, "n", &v->correct.n) == 0 &&

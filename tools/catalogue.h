@@ -4,6 +4,7 @@
  *     { "side": 16,                                   cells across (sight.h)
  *       "bugs": { "NAME": {"bug": "one line", "where": "part, function", "patch_sha256": hex} },
  *       "views": [ { "name": "13_square_patch-hemisphere", "scene": , "variant": , "scene_sha256": ,
+ *                    "options": ["-a", "32", "0.05"],
  *                    "width": , "height": , "spp": , "renders": , "fixed_spp": , "seed": ,
  *                    "picture": "NAME.exr", "picture_sha256": , "n": ,
  *                    "correct": [[value, sd] or null for each fact],
@@ -38,6 +39,8 @@ struct effect {
 struct view {
     char name[128];              /* "13_square_patch-hemisphere" */
     char scene[64], variant[64]; /* variant: "" or "pathtracer-hemisphere" */
+    char option[5][16];          /* with these options besides; none: what the suite renders */
+    const char *options[6];      /* the same, NULL at the end */
     char scene_sha256[65];
     int width,
         height;     /* of the renders that it was made of; their ratio is that of every picture */

@@ -12,8 +12,7 @@ enum { MAX_PATH = 8192 };
 /* What only a comparison with the correct renderer's noise tells. */
 static void finish(struct clue *clue)
 {
-    if (clue->view->renders >= 4)
-        sight_set_spread(&clue->seen, &clue->view->correct);
+    sight_set_spread(&clue->seen, &clue->view->correct);
 }
 
 bool gather_program(const struct gather_options *opt, const char *program, struct clue *clue,
@@ -24,6 +23,8 @@ bool gather_program(const struct gather_options *opt, const char *program, struc
         const struct view *v = &c->view[i];
         /* A seed of its own for each view: the same one would make their noise alike. */
         struct diagnose_job job = {.program = program,
+                                   .options = v->options[0] != NULL ? v->options : NULL,
+                                   .columns = v->correct.columns,
                                    .width = v->width,
                                    .height = v->height,
                                    .spp = v->spp,
@@ -51,9 +52,10 @@ static bool read_picture(const struct view *v, const char *path, int asked, stru
     *clue = (struct clue){.view = v, .is_consistent = true};
     if (!moments_read(path, &m, NULL, e))
         return false;
-    bool ok = sight_of(&m, v->fixed_spp ? asked : 0, &clue->seen, e) || err_prefix(e, "%s", path);
+    bool ok = sight_of(&m, v->correct.columns, v->fixed_spp ? asked : 0, &clue->seen, e) ||
+              err_prefix(e, "%s", path);
     moments_free(&m);
-    if (ok && clue->seen.columns * v->correct.rows != clue->seen.rows * v->correct.columns)
+    if (ok && clue->seen.rows != v->correct.rows)
         ok = err_set(e, "%s: width by height is not %d by %d", path, v->width, v->height);
     if (ok)
         finish(clue);
@@ -81,7 +83,8 @@ static bool find_picture(const json_t *results, const char *json_path, const str
     json_array_foreach(json_object_get(results, "claims"), i, claim)
     {
         const char *file = member_text(json_object_get(claim, "files"), "a");
-        if (file == NULL || strcmp(member_text(claim, "scene"), v->scene) != 0 ||
+        if (file == NULL || v->options[0] != NULL ||
+            strcmp(member_text(claim, "scene"), v->scene) != 0 ||
             strcmp(member_text(claim, "a"), engine) != 0)
             continue;
         const char *slash = strrchr(json_path, '/');

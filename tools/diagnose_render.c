@@ -11,7 +11,7 @@
 enum { MAX_PATH = 4400, FEWEST_CONSISTENT = 4 };
 
 /* How far R may lie from 1: ours is independent, so all that counts is alpha. */
-static const double consistency_margin = 0.3;
+static const double consistency_margin = 0.02;
 
 static bool render_one(const struct diagnose_job *job, int k, struct moments *out, struct err *e)
 {
@@ -25,7 +25,9 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
                                   .scene = &scene,
                                   .spp = job->spp,
                                   .seed = replicate_seed((uint32_t)job->seed, k),
-                                  .options = job->variant != NULL ? job->variant->options : NULL,
+                                  .options = job->options != NULL   ? job->options
+                                             : job->variant != NULL ? job->variant->options
+                                                                    : NULL,
                                   .threads = job->threads,
                                   .timeout_s = job->timeout_s,
                                   .picture = picture,
@@ -69,7 +71,8 @@ bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight 
     bool ok = (m != NULL && s != NULL) || err_set(e, "out of memory"), judged = true;
     int done = 0;
     for (; ok && done < job->renders; done += ok)
-        ok = render_one(job, done, &m[done], e) && sight_of(&m[done], job->spp, &s[done], e);
+        ok = render_one(job, done, &m[done], e) &&
+             sight_of(&m[done], job->columns, job->spp, &s[done], e);
     if (ok)
         *out = sight_average(s, job->renders);
     if (ok && job->renders >= FEWEST_CONSISTENT && has_noise(out))

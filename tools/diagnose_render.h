@@ -8,6 +8,8 @@ struct diagnose_job {
     const char *program;
     const struct suite_scene *scene;
     const struct suite_variant *variant; /* NULL: none */
+    const char *const *options;          /* instead of the variant's, NULL at the end; NULL: none */
+    int columns;                         /* of cells (sight.h) */
     int width, height, spp;
     int renders;   /* averaged; with 4 or more FACT_PIXELS and FACT_IMAGE are set */
     uint64_t seed; /* of the first; the others follow from it */

@@ -6,15 +6,21 @@
 #include <math.h>
 #include <string.h>
 
-static bool check(const struct moments *m, struct err *e)
+static bool check(const struct moments *m, int columns, struct err *e)
 {
-    int longer = m->width > m->height ? m->width : m->height, cell = longer / SIGHT_SIDE;
-    if (longer % SIGHT_SIDE != 0 || m->width % cell != 0 || m->height % cell != 0)
+    int cell = m->width / columns;
+    if (m->width % columns != 0 || m->height % cell != 0 || m->height / cell > SIGHT_SIDE)
         return err_set(
             e,
             "%d x %d pixels: the longer side has to be a multiple of %d, and the other of "
             "a %dth of it",
             m->width, m->height, SIGHT_SIDE, SIGHT_SIDE);
+    if (strcmp(m->unit, "sample") != 0 && strcmp(m->unit, "replicate") != 0)
+        return err_set(
+            e,
+            "%d x %d pixels: the width has to be a multiple of %d, and the height of the "
+            "%dth of the width",
+            m->width, m->height, columns, columns);
     if (strcmp(m->unit, "sample") != 0 && strcmp(m->unit, "replicate") != 0)
         return err_set(e, "a picture of unit '%s' does not state its error", m->unit);
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -56,13 +62,13 @@ static void set_samples(const struct moments *m, double asked, struct sight *s)
     }
 }
 
-bool sight_of(const struct moments *m, double asked, struct sight *out, struct err *e)
+bool sight_of(const struct moments *m, int columns, double asked, struct sight *out, struct err *e)
 {
-    if (!check(m, e))
+    if (!check(m, columns, e))
         return false;
     *out = (struct sight){0};
-    out->cell = (m->width > m->height ? m->width : m->height) / SIGHT_SIDE;
-    out->columns = m->width / out->cell;
+    out->columns = columns;
+    out->cell = m->width / columns;
     out->rows = m->height / out->cell;
     for (int y = 0; y < m->height; y++)
         for (int x = 0; x < m->width; x++)

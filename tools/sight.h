@@ -1,9 +1,9 @@
 /* What a diagnosis sees of a scene's picture: means over a coarse grid of cells, how sure they are, and
  * a few facts about the noise.
  *
- * A cell is a square of pixels; the longer way across a picture is always SIGHT_SIDE cells, so pictures of
- * any size whose sides are whole numbers of cells can be held against each other, as long as they show the
- * same field of view. Cells are numbered row by row from the top left; each has three channels, RGB. */
+ * A cell is a square of pixels; across a picture there are at most SIGHT_SIDE cells, a number that is fixed for
+ * each scene, so pictures of any size whose sides are whole numbers of cells can be held against each other,
+ * as long as they show the same field of view. Cells are numbered row by row from the top left; each has three channels, RGB. */
 #ifndef ASSAY_SIGHT_H
 #define ASSAY_SIGHT_H
 
@@ -32,10 +32,10 @@ struct sight {
     double fact_sd[NUM_FACTS];
 };
 
-/* asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
+/* columns: cells across, at most SIGHT_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
  * cells, on pixels with fewer than 3 observations, and on moments that do not state an error ("stratified",
  * "exact"). FACT_SAMPLES is known if `asked` is. */
-bool sight_of(const struct moments *m, double asked, struct sight *out, struct err *e)
+bool sight_of(const struct moments *m, int columns, double asked, struct sight *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The average of num >= 1 independent sights of one shape, as of one longer render; FACT_SAMPLES is

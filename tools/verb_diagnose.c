@@ -98,11 +98,11 @@ static void print_help(const struct catalogue *c)
          "Names the known bug that explains how pictures differ from the correct ones.\n");
     cli_print_options(stdout, options);
     puts(
-        "\nviews, and the size of their renders; any picture of the same shape will do whose longer\n"
-        "side is a multiple of 16 pixels:");
+        "\nviews, the size of their renders, and what the width of any other picture of the same shape "
+        "has\nto be a multiple of:");
     for (int i = 0; i < c->num_views; i++)
-        printf("  %-36s %d x %d, %d spp\n", c->view[i].name, c->view[i].width, c->view[i].height,
-               c->view[i].spp);
+        printf("  %-36s %d x %d, %d spp, %d\n", c->view[i].name, c->view[i].width,
+               c->view[i].height, c->view[i].spp, c->view[i].correct.columns);
     puts(
         "\nExit code: 0 nothing wrong found, 1 a bug named or wrong in an unknown way, 3 could not\n"
         "judge.");
