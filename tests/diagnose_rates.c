@@ -1,11 +1,12 @@
-/* diagnose_rates BUILD: how often `assay diagnose` is right, as a Markdown page on standard output (make
+/* diagnose_rates BUILD [PART]: how often `assay diagnose` is right, as a Markdown page on standard output (make
  * diagnose-rates). Renders of all bugs and of the correct renderer at sizes, numbers of samples and seeds that the
  * catalogue was not made with; the correct renderer also in TRIES synthetic looks.
  *
  * A synthetic look: each cell of each view is that of a real correct render drawn from POOL, moved so that the pool's
  * mean is the catalogue's mean plus a normal error of the catalogue's own variance, and scaled by
  * sqrt(POOL/(POOL - 1)), which the pool's own mean takes from its scatter. Where a view asks for consistency, its
- * renders are drawn from POOL real ones without replacement, and judged. */
+ * renders are drawn from POOL real ones without replacement, and judged; each such draw serves for
+ * TRIES / CONSISTENT_DRAWS tries. PART (large, small, correct) measures only that. */
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "../tools/diagnose.h"
@@ -18,8 +19,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-enum { POOL = 200, TRIES = 10000, LEADS = 500, MOST_VIEWS = 64, MOST_THREADS = 64 };
+enum {
+    POOL = 200,
+    TRIES = 10000,
+    LEADS = 500,
+    CONSISTENT_DRAWS = 1000,
+    MOST_VIEWS = 64,
+    MOST_THREADS = 64
+};
 static const double alpha = 1e-6;
 
 struct rates {
@@ -107,7 +116,8 @@ static bool look_at_all(const struct rates *r, struct task *task, int num, struc
     pthread_mutex_init(&crew.lock, NULL);
     for (int i = 0; i < threads; i++, started++) {
         worker[i].crew = &crew;
-        snprintf(worker[i].work, sizeof worker[i].work, "%s/diagnose_rates/%d", r->build, i);
+        snprintf(worker[i].work, sizeof worker[i].work, "%s/diagnose_rates/%d.%d", r->build,
+                 (int)getpid(), i);
         if (!make_dirs(worker[i].work, e) ||
             pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
             break;
@@ -259,7 +269,7 @@ static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_
     const struct view *v = &r->c.view[p->consistent_view];
     struct moments chosen[MOST_RENDERS];
     struct sight s[MOST_RENDERS];
-    struct consistency c, gate;
+    struct consistency c;
     bool taken[POOL] = {false};
     for (int k = 0; k < v->renders; k++) {
         int i;
@@ -271,14 +281,14 @@ static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_
         if (!sight_of(&chosen[k], v->correct.columns, v->spp, &s[k], e))
             return false;
     }
-    if (!consistency_judge(chosen, v->renders, 0.02, DIAGNOSE_CONSISTENCY_ALPHA, &c, e) ||
-        !consistency_judge(chosen, v->renders, 0.02, alpha / (2 * r->c.num_views), &gate, e))
+    double share = alpha / (2 * r->c.num_views);
+    if (!consistency_judge(chosen, v->renders, 0.02, share, &c, e))
         return false;
     *out = (struct clue){.view = v,
                          .seen = sight_average(s, v->renders),
-                         .is_consistent = gate.verdict != VERDICT_DIFFERENT};
+                         .is_consistent = c.verdict != VERDICT_DIFFERENT};
     sight_set_consistency(&out->seen, c.pixels, c.pixels_lo, c.pixels_hi, c.image, v->renders,
-                          DIAGNOSE_CONSISTENCY_ALPHA);
+                          share);
     sight_set_spread(&out->seen, &v->correct);
     return true;
 }
@@ -310,8 +320,8 @@ static bool render_singles(const struct rates *r, struct pool *p, const char *pr
     char picture[4400], log[4400];
     const struct suite_scene *found;
     const struct suite_variant *variant;
-    snprintf(picture, sizeof picture, "%s/diagnose_rates/single.exr", r->build);
-    snprintf(log, sizeof log, "%s/diagnose_rates/single.log", r->build);
+    snprintf(picture, sizeof picture, "%s/diagnose_rates/%d.0/single.exr", r->build, (int)getpid());
+    snprintf(log, sizeof log, "%s/diagnose_rates/%d.0/single.log", r->build, (int)getpid());
     if (!view_scene(v, &r->suite, &found, &variant, e))
         return false;
     struct suite_scene scene = *found;
@@ -349,10 +359,10 @@ static bool rate_synthetic(const struct rates *r, struct pool *p, struct err *e)
     for (int t = 0; ok && t < TRIES; t++) {
         struct diagnosis d;
         for (int v = 0; ok && v < r->c.num_views; v++)
-            if (v == p->consistent_view)
-                ok = draw_consistent(r, p, &state, &clue[v], e);
-            else
+            if (v != p->consistent_view)
                 draw_cells(r, p, v, &state, &clue[v]);
+            else if (t % (TRIES / CONSISTENT_DRAWS) == 0)
+                ok = draw_consistent(r, p, &state, &clue[v], e);
         ok = ok && diagnose(&r->c, clue, r->c.num_views, &opt, &d, e);
         if (!ok)
             break;
@@ -417,8 +427,9 @@ int main(int argc, char **argv)
 {
     struct err e = {""};
     struct rates r = {0};
-    if (argc != 2) {
-        fprintf(stderr, "usage: diagnose_rates BUILD\n");
+    const char *part = argc == 3 ? argv[2] : "";
+    if (argc != 2 && argc != 3) {
+        fprintf(stderr, "usage: diagnose_rates BUILD [large|small|correct]\n");
         return 3;
     }
     r.build = argv[1];
@@ -430,8 +441,12 @@ int main(int argc, char **argv)
             "# How often a bug is named rightly\n\nWritten by `make diagnose-rates` (`tests/diagnose_rates.c`); "
             "%d bugs, %d views. How: \"How a bug is named\" in tools/README.md.\n",
             r.c.num_bugs, r.c.num_views);
-    ok = ok && rate_bugs(&r, 150, 75, 71, &e) && rate_bugs(&r, 50, 400, 72, &e) &&
-         rate_correct(&r, &e);
+    if (ok && (*part == '\0' || strcmp(part, "large") == 0))
+        ok = rate_bugs(&r, 150, 75, 71, &e);
+    if (ok && (*part == '\0' || strcmp(part, "small") == 0))
+        ok = rate_bugs(&r, 50, 200, 72, &e);
+    if (ok && (*part == '\0' || strcmp(part, "correct") == 0))
+        ok = rate_correct(&r, &e);
     if (!ok)
         fprintf(stderr, "diagnose_rates: %s\n", e.msg);
     catalogue_free(&r.c);

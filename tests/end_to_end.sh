@@ -436,6 +436,10 @@ for bug in point_light_linear seed_ignored variance_halved; do
 done
 expect "diagnose: left out of the catalogue" 1 "none of the" "$assay" diagnose --seed 6 \
     --pathtracer "$build/mutants/point_light_linear/pathtracer" --without point_light_linear
+expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only 12_point_plane \
+    --pathtracer "$build/mutants/point_light_linear/pathtracer" --out "$tmp/wrong"
+expect "diagnose: the pictures of a validation" 1 "tests/mutants/point_light_linear.patch" \
+    "$assay" diagnose "$tmp/wrong/results.json"
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" && $plane -r 40 40 -f "$tmp/odd.exr"
 expect "diagnose: one picture, larger than the catalogue's" 0 "nothing wrong found" \

@@ -134,7 +134,7 @@ static bool render(const struct base *base, const char *program, int batch, stru
     struct diagnose_job job = base->job;
     job.program = program;
     job.seed += (uint64_t)batch;
-    return diagnose_render(&job, 0.5 * DIAGNOSE_CONSISTENCY_ALPHA, out, NULL, e);
+    return diagnose_render(&job, 1e-3, out, NULL, e);
 }
 
 static bool same_values(const struct sight *a, const struct sight *b)
@@ -143,12 +143,27 @@ static bool same_values(const struct sight *a, const struct sight *b)
            memcmp(a->var, b->var, sizeof a->var) == 0 && a->n == b->n;
 }
 
+/* `times` pictures of as many samples as a batch, with this average. */
+static int repeat(const struct sight *s, int times, struct sight *all)
+{
+    for (int i = 0; i < times; i++) {
+        all[i] = *s;
+        all[i].n /= times;
+        for (int j = 0; j < SIGHT_VALUES; j++) {
+            all[i].var[j] *= times;
+            all[i].k3[j] *= times * times;
+        }
+    }
+    return times;
+}
+
+/* A mean that depends on the number of samples asked for needs more renders instead of longer ones. */
 static bool make_correct(const struct maker *m, struct base *base, struct view *v, struct err *e)
 {
-    struct sight all[BATCHES + LONG_FACTOR * LONG];
+    struct sight all[BATCHES + LONG_FACTOR * LONG], s;
     char program[4400];
     snprintf(program, sizeof program, "%s/pathtracer", m->build);
-    int num = BATCHES;
+    int num = BATCHES, times = v->fixed_spp ? 1 : LONG_FACTOR;
     for (int k = 0; k < BATCHES; k++) {
         if (!render(base, program, k, &base->batch[k], e))
             return false;
@@ -156,40 +171,22 @@ static bool make_correct(const struct maker *m, struct base *base, struct view *
     }
     struct diagnose_job job = base->job;
     job.program = program;
-    job.spp *= v->fixed_spp ? 1 : LONG_FACTOR;
-    job.renders = v->fixed_spp ? LONG_FACTOR : 1;
-    struct sight s;
-    v->correct = sight_average(all, BATCHES);
-    for (int k = 0; k < LONG; k++) {
-        job.seed = LONG_SEED + (uint64_t)k;
+    job.spp *= times * job.renders;
+    job.renders = 1;
+    for (int k = 0; k < LONG * LONG_FACTOR / times; k++) {
+        job.seed = base->job.seed + LONG_SEED + (uint64_t)k;
         if (!diagnose_render(&job, 1e-3, &s, NULL, e))
             return false;
-        /* An average counts pictures alike: one with more samples counts as so many. */
-        int times = job.renders * job.spp / (base->job.renders * base->job.spp);
-        for (int i = 0; i < times; i++) {
-            all[num] = s;
-            all[num].n /= times;
-            for (int j = 0; j < SIGHT_VALUES; j++) {
-                all[num].var[j] *= times;
-                all[num].k3[j] *= times * times;
-            }
-            num++;
-        }
+        num += repeat(&s, times, &all[num]);
     }
-    struct sight mean = sight_average(all, num);
-    for (int f = FACT_PIXELS; f < NUM_FACTS; f++) {
-        mean.fact[f] = v->correct.fact[f];
-        mean.fact_sd[f] = v->correct.fact_sd[f];
-    }
-    mean.fact[FACT_SAMPLES] = v->correct.fact[FACT_SAMPLES];
-    mean.fact_sd[FACT_SAMPLES] = v->correct.fact_sd[FACT_SAMPLES];
-    /* The facts have the values that a correct renderer should have, not those of these few pictures. */
-    mean.fact[FACT_SPREAD] = mean.fact_sd[FACT_SPREAD] = 0;
-    if (v->renders >= 4) {
-        mean.fact[FACT_PIXELS] = mean.fact[FACT_IMAGE] = 0;
-        mean.fact_sd[FACT_PIXELS] = mean.fact_sd[FACT_IMAGE] = 0;
-    }
-    v->correct = mean;
+    v->correct = sight_average(all, num);
+    /* The facts have the values that a correct renderer should have, not those of these few pictures; how
+     * many samples an adaptive render takes is measured. */
+    struct sight batches = sight_average(base->batch, BATCHES);
+    for (int f = 0; f < NUM_FACTS; f++)
+        v->correct.fact[f] = v->correct.fact_sd[f] = f >= FACT_PIXELS && v->renders < 4 ? NAN : 0;
+    v->correct.fact[FACT_SAMPLES] = batches.fact[FACT_SAMPLES];
+    v->correct.fact_sd[FACT_SAMPLES] = batches.fact_sd[FACT_SAMPLES];
     return true;
 }
 

@@ -51,14 +51,11 @@ static bool has_noise(const struct sight *s)
 static bool judge(const struct moments *m, const struct diagnose_job *job, double alpha,
                   struct sight *s, bool *consistent, struct err *e)
 {
-    struct consistency c, gate;
-    if (!consistency_judge(m, job->renders, consistency_margin, DIAGNOSE_CONSISTENCY_ALPHA, &c,
-                           e) ||
-        !consistency_judge(m, job->renders, consistency_margin, alpha, &gate, e))
+    struct consistency c;
+    if (!consistency_judge(m, job->renders, consistency_margin, alpha, &c, e))
         return false;
-    sight_set_consistency(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders,
-                          DIAGNOSE_CONSISTENCY_ALPHA);
-    *consistent = gate.verdict != VERDICT_DIFFERENT;
+    sight_set_consistency(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders, alpha);
+    *consistent = c.verdict != VERDICT_DIFFERENT;
     return true;
 }
 

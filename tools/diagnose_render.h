@@ -18,9 +18,6 @@ struct diagnose_job {
     const char *work_dir; /* for pictures, which are removed; exists */
 };
 
-/* Only for margins of a consistency claim's interval, which the facts take their standard deviation from. */
-#define DIAGNOSE_CONSISTENCY_ALPHA 1e-3
-
 /* consistent (may be NULL): false if a claim of consistency (consistency.h) comes out DIFFERENT at `alpha`. */
 bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight *out,
                      bool *consistent, struct err *e) __attribute__((warn_unused_result));
