@@ -35,7 +35,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -54,6 +54,16 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
 	tests/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
+
+# Brings golden/diagnose/, by which `assay diagnose` names bugs, up to date with tests/mutants.
+catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
+	tests/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_catalogue $(BUILD) tests/mutants golden/diagnose
+
+# How often bugs are named rightly, and that the correct renderer is not accused (an hour).
+diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
+	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
+	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -100,6 +110,8 @@ help:
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
+	@echo 'make catalogue   bring what assay diagnose knows of these bugs up to date'
+	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
@@ -168,6 +180,9 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates: \
+  $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
@@ -177,7 +192,7 @@ $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c))
+  $(wildcard tests/make_*.c tests/diagnose_rates.c))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -214,7 +229,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE catalogue diagnose-rates \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
