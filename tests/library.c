@@ -1,0 +1,63 @@
+#include "library.h"
+
+static struct block draw_block(struct library *l)
+{
+    struct block b = {0, 0, 0};
+    for (int i = 0; i < l->n; i++) {
+        double x = draw(l->law, &l->state) - 1;
+        b.s1 += x;
+        b.s2 += x * x;
+        b.s3 += x * x * x;
+    }
+    return b;
+}
+
+void library_renew(struct library *l, size_t num)
+{
+    for (size_t i = 0; i < num; i++) {
+        l->block[l->next] = draw_block(l);
+        l->next = l->next + 1 == l->num ? 0 : l->next + 1;
+    }
+}
+
+bool library_init(struct library *l, enum law law, int n, size_t num, uint64_t seed, struct err *e)
+{
+    *l = (struct library){.law = law, .n = n, .num = num, .state = seed};
+    l->block = malloc(num * sizeof *l->block);
+    if (l->block == NULL)
+        return err_set(e, "out of memory for %zu blocks of draws", num);
+    library_renew(l, num);
+    return true;
+}
+
+void library_free(struct library *l)
+{
+    free(l->block);
+    *l = (struct library){0};
+}
+
+void library_image(struct library *l, int merge, bool is_grey, struct moments *m)
+{
+    size_t values = 3 * (size_t)m->width * (size_t)m->height;
+    double n = (double)merge * l->n;
+    for (size_t i = 0; i < values; i++) {
+        m->n[i / 3] = n;
+        if (is_grey && i % 3 > 0) {
+            m->mean[i] = m->mean[i - 1];
+            m->m2[i] = m->m2[i - 1];
+            m->m3[i] = m->m3[i - 1];
+            continue;
+        }
+        struct block sum = {0, 0, 0};
+        for (int k = 0; k < merge; k++) {
+            const struct block *b = &l->block[(size_t)(uniform(&l->state) * (double)l->num)];
+            sum.s1 += b->s1;
+            sum.s2 += b->s2;
+            sum.s3 += b->s3;
+        }
+        double shift = sum.s1 / n;
+        m->mean[i] = fmax(0, 1 + shift);
+        m->m2[i] = fmax(0, sum.s2 - sum.s1 * shift);
+        m->m3[i] = sum.s3 - 3 * sum.s2 * shift + 2 * sum.s1 * shift * shift;
+    }
+}
