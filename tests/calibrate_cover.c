@@ -40,12 +40,14 @@ static bool cover_pair(const struct pairs_job *job, struct library *l, struct mo
     const struct cover_cell *cell = job->cover;
     struct compare_options opt = {.alpha = cell->alpha, .tile = TILE};
     struct outcome o;
-    library_image(l, cell->n_a / l->n, true, a);
+    library_image(l, cell->n_a / l->n, true, NULL, a);
     quieten(a);
     if (cell->n_b > 0) {
-        library_image(l, cell->n_b / l->n, true, b);
-        quieten(b);
+        library_image(l, cell->n_b / l->n, true, a, b);
+    } else {
+        constant(b, library_mean(l), 1);
     }
+    quieten(b);
     if (!tester_run(job->weakness, a, b, &opt, &o, e))
         return false;
     if (o.worst_tile.x != 0 || o.worst_tile.y != 0)
@@ -68,8 +70,8 @@ static bool margin_pair(const struct pairs_job *job, struct library *l, struct m
                                   .margin_global = cell->margin_global,
                                   .margin_tile = cell->margin_tile,
                                   .tile = TILE};
-    library_image(l, cell->n / l->n, true, a);
-    library_image(l, cell->n / l->n, true, b);
+    library_image(l, cell->n / l->n, true, NULL, a);
+    library_image(l, cell->n / l->n, true, a, b);
     for (int which = 0; which < 3; which++) { /* the same noise for all three */
         double bias = which == 0 ? cell->margin_global : which == 1 ? cell->margin_tile : 0;
         struct outcome o;
@@ -101,8 +103,6 @@ static bool pairs_chunk(void *arg, int chunk, struct err *e)
         return false;
     struct moments a = new_moments(SIDE, SIDE, "sample");
     struct moments b = new_moments(SIDE, SIDE, exact ? "exact" : "sample");
-    if (exact)
-        constant(&b, 1, 1);
     bool ok = true;
     size_t end = (size_t)(chunk + 1) * CHUNK;
     for (size_t i = (size_t)chunk * CHUNK; ok && i < end && i < job->pairs; i++) {

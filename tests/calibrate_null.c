@@ -9,6 +9,7 @@
 const double null_level[NUM_LEVELS] = {1e-2, 1e-3, 1e-4};
 static const double largest_excess = 0.01; /* of a rate over its p, where p is not small */
 static const double smallest_ks_p = 1e-3;
+static const double margin_variance = 1e-3; /* as good as none, so that the test is at its level */
 
 bool null_init(struct null_run *r, enum weakness weakness, const size_t pairs[NUM_LEVELS],
                struct err *e)
@@ -39,7 +40,8 @@ bool null_pair(struct null_run *r, size_t i, const struct moments *a, const stru
                int tile, struct err *e)
 {
     for (int l = 0; l < NUM_LEVELS; l++) {
-        struct compare_options opt = {.alpha = null_level[l], .tile = tile};
+        struct compare_options opt = {
+            .alpha = null_level[l], .tile = tile, .margin_variance = margin_variance};
         struct outcome o;
         if (i >= r->pairs[l])
             continue;
@@ -58,17 +60,12 @@ bool null_pair(struct null_run *r, size_t i, const struct moments *a, const stru
     return true;
 }
 
-/* Sorted p of one column at LEVEL_SHAPE; untested ones are left out. */
-static size_t sorted_p(const struct null_run *r, int column, double *p)
+/* Sorted p of one column at LEVEL_SHAPE; 1 where nothing was tested. */
+static void sorted_p(const struct null_run *r, int column, double *p)
 {
-    size_t num = 0;
-    for (size_t i = 0; i < r->pairs[LEVEL_SHAPE]; i++) {
-        double log10_p = r->log10_p[LEVEL_SHAPE][i * NUM_COLUMNS + (size_t)column];
-        if (log10_p <= 0)
-            p[num++] = pow(10, log10_p);
-    }
-    sort_numbers(p, num);
-    return num;
+    for (size_t i = 0; i < r->pairs[LEVEL_SHAPE]; i++)
+        p[i] = pow(10, fmin(0, r->log10_p[LEVEL_SHAPE][i * NUM_COLUMNS + (size_t)column]));
+    sort_numbers(p, r->pairs[LEVEL_SHAPE]);
 }
 
 /* Sign and two-sided p make a one-sided one. */
@@ -104,9 +101,10 @@ bool null_summary(const struct null_run *r, const char *name, bool is_exact,
             }
     }
     for (int c = 0; c < NUM_COLUMNS; c++) {
-        size_t num = sorted_p(r, c, p), below = num;
-        if (num == 0)
+        size_t num = r->pairs[LEVEL_SHAPE], below = num;
+        if (out->tested[c][LEVEL_SHAPE] == 0)
             continue;
+        sorted_p(r, c, p);
         out->above[c] = ks_above(p, num);
         for (int i = 0; i < CURVE_POINTS; i++) {
             while (below > 0 && p[below - 1] > pow(10, -i / 8.0))
@@ -129,22 +127,20 @@ void null_pool(const struct null_result *part, int num, const char *name, struct
 {
     *out = (struct null_result){0};
     snprintf(out->name, sizeof out->name, "%s", name);
-    double weight[NUM_COLUMNS] = {0};
-    for (int c = 0; c < NUM_COLUMNS; c++)
-        out->above[c] = -1;
-    for (int i = 0; i < num; i++)
+    for (int i = 0; i < num; i++) {
+        for (int l = 0; l < NUM_LEVELS; l++)
+            out->pairs[l] += part[i].pairs[l];
+        double weight = part[i].pairs[LEVEL_SHAPE] / fmax(1, out->pairs[LEVEL_SHAPE]);
         for (int c = 0; c < NUM_COLUMNS; c++) {
+            out->above[c] = -1;
             for (int l = 0; l < NUM_LEVELS; l++) {
-                out->pairs[l] += c == 0 ? part[i].pairs[l] : 0;
                 out->tested[c][l] += part[i].tested[c][l];
                 out->rejected[c][l] += part[i].rejected[c][l];
             }
-            double tested = part[i].tested[c][LEVEL_SHAPE];
-            for (int k = 0; k < CURVE_POINTS && tested > 0; k++)
-                out->curve[c][k] +=
-                    (part[i].curve[c][k] - out->curve[c][k]) * tested / (weight[c] + tested);
-            weight[c] += tested;
+            for (int k = 0; k < CURVE_POINTS; k++)
+                out->curve[c][k] += (part[i].curve[c][k] - out->curve[c][k]) * weight;
         }
+    }
 }
 
 bool null_check(const struct null_result *r, struct checks *c)
@@ -155,10 +151,9 @@ bool null_check(const struct null_result *r, struct checks *c)
             if (r->pairs[l] > 0)
                 check_at_most(c, r->rejected[column][l], r->pairs[l], null_level[l], "%s: %s at %g",
                               r->name, column_name[column], null_level[l]);
-        double tested = r->tested[column][LEVEL_SHAPE];
         /* 1.95 / sqrt n: the largest distance in 99.9 % of uniform samples. */
-        if (tested > 0 && r->above[column] >= 0)
-            check_that(c, r->above[column] <= largest_excess + 1.95 / sqrt(tested),
+        if (r->tested[column][LEVEL_SHAPE] > 0 && r->above[column] >= 0)
+            check_that(c, r->above[column] <= largest_excess + 1.95 / sqrt(r->pairs[LEVEL_SHAPE]),
                        "%s: %s: the rate exceeds p by at most %.4f", r->name, column_name[column],
                        r->above[column]);
     }

@@ -26,7 +26,7 @@ struct null_run {
 bool null_init(struct null_run *r, enum weakness weakness, const size_t pairs[NUM_LEVELS],
                struct err *e) __attribute__((warn_unused_result));
 void null_free(struct null_run *r);
-/* Runs pair i at every level that wants it. margins 0. */
+/* Runs pair i at every level that wants it. margins 0, that of the variance 0.1 %. */
 bool null_pair(struct null_run *r, size_t i, const struct moments *a, const struct moments *b,
                int tile, struct err *e) __attribute__((warn_unused_result));
 

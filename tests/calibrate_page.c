@@ -107,7 +107,7 @@ static void false_alarms(FILE *f, const struct settings *s, const struct results
     fprintf(
         f,
         "## False alarms: real renders\n"
-        "%.0f pairs of renders of scenes of the suite from disjoint seeds; margins 0, tiles of 8 "
+        "%.0f pairs of renders of scenes of the suite from disjoint seeds; margins 0 (variance: 0.1 %%), tiles of 8 "
         "pixels. \"64 and 64\": samples per\npixel of A and B; \"32 and 8 x 32\": B is 8 replicates "
         "of 32 samples. The gate: rate of DIFFERENT.\n\n",
         pooled.pairs[0]);

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { LEFT = 70, TOP = 40, WIDTH = 430, HEIGHT = 330, RIGHT = 210, BELOW = 52 };
+enum { LEFT = 84, TOP = 40, WIDTH = 430, HEIGHT = 330, RIGHT = 210, BELOW = 52 };
 
 static const char style[] =
     "<style>\n"
@@ -114,7 +114,7 @@ static void draw_marks(FILE *f, const struct plot *p)
         fprintf(f,
                 "<path class=\"mark\" d=\"M%.1f %dV%d\"/><text x=\"%.1f\" y=\"%d\" "
                 "text-anchor=\"end\">%s</text>\n",
-                at_x(p, p->mark_x), TOP, TOP + HEIGHT, at_x(p, p->mark_x) - 5, TOP + 14,
+                at_x(p, p->mark_x), TOP, TOP + HEIGHT, at_x(p, p->mark_x) - 5, TOP + HEIGHT - 8,
                 p->mark_text);
     if (p->mark_y > 0)
         fprintf(f, "<path class=\"mark\" d=\"M%d %.1fH%d\"/>\n", LEFT, at_y(p, p->mark_y),
@@ -143,7 +143,7 @@ bool plot_write(const char *path, const struct plot *p, struct err *e)
         draw_series(f, p, i);
     fprintf(
         f,
-        "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text><text transform=\"translate(18 "
+        "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text><text transform=\"translate(20 "
         "%d) rotate(-90)\" text-anchor=\"middle\">%s</text>\n</svg>\n",
         LEFT + WIDTH / 2, TOP + HEIGHT + 40, p->x_label, TOP + HEIGHT / 2, p->y_label);
     return out_commit(&out, e);

@@ -29,8 +29,8 @@ static void biased_pair(const struct power_cell *cell, struct library *l, double
 {
     size_t side = (size_t)cell->side, tile = side / 2;
     library_renew(l, side * side / 4);
-    library_image(l, cell->n / l->n, cell->is_grey, a);
-    library_image(l, cell->n / l->n, cell->is_grey, b);
+    library_image(l, cell->n / l->n, cell->is_grey, NULL, a);
+    library_image(l, cell->n / l->n, cell->is_grey, a, b);
     for (size_t p = 0; p < side * side; p++)
         if (!cell->one_tile || (p % side < tile && p / side < tile))
             for (size_t i = 3 * p; i < 3 * p + 3; i++)

@@ -144,6 +144,7 @@ struct settings settings_short(void)
     add_synthetic(&s, LAW_NORMAL, 16, 16);
     add_synthetic(&s, LAW_EXPONENTIAL, 64, 64);
     add_synthetic(&s, LAW_BLACK, 64, 0);
+    add_synthetic(&s, LAW_PARETO, 64, 0);
     add_tail(&s, LAW_EXPONENTIAL, 64, 64, 20000);
     add_render(&s, "41_cornell", 16, 16, 0);
     add_power(&s, (struct power_cell){.name = "normal, 16; all pixels",

@@ -57,14 +57,14 @@ static bool synthetic_chunk(void *arg, int chunk, struct err *e)
     struct moments b = new_moments(SIDE, SIDE, cell->n_b > 0 ? "sample" : "exact");
     bool ok = true;
     size_t first = (size_t)chunk * CHUNK, end = first + CHUNK;
-    if (cell->n_b == 0)
-        constant(&b, 1, 1);
     for (size_t i = first; ok && i < end && i < job->largest; i++) {
         bool grey = i % 2 == 0;
         library_renew(&library, RENEWED);
-        library_image(&library, cell->n_a / block, grey, &a);
+        library_image(&library, cell->n_a / block, grey, NULL, &a);
         if (cell->n_b > 0)
-            library_image(&library, cell->n_b / block, grey, &b);
+            library_image(&library, cell->n_b / block, grey, &a, &b);
+        else
+            constant(&b, library_mean(&library), 1);
         ok = null_pair(&job->run, i, &a, &b, TILE, e);
     }
     moments_free(&a);
@@ -112,9 +112,8 @@ struct tail_job {
     struct tail_result *part; /* one a chunk */
 };
 
-/* Blocks of a library as pixels of one region: the sums that pyramid.h makes of moments, straight from
- * the library's own, for 5e7 images would take hours. */
-static void add_pixel(struct cell *sum, struct library *l, int merge, double sign)
+/* A pixel of a region, straight from a library: whole images for every region would take hours. */
+static struct estimate pick_pixel(struct library *l, int merge)
 {
     struct block b = {0, 0, 0};
     for (int k = 0; k < merge; k++) {
@@ -126,13 +125,7 @@ static void add_pixel(struct cell *sum, struct library *l, int merge, double sig
     double n = (double)merge * l->n, shift = b.s1 / n;
     double v = fmax(0, b.s2 - b.s1 * shift) / (n * (n - 1));
     double k3 = (b.s3 - 3 * b.s2 * shift + 2 * b.s1 * shift * shift) / (n * (n - 1) * (n - 2));
-    *(sign > 0 ? &sum->a : &sum->b) += 1 + shift;
-    *(sign > 0 ? &sum->va : &sum->vb) += v;
-    sum->k3 += sign * k3;
-    if (v > 0) {
-        sum->var_v += fmax(2 * v * v / (n - 1), k3 * k3 / v);
-        sum->var_k3 += 6 * v * v * v / ((n - 1) * (n - 2));
-    }
+    return estimate_from(1 + shift, v, k3, n);
 }
 
 static bool tail_chunk_run(void *arg, int chunk, struct err *e)
@@ -150,7 +143,7 @@ static bool tail_chunk_run(void *arg, int chunk, struct err *e)
                           .height = 16,
                           .floor = 0.05,
                           .n_min = cell->n_a,
-                          .z_guard = {guard, guard}};
+                          .z_guard = {[STATISTIC_PYRAMID] = guard}};
     struct rect rect = {0, 0, 8, 8};
     size_t first = (size_t)chunk * tail_chunk;
     size_t regions = job->regions - first < tail_chunk ? job->regions - first : tail_chunk;
@@ -160,11 +153,11 @@ static bool tail_chunk_run(void *arg, int chunk, struct err *e)
         struct cell sum = {0};
         library_renew(&library, 1);
         for (int p = 0; p < REGION_PIXELS; p++) {
-            add_pixel(&sum, &library, cell->n_a / block, 1);
+            struct estimate a = pick_pixel(&library, cell->n_a / block);
+            struct estimate b = {.mean = library_mean(&library)};
             if (cell->n_b > 0)
-                add_pixel(&sum, &library, cell->n_b / block, -1);
-            else
-                sum.b += 1;
+                b = pick_pixel(&library, cell->n_b / block);
+            cell_add_pixel(&sum, &a, &b);
         }
         struct measured m = region_measure(&judge, &sum, rect);
         if (m.noise_free || !region_testable(&judge, &m))

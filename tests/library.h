@@ -1,7 +1,7 @@
 /* Many synthetic images of one law, cheaply: pixels are put together from a library of blocks of n
  * draws, picked at random with replacement, while every image renews some of the blocks. Two images
- * of one library are exchangeable, so equal means hold between them exactly; between libraries, or
- * against the law's own mean, up to the library's error (a share 1/sqrt(blocks) of a block's). */
+ * of one library are exchangeable, so equal means hold between them exactly, and against the library's
+ * mean; the law's own mean it has only up to 1/sqrt(blocks) of a block's standard deviation. */
 #ifndef ASSAY_TESTS_LIBRARY_H
 #define ASSAY_TESTS_LIBRARY_H
 
@@ -17,6 +17,7 @@ struct library {
     int n; /* draws of a block */
     size_t num, next;
     struct block *block;
+    double sum; /* of all s1 */
     uint64_t state;
 };
 
@@ -26,8 +27,12 @@ bool library_init(struct library *l, enum law law, int n, size_t num, uint64_t s
 void library_free(struct library *l);
 /* Draws `num` blocks anew, the oldest first. */
 void library_renew(struct library *l, size_t num);
+/* What every pixel's mean is expected to be, given the library. */
+double library_mean(const struct library *l);
 /* Every pixel of `merge` blocks, so n = merge * l->n; the channels are one and the same (grey) or
- * independent. */
-void library_image(struct library *l, int merge, bool is_grey, struct moments *m);
+ * independent. No pixel has the very numbers of `other`'s, unless it has no noise: that would be a
+ * seed used twice. NULL: no such image. */
+void library_image(struct library *l, int merge, bool is_grey, const struct moments *other,
+                   struct moments *m);
 
 #endif

@@ -74,7 +74,7 @@ static void test_library(void **state)
     struct moments m = new_moments(SIDE, SIDE, "sample");
     double sum[3] = {0}, square[3] = {0}, cross = 0, num = 0;
     for (int image = 0; image < IMAGES; image++) {
-        library_image(&l, 4, false, &m);
+        library_image(&l, 4, false, NULL, &m);
         library_renew(&l, 16384);
         for (size_t p = 0; p < SIDE * SIDE; p++) {
             double n = m.n[p];
@@ -97,7 +97,7 @@ static void test_library(void **state)
             assert_true(fabs(mean - 1.02) > 5 * se);
     }
     assert_true(fabs(cross / sqrt(num / 3)) < 5);
-    library_image(&l, 4, true, &m);
+    library_image(&l, 4, true, NULL, &m);
     for (size_t i = 0; i < 3 * SIDE * SIDE; i += 3)
         assert_true(m.mean[i] == m.mean[i + 1] && m.m3[i] == m.m3[i + 2]);
     library_free(&l);
