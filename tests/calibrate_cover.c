@@ -132,7 +132,7 @@ static bool pairs_run(struct work *w, struct pairs_job *job, double cost, double
 
 double cover_cost(const struct cover_cell *cell, size_t pairs)
 {
-    return (double)pairs * (0.25 + 256e-6 * 15 * block_of(cell->n_a));
+    return (double)pairs * (0.45 + 256e-6 * 15 * block_of(cell->n_a));
 }
 
 bool cover_run(struct work *w, const struct cover_cell *cell, enum weakness weakness, size_t pairs,
@@ -166,7 +166,7 @@ bool cover_check(const struct cover_result *r, struct checks *c)
 
 double margin_cost(const struct margin_cell *cell, size_t pairs)
 {
-    return (double)pairs * (0.6 + 256e-6 * 15 * block_of(cell->n));
+    return (double)pairs * (1.4 + 256e-6 * 15 * block_of(cell->n));
 }
 
 bool margin_run(struct work *w, const struct margin_cell *cell, enum weakness weakness,

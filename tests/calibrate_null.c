@@ -92,10 +92,11 @@ bool null_summary(const struct null_run *r, const char *name, bool is_exact,
     if (p == NULL)
         return err_set(e, "out of memory for the p-values of %s", name);
     for (int l = 0; l < NUM_LEVELS; l++) {
-        out->pairs[l] = (double)r->pairs[l];
-        for (size_t i = 0; i < r->pairs[l]; i++)
+        int at = r->pairs[l] > 0 ? l : LEVEL_SHAPE;
+        out->pairs[l] = (double)r->pairs[at];
+        for (size_t i = 0; i < r->pairs[at]; i++)
             for (size_t c = 0; c < NUM_COLUMNS; c++) {
-                double log10_p = r->log10_p[l][i * NUM_COLUMNS + c];
+                double log10_p = r->log10_p[at][i * NUM_COLUMNS + c];
                 out->tested[c][l] += log10_p <= 0;
                 out->rejected[c][l] += log10_p <= log10(null_level[l]);
             }

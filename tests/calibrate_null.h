@@ -18,7 +18,9 @@ extern const double null_level[NUM_LEVELS]; /* 1e-2, 1e-3, 1e-4 */
 /* The p-values of many pairs. null_pair() may be called from several threads for different pairs. */
 struct null_run {
     enum weakness weakness;
-    size_t pairs[NUM_LEVELS];   /* the first of them are also run at this level */
+    /* The first of them are run at this level. 0: the level is read off the run at LEVEL_SHAPE, whose
+     * guard against skewness lets more through than that of a smaller alpha. */
+    size_t pairs[NUM_LEVELS];
     float *log10_p[NUM_LEVELS]; /* NUM_COLUMNS a pair */
     float *mean_t;              /* of the image's luminance, at LEVEL_SHAPE */
 };
@@ -26,13 +28,13 @@ struct null_run {
 bool null_init(struct null_run *r, enum weakness weakness, const size_t pairs[NUM_LEVELS],
                struct err *e) __attribute__((warn_unused_result));
 void null_free(struct null_run *r);
-/* Runs pair i at every level that wants it. margins 0, that of the variance 0.1 %. */
+/* Runs pair i at every level that wants it; margins 0, that of the variance 0.1 %. */
 bool null_pair(struct null_run *r, size_t i, const struct moments *a, const struct moments *b,
                int tile, struct err *e) __attribute__((warn_unused_result));
 
 struct null_result {
     char name[64];
-    double pairs[NUM_LEVELS];
+    double pairs[NUM_LEVELS];                 /* that were looked at */
     double tested[NUM_COLUMNS][NUM_LEVELS];   /* pairs in which the column was tested */
     double rejected[NUM_COLUMNS][NUM_LEVELS]; /* p <= level */
     double curve[NUM_COLUMNS][CURVE_POINTS];  /* share of all pairs with p <= 10^(-i/8) */

@@ -100,7 +100,7 @@ static bool power_chunk(void *arg, int index, struct err *e)
 double power_cost(const struct power_cell *cell, size_t pairs)
 {
     double pixels = (double)cell->side * cell->side;
-    return (double)pairs * POWER_POINTS * pixels * (0.8e-3 + 4e-6 * block_of(cell->n));
+    return (double)pairs * POWER_POINTS * pixels * (1.8e-3 + 4e-6 * block_of(cell->n));
 }
 
 bool power_run(struct work *w, const struct power_cell *cell, enum weakness weakness, size_t pairs,

@@ -91,7 +91,7 @@ double render_cost(const struct render_cell *cell, size_t pairs)
 {
     double pixels = (double)cell->side * cell->side;
     double pictures = cell->replicates > 0 ? 1 + cell->replicates : 2;
-    return (double)pairs * pixels * (pictures * cell->spp * 1e-3 + 3e-3);
+    return (double)pairs * pixels * (pictures * cell->spp * 1e-3 + 5e-3);
 }
 
 static bool open_scene(struct render_job *job, const char *scenes, struct err *e)

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-enum { SIDE = 16, TILE = 8, CHUNK = 5000, RENEWED = SIDE * SIDE, REGION_PIXELS = 64 };
+enum { SIDE = 16, TILE = 8, CHUNK = 5000, RENEWED = 128, REGION_PIXELS = 64 };
 static const size_t tail_chunk = 1000000;
 const double tail_level[3] = {1e-4, 1e-5, 1e-6};
 static const double guard_factor = 1.2214; /* e^0.2 */
@@ -86,7 +86,7 @@ double synthetic_cost(const struct synthetic_cell *cell, const size_t pairs[NUM_
     double runs = 0;
     for (int l = 0; l < NUM_LEVELS; l++)
         runs += (double)pairs[l];
-    return 0.2 * runs + (double)largest_of(pairs) * RENEWED * block_of(cell) * 15e-6;
+    return 0.45 * runs + (double)largest_of(pairs) * RENEWED * block_of(cell) * 15e-6;
 }
 
 bool synthetic_run(struct work *w, const struct synthetic_cell *cell, enum weakness weakness,
