@@ -140,6 +140,17 @@ static void add_claim(struct run *r, const char *scene, const char *b, const cha
     json_object_set_new(c, "tile_log10_p", json_pack("[f f f n]", -0.1, -2.0, -0.9));
     json_object_set_new(c, "tile_t", json_pack("[f f f n]", 0.3, 2.6, 1.5));
     json_object_set_new(c, "seeds_b", json_pack("[i i]", 7, 8));
+    json_object_set_new(c, "statistics",
+                        json_pack("[{ss sf si sf ss} {ss sf si sf ss} {ss sf si sf ss}]", "name",
+                                  "image", "share", 0.4, "num_tests", 4, "log10_p", -0.2, "what",
+                                  "the image <red>", "name", "pyramid", "share", 0.6, "num_tests",
+                                  99, "log10_p", -12.0, "what", "2 x 2 pixels at 4,6 (green)",
+                                  "name", "noise", "share", 0.0, "num_tests", 0, "log10_p", 0.0,
+                                  "what", ""));
+    json_object_set_new(c, "direction",
+                        json_pack("{ss sf sf s[ff] ss}", "name", "shift by x", "explained", 0.93,
+                                  "amount", 0.48, "ci", 0.46, 0.5, "unit", "px"));
+    json_object_set_new(c, "variance_ratio", json_pack("{sf s[ff]}", "ratio", 1.9, "ci", 1.8, 2.0));
     json_object_set_new(c, "files",
                         json_pack("{ss ss ss ss}", "a", files[0], "b", files[1], "z", files[2],
                                   "relative", files[3]));
