@@ -47,6 +47,12 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
     return true;
 }
 
+/* Its variance is the other side's too, and its n no count (moments.h). */
+static bool is_picture(const struct moments *m)
+{
+    return strcmp(m->unit, "picture") == 0;
+}
+
 /* Checks one side and gathers what it contributes to the judge. An observation's typical brightness
  * where it matters is E[x^2]/E[x], for something seen rarely its brightness when seen. */
 static bool check_side(const struct moments *m, struct judge *j, struct err *e)
@@ -55,7 +61,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
     if (strcmp(m->unit, "stratified") == 0)
         return err_set(e, "its samples depend on each other (--sampler sobol), so its variance is "
                           "unknown: only replicates with seeds of their own may be compared");
-    if (!exact && !replicates && strcmp(m->unit, "sample") != 0)
+    if (!exact && !replicates && !is_picture(m) && strcmp(m->unit, "sample") != 0)
         return err_set(e, "unknown unit '%s' of an observation", m->unit);
     bool varies = false;
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -79,7 +85,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 /* The same seeds on both sides: no difference could show, and none would be there to find. */
 static bool check_shared(const struct moments *a, const struct moments *b, struct err *e)
 {
-    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0)
+    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_picture(a))
         return true;
     size_t pixels = (size_t)a->width * (size_t)a->height, shared = noise_shared(a, b);
     if (shared > 0)
@@ -96,13 +102,13 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
 {
     static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};
     bool pixels = j->width * j->height > 1, noise_a = strcmp(a->unit, "exact") != 0;
-    bool noise_b = strcmp(b->unit, "exact") != 0;
+    bool noise_b = strcmp(b->unit, "exact") != 0, known = !is_picture(a) && !is_picture(b);
     bool applies[NUM_STATISTICS] = {
         [STATISTIC_IMAGE] = true,
         [STATISTIC_PYRAMID] = pixels,
-        [STATISTIC_DENSE] = pixels && (noise_a || noise_b),
-        [STATISTIC_DIRECTED] = pixels && (noise_a || noise_b),
-        [STATISTIC_NOISE] = j->opt.margin_variance > 0 && noise_a && noise_b,
+        [STATISTIC_DENSE] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_DIRECTED] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_NOISE] = j->opt.margin_variance > 0 && known && noise_a && noise_b,
     };
     double sum = 0;
     for (int s = 0; s < NUM_STATISTICS; s++)

@@ -1,4 +1,4 @@
-/* What must hold before anything is compared (tools/README.md, "Hygiene"). Used by compare.c only. */
+/* What must hold before anything is compared (tools/README.md, "Hygiene"). Used by compare.c and gate.c. */
 #ifndef ASSAY_HYGIENE_H
 #define ASSAY_HYGIENE_H
 

@@ -17,6 +17,8 @@ static const double shared_level = 1e-6;
 /* Paths in one observation of the kind in which both sides can be counted; 0 if there is none. */
 static double paths(const struct moments *m, const struct moments *other)
 {
+    if (strcmp(m->unit, "picture") == 0)
+        return 0;
     if (m->spp > 0 && other->spp > 0)
         return m->spp;
     return strcmp(m->unit, other->unit) == 0 && m->spp == other->spp ? 1 : 0;

@@ -26,15 +26,23 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
     double v_scale = exact ? 0 : 1 / (n * (n - 1));
     double k_scale = exact ? 0 : v_scale / (n - 2);
     const double *mean = m->mean + 3 * pixel, *m2 = m->m2 + 3 * pixel, *m3 = m->m3 + 3 * pixel;
-    if (channel < CHANNEL_LUMINANCE)
-        return estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
-    double sum = 0, deviation = 0, root = 0;
+    const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
+    if (channel < CHANNEL_LUMINANCE) {
+        struct estimate est =
+            estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
+        est.tolerance = tolerance[channel];
+        return est;
+    }
+    double sum = 0, deviation = 0, root = 0, rounding = 0;
     for (int c = 0; c < 3; c++) {
         sum += luminance_weight[c] * mean[c];
         deviation += luminance_weight[c] * sqrt(m2[c] * v_scale);
         root += luminance_weight[c] * cbrt(m3[c] * k_scale);
+        rounding += luminance_weight[c] * tolerance[c];
     }
-    return estimate_from(sum, deviation * deviation, root * root * root, n);
+    struct estimate est = estimate_from(sum, deviation * deviation, root * root * root, n);
+    est.tolerance = rounding;
+    return est;
 }
 
 void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
@@ -47,6 +55,7 @@ void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct est
     dst->var_v += a->var_v + b->var_v;
     dst->var_v_normal += a->var_v_normal + b->var_v_normal;
     dst->var_k3 += a->var_k3 + b->var_k3;
+    dst->tolerance += a->tolerance + b->tolerance;
 }
 
 static void add_cell(struct cell *dst, const struct cell *src)
@@ -59,6 +68,7 @@ static void add_cell(struct cell *dst, const struct cell *src)
     dst->var_v += src->var_v;
     dst->var_v_normal += src->var_v_normal;
     dst->var_k3 += src->var_k3;
+    dst->tolerance += src->tolerance;
 }
 
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,

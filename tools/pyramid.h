@@ -19,6 +19,7 @@ struct estimate {
                       the covariance of mean and variance is k3) */
     double var_v_normal; /* variance of v if normal: 2 v^2/(n-1) */
     double var_k3;       /* variance of k3 if normal, 6 v^3/((n-1)(n-2)) */
+    double tolerance;    /* of the mean, from rounded numbers (moments.h) */
 };
 
 /* Channel 3 is luminance, whose variance the moments do not hold: the bound for any correlation of
@@ -36,7 +37,8 @@ struct cell {
     double k3;     /* third cumulant of A - B */
     double var_v;  /* variance of va + vb */
     double var_v_normal;
-    double var_k3; /* variance of k3 */
+    double var_k3;    /* variance of k3 */
+    double tolerance; /* of a and b together, from rounded numbers */
 };
 
 struct pyramid_level {

@@ -8,6 +8,7 @@
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
 static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
 static const double float_tolerance = 1e-5; /* relative: two engines' float32 arithmetic */
+static const double least_dof = 0.2; /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;
 const double region_mdb_none = 1e6;
@@ -39,11 +40,11 @@ static struct measured measure(const struct cell *cell, double unit, double size
     struct measured m = {.d = cell->a - cell->b,
                          .unit = unit,
                          .margin = margin,
-                         .tolerance = float_tolerance * size,
+                         .tolerance = float_tolerance * size + cell->tolerance,
                          .statistic = statistic};
     m.v = cell->va + cell->vb;
     m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
-    m.noise_free = m.v <= m.tolerance * m.tolerance;
+    m.noise_free = m.v <= pow(float_tolerance * size, 2);
     if (!m.noise_free) {
         m.dof = stats_dof(m.v, cell->var_v);
         m.dof_normal = stats_dof(m.v, cell->var_v_normal);
@@ -142,10 +143,10 @@ static bool half_width(const struct judge *j, const struct measured *m, double *
 {
     double factor = 0;
     for (int i = 0; i < 4; i++) {
-        *x = stats_t_quantile(j->opt.alpha * exp(-factor), m->dof);
+        *x = stats_t_quantile(j->opt.alpha * exp(-factor), fmax(least_dof, m->dof));
         factor = fmin(skew_limit_widened, skew_factor(m, *x));
     }
-    return factor < skew_limit_widened;
+    return factor < skew_limit_widened && m->dof >= least_dof;
 }
 
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size)

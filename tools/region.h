@@ -24,13 +24,13 @@ struct measured {
     double d;         /* A - B */
     double unit;      /* of relative quantities */
     double margin;    /* relative */
-    double tolerance; /* what float32 arithmetic may do to d */
+    double tolerance; /* what float32 arithmetic and rounded files may do to d */
     double v;         /* variance of d */
     double v_margin; /* variance of A - (1 + margin) B: for every test and interval with a margin */
     double dof;
     double dof_normal; /* if the law is normal; for heavier tails it says more of the mean of t^2 */
     double skew;       /* of d: |g| plus one standard error */
-    bool noise_free;   /* the standard error is within the tolerance */
+    bool noise_free;   /* the standard error is within that of float32 arithmetic */
     int statistic;     /* by which it is tested */
 };
 
