@@ -15,6 +15,9 @@ double calibrate_cost(const struct settings *s)
         sum += cover_cost(&s->cover[i], s->cover_pairs);
     for (int i = 0; i < s->num_margin; i++)
         sum += margin_cost(&s->margin[i], s->margin_pairs);
+    for (int i = 0; i < s->num_stages; i++)
+        sum += stages_cost(&s->stages[i], s->stages_pairs);
+    sum += s->num_permutation * permutations_cost(s->permutation_pairs);
     return sum;
 }
 
@@ -31,6 +34,10 @@ bool calibrate(struct work *w, const struct settings *s, const char *scenes, enu
         ok = cover_run(w, &s->cover[i], weakness, s->cover_pairs, s->blocks, &out->cover[i], e);
     for (int i = 0; ok && i < s->num_margin; i++)
         ok = margin_run(w, &s->margin[i], weakness, s->margin_pairs, s->blocks, &out->margin[i], e);
+    for (int i = 0; ok && i < s->num_stages; i++)
+        ok = stages_run(w, &s->stages[i], s->stages_pairs, s->blocks, &out->stages[i], e);
+    for (int i = 0; ok && i < s->num_permutation; i++)
+        ok = permutations_run(w, &s->permutation[i], s->permutation_pairs, &out->permutation[i], e);
     for (int i = 0; ok && i < s->num_tail; i++)
         ok = tail_run(w, &s->tail[i], s->tail_regions[i], s->blocks, &out->tail[i], e);
     for (int i = 0; ok && i < s->num_synthetic; i++)
@@ -56,4 +63,8 @@ void calibrate_check(const struct settings *s, const struct results *r, struct c
         cover_check(&r->cover[i], c);
     for (int i = 0; i < s->num_margin; i++)
         margin_check(&r->margin[i], c);
+    for (int i = 0; i < s->num_stages; i++)
+        stages_check(&r->stages[i], c);
+    for (int i = 0; i < s->num_permutation; i++)
+        permutations_check(&r->permutation[i], c);
 }

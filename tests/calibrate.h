@@ -3,6 +3,7 @@
 #ifndef ASSAY_CALIBRATE_H
 #define ASSAY_CALIBRATE_H
 
+#include "calibrate_gate.h"
 #include "calibrate_power.h"
 #include "calibrate_render.h"
 #include "calibrate_synthetic.h"
@@ -13,12 +14,15 @@ enum {
     MAX_TAIL = 12,
     MAX_POWER = 8,
     MAX_COVER = 20,
-    MAX_MARGIN = 12
+    MAX_MARGIN = 12,
+    MAX_STAGES = 8,
+    MAX_PERMUTATION = 4
 };
 
 struct settings {
     size_t blocks; /* of a library */
     int num_synthetic, num_render, num_tail, num_power, num_cover, num_margin;
+    int num_stages, num_permutation;
     struct synthetic_cell synthetic[MAX_SYNTHETIC];
     size_t synthetic_pairs[NUM_LEVELS];
     struct render_cell render[MAX_RENDER];
@@ -31,6 +35,10 @@ struct settings {
     size_t cover_pairs;
     struct margin_cell margin[MAX_MARGIN];
     size_t margin_pairs;
+    struct stages_cell stages[MAX_STAGES];
+    size_t stages_pairs;
+    struct permutation_cell permutation[MAX_PERMUTATION];
+    size_t permutation_pairs;
 };
 
 /* Those of the published page with every number of pairs times `share` (1: the page itself). */
@@ -46,6 +54,8 @@ struct results {
     struct power_result power[MAX_POWER];
     struct cover_result cover[MAX_COVER];
     struct margin_result margin[MAX_MARGIN];
+    struct stages_result stages[MAX_STAGES];
+    struct permutation_result permutation[MAX_PERMUTATION];
 };
 
 /* Runs all of it. w->total is raised by what is to come. `scenes`: the suite's directory. */

@@ -263,6 +263,41 @@ static void intervals(FILE *f, const struct settings *s, const struct results *r
     fputs("\n", f);
 }
 
+static void gates(FILE *f, const struct settings *s, const struct results *r)
+{
+    fprintf(
+        f,
+        "## Two stages, and permutation\nTwo stages with fresh seeds (tools/gate.h): flagged by the "
+        "first with at most the root of alpha, DIFFERENT with at most alpha;\n%zu pairs a row.\n\n"
+        "| law and n | alpha | flagged | DIFFERENT | |\n|---|--:|---|---|---|\n",
+        s->stages_pairs);
+    for (int i = 0; i < s->num_stages; i++) {
+        const struct stages_result *g = &r->stages[i];
+        struct checks c = {.num = 0};
+        stages_check(g, &c);
+        fprintf(f, "| %s | %g |", g->name, g->alpha);
+        rate_cell(f, g->flagged, g->pairs);
+        rate_cell(f, g->different, g->pairs);
+        fprintf(f, " %s |\n", checks_word(&c, 0));
+    }
+    fprintf(
+        f,
+        "\nPermutation of 6 and 6 replicates (tools/permutation.h), 8 x 8 pixels of one draw each; "
+        "%zu pairs a row. The test is exact, so the rate\nis at most alpha whatever the law.\n\n"
+        "| law | alpha 0.1 | alpha 0.05 | alpha 0.01 | |\n|---|---|---|---|---|\n",
+        s->permutation_pairs);
+    for (int i = 0; i < s->num_permutation; i++) {
+        const struct permutation_result *p = &r->permutation[i];
+        struct checks c = {.num = 0};
+        permutations_check(p, &c);
+        fprintf(f, "| %s |", p->name);
+        for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
+            rate_cell(f, p->rejected[l], p->pairs);
+        fprintf(f, " %s |\n", checks_word(&c, 0));
+    }
+    fputs("\n", f);
+}
+
 static void weakened(FILE *f, const struct weak_results *weak)
 {
     fputs(
@@ -298,6 +333,7 @@ bool page_write(const char *dir, const char *command, const struct settings *s,
         uniformity(out.f, s, r);
         power(out.f, s, r);
         intervals(out.f, s, r);
+        gates(out.f, s, r);
         weakened(out.f, weak);
         if (all->failed > 0) {
             fputs("\n## What does not hold\n", out.f);

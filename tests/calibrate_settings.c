@@ -58,6 +58,20 @@ static void add_margin(struct settings *s, enum law law, int n, double alpha, do
         (struct margin_cell){law, n, alpha, margin_global, margin_tile, seed};
 }
 
+static void add_stages(struct settings *s, enum law law, int n, double alpha)
+{
+    assert(s->num_stages < MAX_STAGES);
+    uint64_t seed = 7000 + (uint64_t)s->num_stages;
+    s->stages[s->num_stages++] = (struct stages_cell){law, n, alpha, seed};
+}
+
+static void add_permutation(struct settings *s, enum law law)
+{
+    assert(s->num_permutation < MAX_PERMUTATION);
+    uint64_t seed = 8000 + (uint64_t)s->num_permutation;
+    s->permutation[s->num_permutation++] = (struct permutation_cell){law, seed};
+}
+
 struct settings settings_published(double share)
 {
     static const char *const scenes[] = {"25_ggx_metal",     "33_sphere_light", "41_cornell",
@@ -71,6 +85,8 @@ struct settings settings_published(double share)
         .power_pairs = part(share, 2000),
         .cover_pairs = part(share, 2e4),
         .margin_pairs = part(share, 1e4),
+        .stages_pairs = part(share, 2e4),
+        .permutation_pairs = part(share, 1e4),
     };
     for (int i = 0; i < NUM_LAWS; i++) {
         static const int n[][2] = {{16, 16}, {64, 64}, {1024, 1024}, {64, 1024}, {1024, 0}};
@@ -128,6 +144,13 @@ struct settings settings_published(double share)
         add_margin(&s, LAW_NORMAL, 16, margin_alpha[i], 0.03, 0.08);
         add_margin(&s, LAW_EXPONENTIAL, 64, margin_alpha[i], 0.05, 0.15);
     }
+    add_stages(&s, LAW_NORMAL, 16, 0.01);
+    add_stages(&s, LAW_EXPONENTIAL, 64, 0.01);
+    add_stages(&s, LAW_NORMAL, 16, 0.001);
+    add_stages(&s, LAW_EXPONENTIAL, 64, 0.001);
+    add_permutation(&s, LAW_NORMAL);
+    add_permutation(&s, LAW_BLACK);
+    add_permutation(&s, LAW_PARETO);
     return s;
 }
 
@@ -199,8 +222,15 @@ void settings_hash(const struct settings *s, char hex[65])
         fprintf(f, "margin %s %d %g %g %g %ju\n", law_name[c->law], c->n, c->alpha,
                 c->margin_global, c->margin_tile, (uintmax_t)c->seed);
     }
-    fprintf(f, "pairs %zu %zu %zu %zu\n", s->render_pairs, s->power_pairs, s->cover_pairs,
-            s->margin_pairs);
+    for (int i = 0; i < s->num_stages; i++) {
+        const struct stages_cell *c = &s->stages[i];
+        fprintf(f, "stages %s %d %g %ju\n", law_name[c->law], c->n, c->alpha, (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_permutation; i++)
+        fprintf(f, "permutation %s %ju\n", law_name[s->permutation[i].law],
+                (uintmax_t)s->permutation[i].seed);
+    fprintf(f, "pairs %zu %zu %zu %zu %zu %zu\n", s->render_pairs, s->power_pairs, s->cover_pairs,
+            s->margin_pairs, s->stages_pairs, s->permutation_pairs);
     fclose(f);
     sha256_text(text, hex);
     free(text);
