@@ -226,7 +226,7 @@ static void intervals(FILE *f, const struct settings *s, const struct results *r
     fprintf(
         f,
         "## Intervals and EQUIVALENT\nEqual means: how often the interval of the image, and that of "
-        "a tile of 8 x 8 pixels, does not hold 0. %zu pairs a row. \"With\":\npairs in which there "
+        "a tile of 8 x 8 pixels, leaves 0 out. %zu pairs a row. \"With\":\npairs in which there "
         "was an interval at all.\n\n"
         "| law and n | interval | image: with | misses | tile: with | misses | |\n"
         "|---|--:|--:|---|--:|---|---|\n",

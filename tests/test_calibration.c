@@ -188,6 +188,40 @@ static void test_blindness_to_skew_is_caught(void **state)
     expect_caught(WEAK_NO_SKEW, "gate at 0.01");
 }
 
+/* The page in the repository: made by the settings of this source, and every line of it holds. */
+static void test_published_page(void **state)
+{
+    (void)state;
+    static char text[200000];
+    char hex[65], line[96];
+    struct settings s = settings_published(1);
+    FILE *f = fopen("tests/calibration/README.md", "r");
+    assert_non_null(f);
+    size_t size = fread(text, 1, sizeof text - 1, f);
+    fclose(f);
+    assert_true(size > 0 && size < sizeof text - 1);
+    text[size] = '\0';
+    settings_hash(&s, hex);
+    snprintf(line, sizeof line, "Settings: `%s`.", hex);
+    if (strstr(text, line) == NULL)
+        fail_msg("the page was made by other settings than %s: make calibrate", hex);
+    assert_non_null(strstr(text, "Written by `make calibrate`;"));
+    const char *all = strstr(text, "**All ");
+    if (all == NULL)
+        fail_msg("some of the page's lines do not hold");
+    assert_true(strtol(all + 6, NULL, 10) > 1000);
+    assert_null(strstr(text, "does not hold"));
+    static const char *const plots[] = {"false_alarms", "statistics", "tail", "power"};
+    for (size_t i = 0; i < sizeof plots / sizeof *plots; i++) {
+        snprintf(line, sizeof line, "tests/calibration/%s.svg", plots[i]);
+        f = fopen(line, "r");
+        assert_non_null(f);
+        fclose(f);
+        snprintf(line, sizeof line, "(%s.svg)", plots[i]);
+        assert_non_null(strstr(text, line));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -200,6 +234,7 @@ int main(void)
         cmocka_unit_test(test_copied_observations_are_caught),
         cmocka_unit_test(test_variance_of_one_side_is_caught),
         cmocka_unit_test(test_blindness_to_skew_is_caught),
+        cmocka_unit_test(test_published_page),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
