@@ -282,6 +282,17 @@ static void values_out_of_order(void **state)
     set(claim, "passed", "true");
     expect_claim_rejected(claim, "claim 1 (12_furnace against povray): has an 'error' and yet");
     expect_claim_rejected(json_string("x"), "claim 1 (? against ?): not an object");
+
+    /* An error and a verdict: only for want of time. */
+    claim = parse(error_claim);
+    set(claim, "verdict", "\"DIFFERENT\"");
+    expect_claim_rejected(claim, "has an 'error' and yet a 'verdict' that is not INCONCLUSIVE");
+    claim = parse(judged_claim);
+    set(claim, "looks", "[{\"n_a\": 1, \"n_b\": 1, \"alpha\": 0.1, \"stage\": 1}]");
+    expect_claim_rejected(claim, "'looks.verdict' is missing");
+    claim = parse(judged_claim);
+    set(claim, "cost_s", "{\"a\": 1}");
+    expect_claim_rejected(claim, "'cost_s.b' is missing");
 }
 
 static void bad_file(void **state)
@@ -351,6 +362,14 @@ static void exit_codes(void **state)
             fail_msg("row %zu: %d, not %d", i, results_exit_code(root), row[i].code);
         json_decref(root);
     }
+    /* Without time it is inconclusive: worse than a pass, better than a difference. */
+    json_t *late = parse(error_claim);
+    set(late, "verdict", "\"INCONCLUSIVE\"");
+    json_t *root = results_of(2, (json_t *[]){parse(judged_claim), late});
+    assert_int_equal(results_exit_code(root), 2);
+    json_array_append_new(json_object_get(root, "claims"), claim_with("DIFFERENT", "EQUIVALENT"));
+    assert_int_equal(results_exit_code(root), 1);
+    json_decref(root);
 }
 
 /* Four claims that need every width rule: a scene name with a two-byte letter, a value that rounds

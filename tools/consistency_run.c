@@ -2,9 +2,11 @@
 
 #include "../reference/job.h"
 #include "../renderer/fs.h"
+#include "../renderer/progress.h"
 #include "consistency.h"
 #include "ours.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -13,8 +15,11 @@ enum { PATH_SIZE = 8192 };
 
 /* Render k of the scene; the picture is removed. */
 static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
-                       struct moments *out, double *seconds, struct err *e)
+                       double deadline, struct moments *out, double *seconds, struct err *e)
 {
+    double left = deadline - now_seconds();
+    if (left <= 0)
+        return err_set(e, "the budget is spent");
     char picture[PATH_SIZE], log[PATH_SIZE];
     snprintf(picture, sizeof picture, "%s/data/%s/consistency.exr", opt->out_dir, s->name);
     snprintf(log, sizeof log, "%s/data/%s/consistency.log", opt->out_dir, s->name);
@@ -23,7 +28,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                  .spp = s->consistency.spp,
                                  .seed = replicate_seed((uint32_t)opt->seed, k),
                                  .threads = opt->threads,
-                                 .timeout_s = opt->timeout_s,
+                                 .timeout_s = fmin(left, opt->timeout_s),
                                  .picture = picture,
                                  .log = log};
     double cpu_s;
@@ -48,7 +53,7 @@ static json_t *judged(const struct suite_scene *s, double alpha, const struct co
 }
 
 json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
-                        double alpha)
+                        double alpha, double deadline)
 {
     int num = s->consistency.renders, done = 0;
     struct moments *render = calloc((size_t)num, sizeof *render);
@@ -57,11 +62,15 @@ json_t *consistency_run(const struct validate_options *opt, const struct suite_s
     double seconds = 0;
     bool ok = render != NULL || err_set(&e, "out of memory");
     for (; ok && done < num; done += ok)
-        ok = render_one(opt, s, done, &render[done], &seconds, &e);
+        ok = render_one(opt, s, done, deadline, &render[done], &seconds, &e);
     ok = ok && consistency_judge(render, num, s->consistency.margin, alpha, &c, &e);
     for (int k = 0; k < done; k++)
         moments_free(&render[k]);
     free(render);
+    if (!ok && now_seconds() >= deadline)
+        return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
+                         "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
+                         "budget spent before its renders were done");
     return ok ? judged(s, alpha, &c, seconds)
               : json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
                           "error", e.msg);
@@ -73,6 +82,13 @@ static bool is_interval(const json_t *v)
            json_is_number(json_array_get(v, 1));
 }
 
+/* Of a claim with an error. */
+static bool only_time_missing(const json_t *c)
+{
+    const char *verdict = member_text(c, "verdict");
+    return verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
 static bool check_one(const json_t *c, const char *where, struct err *e)
 {
     static const char *const numbers[] = {"renders", "spp",   "alpha",  "margin",
@@ -81,7 +97,8 @@ static bool check_one(const json_t *c, const char *where, struct err *e)
     if (member_text(c, "scene") == NULL || member_text(c, "engine") == NULL)
         return err_set(e, "%s: 'scene' or 'engine' is missing", where);
     if (member_text(c, "error") != NULL)
-        return !passed || err_set(e, "%s: has an 'error' and yet 'passed'", where);
+        return (!passed && only_time_missing(c)) ||
+               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!json_is_number(json_object_get(c, numbers[i])))
             return err_set(e, "%s: '%s' is not a number", where, numbers[i]);
@@ -139,8 +156,10 @@ void consistency_print(FILE *f, const json_t *consistency, bool markdown)
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
         if (member_text(c, "error") != NULL)
-            fprintf(f, markdown ? "| %s | | | | NOT JUDGED: %s |\n" : "%s  NOT JUDGED: %s\n",
-                    member_text(c, "scene"), member_text(c, "error"));
+            fprintf(f, markdown ? "| %s | | | | %s: %s |\n" : "%s  %s: %s\n",
+                    member_text(c, "scene"),
+                    member_text(c, "verdict") != NULL ? member_text(c, "verdict") : "NOT JUDGED",
+                    member_text(c, "error"));
         else
             fprintf(f,
                     markdown ? "| %s | %.0f x %.0f spp | %.3f [%.3f, %.3f] | %.2f | %s |\n"

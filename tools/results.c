@@ -23,11 +23,21 @@ static const struct member root_members[] = {{"command", STRING, true},  {"versi
                                              {"seconds", NUMBER, false}};
 
 /* A claim that could not be judged has these and no more. */
-static const struct member any_claim_members[] = {
-    {"scene", STRING, true},     {"a", STRING, true},         {"b", STRING, true},
-    {"expected", STRING, true},  {"passed", BOOLEAN, true},   {"title", STRING, false},
-    {"detects", STRING, false},  {"blind_to", STRING, false}, {"error", STRING, false},
-    {"quantity", STRING, false}, {"rerun", STRING, false}};
+static const struct member any_claim_members[] = {{"scene", STRING, true},
+                                                  {"a", STRING, true},
+                                                  {"b", STRING, true},
+                                                  {"expected", STRING, true},
+                                                  {"passed", BOOLEAN, true},
+                                                  {"title", STRING, false},
+                                                  {"detects", STRING, false},
+                                                  {"blind_to", STRING, false},
+                                                  {"error", STRING, false},
+                                                  {"quantity", STRING, false},
+                                                  {"rerun", STRING, false},
+                                                  {"stages", COUNT, false},
+                                                  {"alpha_claim", NUMBER, false},
+                                                  {"alpha_spent", NUMBER, false},
+                                                  {"cost_s", OBJECT, false}};
 
 static const struct member judged_members[] = {
     {"quantity", STRING, true},      {"verdict", STRING, true},
@@ -223,11 +233,32 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
     return true;
 }
 
+static const struct member look_members[] = {{"n_a", NUMBER, true},
+                                             {"n_b", NUMBER, true},
+                                             {"alpha", NUMBER, true},
+                                             {"stage", COUNT, true},
+                                             {"verdict", STRING, true}};
+static const struct member cost_members[] = {{"a", NUMBER, true}, {"b", NUMBER, true}};
+
+static bool check_looks(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *looks = json_object_get(claim, "looks"), *cost = json_object_get(claim, "cost_s");
+    if (looks != NULL && !json_is_array(looks))
+        return err_set(e, "%s: 'looks' is not an array", where);
+    for (size_t i = 0; i < json_array_size(looks); i++)
+        if (!check_members(json_array_get(looks, i), look_members, LENGTH(look_members), where,
+                           "looks.", e))
+            return false;
+    return cost == NULL ||
+           check_members(cost, cost_members, LENGTH(cost_members), where, "cost_s.", e);
+}
+
 static bool check_claim(const json_t *claim, const char *where, struct err *e)
 {
     if (!json_is_object(claim))
         return err_set(e, "%s: not an object", where);
-    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e))
+    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e) ||
+        !check_looks(claim, where, e))
         return false;
     enum verdict expected;
     const char *name = member_text(claim, "expected");
@@ -237,6 +268,8 @@ static bool check_claim(const json_t *claim, const char *where, struct err *e)
         return check_judged(claim, where, e);
     if (json_is_true(json_object_get(claim, "passed")))
         return err_set(e, "%s: has an 'error' and yet 'passed'", where);
+    if (json_object_get(claim, "verdict") != NULL && !claim_lacks_time(claim))
+        return err_set(e, "%s: has an 'error' and yet a 'verdict' that is not INCONCLUSIVE", where);
     return true;
 }
 
@@ -311,12 +344,21 @@ enum outcome claim_outcome(const json_t *claim)
     return OUTCOME_UNDECIDED;
 }
 
+bool claim_lacks_time(const json_t *claim)
+{
+    const char *verdict = member_text(claim, "verdict");
+    return json_object_get(claim, "error") != NULL && verdict != NULL &&
+           strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
 int results_exit_code(const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims");
     size_t count[4] = {0};
     for (size_t i = 0; i < json_array_size(claims); i++)
-        count[claim_outcome(json_array_get(claims, i))]++;
+        count[claim_lacks_time(json_array_get(claims, i))
+                  ? OUTCOME_UNDECIDED
+                  : claim_outcome(json_array_get(claims, i))]++;
     const json_t *convergence = json_object_get(results, "convergence");
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");

@@ -30,10 +30,20 @@
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
  * false, "error": "one line" } ] }
  *
+ * Of `assay validate` each claim, judged or not, also has
+ *         "looks": [{"n_a": 64, "n_b": 1, "alpha": 1e-6, "stage": 1, "verdict": "INCONCLUSIVE"}, ...],
+ *         "alpha_claim": 6.7e-5 (of all its looks), "alpha_spent": 1e-6 (of those taken),
+ *         "stages": 1 (or 2, see gate.h; "stage" of a look is the last that it needed),
+ *         "cost_s": {"a": 1.2, "b": 0} (CPU seconds rendered for it in this run; what an earlier
+ *         claim had rendered already costs nothing)
+ * and its "alpha" is that of its last look; intervals of a claim of two stages have half of it. The
+ * root has "stages" and, with --budget, "budget_s".
+ *
  * With --engine the root also has "not_expressible": [{"scene":, "engine":, "reason": "one line"}].
  *
  * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
- * judged: it never counts as passed and makes the exit code 3. "passed" is true exactly where
+ * judged: it never counts as passed and makes the exit code 3, unless it also has the "verdict" INCONCLUSIVE:
+ * then only time was missing, and it counts as that. "passed" is true exactly where
  * "verdict" equals "expected". An element of tile_log10_p and tile_t is null where a tile has no
  * noise at all and so no test.
  *
@@ -65,6 +75,9 @@ double member_number(const json_t *object, const char *name);
  * other verdict that was not expected. */
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
 enum outcome claim_outcome(const json_t *claim);
+/* Of a claim that is OUTCOME_NOT_JUDGED: the budget ended before its first look. It has no numbers,
+ * like any that was not judged, but counts as INCONCLUSIVE. */
+bool claim_lacks_time(const json_t *claim);
 
 /* 0 if every claim and every engine of the convergence passed; else 3 if any could not be judged, else 1 if any verdict was the
  * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
