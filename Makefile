@@ -48,12 +48,12 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
 check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%) \
-  $(BUILD)/tests/student_tracer
+  $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
 	tests/run.sh $(BUILD)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
-	tests/mutants.sh $(BUILD) $(ONLY)
+	tests/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
 
 # SHARE=0.01: a hundredth of it, into BUILD/calibration.
 calibrate: $(BUILD)/tests/make_calibration

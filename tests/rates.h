@@ -10,6 +10,17 @@
 double rate_lower(double k, double n, double tail);
 double rate_upper(double k, double n, double tail);
 
+/* The same, one-sided at confidence 0.999. */
+static inline double lower_bound(int k, int n)
+{
+    return rate_lower(k, n, 0.001);
+}
+
+static inline double upper_bound(int k, int n)
+{
+    return rate_upper(k, n, 0.001);
+}
+
 /* Ascending. */
 void sort_numbers(double *x, size_t n);
 

@@ -20,17 +20,6 @@
 #include <gsl/gsl_cdf.h>
 #include <string.h>
 
-/* One-sided, at confidence 0.999. */
-static double lower_bound(int k, int n)
-{
-    return rate_lower(k, n, 0.001);
-}
-
-static double upper_bound(int k, int n)
-{
-    return rate_upper(k, n, 0.001);
-}
-
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {

@@ -199,7 +199,7 @@ static void records_are_shown(void **state)
     fclose(f);
     assert_non_null(strstr(text, "8 x 32 spp  0.980 [0.800, 1.200]  0.50  EQUIVALENT"));
     assert_non_null(strstr(text, "41  NOT JUDGED: no <file>"));
-    assert_non_null(strstr(text, "| 41 | | | | NOT JUDGED: no <file> |"));
+    assert_non_null(strstr(text, "| 41 | | | | | | NOT JUDGED: no <file> |"));
     assert_non_null(strstr(text, "1 of 2 scenes"));
     assert_non_null(strstr(text, "12_&lt;b&gt;"));
     assert_non_null(strstr(text, "no &lt;file&gt;"));

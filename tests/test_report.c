@@ -539,6 +539,12 @@ static void page_is_whole(void **state)
     }
     assert_text_has(doc, "//article[@id='claim-0']", 0, "assay validate --only this");
     assert_text_has(doc, "//article[@id='claim-0']", 0, "7, 8");
+    assert_text_has(doc, "//article[@id='claim-0']//table", 0, "the image <red>");
+    assert_text_has(doc, "//article[@id='claim-0']//tr[@class='bad']", 0, "2 x 2 pixels at 4,6");
+    assert_text_has(doc, "//article[@id='claim-0']//table", 0, "not asked for");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "shift by x of 0.48 [0.46, 0.5] px");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "explains 93");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "1.9 times that of B [1.8, 2]");
     assert_text_has(doc, "//section[@class='scene']", 1, "64 replicates of 1 samples per pixel");
 
     /* Two scenes of two images, two maps and two colour scales each, all described, none from

@@ -229,11 +229,25 @@ static void missing_or_mistyped_member(void **state)
 static void nested_members(void **state)
 {
     (void)state;
-    static const char *const member[][2] = {
-        {"worst_tile", "x"},  {"worst_tile", "y"},  {"worst_tile", "difference"},
-        {"worst_tile", "ci"}, {"worst_tile", "t"},  {"worst", "width"},
-        {"worst", "height"},  {"worst", "channel"}, {"files", "a"},
-        {"files", "b"},       {"files", "z"},       {"files", "relative"}};
+    static const char *const member[][2] = {{"worst_tile", "x"},
+                                            {"worst_tile", "y"},
+                                            {"worst_tile", "difference"},
+                                            {"worst_tile", "ci"},
+                                            {"worst_tile", "t"},
+                                            {"worst", "width"},
+                                            {"worst", "height"},
+                                            {"worst", "channel"},
+                                            {"files", "a"},
+                                            {"files", "b"},
+                                            {"files", "z"},
+                                            {"files", "relative"},
+                                            {"direction", "name"},
+                                            {"direction", "explained"},
+                                            {"direction", "amount"},
+                                            {"direction", "ci"},
+                                            {"direction", "unit"},
+                                            {"variance_ratio", "ratio"},
+                                            {"variance_ratio", "ci"}};
     for (size_t i = 0; i < sizeof member / sizeof *member; i++) {
         json_t *claim = parse(judged_claim);
         assert_int_equal(json_object_del(json_object_get(claim, member[i][0]), member[i][1]), 0);
@@ -241,6 +255,21 @@ static void nested_members(void **state)
         snprintf(wanted, sizeof wanted, "'%s.%s' is missing", member[i][0], member[i][1]);
         expect_claim_rejected(claim, wanted);
     }
+    static const char *const statistic[] = {"name", "share", "num_tests", "log10_p", "what"};
+    for (size_t i = 0; i < sizeof statistic / sizeof *statistic; i++) {
+        json_t *claim = parse(judged_claim);
+        json_t *first = json_array_get(json_object_get(claim, "statistics"), 0);
+        assert_int_equal(json_object_del(first, statistic[i]), 0);
+        char wanted[128];
+        snprintf(wanted, sizeof wanted, "'statistics.%s' is missing", statistic[i]);
+        expect_claim_rejected(claim, wanted);
+    }
+    json_t *claim = parse(judged_claim);
+    json_array_clear(json_object_get(claim, "statistics"));
+    expect_claim_rejected(claim, "'statistics' is not an array with at least one");
+    claim = parse(judged_claim);
+    json_array_set_new(json_object_get(claim, "statistics"), 0, json_integer(1));
+    expect_claim_rejected(claim, "'statistics' has an element 0 that is not an object");
 }
 
 static void set(json_t *claim, const char *name, const char *json)

@@ -69,7 +69,7 @@ static double student(const struct pixels *s, double r)
     return left > 0 ? u * sqrt((s->num - 1) / left) : copysign(INFINITY, u);
 }
 
-/* skewness of sum (a - r b), with the standard error it would have if it were 0 */
+/* Skewness of sum (a - r b), for the r at which the sum is 0: elsewhere its mean would count as skewness. */
 static double skewness(const struct pixels *s, double r)
 {
     double cube = s->aaa - 3 * r * s->aab + 3 * r * r * s->abb - r * r * r * s->bbb;
@@ -116,7 +116,7 @@ struct variance_ratio noise_ratio(const struct moments *a, const struct moments 
     double limit = 1 + j->opt.margin_variance;
     double r = out.ratio > limit ? limit : out.ratio < 1 / limit ? 1 / limit : out.ratio;
     double guard = stats_t_of_z(j->z_guard[STATISTIC_NOISE], s.num - 1);
-    *testable = skewness(&s, r) * guard * guard * guard / 3 <= skew_limit;
+    *testable = g * guard * guard * guard / 3 <= skew_limit;
     double t = fmin(1e9, fabs(student(&s, r)));
     if (*testable)
         *log10_p = fmax(region_smallest_log10_p, stats_t_log10_p(t, s.num - 1));

@@ -37,12 +37,15 @@ static double cost(const struct task *t)
 }
 
 /* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
- * and in a round the cheapest first. A claim with a single look comes before the fifth round, or at
- * once if it costs nothing. */
-static double round_of(const struct task *t)
+ * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
+ * look of others, comes before that round, or at once if it costs nothing. A scene that must differ cannot
+ * be what --until-different waits for, and comes last there. */
+static double round_of(const struct validation *v, const struct task *t)
 {
+    if (v->opt->until_different && t->scene->expect == VERDICT_DIFFERENT)
+        return NUM_LOOKS;
     if (t->looks == &sequence_single)
-        return cost(t) > 0 ? 3.5 : -1;
+        return cost(t) > 0 ? 1.5 : -1;
     return (double)json_array_size(t->history);
 }
 
@@ -55,8 +58,8 @@ static struct task *choose(const struct validation *v)
             continue;
         if (v->sequence == &sequence_single)
             return t;
-        if (best == NULL || round_of(t) < round_of(best) ||
-            (round_of(t) == round_of(best) && cost(t) < cost(best)))
+        if (best == NULL || round_of(v, t) < round_of(v, best) ||
+            (round_of(v, t) == round_of(v, best) && cost(t) < cost(best)))
             best = t;
     }
     return best;
