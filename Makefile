@@ -64,6 +64,10 @@ catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
 diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
 	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
 	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
+# SHARE=0.01: a hundredth of it, into BUILD/calibration.
+calibrate: $(BUILD)/tests/make_calibration
+	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
+	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -112,6 +116,7 @@ help:
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
 	@echo 'make catalogue   bring what assay diagnose knows of these bugs up to date'
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
+	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
@@ -187,6 +192,7 @@ $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay
 	$(link)
 $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
   tests/anchors_plot.c tests/anchor_images.c tests/anchor_rules.c) $(BUILD)/libassay.a
+$(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
@@ -229,7 +235,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE catalogue diagnose-rates \
+.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE catalogue diagnose-rates calibrate \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
