@@ -64,7 +64,8 @@ catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
 diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
 	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
 	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
-# SHARE=0.01: a hundredth of it, into BUILD/calibration.
+
+# Error rates and power of the tester, published: tests/calibration ; SHARE=0.01: a hundredth of it, into BUILD/calibration.
 calibrate: $(BUILD)/tests/make_calibration
 	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
 	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
@@ -192,6 +193,7 @@ $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay
 	$(link)
 $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
   tests/anchors_plot.c tests/anchor_images.c tests/anchor_rules.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
@@ -235,7 +237,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help FORCE catalogue diagnose-rates calibrate \
+.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
