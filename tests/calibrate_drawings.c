@@ -89,9 +89,11 @@ static bool draw_tail(const char *dir, const struct settings *s, const struct re
                      .mark_y = 1};
     for (int i = 0; i < s->num_tail && p.num < PLOT_SERIES; i++) {
         const struct tail_result *t = &r->tail[i];
+        if (t->tested < 1e5) /* less than ten expected at 1e-4: a bar over all of the drawing */
+            continue;
         struct plot_series *series = &p.series[p.num++];
         snprintf(series->name, sizeof series->name, "%s", t->name);
-        for (int l = 0; l < 3 && t->tested > 0; l++) /* side by side, not on top of each other */
+        for (int l = 0; l < 3; l++) /* side by side, not on top of each other */
             plot_add(series, tail_level[l] * pow(10, 0.06 * (i - 3.5)),
                      t->rejected[l] / t->tested / tail_level[l],
                      rate_lower(t->rejected[l], t->tested, check_tail) / tail_level[l],

@@ -95,8 +95,8 @@ struct settings settings_published(double share)
         add_tail(&s, laws[i], 64, 64, part(share, 1.5e7));
     }
     add_tail(&s, LAW_NORMAL, 16, 16, part(share, 1.5e7));
-    add_tail(&s, LAW_EXPONENTIAL, 64, 1024, part(share, 4e6));
-    add_tail(&s, LAW_EXPONENTIAL, 1024, 0, part(share, 4e6));
+    add_tail(&s, LAW_EXPONENTIAL, 64, 1024, part(share, 1e5));
+    add_tail(&s, LAW_EXPONENTIAL, 1024, 0, part(share, 1e5));
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
         add_render(&s, scenes[i], 16, 64, 0);
         add_render(&s, scenes[i], 32, 16, 0);
