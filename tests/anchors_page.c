@@ -192,19 +192,17 @@ static void reading(FILE *f, const struct anchor_results *r)
         "## Reading the figures\n\n"
         "- Pixels that see a lamp directly have no noise. The floor of Mitsuba's rule gives their "
         "samples a standard deviation of\n  0.01: at a radiance of 10 a bias of %.2f x 0.01 / (10 "
-        "sqrt %d) = %.2g %% fails them, and eleven such pixels are enough.\n  Our gate asks instead "
-        "whether %d equal observations can all have missed something rare; K pixels in one square "
-        "have with\n  probability exp(-%d K b). So where a lamp is in view Mitsuba's rule finds a "
-        "factor on all light sooner. On light that has\n  bounced such pixels say nothing, which is "
-        "why that has a table of its own.\n"
+        "sqrt %d) = %.2g %% fails them, and eleven such pixels are enough.\n  Ours gains from them through "
+        "the directed statistics, which weigh pixels by their noise. A factor on all light is then found "
+        "by\n  the lamp alone. On light that has bounced such pixels say nothing, which is why that has "
+        "a table of its own.\n"
         "- A square on a lamp's edge holds the noisiest pixels of the picture. A sum over the square "
         "has their noise; a rule that\n  counts pixels has not. The 95 %% quantile over pairs and "
         "places is that of the hardest places.\n"
         "- The rows \"(set)\" compare at one false-alarm rate. Ours is strict at 1e-6 and gains by giving "
         "that up; Mitsuba's rule\n  gains more, because as published it hardly ever fires on equal "
         "pairs.\n\n",
-        z, r->settings.spp, 100 * z * 0.01 / (10 * sqrt(r->settings.spp)), r->settings.spp,
-        r->settings.spp);
+        z, r->settings.spp, 100 * z * 0.01 / (10 * sqrt(r->settings.spp)));
 }
 
 static void tables(FILE *f, const struct anchor_results *r)
