@@ -44,7 +44,8 @@ extern const char *const anchor_rule_id[NUM_ANCHOR_RULES];   /* in results.json 
 extern const char *const anchor_rule_name[NUM_ANCHOR_RULES]; /* on the page */
 
 /* A bias found with anchor_settings.power: the order statistic of the smallest biases found in each
- * pair, with its 95 % interval (binomial ranks, no law assumed). INFINITY: more than was tried. */
+ * pair, with its 95 % interval (binomial ranks, no law assumed). INFINITY: more than was tried.
+ * Raised above the order statistic where the rule, asked again, finds it in fewer pairs. */
 struct anchor_bias {
     double b, lo, hi;
     int found; /* pairs in which the rule, asked again, finds b */

@@ -251,14 +251,58 @@ static void measure_pair(void *arg, int pair, int thread)
         show(scene_shown, "judging", (double)(pair + 1) / m->set->num_pairs);
 }
 
+struct question {
+    struct measurement *m;
+    bool open[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS]; /* asked this time */
+};
+
 static void ask_again(void *arg, int pair, int thread)
 {
-    struct measurement *m = arg;
+    const struct question *q = arg;
+    struct measurement *m = q->m;
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
-            m->found[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k] =
-                isfinite(m->bias[r][k]) &&
-                excess(m, &m->bench[thread], r, pair, k, m->bias[r][k]) > 0;
+            if (q->open[r][k])
+                m->found[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k] =
+                    excess(m, &m->bench[thread], r, pair, k, m->bias[r][k]) > 0;
+}
+
+static int times_found(const struct measurement *m, int rule, int kind)
+{
+    int found = 0;
+    for (int i = 0; i < m->set->num_pairs; i++)
+        found += m->found[(i * NUM_ANCHOR_RULES + rule) * NUM_ANCHOR_ERRORS + kind];
+    return found;
+}
+
+/* Is the bias really found with the power asked for? Not always: a rule may find a small error in a pair
+ * and miss a larger one, as ours does where a larger error makes a region too skewed to be tested. Then
+ * the bias is raised by 5 % at a time until it is. */
+static void confirm(struct measurement *m, int threads)
+{
+    int enough = (int)ceil(m->set->power * m->set->num_pairs - 1e-9);
+    struct question q = {.m = m};
+    bool any = true;
+    for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+            q.open[r][k] = isfinite(m->bias[r][k]);
+    while (any) {
+        anchor_parallel(m->set->num_pairs, threads, ask_again, &q);
+        any = false;
+        for (int r = 0; r < NUM_ANCHOR_RULES; r++)
+            for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
+                if (!q.open[r][k])
+                    continue;
+                q.open[r][k] = times_found(m, r, k) < enough;
+                if (q.open[r][k])
+                    m->bias[r][k] *= 1.05;
+                if (m->bias[r][k] > largest_tried) {
+                    m->bias[r][k] = INFINITY;
+                    q.open[r][k] = false;
+                }
+                any = any || q.open[r][k];
+            }
+    }
 }
 
 /* Pair 0 alone first: its answers are where the search starts in all others, so that the record does
@@ -286,14 +330,16 @@ static void measure_pairs(struct measurement *m, int threads, struct anchor_scen
                 .b = sorted[at], .lo = sorted[lo], .hi = hi < n ? sorted[hi] : INFINITY};
         }
     free(sorted);
-    anchor_parallel(n, threads, ask_again, m);
+    confirm(m, threads);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
         out->rule[r].threshold = m->threshold[r];
-        for (int i = 0; i < n; i++) {
+        for (int i = 0; i < n; i++)
             out->rule[r].false_alarms += m->alarm[i * NUM_ANCHOR_RULES + r];
-            for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
-                out->rule[r].bias[k].found +=
-                    m->found[(i * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
+            struct anchor_bias *bias = &out->rule[r].bias[k];
+            bias->b = m->bias[r][k];
+            bias->hi = fmax(bias->hi, bias->b);
+            bias->found = times_found(m, r, k);
         }
     }
 }
