@@ -15,7 +15,8 @@ static const double cell_dof = 5;
 static const double fact_dof = 30;
 /* How well an effect is known to be the same at another size. */
 static const double model_error = 0.01;
-static const double fact_error = 0.05;
+static const double fact_error[NUM_FACTS] = {
+    [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
 /* What floats, stored and rendered, are good for. */
 static const double rounding = 1e-5;
 /* Of the variance that the correct renderer's predicts: a cell that by luck states less is not believed. */
@@ -99,7 +100,7 @@ static void add_facts(const struct clue *clue, const struct effect *e, double am
             fact += amplitude * (e->fact[f] - fact);
             sd = e->fact_sd[f];
         }
-        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error * fact_error;
+        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
         double z2 = pow(clue->seen.fact[f] - fact, 2) / var;
         double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
         t->log_likelihood += student(z2, var, fact_dof);
