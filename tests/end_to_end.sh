@@ -78,7 +78,7 @@ else
     ok "failures leave no files"
 fi
 
-# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds them.)
+# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds all of them.)
 stale=0
 for patch in tests/mutants/*.patch; do
     patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
@@ -86,6 +86,11 @@ for patch in tests/mutants/*.patch; do
         { stale=1; not_ok "mutant $(basename "$patch")" "does not begin with the lines 'Bug: ' and 'Where: '"; }
 done
 [ $stale -eq 0 ] && ok "mutants apply and say what they are"
+# Three of them are built and found, and the renderer as it is passes the same scenes.
+if tests/mutants.sh --quick "$build" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
+    not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
+fi
+rm -f "$tmp/mutants.out"
 
 # Pictures.
 expect "render" 0 "mean radiance" \
@@ -129,7 +134,7 @@ interrupt() {
         timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
-    expect "$1: the picture has moments" 0 "EQUIVALENT" \
+    expect "$1: the picture has moments, and is not judged by itself" 3 "the same observations" \
         "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
     $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
         -f "$tmp/long.exr" >/dev/null
@@ -148,7 +153,7 @@ $pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" 
 for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
 kill -9 $!
 wait $! 2>/dev/null
-expect "--write-every: the picture of a killed render" 0 "EQUIVALENT" \
+expect "--write-every: the picture of a killed render has moments" 3 "the same observations" \
     "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
 if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
     not_ok "--write-every: its state" "none"
@@ -214,13 +219,76 @@ expect "compare: different" 1 "^DIFFERENT" \
 expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
     "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/few.exr" "$tmp/two.exr"
 expect "compare: missing file" 3 "gone.exr" "$san_assay" compare "$tmp/gone.exr" "$tmp/two.exr"
-expect "compare: not moments" 3 "not a moments EXR" "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
+expect "compare: a PNG without its curve" 3 "what light is a code" \
+    "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
 expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
 "$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
 expect "compare: samples that are not independent" 3 "only replicates" \
     "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
+# compare: inputs from elsewhere. Replicates are any float pictures, so moments images do.
+for option in --alpha --margin --margin-tile --margin-variance --again --exchangeable --curve --spp-a --spp-b; do
+    expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
+done
+for k in 1 2 3 4 5; do
+    for set in a b c a2 b2 c2; do
+        mkdir -p "$tmp/runs_$set"
+        case $set in c*) bounces=1 ;; *) bounces=5 ;; esac
+        case $set in a) seed=10 ;; b) seed=20 ;; c) seed=30 ;; a2) seed=40 ;; b2) seed=50 ;; c2) seed=60 ;; esac
+        "$pathtracer" -q -r 32 32 -s 32 -m $bounces --seed $((seed + k)) -f "$tmp/runs_$set/$k.exr" $scene \
+            >/dev/null || not_ok "render runs_$set" "failed"
+    done
+done
+expect "compare: directories" 1 "5 replicates" "$san_assay" compare "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, equal" 2 "could have been missed" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_a" "$tmp/runs_b"
+expect "compare: exchangeable, different" 1 "^DIFFERENT.*p = 0.00794 by 252 labellings" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: too few replicates" 2 "7 a side are needed" \
+    "$san_assay" compare --exchangeable "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable in two stages" 1 "^DIFFERENT.*fresh seeds.*p = 0.0079 and 0.004" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b2" \
+    --json "$tmp/perm/results.json" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, the same seeds again" 3 "fresh seeds" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: results have the notes" 0 "judged by permutation" grep '"notes"' -A 3 "$tmp/perm/results.json"
+expect "report of directories" 0 "index.html" "$san_assay" report "$tmp/perm/results.json"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy.exr"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy2.exr"
+expect "compare: a seed that was ignored" 3 "copy.exr and copy2.exr are the same picture" \
+    "$san_assay" compare "$tmp/runs_a2" "$tmp/runs_b"
+expect "compare: exchangeable files" 3 "one.exr: cannot read" \
+    "$san_assay" compare --exchangeable "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: exchangeable with a margin" 3 "no margin" \
+    "$san_assay" compare --exchangeable --margin 0.1 "$tmp/runs_a" "$tmp/runs_b"
+render -s 256 --seed 7 -m 4 -f "$tmp/shallow2.exr"
+render -s 256 --seed 8 -f "$tmp/two2.exr"
+expect "compare: two stages" 1 "^DIFFERENT.*confirmed" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: two stages, not needed" 0 "were not needed" "$san_assay" compare --alpha 1e-3 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: two stages of the same files" 3 "fresh seeds" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+"$pathtracer" -q -r 64 64 -s 256 --seed 3 -f "$tmp/one.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 4 -f "$tmp/two.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 5 -m 1 -f "$tmp/shallow.png" $scene >/dev/null
+expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]* of 4096" \
+    "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
+expect "compare: PNG, different" 1 "^DIFFERENT" \
+    "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
+expect "compare: PNG against moments" 1 "is not used" \
+    "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
+expect "compare: the same PNG" 3 "the same picture" \
+    "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
+expect "compare: a curve for nothing" 3 "neither" \
+    "$san_assay" compare --curve srgb "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: unknown curve" 3 "none of" \
+    "$san_assay" compare --curve film "$tmp/one.png" "$tmp/two.png"
+expect "compare: samples of a file that says them" 3 "says itself" \
+    "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
+
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json

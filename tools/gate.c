@@ -1,5 +1,6 @@
 #include "gate.h"
 
+#include "hygiene.h"
 #include "pyramid.h"
 #include "region.h"
 #include "stats.h"
@@ -54,8 +55,8 @@ static struct cell cell_of(const struct moments *a, const struct moments *b, str
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++) {
             size_t p = (size_t)y * (size_t)a->width + (size_t)x;
-            struct cell one = pyramid_pixel(a, b, p, channel);
-            pyramid_add(&sum, &one);
+            struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
+            cell_add_pixel(&sum, &ea, &eb);
         }
     return sum;
 }
@@ -67,9 +68,9 @@ static bool region_again(const struct region *found, const struct moments *a,
                          double *log10_p, double *difference, struct err *e)
 {
     struct judge j;
-    if (!judge_init(a, b, opt, &j, e))
+    if (!hygiene_check(a, b, opt, &j, e))
         return false;
-    j.z_guard[0] = j.z_guard[1] = stats_normal_quantile(level);
+    j.z_guard[STATISTIC_IMAGE] = j.z_guard[STATISTIC_PYRAMID] = stats_normal_quantile(level);
     struct rect r = {found->x, found->y, found->width, found->height};
     struct cell cell = cell_of(a, b, r, found->channel);
     struct measured m = region_measure(&j, &cell, r);
@@ -107,7 +108,7 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
             return false;
         }
         region_name(a2->width, a2->height, r, w->channel, what, sizeof what);
-        snprintf(seen, sizeof seen, " %+.3g %%, then %+.3g %%", 100 * w->difference,
+        snprintf(seen, sizeof seen, ": %+.3g %%, then %+.3g %%", 100 * w->difference,
                  100 * difference);
         confirmed = log10_p <= log10(level);
     }
@@ -126,22 +127,22 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
             log10_p = p;
         }
     }
-    char own[sizeof second->reason];
-    memcpy(own, second->reason, sizeof own);
+    char text[1024];
     if (confirmed) {
         second->verdict = VERDICT_DIFFERENT;
         second->extra_factor = 1;
-        snprintf(second->reason, sizeof second->reason,
-                 "%s:%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
+        snprintf(text, sizeof text,
+                 "%s%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
                  "10^%.1f",
                  what, seen, stage, level, flagged, log10_p);
     } else {
         if (second->verdict == VERDICT_DIFFERENT)
             second->verdict = VERDICT_INCONCLUSIVE;
-        snprintf(second->reason, sizeof second->reason,
-                 "%s:%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %.110s", what,
-                 seen, log10_p, own);
+        snprintf(text, sizeof text,
+                 "%s%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %s", what, seen,
+                 log10_p, second->reason);
     }
+    snprintf(second->reason, sizeof second->reason, "%.255s", text);
     return true;
 }
 

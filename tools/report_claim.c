@@ -3,6 +3,7 @@
 #include "report_colour.h"
 #include "report_html.h"
 #include "report_plot.h"
+#include "report_statistics.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -383,6 +384,7 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct im
     write_regions(f, json);
     write_provenance(f, json);
     fputs("</dl>\n", f);
+    report_statistics(f, json);
     const char *rerun = member_text(json, "rerun");
     if (rerun != NULL) {
         fputs("<p class=\"caption\">To run this claim again:</p>\n<pre tabindex=\"0\"><code>", f);

@@ -51,6 +51,7 @@ static const struct member judged_members[] = {
     {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
     {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
     {"tiles_y", COUNT, true},        {"files", OBJECT, true},
+    {"direction", OBJECT, false},    {"variance_ratio", OBJECT, false},
     {"class", STRING, false},        {"n_a", NUMBER, false},
     {"n_b", NUMBER, false},          {"unit_b", STRING, false},
     {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
@@ -67,6 +68,21 @@ static const struct member worst_members[] = {
     {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},
     {"height", COUNT, true}, {"channel", COUNT, true}, {"difference", NUMBER, true},
     {"ci", INTERVAL, true},  {"t", NUMBER, true}};
+
+static const struct member statistic_members[] = {{"name", STRING, true},
+                                                  {"share", NUMBER, true},
+                                                  {"num_tests", COUNT, true},
+                                                  {"log10_p", NUMBER, true},
+                                                  {"what", STRING, true}};
+
+static const struct member direction_members[] = {{"name", STRING, true},
+                                                  {"explained", NUMBER, true},
+                                                  {"amount", NUMBER, true},
+                                                  {"ci", INTERVAL, true},
+                                                  {"unit", STRING, true}};
+
+static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
+                                                       {"ci", INTERVAL, true}};
 
 static const struct member file_members[] = {
     {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
@@ -151,6 +167,38 @@ static bool check_tiles(const json_t *claim, const char *name, size_t num, const
     return true;
 }
 
+static bool check_statistics(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *all = json_object_get(claim, "statistics");
+    if (all == NULL)
+        return err_set(e, "%s: 'statistics' is missing", where);
+    if (!json_is_array(all) || json_array_size(all) == 0)
+        return err_set(e, "%s: 'statistics' is not an array with at least one statistic", where);
+    for (size_t i = 0; i < json_array_size(all); i++) {
+        const json_t *s = json_array_get(all, i);
+        if (!json_is_object(s))
+            return err_set(e, "%s: 'statistics' has an element %zu that is not an object", where,
+                           i);
+        if (!check_members(s, statistic_members, LENGTH(statistic_members), where, "statistics.",
+                           e))
+            return false;
+    }
+    return true;
+}
+
+/* Members that may be absent. */
+static bool check_findings(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *direction = json_object_get(claim, "direction");
+    const json_t *ratio = json_object_get(claim, "variance_ratio");
+    return (direction == NULL ||
+            check_members(direction, direction_members, LENGTH(direction_members), where,
+                          "direction.", e)) &&
+           (ratio == NULL ||
+            check_members(ratio, variance_ratio_members, LENGTH(variance_ratio_members), where,
+                          "variance_ratio.", e));
+}
+
 static bool check_judged(const json_t *claim, const char *where, struct err *e)
 {
     if (!check_members(claim, judged_members, LENGTH(judged_members), where, "", e) ||
@@ -159,7 +207,8 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
         !check_members(json_object_get(claim, "worst"), worst_members, LENGTH(worst_members), where,
                        "worst.", e) ||
         !check_members(json_object_get(claim, "files"), file_members, LENGTH(file_members), where,
-                       "files.", e))
+                       "files.", e) ||
+        !check_statistics(claim, where, e) || !check_findings(claim, where, e))
         return false;
 
     json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));

@@ -15,6 +15,11 @@
  *         "expected": "EQUIVALENT", "verdict": "EQUIVALENT", "passed": true, "reason": "...",
  *         "difference": .0003, "ci": [-.001, .002], "channel_difference": [r, g, b],
  *         "log10_p": -0.3, "mdb_global": .004, "mdb_tile": .03, "num_tests": 123,
+ *         "statistics": [{"name": "image", "share": .28 (of alpha), "num_tests": 4, "log10_p": -0.1 (of
+ *             its smallest p, times num_tests), "what": "the image (red)"}, ...],  five, compare.h
+ *         "direction": {"name": "shift by x", "explained": .97, "amount": .48, "ci": [.46, .50],
+ *             "unit": "px"},                 absent where none could be tested
+ *         "variance_ratio": {"ratio": 1.9, "ci": [1.8, 2.0]},    absent where it is not known
  *         "worst_tile": {"x":, "y":, "difference":, "ci":, "t":}, "worst": {...same, "width":,
  * "height":, "channel":}, "rms_bias": .., "extra_factor": 1, "skew_limited": false, "tile_log10_p":
  * [...], "tile_t": [...], "tiles_x": 8, "tiles_y": 8, "n_a": 2048, "n_b": 16, "unit_b":
@@ -45,7 +50,7 @@
  * A reader may rely on: assay, command, version, date, alpha, claims (at least one, or none where there
  * is convergence); of each claim
  * scene, a, b, expected, passed; of each judged claim everything above except title, detects,
- * blind_to, class, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, seed_a, seeds_b, version_b and
+ * blind_to, class, direction, variance_ratio, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, seed_a, seeds_b, version_b and
  * rerun, which are provenance and absent where the claim has none (two files compared). */
 #ifndef ASSAY_RESULTS_H
 #define ASSAY_RESULTS_H

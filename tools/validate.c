@@ -28,21 +28,33 @@ void say(const struct validation *v, const char *scene, const char *what)
     fprintf(stderr, "] %s: %s\n", scene, what);
 }
 
+/* What starting a program and judging its picture costs, in vertices of paths. */
+static const double start_cost = 3e5;
+
+/* About what the next look of a claim costs, in vertices of paths. */
 static double cost(const struct task *t)
 {
-    if (t->a == NULL)
-        return (double)t->scene->width * t->scene->height * t->scene->consistency.renders *
-               t->scene->consistency.spp;
-    return side_cost(t->a, t->next) + side_cost(t->b, t->next);
+    const struct suite_scene *s = t->scene;
+    double samples, starts = 1;
+    if (t->a == NULL) {
+        samples = (double)s->width * s->height * s->consistency.renders * s->consistency.spp;
+        starts = s->consistency.renders + (s->consistency.batch > 0);
+    } else {
+        samples = side_cost(t->a, t->next) + side_cost(t->b, t->next);
+    }
+    return samples > 0 ? samples * (s->depth + 1) + starts * start_cost : 0;
 }
 
 /* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
- * and in a round the cheapest first. A claim with a single look comes before the fifth round, or at
- * once if it costs nothing. */
-static double round_of(const struct task *t)
+ * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
+ * look of others, comes before that round, or after the first if nothing is rendered for it. --until-different
+ * goes by cost alone; a scene that must differ cannot be what it waits for, and comes last. */
+static double round_of(const struct validation *v, const struct task *t)
 {
+    if (v->opt->until_different)
+        return t->scene->expect == VERDICT_DIFFERENT;
     if (t->looks == &sequence_single)
-        return cost(t) > 0 ? 3.5 : -1;
+        return cost(t) > 0 ? 1.5 : 0.5;
     return (double)json_array_size(t->history);
 }
 
@@ -55,8 +67,8 @@ static struct task *choose(const struct validation *v)
             continue;
         if (v->sequence == &sequence_single)
             return t;
-        if (best == NULL || round_of(t) < round_of(best) ||
-            (round_of(t) == round_of(best) && cost(t) < cost(best)))
+        if (best == NULL || round_of(v, t) < round_of(v, best) ||
+            (round_of(v, t) == round_of(v, best) && cost(t) < cost(best)))
             best = t;
     }
     return best;

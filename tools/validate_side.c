@@ -88,16 +88,19 @@ int side_count(const struct side *s, int look)
     return 1;
 }
 
-/* Where a look's image is kept. */
+/* Where a look's image is kept: looks of as many observations share it. */
 static int slot(const struct side *s, int look)
 {
-    return s->kind == SIDE_TRUTH || s->kind == SIDE_GOLDEN ? 0 : look;
+    int n = side_count(s, look), l = look;
+    while (l > 0 && side_count(s, l - 1) == n)
+        l--;
+    return l;
 }
 
-/* The largest smaller look that is there, or -1. */
+/* The largest look of fewer observations that is there, or -1. */
 static int below(const struct side *s, int stage, int look)
 {
-    int l = look - 1;
+    int l = slot(s, look) - 1;
     while (l >= 0 && !s->at[stage][l].present)
         l--;
     return l;
@@ -247,7 +250,7 @@ static bool add_before(const struct observed *before, struct observed *more, str
 
 static bool make(struct validation *v, struct side *s, int stage, int look, struct observed *out)
 {
-    int l = slot(s, look) == look ? below(s, stage, look) : -1;
+    int l = below(s, stage, look);
     int first = l >= 0 ? side_count(s, l) : 0;
     const struct observed *before = l >= 0 ? &s->at[stage][l] : NULL;
     /* An engine without noise has no more to say. */

@@ -198,6 +198,15 @@ static void tell_not_judged(const json_t *results, struct err *e)
             n++;
         }
     }
+    json_t *consistency = json_object_get(results, "consistency");
+    for (size_t i = 0; first == NULL && i < json_array_size(consistency); i++) {
+        const json_t *c = json_array_get(consistency, i);
+        if (consistency_outcome(c) == OUTCOME_NOT_JUDGED) {
+            err_set(e, "%s, its stated errors: %s", member_text(c, "scene"),
+                    member_text(c, "error"));
+            return;
+        }
+    }
     err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
             json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
             member_text(first, "b"), member_text(first, "error"));
