@@ -12,13 +12,13 @@ V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
-DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
+DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev zlib1g-dev
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenImageIO jansson gsl nettle
+PKGS    := libxml-2.0 OpenImageIO jansson gsl nettle zlib
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
@@ -206,7 +206,7 @@ programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERE
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css tools/page.js
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css $(wildcard tools/page*.js)
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): $(BUILD)/commit
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): \
   CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'

@@ -63,12 +63,9 @@ bool image_inspect(const char *path, struct image_info *out, struct err *e)
 bool image_write_exr(const char *path, const struct image *im, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Writes or encodes 8-bit RGB (3 bytes a pixel, row 0 at the top) as PNG. The encoded bytes belong
- * to the caller (free()). The file appears by rename. */
+/* Writes 8-bit RGB (3 bytes a pixel, row 0 at the top) as PNG. The file appears by rename. */
 bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8, struct err *e)
     __attribute__((warn_unused_result));
-bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes, size_t *size,
-                      struct err *e) __attribute__((warn_unused_result));
 
 /* Text that names the libraries: "OpenImageIO 2.4.7". */
 const char *image_library_version(void);

@@ -3,7 +3,6 @@ extern "C" {
 #include "image.h"
 }
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cerrno>
@@ -196,30 +195,6 @@ extern "C" bool image_write_png(const char *path, int width, int height, const u
     return by_rename(path, e, [&](const std::string &temp, std::string &why) {
         auto out = OIIO::ImageOutput::create("png");
         return write_png_to(*out, temp, width, height, rgb8, why);
-    });
-}
-
-extern "C" bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes,
-                                 size_t *size, struct err *e)
-{
-    return guarded("PNG in memory", e, [&](std::string &why) {
-        std::vector<unsigned char> buffer;
-        OIIO::Filesystem::IOVecOutput io(buffer);
-        auto out = OIIO::ImageOutput::create("memory.png", &io);
-        if (!out) {
-            why = OIIO::geterror();
-            return false;
-        }
-        if (!write_png_to(*out, "memory.png", width, height, rgb8, why))
-            return false;
-        *bytes = static_cast<uint8_t *>(std::malloc(buffer.size()));
-        if (*bytes == nullptr) {
-            why = "out of memory";
-            return false;
-        }
-        std::memcpy(*bytes, buffer.data(), buffer.size());
-        *size = buffer.size();
-        return true;
     });
 }
 

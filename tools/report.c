@@ -12,27 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The page stays below 5 MB: what is left after the pictures goes to the numbers behind them. */
-enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
-
-bool page_add_layer(struct page *p, int width, int height, int channels, const double *value,
-                    size_t *index, struct err *e)
-{
-    size_t n = (size_t)width * (size_t)height * (size_t)channels;
-    struct layer *grown = realloc(p->layer, (p->num_layers + 1) * sizeof *grown);
-    if (grown == NULL)
-        return err_set(e, "out of memory for the report");
-    p->layer = grown;
-    uint16_t *half = malloc(n * sizeof *half);
-    if (half == NULL)
-        return err_set(e, "out of memory for the report");
-    for (size_t i = 0; i < n; i++)
-        half[i] = half_from_double(value[i]);
-    *index = p->num_layers++;
-    p->layer[*index] = (struct layer){width, height, channels, half};
-    return true;
-}
-
 /* Worst outcome first, the file's order within. */
 static int compare_claims(const void *a, const void *b)
 {
@@ -149,9 +128,9 @@ static void write_row(FILE *f, const struct claim_ref *claim)
     fprintf(f, "<tr%s><th scope=\"row\"><a href=\"#claim-%zu\">",
             claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"", claim->index);
     html_text(f, member_text(c, "scene"));
-    fputs("</a></th><td>", f);
+    fputs("</a></th><td class=\"name\">", f);
     html_text(f, member_text(c, "a"));
-    fputs("</td><td>", f);
+    fputs("</td><td class=\"name\">", f);
     report_reference(f, claim);
     fputs("</td><td>", f);
     report_badge(f, claim);
@@ -228,53 +207,17 @@ static size_t gather_scene(struct claim_ref *claim, size_t num)
     return front;
 }
 
-/* Little-endian halves, base64, in elements that no browser runs. */
-static void write_layers(struct page *p)
-{
-    bool all = true;
-    for (size_t i = 0; i < p->num_layers; i++) {
-        const struct layer *l = &p->layer[i];
-        size_t n = (size_t)l->width * (size_t)l->height * (size_t)l->channels;
-        long here = ftell(p->f);
-        if (here < 0 || (size_t)here + 2 * n * 4 / 3 + PAGE_RESERVE > PAGE_LIMIT) {
-            all = false;
-            continue;
-        }
-        uint8_t *bytes = malloc(2 * n);
-        if (bytes == NULL) {
-            all = false;
-            continue;
-        }
-        for (size_t k = 0; k < n; k++) {
-            bytes[2 * k] = (uint8_t)(l->half[k] & 0xff);
-            bytes[2 * k + 1] = (uint8_t)(l->half[k] >> 8);
-        }
-        fprintf(p->f,
-                "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" data-height=\"%d\" "
-                "data-channels=\"%d\">",
-                i, l->width, l->height, l->channels);
-        html_base64(p->f, bytes, 2 * n);
-        fputs("</script>\n", p->f);
-        free(bytes);
-    }
-    if (!all)
-        fputs("<p class=\"caption\">To stay below 5 MB this page leaves out the numbers behind "
-              "some of its pictures; exposure and pixel values are not offered there.</p>\n",
-              p->f);
-}
-
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
                        struct err *e)
 {
     FILE *f = p->f;
-    fprintf(
-        f,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-        "style-src 'unsafe-inline'; script-src '%s'\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay report, ",
-        script_hash(page_js).s);
+    fprintf(f,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+            "style-src 'unsafe-inline'; script-src '%s'\">\n"
+            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+            "<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay report, ",
+            script_hash(page_js).s);
     html_text(f, member_text(root, "date"));
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
     write_header(f, root, claim, num);
@@ -290,7 +233,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
     fputs("</main>\n", f);
-    write_layers(p);
+    page_write_layers(p);
     fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
     return true;
 }
@@ -357,9 +300,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     else
         out_abandon(&out);
 done:
-    for (size_t i = 0; i < page.num_layers; i++)
-        free(page.layer[i].half);
-    free(page.layer);
+    page_free_layers(&page);
     free(claim);
     json_decref(root);
     return ok;
