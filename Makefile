@@ -13,7 +13,8 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev zlib1g-dev
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+  $(if $(shell command -v npm),,nodejs npm)
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -50,7 +51,8 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
+check: $(BUILD)/deps-test all programs-san programs-clang $(CHECKED) $(BUILD)/tests/student_tracer \
+  $(BUILD)/libassay.a $(BUILD)/browser/package-lock.json
 	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
@@ -198,6 +200,11 @@ $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anch
 	$(link)
 $(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
+# playwright-core, by which the page is tested in Debian's chromium.
+$(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
+	$(call say,NPM,$@)
+	$(Q)mkdir -p $(@D) && cp tests/browser/package.json $(@D) && cp $< $(@D)/lock.json && cd $(@D) && \
+	  mv lock.json package-lock.json && npm ci --silent --ignore-scripts --no-audit --no-fund
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay

@@ -525,6 +525,11 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
+# The page, in a browser.
+tests/browser/run.sh "$build" >"$tmp/browser"
+cat "$tmp/browser"
+failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
+
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"

@@ -9,10 +9,10 @@
 
 #include <cmocka.h>
 
-/* Undoes zz() of the pixel's two bytes, which are a plane apart. */
-static long unzigzag(const uint8_t *low, size_t pixels, size_t i)
+/* Undoes zz() of the pixel's bytes, which are a plane apart. */
+static long unzigzag(const uint8_t *low, size_t pixels, size_t i, int bytes)
 {
-    long u = low[i] + 256L * low[pixels + i];
+    long u = low[i] + 256L * low[pixels + i] + (bytes == 3 ? 65536L * low[2 * pixels + i] : 0);
     return u % 2 == 0 ? u / 2 : -(u + 1) / 2;
 }
 
@@ -44,11 +44,11 @@ static double spatial(const double *value, size_t i, size_t w, size_t channel, i
 struct layer_numbers layer_read(const uint8_t *bytes, size_t size, int width, int height)
 {
     size_t w = (size_t)width, pixels = w * (size_t)height;
-    uLongf length = (uLongf)(1 + 20 * pixels);
+    uLongf length = (uLongf)(1 + 23 * pixels);
     uint8_t *raw = malloc(length);
     assert_non_null(raw);
     assert_int_equal(uncompress(raw, &length, bytes, (uLong)size), Z_OK);
-    assert_true(length == 1 + 15 * pixels || length == 1 + 19 * pixels);
+    assert_true(length == 1 + 18 * pixels || length == 1 + 22 * pixels);
     assert_true(raw[0] <= 1);
     struct layer_numbers l = {calloc(3 * pixels, sizeof(double)),
                               calloc(3 * pixels, sizeof(double)), NULL};
@@ -65,13 +65,13 @@ struct layer_numbers layer_read(const uint8_t *bytes, size_t size, int width, in
                 p = (long)floor((double)(s[3 * i - 3] + s[3 * (i - w)]) / 2);
             else if (i > 0)
                 p = x > 0 ? s[3 * i - 3] : s[3 * (i - w)];
-            long now = s[3 * i + c] = p + unzigzag(at, pixels, i);
+            long now = s[3 * i + c] = p + unzigzag(at, pixels, i, 2);
             assert_true(now >= 0 && now < 8192);
             l.error[3 * i + c] = now == 0 ? 0 : pow(2, (double)(now - 4096) / 12);
         }
     const uint8_t *d_plane = at;
     at += 3 * pixels;
-    for (size_t c = 0; c < 3; c++, at += 2 * pixels) {
+    for (size_t c = 0; c < 3; c++, at += 3 * pixels) {
         int d = 0;
         for (size_t i = 0; i < pixels; i++) {
             long now = s[3 * i + c];
@@ -86,9 +86,9 @@ struct layer_numbers layer_read(const uint8_t *bytes, size_t size, int width, in
                                                   : 0;
                 p += (l.value[3 * i + c - 1] - before) * r;
             }
-            double q = fmin(fmax(floor(p / pow(2, e) + 0.5), -16383), 16383);
-            q += (double)unzigzag(at, pixels, i);
-            assert_true(fabs(q) <= 16384);
+            double q = fmin(fmax(floor(p / pow(2, e) + 0.5), -1048575), 1048575);
+            q += (double)unzigzag(at, pixels, i, 3);
+            assert_true(fabs(q) <= 1048576);
             l.value[3 * i + c] = q * pow(2, e);
         }
     }

@@ -58,7 +58,7 @@ static size_t assert_round_trip(const struct moments *m)
             double error = variance > 0 ? sqrt(variance) : 0, v = m->mean[3 * i + c];
             double back = l.value[3 * i + c];
             /* The noise is stored to 2^(1/24), so the step may be that much over 1/8 of it. */
-            double bound = fmax(error / 16 * 1.03, fabs(v) / 16384);
+            double bound = fmax(error / 16 * 1.03, fabs(v) / (1 << 20));
             if (fabs(back - v) > bound)
                 fail_msg("pixel %zu, channel %zu: %.9g is %.9g, noise %.3g", i, c, v, back, error);
             if (error == 0)

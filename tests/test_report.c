@@ -495,6 +495,7 @@ static void page_is_whole(void **state)
     }
     assert_text_has(doc, "//article[@id='claim-0']", 0, "assay validate --only this");
     assert_text_has(doc, "//article[@id='claim-0']", 0, "7, 8");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "assay golden approve 41_cornell/cycles");
     assert_text_has(doc, "//article[@id='claim-0']//table", 0, "the image <red>");
     assert_text_has(doc, "//article[@id='claim-0']//tr[@class='bad']", 0, "2 x 2 pixels at 4,6");
     assert_text_has(doc, "//article[@id='claim-0']//table", 0, "not asked for");
@@ -667,8 +668,8 @@ static void page_stays_small(void **state)
     assert_text_has(doc, "//h1", 0, "All 10 claims came out as expected.");
     assert_int_equal(count_nodes(doc, "//table[@id='claims']/tbody/tr"), 10);
     assert_int_equal(count_nodes(doc, "//section[@class='scene']"), 5);
-    /* A scene's own picture is there once: 5 x 3. An exact value has 14 bits, a noisy one 7: the ten
-     * exact pictures alone are 10 x 65536 x 3 x 14/8 bytes and a third more. The page says what is not
+    /* A scene's own picture is there once: 5 x 3. An exact value has 20 bits, a noisy one 7: the ten
+     * exact pictures alone are 10 x 65536 x 3 x 20/8 bytes and a third more. The page says what is not
      * there. */
     int layers = count_nodes(doc, "//script[starts-with(@id, 'layer-')]");
     assert_int_equal(count_nodes(doc, "//div[@class='viewer']//li"), 15);

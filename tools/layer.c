@@ -6,7 +6,7 @@
 
 #include <zlib.h>
 
-enum { OFFSET = 4096, STEPS = 12, LARGEST = 1 << 14 };
+enum { OFFSET = 4096, STEPS = 12, LARGEST = 1 << 20 };
 
 static const double octave[STEPS] = {4096, 4340, 4598, 4871, 5161, 5468,
                                      5793, 6137, 6502, 6889, 7298, 7732};
@@ -25,11 +25,11 @@ static unsigned zigzag(int i)
     return i >= 0 ? 2 * (unsigned)i : 2 * (unsigned)-(i + 1) + 1;
 }
 
-/* Element i of a plane of 16 bits and of its upper half, a plane further. */
-static void put16(struct coder *c, size_t i, unsigned v)
+/* The lowest bytes of v at element i of as many planes. */
+static void put(struct coder *c, size_t i, uint32_t v, size_t bytes)
 {
-    c->plane[i] = (uint8_t)(v & 0xff);
-    c->plane[c->pixels + i] = (uint8_t)(v >> 8);
+    for (size_t b = 0; b < bytes; b++)
+        c->plane[b * c->pixels + i] = (uint8_t)(v >> 8 * b);
 }
 
 static int floor_div(int a, int b)
@@ -61,7 +61,7 @@ static void encode_noise(struct coder *c)
                 p = i >= w ? (s[i - 1] + s[i - w]) >> 1 : s[i - 1];
             else if (i >= w)
                 p = s[i - w];
-            put16(c, i, zigzag(s[i] - p));
+            put(c, i, zigzag(s[i] - p), 2);
         }
     }
 }
@@ -69,7 +69,7 @@ static void encode_noise(struct coder *c)
 /* e of one value: the largest that is exact enough. */
 static int exponent(double value, int noise)
 {
-    int by_value = value != 0 ? ilogb(value) - 13 : -128;
+    int by_value = value != 0 ? ilogb(value) - 19 : -128;
     int by_noise = noise != 0 ? floor_div(noise - OFFSET, STEPS) - 3 : -128;
     int e = by_value > by_noise ? by_value : by_noise;
     return e < -128 ? -128 : e > 127 ? 127 : e;
@@ -108,7 +108,7 @@ static void encode_values(struct coder *c)
     size_t w = (size_t)c->m->width;
     uint8_t *d_plane = c->plane;
     c->plane += 3 * c->pixels;
-    for (int k = 0; k < 3; k++, d_plane += c->pixels, c->plane += 2 * c->pixels) {
+    for (int k = 0; k < 3; k++, d_plane += c->pixels, c->plane += 3 * c->pixels) {
         uint8_t left = 0;
         for (size_t i = 0; i < c->pixels; i++) {
             double v = c->m->mean[3 * i + (size_t)k];
@@ -132,7 +132,7 @@ static void encode_values(struct coder *c)
             double q = rint(ldexp(v, -e)), limit = LARGEST - 1;
             q = fmin(fmax(q, -LARGEST), LARGEST);
             p = fmin(fmax(floor(ldexp(p, -e) + 0.5), -limit), limit);
-            put16(c, i, zigzag((int)q - (int)p));
+            put(c, i, zigzag((int)q - (int)p), 3);
             c->value[k][i] = ldexp(q, e);
         }
     }
@@ -142,9 +142,8 @@ static void encode_counts(struct coder *c)
 {
     uint32_t left = 0;
     for (size_t i = 0; i < c->pixels; i++) {
-        uint32_t n = (uint32_t)fmin(c->m->n[i], 4294967295.0), d = n - left;
-        for (size_t b = 0; b < 4; b++)
-            c->plane[b * c->pixels + i] = (uint8_t)(d >> 8 * b);
+        uint32_t n = (uint32_t)fmin(c->m->n[i], 4294967295.0);
+        put(c, i, n - left, 4);
         left = n;
     }
     c->plane += 4 * c->pixels;
@@ -176,7 +175,7 @@ bool layer_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *
                   struct err *e)
 {
     struct coder c = {.m = m, .pixels = (size_t)m->width * (size_t)m->height};
-    uint8_t *raw = malloc(1 + 19 * c.pixels), *other = NULL;
+    uint8_t *raw = malloc(1 + 22 * c.pixels), *other = NULL;
     double *value = malloc(3 * c.pixels * sizeof *value);
     int *noise = malloc(3 * c.pixels * sizeof *noise);
     bool ok = raw != NULL && value != NULL && noise != NULL;

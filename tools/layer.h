@@ -1,8 +1,8 @@
 /* A picture's numbers, packed for the page: mean and standard error of every pixel and channel, as exact
  * as their noise warrants and no more. page_layer.js unpacks them.
  *
- * Precision. A value is stored as q 2^e, q whole, |q| <= 2^14, with e such that it is off by at most 1/16
- * of its own standard error or 1/16384 of itself, whichever is coarser. A standard error is stored in
+ * Precision. A value is stored as q 2^e, q whole, |q| <= 2^20, with e such that it is off by at most 1/16
+ * of its own standard error or 2^-20 of itself, whichever is more. A standard error is stored in
  * twelfths of an octave, off by at most 3 %.
  *
  * Format: a zlib stream (RFC 1950) of byte planes, each a byte a pixel, row 0 at the top. Channels are in
@@ -14,7 +14,7 @@
  *              than W of the channel before (0 in column 0).
  *   1 plane each  D less its W (0 in column 0), mod 256. e = D - 128 where S = 0, else
  *              floor((S - 4096)/12) - 3 + D.
- *   2 planes each  low and high byte of zz(q - Q), Q = floor(P/2^e + 1/2) within +-(2^14 - 1). P in R is
+ *   3 planes each  bytes of zz(q - Q), lowest first; Q = floor(P/2^e + 1/2) within +-(2^20 - 1). P in R is
  *              the spatial prediction s from decoded values q 2^e, in this order of operations: mean:
  *              ((W + NW) + (N + NE))/4 (last column: ((W + NW) + N)/3), slope: (W + N) - NW; in row 0 it is
  *              W, in column 0 N, in the first pixel 0. In G and B, c and the channel before b:

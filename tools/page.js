@@ -22,6 +22,7 @@ class Scene {
       kind: null, claim: this.claims[0], wiping: false, wipe: 0.5, against: Math.min(1, this.shots.length - 1),
       pixel: { x: this.width >> 1, y: this.height >> 1 }, tile: null, grid: 0, ready: false });
     this.maps = new Map();
+    this.buffers = new Map();
     this.build();
   }
 
@@ -36,7 +37,6 @@ class Scene {
         return;
       }
       this.shots.forEach((s, i) => (s.layer = all[i]));
-      this.claims.forEach((c) => this.captionMaps(c));
       this.show(this.shown, this.kind);
       this.readPixel();
     });
@@ -56,13 +56,14 @@ class Scene {
   mapSource(kind, claim) {
     if (!this.ready) return null;
     const m = this.map(kind, claim), k = mapKinds[kind];
-    return { key: kind + claim.a.id + " " + claim.b.id, label: k.name + ": " + claim.name,
+    const id = kind + " " + claim.a.id + " " + claim.b.id;
+    return { id, key: id, label: k.name + ": " + claim.name,
              paint: (rgba) => paintMap(rgba, m.value, m.range, k.diverging) };
   }
 
   shotSource(shot) {
     if (!this.ready) return null;
-    return { key: shot.id + " " + this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
+    return { id: "picture " + shot.id, key: this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
              paint: (rgba) => paintPicture(rgba, shot.layer, 2 ** this.stops / this.white, this.curve) };
   }
 
@@ -162,8 +163,10 @@ class Scene {
   buildMaps(claim) {
     const maps = claim.article.querySelector(".maps");
     claim.figures = ["difference", "t"].map((kind) => {
-      const pane = new Pane(this, () => this.mapSource(kind, claim));
-      pane.claim = claim;
+      const pane = new Pane(this, () => {
+        const source = this.mapSource(kind, claim);
+        return source && Object.assign(source, { prepare: () => this.captionMap(claim, kind, figure) });
+      });
       const figure = make("figure", { className: "map", "data-kind": kind }, pane.frame);
       return figure;
     });
@@ -176,12 +179,12 @@ class Scene {
       });
   }
 
-  captionMaps(claim) {
-    for (const figure of claim.figures) {
-      const kind = figure.dataset.kind, k = mapKinds[kind], m = this.map(kind, claim);
-      figure.append(legend(m.range, k), make("figcaption", {}, make("b", {}, k.name + ". "),
-        k.says(claim.a.name, claim.b.name, m.value)));
-    }
+  // Legend and sentence, when the map is first drawn.
+  captionMap(claim, kind, figure) {
+    if (figure.querySelector("figcaption")) return;
+    const k = mapKinds[kind], m = this.map(kind, claim);
+    figure.append(legend(m.range, k), make("figcaption", {}, make("b", {}, k.name + ". "),
+      k.says(claim.a.name, claim.b.name, m.value)));
   }
 
   show(shown, kind) {
@@ -290,8 +293,8 @@ class Scene {
       layer.unit === "exact" ? "exact" : digits(countAt(layer, i), 7)]));
     const pairs = this.claims.map((c) => {
       const p = greyOf(c.a.layer), q = greyOf(c.b.layer), unit = Math.max(q.value[i], 0.05 * q.mean);
-      return row(c.name, [withError(100 * (p.value[i] - q.value[i]) / unit,
-        100 * Math.hypot(p.error[i], q.error[i]) / unit) + " %", digits(this.map("t", c).value[i])]);
+      const d = p.value[i] - q.value[i], e = Math.hypot(p.error[i], q.error[i]);
+      return row(c.name, [withError(100 * d / unit, 100 * e / unit) + " %", digits(studentT(d, e))]);
     });
     const table = (...rows) => make("table", {}, make("thead", {}, rows[0]), make("tbody", {}, ...rows[1]));
     this.probe.replaceChildren(

@@ -10,8 +10,17 @@ const POWER = (() => {
   return table;
 })();
 const pow2 = (n) => POWER[n + 1022];
-const OCTAVE = Array.from({ length: 12 }, (_, i) => Math.round(4096 * 2 ** (i / 12)));
-const NOISE_OFFSET = 4096, Q_LIMIT = 16383;
+const OCTAVE = Array.from({ length: 12 }, (_, i) => Math.round(4096 * 2 ** (i / 12)) / 4096);
+// Of every S: the standard error, and the exponent that belongs to it.
+const NOISE = Float64Array.from({ length: 8192 }, (_, s) => (s ? 2 ** ((s - 4096) / 12) : 0));
+const EXPONENT = Int16Array.from({ length: 8192 }, (_, s) => (s ? Math.floor((s - 4096) / 12) - 3 : -128));
+const Q_LIMIT = (1 << 20) - 1;
+
+function bytesOf(base64) {
+  const text = atob(base64), bytes = new Uint8Array(text.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
+  return bytes;
+}
 
 function inflate(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -22,7 +31,7 @@ function inflate(bytes) {
 function carry(noise, noiseBefore, s, sBefore) {
   if (noise && noiseBefore) {
     const k = noise - noiseBefore, octaves = Math.floor(k / 12);
-    return OCTAVE[k - 12 * octaves] / 4096 * pow2(octaves);
+    return OCTAVE[k - 12 * octaves] * pow2(octaves);
   }
   return sBefore !== 0 ? s / sBefore : 0;
 }
@@ -32,53 +41,43 @@ function unpackLayer(raw, width, height, uniformN) {
   const pixels = width * height, slope = raw[0] === 1;
   let at = 1;
   const plane = () => raw.subarray(at, at += pixels);
-  const words = () => {
-    const low = plane(), high = plane();
-    return (i) => {
-      const u = low[i] | (high[i] << 8);
-      return u & 1 ? -((u + 1) >> 1) : u >> 1;
-    };
-  };
+  const signed = (u) => (u & 1 ? -((u + 1) >> 1) : u >> 1);
 
   const noise = [], error = [];
   for (let k = 0; k < 3; k++) {
-    const delta = words(), s = new Int16Array(pixels), before = noise[k - 1], e = new Float32Array(pixels);
-    for (let i = 0; i < pixels; i++) {
-      const inRow = i % width > 0;
+    const low = plane(), high = plane(), s = new Int16Array(pixels), before = noise[k - 1], e = new Float32Array(pixels);
+    for (let i = 0, x = 0; i < pixels; i++, x = x + 1 === width ? 0 : x + 1) {
       let p = 0;
-      if (k > 0) p = before[i] + (inRow ? s[i - 1] - before[i - 1] : 0);
-      else if (inRow) p = i >= width ? (s[i - 1] + s[i - width]) >> 1 : s[i - 1];
-      else if (i >= width) p = s[i - width];
-      s[i] = p + delta(i);
-      if (s[i]) e[i] = 2 ** ((s[i] - NOISE_OFFSET) / 12);
+      if (k > 0) p = before[i] + (x > 0 ? s[i - 1] - before[i - 1] : 0);
+      else if (x > 0) p = i >= width ? (s[i - 1] + s[i - width]) >> 1 : s[i - 1];
+      else if (i > 0) p = s[i - width];
+      s[i] = p + signed(low[i] | high[i] << 8);
+      e[i] = NOISE[s[i]];
     }
     noise.push(s);
     error.push(e);
   }
 
-  // The exact numbers are multiples q 2^e with |q| <= 2^14, which single precision holds.
+  // The exact numbers are multiples q 2^e with |q| <= 2^20, which single precision holds.
   const value = [], shift = [plane(), plane(), plane()];
   let spatialBefore = null;
   for (let k = 0; k < 3; k++) {
-    const delta = words(), v = new Float32Array(pixels), spatial = new Float64Array(pixels);
-    const before = value[k - 1];
-    let d = 0;
-    for (let i = 0; i < pixels; i++) {
-      const x = i % width;
-      d = (x > 0 ? d : 0) + shift[k][i] & 255;
-      const s = noise[k][i];
-      const e = s ? Math.floor((s - NOISE_OFFSET) / 12) - 3 + d : d - 128;
+    const low = plane(), middle = plane(), high = plane();
+    const v = new Float32Array(pixels), spatial = new Float64Array(pixels);
+    const before = value[k - 1], noiseHere = noise[k], noiseBefore = noise[k - 1], shiftHere = shift[k];
+    for (let i = 0, x = 0, d = 0; i < pixels; i++, x = x + 1 === width ? 0 : x + 1) {
+      d = (x > 0 ? d : 0) + shiftHere[i] & 255;
+      const s = noiseHere[i], e = EXPONENT[s] + d;
       let p = 0;
-      if (i === 0) p = 0;
-      else if (i < width) p = v[i - 1];
+      if (i < width) p = i > 0 ? v[i - 1] : 0;
       else if (x === 0) p = v[i - width];
       else if (slope) p = (v[i - 1] + v[i - width]) - v[i - width - 1];
       else if (x + 1 === width) p = ((v[i - 1] + v[i - width - 1]) + v[i - width]) / 3;
       else p = ((v[i - 1] + v[i - width - 1]) + (v[i - width] + v[i - width + 1])) / 4;
       spatial[i] = p;
-      if (k > 0) p = p + (before[i] - spatialBefore[i]) * carry(s, noise[k - 1][i], p, spatialBefore[i]);
-      const q = Math.min(Math.max(Math.floor(p * pow2(-e) + 0.5), -Q_LIMIT), Q_LIMIT) + delta(i);
-      v[i] = q * pow2(e);
+      if (k > 0) p = p + (before[i] - spatialBefore[i]) * carry(s, noiseBefore[i], p, spatialBefore[i]);
+      const predicted = Math.min(Math.max(Math.floor(p * pow2(-e) + 0.5), -Q_LIMIT), Q_LIMIT);
+      v[i] = (predicted + signed(low[i] | middle[i] << 8 | high[i] << 16)) * pow2(e);
     }
     value.push(v);
     spatialBefore = spatial;
@@ -104,7 +103,7 @@ function loadLayer(id) {
     const element = document.getElementById("layer-" + id);
     const d = element ? element.dataset : null;
     layers.set(id, !d ? Promise.resolve(null) :
-      inflate(Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0))).then((raw) => {
+      inflate(bytesOf(element.textContent)).then((raw) => {
         element.textContent = "";
         return Object.assign(unpackLayer(raw, +d.width, +d.height, +d.n), { unit: d.unit, spp: +d.spp });
       }));

@@ -2,7 +2,7 @@
 
 const lutElement = document.getElementById("colours");
 // Red, green, blue of 257 steps of the diverging map, then of 256 of the sequential one.
-const LUT = lutElement ? Uint8Array.from(atob(lutElement.textContent), (c) => c.charCodeAt(0)) : new Uint8Array(1539);
+const LUT = lutElement ? bytesOf(lutElement.textContent) : new Uint8Array(1539);
 const SEQUENTIAL = 3 * 257;
 
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -22,6 +22,8 @@ function greyOf(layer) {
   }
   return layer.grey;
 }
+
+const studentT = (d, error) => (d === 0 ? 0 : Math.min(1e4, Math.max(-1e4, d / error)));
 
 const countAt = (layer, i) => (typeof layer.n === "number" ? layer.n : layer.n[i]);
 
@@ -51,10 +53,7 @@ const makeMap = {
   },
   t(a, b) {
     const p = greyOf(a), q = greyOf(b);
-    return p.value.map((v, i) => {
-      const d = v - q.value[i], e = Math.hypot(p.error[i], q.error[i]);
-      return d === 0 ? 0 : Math.min(1e4, Math.max(-1e4, d / e));
-    });
+    return p.value.map((v, i) => studentT(v - q.value[i], Math.hypot(p.error[i], q.error[i])));
   },
   // Root of the mean square difference around a pixel less the square that noise alone would leave.
   error(a, b) {

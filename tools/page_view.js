@@ -33,12 +33,11 @@ const seen = new IntersectionObserver((entries) => {
 const resized = new ResizeObserver((entries) => entries.forEach((entry) => redraw(entry.target.pane)));
 
 class Pane {
-  // source() says what to show: {key, paint(rgba), label}, {.., over} with the wiped-in one, or null.
+  // source() says what to show: {id, key, paint(rgba), label}, {.., over} with the wiped-in one, or null.
   constructor(scene, source) {
     this.scene = scene;
     this.source = source;
     this.visible = false;
-    this.buffers = new Map();
     this.canvas = make("canvas", { role: "img" });
     this.frame = make("div", { className: "frame", tabIndex: 0 }, this.canvas);
     this.frame.style.aspectRatio = scene.width + " / " + scene.height;
@@ -50,12 +49,13 @@ class Pane {
     resized.observe(this.frame);
   }
 
-  // The picture at one pixel a pixel; drawn again only when what it shows has changed.
-  buffer(slot, source) {
-    let b = this.buffers.get(slot);
-    if (!b || b.key !== source.key) {
-      if (!b) this.buffers.set(slot, b = { canvas: make("canvas", { width: this.scene.width, height: this.scene.height }) });
-      const context = b.canvas.getContext("2d"), image = context.createImageData(this.scene.width, this.scene.height);
+  // A picture at one pixel a pixel, for all frames; painted again only when its key has changed.
+  buffer(source) {
+    const { width, height, buffers } = this.scene;
+    let b = buffers.get(source.id);
+    if (!b) buffers.set(source.id, b = { canvas: make("canvas", { width, height }) });
+    if (b.key !== source.key) {
+      const context = b.canvas.getContext("2d"), image = context.createImageData(width, height);
       source.paint(image.data);
       context.putImageData(image, 0, 0);
       b.key = source.key;
@@ -70,21 +70,22 @@ class Pane {
     const width = Math.round(this.frame.clientWidth * ratio), height = Math.round(width * s.height / s.width);
     if (this.canvas.width !== width || this.canvas.height !== height)
       Object.assign(this.canvas, { width, height });
+    if (source.prepare) source.prepare();
     this.canvas.setAttribute("aria-label", source.label);
     const c = this.canvas.getContext("2d"), scale = width / s.width * v.zoom;
     c.imageSmoothingEnabled = scale < 1;
-    const put = (slot, what, x0, x1) => {
+    const put = (what, x0, x1) => {
       c.save();
       c.beginPath();
       c.rect(x0, 0, x1 - x0, height);
       c.clip();
       c.setTransform(scale, 0, 0, scale, -v.x * scale, -v.y * scale);
-      c.drawImage(this.buffer(slot, what), 0, 0);
+      c.drawImage(this.buffer(what), 0, 0);
       c.restore();
     };
     const split = source.over ? Math.round(width * s.wipe) : width;
-    if (source.over) put(1, source.over, split, width);
-    put(0, source, 0, split);
+    if (source.over) put(source.over, split, width);
+    put(source, 0, split);
     const box = (x, y, w, h, inner) => {
       const r = [(x - v.x) * scale, (y - v.y) * scale, w * scale, h * scale];
       c.lineWidth = 3 * ratio;

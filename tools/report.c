@@ -228,6 +228,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
         if (!report_scene(p, claim + done, of_scene, e))
             return false;
         done += of_scene;
+        p->num_scenes++;
     }
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));

@@ -274,6 +274,26 @@ static void write_command(FILE *f, const char *what, const char *command)
     fputs("</code></pre>\n", f);
 }
 
+/* Of a stored reference (it has seeds): how to replace it. */
+static void write_approval(FILE *f, const json_t *claim)
+{
+    if (json_object_get(claim, "seeds_b") == NULL)
+        return;
+    fputs(
+        "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
+        "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
+        "tabindex=\"0\"><code>assay golden render --fresh --engine ",
+        f);
+    html_text(f, member_text(claim, "b"));
+    fputs(" --only ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("\nassay golden approve ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("/", f);
+    html_text(f, member_text(claim, "b"));
+    fputs("</code></pre>\n", f);
+}
+
 void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b)
 {
     FILE *f = p->f;
@@ -316,5 +336,6 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     fputs("</dl>\n", f);
     report_statistics(f, json);
     write_command(f, "To run this claim again:", member_text(json, "rerun"));
+    write_approval(f, json);
     fputs("</article>\n", f);
 }

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The page stays below 5 MB: what is left after the text goes to the numbers behind the pictures. */
+/* The page of a suite stays below 5 MB: what is left after the text goes to the numbers behind the
+ * pictures. The page of one scene has them whatever their size. */
 enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
 
 bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
@@ -56,7 +57,8 @@ void page_write_layers(struct page *p)
     for (size_t i = 0; i < p->num_layers; i++) {
         const struct page_layer *l = &p->layer[i];
         long here = ftell(p->f);
-        if (here < 0 || (size_t)here + l->size * 4 / 3 + PAGE_RESERVE > PAGE_LIMIT) {
+        size_t end = (size_t)here + l->size * 4 / 3 + PAGE_RESERVE;
+        if (here < 0 || (p->num_scenes > 1 && end > PAGE_LIMIT)) {
             left_out++;
             continue;
         }

@@ -23,7 +23,7 @@ struct page {
     FILE *f;
     char dir[4096]; /* of results.json, with a final slash, or "" */
     struct page_layer *layer;
-    size_t num_layers;
+    size_t num_layers, num_scenes;
 };
 
 /* The number on the page of the layer of m, which was read from path; the same path has one. */

@@ -166,7 +166,7 @@ static void write_images(struct page *p, const struct scene *s)
                           : " is shown at 80 % of white)",
           p->f);
     fputs(", then the sRGB curve. Each square is one pixel. Values are exact to 1/16 of their own "
-          "standard error, or 1/16384 of themselves if that is more.</p>\n",
+          "standard error or a millionth of themselves.</p>\n",
           p->f);
 }
 
