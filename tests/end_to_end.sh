@@ -277,6 +277,10 @@ expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]
     "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
 expect "compare: PNG, different" 1 "^DIFFERENT" \
     "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report --github" 0 "^::error title=.*DIFFERENT, expected EQUIVALENT" \
+    env GITHUB_STEP_SUMMARY="$tmp/summary.md" "$san_assay" report --github "$tmp/png/results.json"
+expect "report --github: the summary" 0 "^## Of 1 claims 1 came out wrong" cat "$tmp/summary.md"
+expect "report --github: with another" 3 "no other" "$san_assay" report --github --matrix "$tmp/png/results.json"
 expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
 expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
@@ -290,6 +294,13 @@ expect "compare: samples of a file that says them" 3 "says itself" \
     "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
 
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
+    "$tmp/shallow.png" "$tmp/two.png"
+expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"
+expect "compare --report: only the page is left" 0 "^page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
+    sh -c "ls '$tmp/png' | tr '\\n' ' '"
+expect "compare --report: no directory" 3 "one.exr/page.html" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
+    "$tmp/one.exr" "$tmp/two.exr"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 

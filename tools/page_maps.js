@@ -164,7 +164,7 @@ const curves = {
   sRGB: (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055),
   linear: (v) => v,
   "gamma 2.2": (v) => v ** (1 / 2.2),
-  "logarithmic, 4 decades": (v) => (v > 0 ? 1 + Math.log10(v) / 4 : 0),
+  "log, 4 decades": (v) => (v > 0 ? 1 + Math.log10(v) / 4 : 0),
 };
 const CURVE_STEPS = 16384;
 const curveTables = {};

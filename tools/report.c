@@ -125,15 +125,14 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 static void write_row(FILE *f, const struct claim_ref *claim)
 {
     const json_t *c = claim->json;
-    fprintf(f, "<tr%s><th scope=\"row\"><a href=\"#claim-%zu\">",
-            claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"", claim->index);
+    fprintf(f, "<tr%s><td>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
+    report_badge(f, claim);
+    fprintf(f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
     html_text(f, member_text(c, "scene"));
     fputs("</a></th><td class=\"name\">", f);
     html_text(f, member_text(c, "a"));
     fputs("</td><td class=\"name\">", f);
     report_reference(f, claim);
-    fputs("</td><td>", f);
-    report_badge(f, claim);
     fputs("</td><td>", f);
     html_text(f, member_text(c, "expected"));
     if (claim->outcome == OUTCOME_NOT_JUDGED) {
@@ -161,18 +160,18 @@ static void write_row(FILE *f, const struct claim_ref *claim)
 
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
-    fputs("<section>\n"
-          "<h2>The claims</h2>\n"
-          "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
-          "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
-          "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
-          "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">In "
-          "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
-          "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
-          "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
-          "class=\"num\">Time</th></tr></thead>\n"
-          "<tbody>\n",
-          f);
+    fputs(
+        "<section>\n"
+        "<h2>The claims</h2>\n"
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
+        "<table id=\"claims\"><thead><tr><th scope=\"col\">Verdict</th><th scope=\"col\">Scene</th>"
+        "<th scope=\"col\">Tested</th><th scope=\"col\">Against</th><th scope=\"col\">Expected</th>"
+        "<th scope=\"col\">In margin</th><th scope=\"col\" class=\"num\">Difference %</th><th "
+        "scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
+        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" class=\"num\">Time</th></tr>"
+        "</thead>\n"
+        "<tbody>\n",
+        f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
     fputs("</tbody></table>\n"

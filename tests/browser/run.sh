@@ -23,7 +23,7 @@ for seed in 1 2; do
     "$build/pathtracer" -q -r 48 32 -s 16 --seed $seed -f "$tmp/$seed.exr" reference/scenes/12_point_plane.dae >/dev/null
     mv "$tmp/$seed.exr" "$tmp/$evil\"'$seed.exr"
 done
-"$build/assay" compare -q --json "$tmp/evil.json" "$tmp/$evil\"'1.exr" "$tmp/$evil\"'2.exr"
+"$build/assay" compare -q --json "$tmp/evil.json" --report "$tmp/compared.html" "$tmp/$evil\"'1.exr" "$tmp/$evil\"'2.exr"
 sed -i "s|\"reason\": \".*\"|\"reason\": \"</script><script>alert(2)</script>\", \"notes\": [\"$evil\"]|" "$tmp/evil.json"
 "$build/assay" report -o "$tmp/evil.html" "$tmp/evil.json" >/dev/null
-look names.mjs "$tmp/evil.html"
+for page in evil compared; do look names.mjs "$tmp/$page.html"; done
