@@ -4,11 +4,13 @@
 #include "report_consistency.h"
 #include "report_cost.h"
 #include "report_converge.h"
+#include "report_csv.h"
 #include "report_html.h"
 #include "report_page.h"
 #include "report_parts.h"
 #include "report_plot.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -158,6 +160,27 @@ static void write_row(FILE *f, const struct claim_ref *claim)
     fputs("</td></tr>\n", f);
 }
 
+static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    static const char *const text[] = {"scene", "a", "b", "verdict", "expected", "error"};
+    static const char *const number[] = {"difference", "mdb_global", "margin_global", "alpha",
+                                         "seconds_a"};
+    struct csv csv = csv_open(f, "claims.csv",
+                              "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
+                              "alpha,seconds,low,high");
+    for (size_t i = 0; i < num; i++) {
+        const json_t *c = claim[i].json, *ci = json_object_get(c, "ci");
+        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
+            csv_text(&csv, member_text(c, text[k]));
+        for (size_t k = 0; k < sizeof number / sizeof *number; k++)
+            csv_number(&csv, json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
+        for (size_t k = 0; k < 2; k++)
+            csv_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+}
+
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
     fputs(
@@ -174,8 +197,9 @@ static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
         f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
-    fputs("</tbody></table>\n"
-          "</div>\n"
+    fputs("</tbody></table>\n</div>\n<p class=\"caption\">The table as a file: ", f);
+    write_csv(f, claim, num);
+    fputs("</p>\n"
           "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
           "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
           "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "

@@ -2,6 +2,7 @@
 
 #include "report_html.h"
 #include "report_plot.h"
+#include "report_power.h"
 #include "report_statistics.h"
 #include "report_tiles.h"
 
@@ -327,6 +328,8 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     write_notes(f, json);
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
+    report_qq(f, json);
+    report_power(f, json);
     fputs("</div>\n", f);
     report_tiles(f, json);
     fputs("<h4>Everything needed to doubt it</h4>\n<dl class=\"facts\">\n", f);
