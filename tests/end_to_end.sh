@@ -297,9 +297,9 @@ expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/res
 expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
     "$tmp/shallow.png" "$tmp/two.png"
 expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"
-expect "compare --report: only the page is left" 0 "^page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
+expect "compare --report: only the page is left" 0 "^index.html page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
     sh -c "ls '$tmp/png' | tr '\\n' ' '"
-expect "compare --report: no directory" 3 "one.exr/page.html" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
+expect "compare --report: no directory" 3 "one.exr: not a directory" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
     "$tmp/one.exr" "$tmp/two.exr"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
