@@ -294,6 +294,17 @@ expect "compare: samples of a file that says them" 3 "says itself" \
     "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
 
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+mkdir -p "$tmp/history"
+for k in 1 2; do
+    mkdir -p "$tmp/history/$k"
+    sed "s/\"date\": \"2/\"date\": \"$k/" "$tmp/png/results.json" >"$tmp/history/$k/results.json"
+done
+expect "report --history" 0 "^0 of 1 claims moved in the last of 2 runs: .*/history/history.html" \
+    "$san_assay" report --history "$tmp/history/"
+sed -i 's/"difference": -*0/"difference": 9/' "$tmp/history/2/results.json"
+expect "report --history: a move" 1 "^1 of 1 claims moved" "$san_assay" report --history "$tmp/history"
+expect "report --history: nothing there" 3 "no results.json" "$san_assay" report --history "$tmp/runs_a"
+expect "report --history with another option" 3 "alone" "$san_assay" report --history "$tmp/history" --matrix
 expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
     "$tmp/shallow.png" "$tmp/two.png"
 expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"

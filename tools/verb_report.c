@@ -3,6 +3,7 @@
 #include "consistency_run.h"
 #include "convergence.h"
 #include "convergence_matrix.h"
+#include "history.h"
 #include "report.h"
 #include "results.h"
 #include "results_matrix.h"
@@ -11,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum option { OPT_OUT, OPT_MARKDOWN, OPT_MATRIX, OPT_CONVERGE, OPT_GITHUB, OPT_HELP };
+enum option { OPT_OUT, OPT_MARKDOWN, OPT_MATRIX, OPT_CONVERGE, OPT_GITHUB, OPT_HISTORY, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_OUT] = {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
@@ -25,6 +26,9 @@ static const struct cli_option options[] = {
                     "no page; print workflow commands of GitHub Actions that annotate what is\n"
                     "not as expected, and add the headline and the verdict table to the file\n"
                     "that GITHUB_STEP_SUMMARY names"},
+    [OPT_HISTORY] = {0, "history", 1, "DIR",
+                     "instead: a page of all results.json in and below DIR, against time\n"
+                     "(DIR/history.html); exit code 1 if the last run has moved"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
@@ -90,6 +94,34 @@ static bool print_matrix(const char *path, struct err *e)
     return true;
 }
 
+/* Family-wise, over all claims of the page. */
+static const double history_alpha = 1e-3;
+
+static int write_history(const char *dir, const char *out, struct err *e)
+{
+    struct history h;
+    char path[4096];
+    size_t length = strlen(dir);
+    while (length > 1 && dir[length - 1] == '/')
+        length--;
+    int n = snprintf(path, sizeof path, "%.*s/history.html", (int)length, dir);
+    if (n < 0 || (size_t)n >= sizeof path) {
+        err_set(e, "%.64s...: path too long", dir);
+        return EXIT_NOT_JUDGED;
+    }
+    if (!history_read(dir, history_alpha, &h, e))
+        return EXIT_NOT_JUDGED;
+    int code = h.moved > 0 ? EXIT_DIFFERENT : EXIT_EQUIVALENT;
+    out = out != NULL ? out : path;
+    if (history_write_page(&h, out, e))
+        printf("%zu of %zu claims moved in the last of %zu runs: %s\n", h.moved, h.num_series,
+               h.num_runs, out);
+    else
+        code = EXIT_NOT_JUDGED;
+    history_free(&h);
+    return code;
+}
+
 /* index.html in the directory of the results. */
 static void page_beside(const char *results, char *path, size_t size)
 {
@@ -101,7 +133,7 @@ static void page_beside(const char *results, char *path, size_t size)
 int verb_report(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    const char *results = NULL, *converge = NULL, *out = NULL;
+    const char *results = NULL, *converge = NULL, *out = NULL, *history = NULL;
     bool markdown = false, matrix = false, github = false;
     for (int i; (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
@@ -114,6 +146,8 @@ int verb_report(int argc, char **argv, struct err *e)
             converge = c.value[0];
         } else if (i == OPT_MATRIX) {
             matrix = true;
+        } else if (i == OPT_HISTORY) {
+            history = c.value[0];
         } else if (i == OPT_GITHUB) {
             github = true;
         } else if (i == OPT_MARKDOWN) {
@@ -126,6 +160,12 @@ int verb_report(int argc, char **argv, struct err *e)
             err_set(e, "report takes one results file, '%s' is one more", c.value[0]);
             return EXIT_NOT_JUDGED;
         }
+    }
+    if (history != NULL) {
+        if (results == NULL && converge == NULL && !matrix && !markdown && !github)
+            return write_history(history, out, e);
+        err_set(e, "--history goes with --out alone");
+        return EXIT_NOT_JUDGED;
     }
     if (results == NULL) {
         err_set(e, "report needs a results.json (see --help)");
