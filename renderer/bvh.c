@@ -1,4 +1,5 @@
 #include "bvh.h"
+#include "bvh_wide.h"
 #include "shape.h"
 
 #include <float.h>
@@ -26,6 +27,7 @@ struct node {
 };
 
 struct bvh {
+    struct wide *wide; /* BVH_WIDE, and then nothing else is set */
     const struct scene *scene;
     struct node *nodes;         /* node 0 is the root; NULL: brute force */
     uint32_t *order;            /* primitive numbers in leaf order */
@@ -34,7 +36,7 @@ struct bvh {
     int depth;
 };
 
-const char *const bvh_kind_names[] = {"bruteforce", "centroid", "sah", NULL};
+const char *const bvh_kind_names[] = {"bruteforce", "centroid", "sah", "wide", NULL};
 
 static const struct box empty_box = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
 
@@ -223,9 +225,21 @@ static bool build_tree(struct bvh *t, enum bvh_kind kind)
 
 struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
 {
+    return bvh_build_for(s, kind, ISA_AUTO, e);
+}
+
+struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
+{
     struct bvh *t = calloc(1, sizeof *t);
     if (t == NULL)
         goto fail;
+    if (kind == BVH_WIDE) {
+        t->wide = wide_build(s, isa, e);
+        if (t->wide != NULL)
+            return t;
+        free(t);
+        return NULL;
+    }
     t->scene = s;
     t->num_primitives = scene_num_primitives(s);
     t->order = malloc(t->num_primitives * sizeof *t->order);
@@ -259,6 +273,7 @@ void bvh_free(struct bvh *t)
 {
     if (t == NULL)
         return;
+    wide_free(t->wide);
     free(t->nodes);
     free(t->order);
     free(t->triangles);
@@ -267,6 +282,8 @@ void bvh_free(struct bvh *t)
 
 double bvh_sah_cost(const struct bvh *t)
 {
+    if (t->wide != NULL)
+        return t->wide->cost;
     if (t->nodes == NULL)
         return t->num_primitives;
     double root = half_area(t->nodes[0].box), cost = 0;
@@ -279,12 +296,20 @@ double bvh_sah_cost(const struct bvh *t)
 
 int bvh_depth(const struct bvh *t)
 {
-    return t->depth;
+    return t->wide != NULL ? t->wide->depth : t->depth;
 }
 
 uint32_t bvh_num_nodes(const struct bvh *t)
 {
-    return t->num_nodes;
+    return t->wide != NULL ? t->wide->num_nodes : t->num_nodes;
+}
+
+size_t bvh_size(const struct bvh *t)
+{
+    if (t->wide != NULL)
+        return sizeof *t + sizeof *t->wide + t->wide->used;
+    return sizeof *t + t->num_nodes * sizeof *t->nodes +
+           t->num_primitives * (sizeof *t->order + sizeof *t->triangles);
 }
 
 /* 1/d with zeros replaced by something tiny, so that no 0 * inf = NaN comes up below. */
@@ -429,6 +454,10 @@ static bool is_occluded(const struct bvh *t, const ray *r, uint32_t ignore, stru
 void bvh_closest(const struct bvh *t, const struct rays *r, const uint16_t *lane, int num_lanes,
                  struct hits *h, struct bvh_stats *stats)
 {
+    if (t->wide != NULL) {
+        t->wide->kernel->closest(t->wide, r, lane, num_lanes, h, stats);
+        return;
+    }
     for (int k = 0; k < num_lanes; k++) {
         int i = lane[k];
         closest(t, rays_get(r, i), &h->t[i], &h->u[i], &h->v[i], &h->prim[i], stats);
@@ -438,6 +467,10 @@ void bvh_closest(const struct bvh *t, const struct rays *r, const uint16_t *lane
 void bvh_occluded(const struct bvh *t, const struct rays *r, const uint16_t *lane, int num_lanes,
                   bool *occluded, struct bvh_stats *stats)
 {
+    if (t->wide != NULL) {
+        t->wide->kernel->occluded(t->wide, r, lane, num_lanes, occluded, stats);
+        return;
+    }
     for (int k = 0; k < num_lanes; k++) {
         ray one = rays_get(r, lane[k]);
         occluded[lane[k]] = is_occluded(t, &one, r->ignore[lane[k]], stats);
