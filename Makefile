@@ -38,7 +38,7 @@ RENDERER := $(filter-out renderer/main.c renderer/wide_kernel.c,$(wildcard rende
   $(wildcard renderer/*.cc) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/bench_%.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -57,6 +57,9 @@ check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
 	tests/mutants.sh $(BUILD) $(ONLY)
+
+bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench_rays
+	$(BUILD)/tests/bench_rays --json $(BUILD)/bench_rays.json
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -98,6 +101,7 @@ help:
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
+	@echo 'make bench-rays  rays per second against Embree, one thread (a minute)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
@@ -166,7 +170,7 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
-$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
+$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench_rays: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
 	$(archive)
@@ -182,7 +186,7 @@ $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c))
+  $(wildcard tests/make_*.c tests/bench_*.c))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -219,7 +223,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bench-rays bvh-table golden report deps deps-live install format clean help FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -29,40 +29,93 @@ static inline const void *at(const struct wide *w, uint32_t ref)
     return w->arena + (size_t)(ref & WIDE_PLACE) * WIDE_LINE;
 }
 
-/* The largest float below tmax: a hit is at most that far, and another at the very same distance
- * counts only if its number is smaller. */
-static float below(float tmax)
+/* Eight rays as the lists of them are read, lane by lane what boxes and primitives want of each. */
+struct octet {
+    vf o[3], d[3], sx, sy, sz, tmin;
+    vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
+                 distance counts only if its number is smaller */
+    vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
+    vi axis;                       /* of the largest component of d, the third of the shear */
+    vi ignore;
+};
+
+/* a[lane[0]], ..., a[lane[7]] */
+INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
 {
-    return nextafterf(tmax, -INFINITY);
+    vf v;
+    if (in_row)
+        memcpy(&v, a + lane[0], sizeof v);
+    else
+        v = (vf){a[lane[0]], a[lane[1]], a[lane[2]], a[lane[3]],
+                 a[lane[4]], a[lane[5]], a[lane[6]], a[lane[7]]};
+    return v;
+}
+
+/* As shear_of(). */
+INLINE void octet_shear(struct octet *q)
+{
+    vf x = vf_abs(q->d[0]), y = vf_abs(q->d[1]), z = vf_abs(q->d[2]);
+    vi is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
+    q->axis = vi_select(is_x, vi_set(0), vi_select(is_y, vi_set(1), vi_set(2)));
+    q->sz = 1 / vf_select(is_x, q->d[0], vf_select(is_y, q->d[1], q->d[2]));
+    q->sx = vf_select(is_x, q->d[1], vf_select(is_y, q->d[2], q->d[0])) * q->sz;
+    q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
+}
+
+INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    bool in_row = true;
+    for (int i = 1; i < LANES; i++)
+        in_row &= lane[i] == lane[0] + i;
+    q->o[0] = gather(r->o.x, lane, in_row);
+    q->o[1] = gather(r->o.y, lane, in_row);
+    q->o[2] = gather(r->o.z, lane, in_row);
+    q->d[0] = gather(r->d.x, lane, in_row);
+    q->d[1] = gather(r->d.y, lane, in_row);
+    q->d[2] = gather(r->d.z, lane, in_row);
+    q->tmin = gather(r->tmin, lane, in_row);
+    vi tmax = (vi)gather(r->tmax, lane, in_row);
+    vi zero = vf_eq((vf)tmax, vf_set(0));
+    q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
+    octet_shear(q);
+}
+
+INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    const uint32_t *a = r->ignore;
+    q->ignore = (vi){(int32_t)a[lane[0]], (int32_t)a[lane[1]], (int32_t)a[lane[2]],
+                     (int32_t)a[lane[3]], (int32_t)a[lane[4]], (int32_t)a[lane[5]],
+                     (int32_t)a[lane[6]], (int32_t)a[lane[7]]};
 }
 
 /* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
  * of float of their distance from the origin [Woop13 3.3]; reciprocal, products and difference of the
  * slabs come to no more than 4 of distance and coordinate together. Twice that. */
-static float growth(const struct wide *w, const float o[3])
+INLINE vf growth(const struct wide *w, const struct octet *q)
 {
-    float reach = 0, coordinate = 0;
+    vf reach = vf_set(0), coordinate = reach;
     for (int a = 0; a < 3; a++) {
-        reach = maxf(reach, maxf(fabsf(w->min[a] - o[a]), fabsf(w->max[a] - o[a])));
-        coordinate = maxf(coordinate, fabsf(o[a]));
+        reach = vf_max(reach, vf_max(vf_abs(w->min[a] - q->o[a]), vf_abs(w->max[a] - q->o[a])));
+        coordinate = vf_max(coordinate, vf_abs(q->o[a]));
     }
     return 10 * FLT_EPSILON * (reach + coordinate);
 }
 
 /* 1/d, of zeros and next to them a number as large that neither NaN nor infinity comes up. */
-static float inverse(float d, float grow)
+INLINE vf inverse(vf d, vf grow)
 {
-    float tiny = maxf(1e-18f, grow * 1e-29f);
-    return 1 / (fabsf(d) < tiny ? copysignf(tiny, d) : d);
+    vf tiny = vf_max(vf_set(1e-18f), grow * 1e-29f), sign = (vf)((vi)d & vi_set(INT32_MIN));
+    return 1 / vf_select(vf_lt(vf_abs(d), tiny), (vf)((vi)tiny | (vi)sign), d);
 }
 
-/* The axes in the order of the shear [Woop13]: k[2] the one of the largest component. */
-static void shear_axes(const float d[3], int k[3])
+INLINE void octet_slabs(const struct wide *w, struct octet *q)
 {
-    float x = fabsf(d[0]), y = fabsf(d[1]), z = fabsf(d[2]);
-    k[2] = x > y && x > z ? 0 : y > z ? 1 : 2;
-    k[0] = (k[2] + 1) % 3;
-    k[1] = (k[2] + 2) % 3;
+    vf grow = growth(w, q);
+    for (int a = 0; a < 3; a++) {
+        vf inv = q->inv[a] = inverse(q->d[a], grow), by = grow * vf_abs(inv);
+        q->enter[a] = q->o[a] * inv + by;
+        q->leave[a] = q->o[a] * inv - by;
+    }
 }
 
 /* Lanes where both products rounded to the same: again in double, where they are exact (shape.c). */
@@ -121,63 +174,64 @@ INLINE vi sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmi
     return pass & (first | second);
 }
 
-/* One ray, and what the boxes and leaves want of it, in all lanes. */
+/* One ray, and what it has found. */
 struct single {
-    vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
-    vf o[3], sx, sy, sz, tmin;     /* o in the order of the shear */
-    float origin[3], d[3], limit, u, v;
-    int32_t prim;
-    uint32_t ignore;
+    const struct octet *q; /* lane `lane` of it */
+    int lane;
     int row[3], k[3]; /* planes of entry; axes of the shear */
+    float limit, u, v;
+    int32_t prim;
 };
 
-static inline void single_init(const struct wide *w, const struct rays *r, int i, struct single *s)
+INLINE float lane_of(const vf *a, int i)
 {
-    const float o[3] = {r->o.x[i], r->o.y[i], r->o.z[i]}, d[3] = {r->d.x[i], r->d.y[i], r->d.z[i]};
-    float grow = growth(w, o);
+    return ((const float *)a)[i];
+}
+
+INLINE vf splat(const vf *a, int i)
+{
+    return vf_set(lane_of(a, i));
+}
+
+INLINE void single_init(const struct octet *q, int lane, struct single *s)
+{
+    static const int shear[3][3] = {{1, 2, 0}, {2, 0, 1}, {0, 1, 2}};
+    s->q = q;
+    s->lane = lane;
     for (int a = 0; a < 3; a++) {
-        float inv = inverse(d[a], grow);
-        s->inv[a] = vf_set(inv);
-        s->enter[a] = vf_set(o[a] * inv + grow * fabsf(inv));
-        s->leave[a] = vf_set(o[a] * inv - grow * fabsf(inv));
-        s->row[a] = 2 * a + (inv < 0);
-        s->origin[a] = o[a];
-        s->d[a] = d[a];
+        s->row[a] = 2 * a + (lane_of(&q->inv[a], lane) < 0);
+        s->k[a] = shear[((const int32_t *)&q->axis)[lane]][a];
     }
-    shear_axes(d, s->k);
-    float sz = 1 / d[s->k[2]];
-    for (int a = 0; a < 3; a++)
-        s->o[a] = vf_set(o[s->k[a]]);
-    s->sx = vf_set(d[s->k[0]] * sz);
-    s->sy = vf_set(d[s->k[1]] * sz);
-    s->sz = vf_set(sz);
-    s->tmin = vf_set(r->tmin[i]);
-    s->limit = below(r->tmax[i]);
-    s->prim = NOTHING;
+    s->limit = lane_of(&q->limit, lane);
     s->u = s->v = 0;
+    s->prim = NOTHING;
 }
 
 /* Lanes of the leaf that the ray meets inside (tmin, limit]. */
-INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf *t, vf *u,
-                      vf *v)
+INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf limit,
+                      vf *t, vf *u, vf *v)
 {
-    vf limit = vf_set(s->limit);
+    const struct octet *q = s->q;
+    const int i = s->lane;
     if (spheres) {
         *u = *v = vf_set(0);
-        return sphere_hit(s->origin[0] - vf_load(l->p[0][0]), s->origin[1] - vf_load(l->p[0][1]),
-                          s->origin[2] - vf_load(l->p[0][2]), vf_set(s->d[0]), vf_set(s->d[1]),
-                          vf_set(s->d[2]), vf_load(l->p[1][0]), s->tmin, limit, t);
+        return sphere_hit(
+            splat(&q->o[0], i) - vf_load(l->p[0][0]), splat(&q->o[1], i) - vf_load(l->p[0][1]),
+            splat(&q->o[2], i) - vf_load(l->p[0][2]), splat(&q->d[0], i), splat(&q->d[1], i),
+            splat(&q->d[2], i), vf_load(l->p[1][0]), splat(&q->tmin, i), limit, t);
     }
-    vf x[3], y[3], z[3];
+    const int kx = s->k[0], ky = s->k[1], kz = s->k[2];
+    vf ox = splat(&q->o[kx], i), oy = splat(&q->o[ky], i), oz = splat(&q->o[kz], i);
+    vf sx = splat(&q->sx, i), sy = splat(&q->sy, i), x[3], y[3], z[3];
     for (int c = 0; c < 3; c++) {
-        z[c] = vf_load(l->p[c][s->k[2]]) - s->o[2];
-        x[c] = vf_load(l->p[c][s->k[0]]) - s->o[0] - s->sx * z[c];
-        y[c] = vf_load(l->p[c][s->k[1]]) - s->o[1] - s->sy * z[c];
+        z[c] = vf_load(l->p[c][kz]) - oz;
+        x[c] = vf_load(l->p[c][kx]) - ox - sx * z[c];
+        y[c] = vf_load(l->p[c][ky]) - oy - sy * z[c];
     }
-    vi pass = sheared_hit(x, y, z, s->sz, t, u, v);
+    vi pass = sheared_hit(x, y, z, splat(&q->sz, i), t, u, v);
     if (!bits(pass))
         return pass;
-    return pass & vf_lt(s->tmin, *t) & vf_le(*t, limit);
+    return pass & vf_lt(splat(&q->tmin, i), *t) & vf_le(*t, limit);
 }
 
 INLINE void single_keep_nearest(const struct wide_leaf *l, unsigned hit, vf t, vf u, vf v,
@@ -186,25 +240,42 @@ INLINE void single_keep_nearest(const struct wide_leaf *l, unsigned hit, vf t, v
     do {
         int i = __builtin_ctz(hit);
         hit &= hit - 1;
-        if (t[i] < s->limit || (int32_t)l->prim[i] < s->prim) {
-            s->limit = t[i];
-            s->u = u[i];
-            s->v = v[i];
+        if (lane_of(&t, i) < s->limit || (int32_t)l->prim[i] < s->prim) {
+            s->limit = lane_of(&t, i);
+            s->u = lane_of(&u, i);
+            s->v = lane_of(&v, i);
             s->prim = (int32_t)l->prim[i];
         }
     } while (hit);
 }
 
-/* Children that the ray meets within (tmin, limit], and where it enters them. */
-INLINE unsigned single_node(const struct wide_node *n, const struct single *s, vf limit, vf *enter)
+/* A ray to the boxes, in registers. */
+struct slabs {
+    vf inv[3], enter[3], leave[3], tmin;
+};
+
+INLINE struct slabs single_slabs(const struct single *s)
 {
-    vf x0 = mul_sub(vf_load(n->plane[s->row[0]]), s->inv[0], s->enter[0]);
-    vf y0 = mul_sub(vf_load(n->plane[s->row[1]]), s->inv[1], s->enter[1]);
-    vf z0 = mul_sub(vf_load(n->plane[s->row[2]]), s->inv[2], s->enter[2]);
-    vf x1 = mul_sub(vf_load(n->plane[s->row[0] ^ 1]), s->inv[0], s->leave[0]);
-    vf y1 = mul_sub(vf_load(n->plane[s->row[1] ^ 1]), s->inv[1], s->leave[1]);
-    vf z1 = mul_sub(vf_load(n->plane[s->row[2] ^ 1]), s->inv[2], s->leave[2]);
-    *enter = vf_max(vf_max(x0, y0), vf_max(z0, s->tmin));
+    struct slabs b = {.tmin = splat(&s->q->tmin, s->lane)};
+    for (int a = 0; a < 3; a++) {
+        b.inv[a] = splat(&s->q->inv[a], s->lane);
+        b.enter[a] = splat(&s->q->enter[a], s->lane);
+        b.leave[a] = splat(&s->q->leave[a], s->lane);
+    }
+    return b;
+}
+
+/* Children that the ray meets within (tmin, limit], and where it enters them. */
+INLINE unsigned single_node(const struct wide_node *n, const struct single *s,
+                            const struct slabs *b, vf limit, vf *enter)
+{
+    vf x0 = mul_sub(vf_load(n->plane[s->row[0]]), b->inv[0], b->enter[0]);
+    vf y0 = mul_sub(vf_load(n->plane[s->row[1]]), b->inv[1], b->enter[1]);
+    vf z0 = mul_sub(vf_load(n->plane[s->row[2]]), b->inv[2], b->enter[2]);
+    vf x1 = mul_sub(vf_load(n->plane[s->row[0] ^ 1]), b->inv[0], b->leave[0]);
+    vf y1 = mul_sub(vf_load(n->plane[s->row[1] ^ 1]), b->inv[1], b->leave[1]);
+    vf z1 = mul_sub(vf_load(n->plane[s->row[2] ^ 1]), b->inv[2], b->leave[2]);
+    *enter = vf_max(vf_max(x0, y0), vf_max(z0, b->tmin));
     return bits(vf_le(*enter, vf_min(vf_min(x1, y1), vf_min(z1, limit))));
 }
 
@@ -240,12 +311,14 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
 {
     struct stacked stack[STACK], *top = stack;
     uint32_t ref = 0;
+    const struct slabs b = single_slabs(s);
     vf limit = vf_set(s->limit), t, u, v;
+    uint64_t nodes = 0, leaves = 0;
     for (;;) {
         while (!(ref & WIDE_LEAF)) {
             const struct wide_node *n = at(w, ref);
-            stats->box_tests++;
-            unsigned hit = single_node(n, s, limit, &t);
+            nodes++;
+            unsigned hit = single_node(n, s, &b, limit, &t);
             if (hit == 0)
                 goto pop;
             if ((hit & (hit - 1)) == 0)
@@ -254,8 +327,8 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
                 ref = push_sorted(n, hit, t, &top);
         }
         const struct wide_leaf *l = at(w, ref);
-        stats->primitive_tests++;
-        unsigned hit = bits(single_leaf(l, s, ref & WIDE_SPHERES, &t, &u, &v));
+        leaves++;
+        unsigned hit = bits(single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v));
         if (hit) {
             single_keep_nearest(l, hit, t, u, v, s);
             limit = vf_set(s->limit);
@@ -263,24 +336,30 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
     pop:
         do {
             if (top == stack)
-                return;
+                goto done;
             top--;
         } while (top->t > s->limit);
         ref = top->ref;
     }
+done:
+    stats->box_tests += nodes;
+    stats->primitive_tests += leaves;
 }
 
 static bool single_occluded(const struct wide *w, const struct single *s, struct bvh_stats *stats)
 {
     uint32_t stack[STACK], *top = stack;
     uint32_t ref = 0;
+    const struct slabs b = single_slabs(s);
     const vf limit = vf_set(s->limit);
     vf t, u, v;
+    uint64_t nodes = 0, leaves = 0;
+    bool met_something = false;
     for (;;) {
         while (!(ref & WIDE_LEAF)) {
             const struct wide_node *n = at(w, ref);
-            stats->box_tests++;
-            unsigned hit = single_node(n, s, limit, &t);
+            nodes++;
+            unsigned hit = single_node(n, s, &b, limit, &t);
             if (hit == 0)
                 goto pop;
             ref = n->child[__builtin_ctz(hit)];
@@ -288,49 +367,43 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
                 *top++ = n->child[__builtin_ctz(hit)];
         }
         const struct wide_leaf *l = at(w, ref);
-        stats->primitive_tests++;
-        vi met = single_leaf(l, s, ref & WIDE_SPHERES, &t, &u, &v);
+        leaves++;
+        vi met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);
         if (bits(met)) {
             vi prim;
             memcpy(&prim, l->prim, sizeof prim);
-            if (bits(met & ~vi_eq(prim, vi_set((int32_t)s->ignore))))
-                return true;
+            if (bits(met & ~vi_eq(prim, vi_set(((const int32_t *)&s->q->ignore)[s->lane])))) {
+                met_something = true;
+                break;
+            }
         }
     pop:
         if (top == stack)
-            return false;
+            break;
         ref = *--top;
     }
+    stats->box_tests += nodes;
+    stats->primitive_tests += leaves;
+    return met_something;
 }
 
-/* Eight rays with the same axes of the shear, a ray to a lane. A lane with limit -infinity meets
- * nothing. */
+/* Eight rays with the same axes of the shear, a ray to a lane, and what they have found. */
 struct packet {
-    vf o[3], d[3], sx, sy, sz, tmin, limit, u, v; /* o, d by axis */
-    vi prim, ignore;
+    const struct octet *q;
     int k[3];
+    vf limit, u, v; /* limit -infinity: the ray meets nothing any more */
+    vi prim;
 };
 
-static void packet_init(const struct rays *r, const uint16_t *lane, int n, struct packet *p)
+/* The first `n` lanes. */
+INLINE void packet_init(const struct octet *q, int n, struct packet *p)
 {
-    static const float nowhere = -INFINITY;
-    for (int i = 0; i < LANES; i++) {
-        int from = lane[i < n ? i : 0];
-        p->o[0][i] = r->o.x[from];
-        p->o[1][i] = r->o.y[from];
-        p->o[2][i] = r->o.z[from];
-        p->d[0][i] = r->d.x[from];
-        p->d[1][i] = r->d.y[from];
-        p->d[2][i] = r->d.z[from];
-        p->tmin[i] = r->tmin[from];
-        p->limit[i] = i < n ? below(r->tmax[from]) : nowhere;
-        p->ignore[i] = (int32_t)r->ignore[from];
-    }
-    const float d[3] = {p->d[0][0], p->d[1][0], p->d[2][0]};
-    shear_axes(d, p->k);
-    p->sz = 1 / p->d[p->k[2]];
-    p->sx = p->d[p->k[0]] * p->sz;
-    p->sy = p->d[p->k[1]] * p->sz;
+    const vi number = {0, 1, 2, 3, 4, 5, 6, 7};
+    p->q = q;
+    p->k[2] = q->axis[0];
+    p->k[0] = (p->k[2] + 1) % 3;
+    p->k[1] = (p->k[2] + 2) % 3;
+    p->limit = vf_select(vi_lt(number, vi_set(n)), q->limit, vf_set(-INFINITY));
     p->u = p->v = vf_set(0);
     p->prim = vi_set(NOTHING);
 }
@@ -339,32 +412,33 @@ static void packet_init(const struct rays *r, const uint16_t *lane, int n, struc
  * whoever meets something that it does not ignore. True if a ray met something. */
 INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool spheres, bool any)
 {
+    const struct octet *q = p->q;
     vi changed = vi_set(0);
     for (int j = 0; j < WIDTH && l->prim[j] != NO_HIT; j++) {
         vf t, u, v;
         vi hit;
         if (spheres) {
             u = v = vf_set(0);
-            hit = sphere_hit(p->o[0] - l->p[0][0][j], p->o[1] - l->p[0][1][j],
-                             p->o[2] - l->p[0][2][j], p->d[0], p->d[1], p->d[2],
-                             vf_set(l->p[1][0][j]), p->tmin, p->limit, &t);
+            hit = sphere_hit(q->o[0] - l->p[0][0][j], q->o[1] - l->p[0][1][j],
+                             q->o[2] - l->p[0][2][j], q->d[0], q->d[1], q->d[2],
+                             vf_set(l->p[1][0][j]), q->tmin, p->limit, &t);
             if (!bits(hit))
                 continue;
         } else {
             vf x[3], y[3], z[3];
             for (int c = 0; c < 3; c++) {
-                z[c] = l->p[c][p->k[2]][j] - p->o[p->k[2]];
-                x[c] = l->p[c][p->k[0]][j] - p->o[p->k[0]] - p->sx * z[c];
-                y[c] = l->p[c][p->k[1]][j] - p->o[p->k[1]] - p->sy * z[c];
+                z[c] = l->p[c][p->k[2]][j] - q->o[p->k[2]];
+                x[c] = l->p[c][p->k[0]][j] - q->o[p->k[0]] - q->sx * z[c];
+                y[c] = l->p[c][p->k[1]][j] - q->o[p->k[1]] - q->sy * z[c];
             }
-            hit = sheared_hit(x, y, z, p->sz, &t, &u, &v);
+            hit = sheared_hit(x, y, z, q->sz, &t, &u, &v);
             if (!bits(hit))
                 continue;
-            hit &= vf_lt(p->tmin, t) & vf_le(t, p->limit);
+            hit &= vf_lt(q->tmin, t) & vf_le(t, p->limit);
         }
         const vi prim = vi_set((int32_t)l->prim[j]);
         if (any) {
-            hit &= ~vi_eq(prim, p->ignore);
+            hit &= ~vi_eq(prim, q->ignore);
             p->limit = vf_select(hit, vf_set(-INFINITY), p->limit);
             p->prim = vi_select(hit, prim, p->prim);
         } else {
@@ -379,15 +453,15 @@ INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool sphere
     return bits(changed) != 0;
 }
 
-static float smallest(vf a)
+INLINE float smallest(vf a)
 {
-    float m = a[0];
-    for (int i = 1; i < LANES; i++)
-        m = minf(m, a[i]);
-    return m;
+    a = vf_min(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
+    a = vf_min(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
+    a = vf_min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
+    return a[0];
 }
 
-static float largest(vf a)
+INLINE float largest(vf a)
 {
     return -smallest(-a);
 }
@@ -398,44 +472,35 @@ struct bundle {
     int row[3];
 };
 
-/* False if the rays are not alike: then they go one by one. */
-static bool bundle_init(const struct wide *w, const struct packet *p, struct bundle *b)
+/* Are the rays alike enough to go together? One sign and one largest axis, directions within a few
+ * degrees, origins within a few percent of the scene. */
+INLINE bool are_alike(const struct wide *w, const struct octet *q)
 {
-    unsigned negative[3];
-    float grow = 0;
+    vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
     for (int a = 0; a < 3; a++) {
-        negative[a] = bits(vf_lt(p->d[a], vf_set(0)));
-        if (negative[a] != 0 && negative[a] != 255)
+        unsigned negative = bits((vi)q->inv[a]);
+        if (negative != 0 && negative != 255)
             return false;
-        if (largest(p->d[a]) - smallest(p->d[a]) > 0.1f)
-            return false;
+        float far = 0.03f * (w->max[a] - w->min[a]) + 0.001f * fabsf(q->o[a][0]);
+        alike &= vf_lt(vf_abs(q->d[a] - q->d[a][0]), vf_set(0.1f));
+        alike &= vf_le(vf_abs(q->o[a] - q->o[a][0]), vf_set(far));
     }
+    return bits(alike) == 255;
+}
+
+static void bundle_init(const struct wide *w, const struct octet *q, struct bundle *b)
+{
+    float grow = largest(growth(w, q));
     for (int a = 0; a < 3; a++) {
-        float low = smallest(p->o[a]), high = largest(p->o[a]);
-        if (high - low > 0.02f * (w->max[a] - w->min[a]) + 0.01f * fabsf(low))
-            return false;
+        bool negative = q->inv[a][0] < 0;
+        float low = smallest(q->o[a]) - grow, high = largest(q->o[a]) + grow;
+        b->inv[a][0] = vf_set(smallest(q->inv[a]));
+        b->inv[a][1] = vf_set(largest(q->inv[a]));
+        b->enter[a] = vf_set(negative ? low : high);
+        b->leave[a] = vf_set(negative ? high : low);
+        b->row[a] = 2 * a + negative;
     }
-    for (int i = 0; i < LANES; i++) {
-        const float o[3] = {p->o[0][i], p->o[1][i], p->o[2][i]},
-                    d[3] = {p->d[0][i], p->d[1][i], p->d[2][i]};
-        int k[3];
-        grow = maxf(grow, growth(w, o));
-        shear_axes(d, k);
-        if (k[2] != p->k[2])
-            return false;
-    }
-    for (int a = 0; a < 3; a++) {
-        float sign = negative[a] ? -1 : 1;
-        float d0 = smallest(sign * p->d[a]), d1 = largest(sign * p->d[a]);
-        float low = smallest(p->o[a]) - grow, high = largest(p->o[a]) + grow;
-        b->inv[a][0] = vf_set(sign * inverse(d0, grow));
-        b->inv[a][1] = vf_set(sign * inverse(d1, grow));
-        b->enter[a] = vf_set(negative[a] ? low : high);
-        b->leave[a] = vf_set(negative[a] ? high : low);
-        b->row[a] = 2 * a + (negative[a] != 0);
-    }
-    b->tmin = vf_set(smallest(p->tmin));
-    return true;
+    b->tmin = vf_set(smallest(q->tmin));
 }
 
 /* Children that some ray of the bundle may meet, and a bound on where. */
@@ -518,9 +583,10 @@ static void packet_verdict(const struct packet *p, const uint16_t *lane, int n, 
         occluded[lane[i]] = met >> i & 1;
 }
 
-/* Lanes by the axis of the shear, so that eight of them share it: list[k], count[k]. */
+/* Lanes by the axis of the shear, so that eight of them share it: list[k], count[k]. A list has room
+ * for the repeats of its last lane that fill up eight. */
 struct by_axis {
-    uint16_t list[3][BATCH_LANES];
+    uint16_t list[3][BATCH_LANES + LANES];
     int count[3];
 };
 
@@ -528,11 +594,14 @@ static void sort_by_axis(const struct rays *r, const uint16_t *lane, int n, stru
 {
     a->count[0] = a->count[1] = a->count[2] = 0;
     for (int i = 0; i < n; i++) {
-        const float d[3] = {r->d.x[lane[i]], r->d.y[lane[i]], r->d.z[lane[i]]};
-        int k[3];
-        shear_axes(d, k);
-        a->list[k[2]][a->count[k[2]]++] = lane[i];
+        float x = fabsf(r->d.x[lane[i]]), y = fabsf(r->d.y[lane[i]]), z = fabsf(r->d.z[lane[i]]);
+        int is_x = (x > y) & (x > z), is_y = y > z;
+        int k = is_x ? 0 : 2 - is_y;
+        a->list[k][a->count[k]++] = lane[i];
     }
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < LANES && a->count[k] > 0; i++)
+            a->list[k][a->count[k] + i] = a->list[k][a->count[k] - 1];
 }
 
 static void list_closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
@@ -542,9 +611,11 @@ static void list_closest(const struct wide *w, const struct rays *r, const uint1
     sort_by_axis(r, lane, n, &a);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < a.count[k]; i += LANES) {
+            struct octet q;
             struct packet p;
             int some = a.count[k] - i < LANES ? a.count[k] - i : LANES;
-            packet_init(r, a.list[k] + i, some, &p);
+            octet_init(r, a.list[k] + i, &q);
+            packet_init(&q, some, &p);
             packet_list(w, &p, false, stats);
             packet_result(&p, r, a.list[k] + i, some, h);
         }
@@ -557,12 +628,25 @@ static void list_occluded(const struct wide *w, const struct rays *r, const uint
     sort_by_axis(r, lane, n, &a);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < a.count[k]; i += LANES) {
+            struct octet q;
             struct packet p;
             int some = a.count[k] - i < LANES ? a.count[k] - i : LANES;
-            packet_init(r, a.list[k] + i, some, &p);
+            octet_init(r, a.list[k] + i, &q);
+            octet_ignore(r, a.list[k] + i, &q);
+            packet_init(&q, some, &p);
             packet_list(w, &p, true, stats);
             packet_verdict(&p, a.list[k] + i, some, occluded);
         }
+}
+
+/* Lanes k .. k+7 of a list of n; behind its end the last again. */
+static const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
+{
+    if (n - k >= LANES)
+        return lane + k;
+    for (int i = 0; i < LANES; i++)
+        filled[i] = lane[k + i < n ? k + i : n - 1];
+    return filled;
 }
 
 static void closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
@@ -573,23 +657,26 @@ static void closest(const struct wide *w, const struct rays *r, const uint16_t *
         list_closest(w, r, lane, num_lanes, h, stats);
         return;
     }
-    for (int k = 0; k < num_lanes;) {
-        struct packet p;
-        struct bundle b;
-        int group = num_lanes - k < LANES ? num_lanes - k : LANES;
-        if (group == LANES) {
-            packet_init(r, lane + k, LANES, &p);
-            if (bundle_init(w, &p, &b)) {
-                packet_traverse(w, &b, &p, false, stats);
-                packet_result(&p, r, lane + k, LANES, h);
-                k += LANES;
-                continue;
-            }
+    for (int k = 0; k < num_lanes; k += LANES) {
+        uint16_t filled[LANES];
+        const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
+        int some = num_lanes - k < LANES ? num_lanes - k : LANES;
+        struct octet q;
+        octet_init(r, eight, &q);
+        octet_slabs(w, &q);
+        if (some == LANES && are_alike(w, &q)) {
+            struct packet p;
+            struct bundle b;
+            packet_init(&q, LANES, &p);
+            bundle_init(w, &q, &b);
+            packet_traverse(w, &b, &p, false, stats);
+            packet_result(&p, r, eight, LANES, h);
+            continue;
         }
-        for (int end = k + group; k < end; k++) {
-            int i = lane[k];
+        for (int j = 0; j < some; j++) {
+            int i = eight[j];
             struct single s;
-            single_init(w, r, i, &s);
+            single_init(&q, j, &s);
             single_closest(w, &s, stats);
             bool none = s.prim == NOTHING;
             h->t[i] = none ? r->tmax[i] : s.limit;
@@ -608,24 +695,27 @@ static void occluded(const struct wide *w, const struct rays *r, const uint16_t 
         list_occluded(w, r, lane, num_lanes, occluded, stats);
         return;
     }
-    for (int k = 0; k < num_lanes;) {
-        struct packet p;
-        struct bundle b;
-        int group = num_lanes - k < LANES ? num_lanes - k : LANES;
-        if (group == LANES) {
-            packet_init(r, lane + k, LANES, &p);
-            if (bundle_init(w, &p, &b)) {
-                packet_traverse(w, &b, &p, true, stats);
-                packet_verdict(&p, lane + k, LANES, occluded);
-                k += LANES;
-                continue;
-            }
+    for (int k = 0; k < num_lanes; k += LANES) {
+        uint16_t filled[LANES];
+        const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
+        int some = num_lanes - k < LANES ? num_lanes - k : LANES;
+        struct octet q;
+        octet_init(r, eight, &q);
+        octet_ignore(r, eight, &q);
+        octet_slabs(w, &q);
+        if (some == LANES && are_alike(w, &q)) {
+            struct packet p;
+            struct bundle b;
+            packet_init(&q, LANES, &p);
+            bundle_init(w, &q, &b);
+            packet_traverse(w, &b, &p, true, stats);
+            packet_verdict(&p, eight, LANES, occluded);
+            continue;
         }
-        for (int end = k + group; k < end; k++) {
+        for (int j = 0; j < some; j++) {
             struct single s;
-            single_init(w, r, lane[k], &s);
-            s.ignore = r->ignore[lane[k]];
-            occluded[lane[k]] = single_occluded(w, &s, stats);
+            single_init(&q, j, &s);
+            occluded[eight[j]] = single_occluded(w, &s, stats);
         }
     }
 }
