@@ -83,9 +83,9 @@ INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct 
 INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
 {
     const uint32_t *a = r->ignore;
-    q->ignore = (vi){(int32_t)a[lane[0]], (int32_t)a[lane[1]], (int32_t)a[lane[2]],
-                     (int32_t)a[lane[3]], (int32_t)a[lane[4]], (int32_t)a[lane[5]],
-                     (int32_t)a[lane[6]], (int32_t)a[lane[7]]};
+    q->ignore =
+        (vi){(int32_t)a[lane[0]], (int32_t)a[lane[1]], (int32_t)a[lane[2]], (int32_t)a[lane[3]],
+             (int32_t)a[lane[4]], (int32_t)a[lane[5]], (int32_t)a[lane[6]], (int32_t)a[lane[7]]};
 }
 
 /* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
@@ -174,11 +174,14 @@ INLINE vi sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmi
     return pass & (first | second);
 }
 
+enum { ROW = sizeof(vf) };
+
 /* One ray, and what it has found. */
 struct single {
     const struct octet *q; /* lane `lane` of it */
     int lane;
-    int row[3], k[3]; /* planes of entry; axes of the shear */
+    size_t row[3]; /* planes of entry, in bytes from the start of a node */
+    int k[3];      /* axes of the shear */
     float limit, u, v;
     int32_t prim;
 };
@@ -199,7 +202,7 @@ INLINE void single_init(const struct octet *q, int lane, struct single *s)
     s->q = q;
     s->lane = lane;
     for (int a = 0; a < 3; a++) {
-        s->row[a] = 2 * a + (lane_of(&q->inv[a], lane) < 0);
+        s->row[a] = ROW * (2 * (size_t)a + (lane_of(&q->inv[a], lane) < 0));
         s->k[a] = shear[((const int32_t *)&q->axis)[lane]][a];
     }
     s->limit = lane_of(&q->limit, lane);
@@ -252,12 +255,14 @@ INLINE void single_keep_nearest(const struct wide_leaf *l, unsigned hit, vf t, v
 /* A ray to the boxes, in registers. */
 struct slabs {
     vf inv[3], enter[3], leave[3], tmin;
+    size_t row[3];
 };
 
 INLINE struct slabs single_slabs(const struct single *s)
 {
     struct slabs b = {.tmin = splat(&s->q->tmin, s->lane)};
     for (int a = 0; a < 3; a++) {
+        b.row[a] = s->row[a];
         b.inv[a] = splat(&s->q->inv[a], s->lane);
         b.enter[a] = splat(&s->q->enter[a], s->lane);
         b.leave[a] = splat(&s->q->leave[a], s->lane);
@@ -265,22 +270,36 @@ INLINE struct slabs single_slabs(const struct single *s)
     return b;
 }
 
-/* Children that the ray meets within (tmin, limit], and where it enters them. */
-INLINE unsigned single_node(const struct wide_node *n, const struct single *s,
-                            const struct slabs *b, vf limit, vf *enter)
+INLINE vf row_at(const void *node, size_t row)
 {
-    vf x0 = mul_sub(vf_load(n->plane[s->row[0]]), b->inv[0], b->enter[0]);
-    vf y0 = mul_sub(vf_load(n->plane[s->row[1]]), b->inv[1], b->enter[1]);
-    vf z0 = mul_sub(vf_load(n->plane[s->row[2]]), b->inv[2], b->enter[2]);
-    vf x1 = mul_sub(vf_load(n->plane[s->row[0] ^ 1]), b->inv[0], b->leave[0]);
-    vf y1 = mul_sub(vf_load(n->plane[s->row[1] ^ 1]), b->inv[1], b->leave[1]);
-    vf z1 = mul_sub(vf_load(n->plane[s->row[2] ^ 1]), b->inv[2], b->leave[2]);
+    return *(const vf *)((const char *)node + row);
+}
+
+/* Children that the ray meets within (tmin, limit], and where it enters them. */
+INLINE unsigned single_node(const struct wide_node *n, const struct slabs *b, vf limit, vf *enter)
+{
+    vf x0 = mul_sub(row_at(n, b->row[0]), b->inv[0], b->enter[0]);
+    vf y0 = mul_sub(row_at(n, b->row[1]), b->inv[1], b->enter[1]);
+    vf z0 = mul_sub(row_at(n, b->row[2]), b->inv[2], b->enter[2]);
+    vf x1 = mul_sub(row_at(n, b->row[0] ^ ROW), b->inv[0], b->leave[0]);
+    vf y1 = mul_sub(row_at(n, b->row[1] ^ ROW), b->inv[1], b->leave[1]);
+    vf z1 = mul_sub(row_at(n, b->row[2] ^ ROW), b->inv[2], b->leave[2]);
     *enter = vf_max(vf_max(x0, y0), vf_max(z0, b->tmin));
     return bits(vf_le(*enter, vf_min(vf_min(x1, y1), vf_min(z1, limit))));
 }
 
+INLINE void fetch_ahead(const struct wide *w, uint32_t ref)
+{
+    const char *p = at(w, ref);
+    __builtin_prefetch(p);
+    __builtin_prefetch(p + 64);
+    __builtin_prefetch(p + 128);
+    __builtin_prefetch(p + 192);
+}
+
 /* Pushes the children, the farthest first, and returns the nearest. */
-INLINE uint32_t push_sorted(const struct wide_node *n, unsigned hit, vf enter, struct stacked **top)
+INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
+                            struct stacked **top)
 {
     float t[LANES] __attribute__((aligned(32)));
     vf_store(t, enter);
@@ -290,6 +309,8 @@ INLINE uint32_t push_sorted(const struct wide_node *n, unsigned hit, vf enter, s
     struct stacked *base = *top, *p = base;
     *p++ = (struct stacked){t[i], n->child[i]};
     *p++ = (struct stacked){t[j], n->child[j]};
+    fetch_ahead(w, base[0].ref);
+    fetch_ahead(w, base[1].ref);
     if (base[0].t < base[1].t) {
         struct stacked swap = base[0];
         base[0] = base[1];
@@ -298,6 +319,7 @@ INLINE uint32_t push_sorted(const struct wide_node *n, unsigned hit, vf enter, s
     while (hit) {
         i = __builtin_ctz(hit);
         hit &= hit - 1;
+        fetch_ahead(w, n->child[i]);
         struct stacked *q = p++;
         for (; q > base && q[-1].t < t[i]; q--)
             *q = q[-1];
@@ -318,13 +340,13 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
         while (!(ref & WIDE_LEAF)) {
             const struct wide_node *n = at(w, ref);
             nodes++;
-            unsigned hit = single_node(n, s, &b, limit, &t);
+            unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
                 goto pop;
             if ((hit & (hit - 1)) == 0)
                 ref = n->child[__builtin_ctz(hit)];
             else
-                ref = push_sorted(n, hit, t, &top);
+                ref = push_sorted(w, n, hit, t, &top);
         }
         const struct wide_leaf *l = at(w, ref);
         leaves++;
@@ -359,7 +381,7 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
         while (!(ref & WIDE_LEAF)) {
             const struct wide_node *n = at(w, ref);
             nodes++;
-            unsigned hit = single_node(n, s, &b, limit, &t);
+            unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
                 goto pop;
             ref = n->child[__builtin_ctz(hit)];
@@ -534,7 +556,7 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
             if ((hit & (hit - 1)) == 0)
                 ref = n->child[__builtin_ctz(hit)];
             else
-                ref = push_sorted(n, hit, t, &top);
+                ref = push_sorted(w, n, hit, t, &top);
         }
         stats->primitive_tests++;
         const struct wide_leaf *l = at(w, ref);
@@ -649,34 +671,39 @@ static const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t fil
     return filled;
 }
 
-static void closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
-                    struct hits *h, struct bvh_stats *stats)
+/* One batch: rays that are alike go in packets, the others one by one. h is NULL: occlusion. */
+INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
+                  bool any, struct hits *h, bool *occluded, struct bvh_stats *stats)
 {
-    stats->rays += (uint64_t)num_lanes;
-    if (w->num_nodes == 0) {
-        list_closest(w, r, lane, num_lanes, h, stats);
-        return;
-    }
+    struct octet octet, *o = &octet;
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
         int some = num_lanes - k < LANES ? num_lanes - k : LANES;
-        struct octet q;
-        octet_init(r, eight, &q);
-        octet_slabs(w, &q);
-        if (some == LANES && are_alike(w, &q)) {
+        octet_init(r, eight, o);
+        if (any)
+            octet_ignore(r, eight, o);
+        octet_slabs(w, o);
+        if (some == LANES && are_alike(w, o)) {
             struct packet p;
             struct bundle b;
-            packet_init(&q, LANES, &p);
-            bundle_init(w, &q, &b);
-            packet_traverse(w, &b, &p, false, stats);
-            packet_result(&p, r, eight, LANES, h);
+            packet_init(o, LANES, &p);
+            bundle_init(w, o, &b);
+            packet_traverse(w, &b, &p, any, stats);
+            if (any)
+                packet_verdict(&p, eight, LANES, occluded);
+            else
+                packet_result(&p, r, eight, LANES, h);
             continue;
         }
         for (int j = 0; j < some; j++) {
             int i = eight[j];
             struct single s;
-            single_init(&q, j, &s);
+            single_init(o, j, &s);
+            if (any) {
+                occluded[i] = single_occluded(w, &s, stats);
+                continue;
+            }
             single_closest(w, &s, stats);
             bool none = s.prim == NOTHING;
             h->t[i] = none ? r->tmax[i] : s.limit;
@@ -687,37 +714,24 @@ static void closest(const struct wide *w, const struct rays *r, const uint16_t *
     }
 }
 
+static void closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
+                    struct hits *h, struct bvh_stats *stats)
+{
+    stats->rays += (uint64_t)num_lanes;
+    if (w->num_nodes == 0)
+        list_closest(w, r, lane, num_lanes, h, stats);
+    else
+        trace(w, r, lane, num_lanes, false, h, NULL, stats);
+}
+
 static void occluded(const struct wide *w, const struct rays *r, const uint16_t *lane,
                      int num_lanes, bool *occluded, struct bvh_stats *stats)
 {
     stats->rays += (uint64_t)num_lanes;
-    if (w->num_nodes == 0) {
+    if (w->num_nodes == 0)
         list_occluded(w, r, lane, num_lanes, occluded, stats);
-        return;
-    }
-    for (int k = 0; k < num_lanes; k += LANES) {
-        uint16_t filled[LANES];
-        const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
-        int some = num_lanes - k < LANES ? num_lanes - k : LANES;
-        struct octet q;
-        octet_init(r, eight, &q);
-        octet_ignore(r, eight, &q);
-        octet_slabs(w, &q);
-        if (some == LANES && are_alike(w, &q)) {
-            struct packet p;
-            struct bundle b;
-            packet_init(&q, LANES, &p);
-            bundle_init(w, &q, &b);
-            packet_traverse(w, &b, &p, true, stats);
-            packet_verdict(&p, eight, LANES, occluded);
-            continue;
-        }
-        for (int j = 0; j < some; j++) {
-            struct single s;
-            single_init(&q, j, &s);
-            occluded[eight[j]] = single_occluded(w, &s, stats);
-        }
-    }
+    else
+        trace(w, r, lane, num_lanes, true, NULL, occluded, stats);
 }
 
 /* The builder. Minimum and maximum, or sum and minus sum, change places. */

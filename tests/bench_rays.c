@@ -131,24 +131,24 @@ static void embree_trace(const struct tracer *t, const struct ray_set *s, bool s
 }
 
 static void our_trace(const struct tracer *t, const struct ray_set *s, bool shadow,
-                      struct answers *a)
+                      struct answers *a, struct bvh_stats *stats)
 {
     uint16_t lane[BATCH_LANES];
-    struct bvh_stats stats = {0};
     for (int i = 0; i < BATCH_LANES; i++)
         lane[i] = (uint16_t)i;
     for (size_t b = 0; b < num_batches(s); b++)
         if (shadow)
-            bvh_occluded(t->bvh, &s->batch[b], lane, batch_size(s, b), a->occluded[b], &stats);
+            bvh_occluded(t->bvh, &s->batch[b], lane, batch_size(s, b), a->occluded[b], stats);
         else
-            bvh_closest(t->bvh, &s->batch[b], lane, batch_size(s, b), &a->hit[b], &stats);
+            bvh_closest(t->bvh, &s->batch[b], lane, batch_size(s, b), &a->hit[b], stats);
 }
 
-static double trace(const struct tracer *t, const struct ray_set *s, bool shadow, struct answers *a)
+static double trace(const struct tracer *t, const struct ray_set *s, bool shadow, struct answers *a,
+                    struct bvh_stats *stats)
 {
     double start = cpu_seconds();
     if (t->bvh != NULL)
-        our_trace(t, s, shadow, a);
+        our_trace(t, s, shadow, a, stats);
     else
         embree_trace(t, s, shadow, a);
     return cpu_seconds() - start;
@@ -347,8 +347,8 @@ static size_t count_different(const struct ray_set *s, bool shadow, const struct
 enum { DEFAULT, ROBUST, WIDE, NUM_TRACERS };
 
 struct result {
-    double ratio[NUM_SETS], robust[NUM_SETS], mrays[NUM_SETS], build, mtri_per_s,
-        bytes_per_triangle;
+    double ratio[NUM_SETS], robust[NUM_SETS], mrays[NUM_SETS], nodes[NUM_SETS], leaves[NUM_SETS],
+        build, mtri_per_s, bytes_per_triangle;
     bool wrong, list;
 };
 
@@ -397,17 +397,18 @@ static struct result measure(const struct subject *of, enum isa isa, int rounds)
     for (int k = 0; k < NUM_TRACERS; k++)
         answer[k] = new_answers();
     camera_rays(of, middle, size, &set[PRIMARY]);
-    trace(&t[ROBUST], &set[PRIMARY], false, &answer[ROBUST]);
+    trace(&t[ROBUST], &set[PRIMARY], false, &answer[ROBUST], NULL);
     go_on(s, &set[PRIMARY], &answer[ROBUST], size, light, 72, &set[BOUNCE1], &set[SHADOW1]);
-    trace(&t[ROBUST], &set[BOUNCE1], false, &answer[ROBUST]);
+    trace(&t[ROBUST], &set[BOUNCE1], false, &answer[ROBUST], NULL);
     go_on(s, &set[BOUNCE1], &answer[ROBUST], size, light, 73, &set[BOUNCE2], &set[SHADOW2]);
     for (enum set k = 0; k < NUM_SETS; k++) {
         double a[MAX_ROUNDS], b[MAX_ROUNDS], rate[MAX_ROUNDS];
         bool shadow = is_shadow(k);
         for (int round = -1; round < rounds; round++) {
             double seconds[NUM_TRACERS];
+            struct bvh_stats stats = {0};
             for (int j = 0; j < NUM_TRACERS; j++)
-                seconds[j] = trace(&t[j], &set[k], shadow, &answer[j]);
+                seconds[j] = trace(&t[j], &set[k], shadow, &answer[j], &stats);
             if (round < 0) { /* warms up, and is looked at */
                 size_t n = count_different(&set[k], shadow, &answer[ROBUST], &answer[WIDE], size);
                 if (n * 2000 > set[k].num_rays) {
@@ -419,6 +420,8 @@ static struct result measure(const struct subject *of, enum isa isa, int rounds)
             }
             a[round] = seconds[DEFAULT] / seconds[WIDE];
             b[round] = seconds[ROBUST] / seconds[WIDE];
+            out.nodes[k] = (double)stats.box_tests / (double)stats.rays;
+            out.leaves[k] = (double)stats.primitive_tests / (double)stats.rays;
             rate[round] = (double)set[k].num_rays / seconds[WIDE] * 1e-6;
         }
         out.ratio[k] = median(a, rounds);
@@ -628,6 +631,10 @@ int main(int argc, char **argv)
             print_row("", "robust", r.robust);
             putchar('\n');
             print_row("", "Mrays/s", r.mrays);
+            putchar('\n');
+            print_row("", "nodes", r.nodes);
+            putchar('\n');
+            print_row("", "leaves", r.leaves);
             putchar('\n');
             for (int k = 0; k < NUM_SETS; k++) {
                 mean_add(&(r.list ? lists : trees)[0][k], r.ratio[k]);
