@@ -15,8 +15,21 @@ struct range {
     struct wide_box box, centres;
 };
 
+/* The binary tree that the wide one is made of. cost[i]: expected tests of the best wide tree of this
+ * part that hangs on at most i + 1 children of the node above; left_slots[i]: how many of these go to
+ * the left half, 0: all of it is one child; left_slots[0]: if it is a node, how many of its eight. */
+struct part {
+    struct wide_box box;
+    uint32_t first, count;
+    uint32_t left; /* left and left + 1 are the halves; 0: a leaf */
+    float cost[WIDTH];
+    uint8_t left_slots[WIDTH];
+};
+
 struct build {
     struct wide *w;
+    struct part *part; /* 0 is the root */
+    size_t num_parts, room_for_parts;
     const struct scene *scene;
     struct wide_item *item;
     size_t capacity; /* bytes of the arena */
@@ -177,27 +190,99 @@ static void cut(struct build *b, struct range *r, struct range *right)
     *r = l;
 }
 
-/* The range is cut, the largest part first, until there are eight parts or all are leaves. False if
- * out of memory. */
-static bool add_node(struct build *b, const struct range *whole, int depth)
+static bool reserve_parts(struct build *b)
 {
-    struct range child[WIDTH] = {*whole};
-    bool leaf[WIDTH] = {fits_leaf(b, whole)};
-    int n = 1;
-    while (n < WIDTH) {
-        int largest = -1;
-        float most = -1;
-        for (int i = 0; i < n; i++)
-            if (!leaf[i] && half_area(&child[i].box) > most) {
-                most = half_area(&child[i].box);
-                largest = i;
+    if (b->num_parts + 2 <= b->room_for_parts)
+        return true;
+    size_t room = b->room_for_parts + b->room_for_parts / 2 + 64;
+    struct part *larger = alloc_aligned(room * sizeof *larger);
+    if (larger == NULL)
+        return false;
+    if (b->part != NULL)
+        memcpy(larger, b->part, b->num_parts * sizeof *larger);
+    free(b->part);
+    b->part = larger;
+    b->room_for_parts = room;
+    return true;
+}
+
+/* The best ways to hang part i on 1 to 8 children, by those of its halves [Ylitie17]. */
+static void best_slots(struct build *b, uint32_t i)
+{
+    struct part *p = &b->part[i];
+    const struct part *l = &b->part[p->left], *r = l + 1;
+    float split[WIDTH + 1];
+    uint8_t left[WIDTH + 1];
+    for (int n = 2; n <= WIDTH; n++) {
+        split[n] = INFINITY;
+        for (int k = 1; k < n; k++) {
+            float c = l->cost[k - 1] + r->cost[n - k - 1];
+            if (c < split[n]) {
+                split[n] = c;
+                left[n] = (uint8_t)k;
             }
-        if (largest < 0)
-            break;
-        cut(b, &child[largest], &child[n]);
-        leaf[largest] = fits_leaf(b, &child[largest]);
-        leaf[n] = fits_leaf(b, &child[n]);
-        n++;
+        }
+    }
+    p->cost[0] = half_area(&p->box) + split[WIDTH];
+    p->left_slots[0] = left[WIDTH];
+    for (int n = 2; n <= WIDTH; n++) {
+        bool better = split[n] < p->cost[n - 2];
+        bool inherit = !better && n > 2;
+        p->cost[n - 1] = better ? split[n] : p->cost[n - 2];
+        p->left_slots[n - 1] = better ? left[n] : inherit ? p->left_slots[n - 2] : 0;
+    }
+}
+
+/* Cuts range r in two until each part is a leaf; part i is the whole. False if out of memory. */
+static bool add_part(struct build *b, uint32_t i, struct range *r)
+{
+    b->part[i] = (struct part){.box = r->box, .first = r->first, .count = r->count};
+    if (fits_leaf(b, r)) {
+        for (int k = 0; k < WIDTH; k++)
+            b->part[i].cost[k] = half_area(&r->box);
+        return true;
+    }
+    if (!reserve_parts(b))
+        return false;
+    uint32_t left = (uint32_t)b->num_parts;
+    b->num_parts += 2;
+    struct range right;
+    cut(b, r, &right);
+    if (!add_part(b, left, r) || !add_part(b, left + 1, &right))
+        return false;
+    b->part[i].left = left;
+    best_slots(b, i);
+    return true;
+}
+
+/* The parts that become children: those of part i, which has `slots` of them. */
+static int gather_children(const struct build *b, uint32_t i, int slots, uint32_t *child, int n)
+{
+    const struct part *p = &b->part[i];
+    int left = p->left == 0 || slots == 1 ? 0 : p->left_slots[slots - 1];
+    if (left == 0) {
+        child[n] = i;
+        return n + 1;
+    }
+    n = gather_children(b, p->left, left, child, n);
+    return gather_children(b, p->left + 1, slots - left, child, n);
+}
+
+static double chance(const struct build *b, const struct wide_box *box)
+{
+    return b->root_area > 0 ? (double)half_area(box) / b->root_area : 1;
+}
+
+/* Part i as a node and what is below. False if out of memory. */
+static bool add_node(struct build *b, uint32_t i, int depth)
+{
+    const struct part *p = &b->part[i];
+    uint32_t child[WIDTH];
+    int n = 1, left = p->left_slots[0];
+    child[0] = i; /* a scene that is one leaf has a node all the same */
+    if (p->left != 0) {
+        n = gather_children(b, p->left, left, child, 0);
+        n = gather_children(b, p->left + 1, WIDTH - left, child, n);
     }
     struct wide *w = b->w;
     if (!reserve(b, sizeof(struct wide_node)))
@@ -207,28 +292,39 @@ static bool add_node(struct build *b, const struct range *whole, int depth)
     w->num_nodes++;
     if (depth > w->depth)
         w->depth = depth;
-    b->w->cost += b->root_area > 0 ? (double)half_area(&whole->box) / b->root_area : 1;
+    w->cost += chance(b, &p->box);
     struct wide_node node = {.child = {0}};
-    for (int i = 0; i < WIDTH; i++)
+    for (int k = 0; k < WIDTH; k++)
         for (int a = 0; a < 3; a++) {
-            node.plane[2 * a][i] = i < n ? child[i].box.v[a] : INFINITY;
-            node.plane[2 * a + 1][i] = i < n ? -child[i].box.v[4 + a] : -INFINITY;
+            node.plane[2 * a][k] = k < n ? b->part[child[k]].box.v[a] : INFINITY;
+            node.plane[2 * a + 1][k] = k < n ? -b->part[child[k]].box.v[4 + a] : -INFINITY;
         }
     /* Leaves lie behind their node. */
-    for (int i = 0; i < n; i++)
-        if (leaf[i]) {
-            if ((node.child[i] = add_leaf(b, &child[i])) == WIDE_PLACE)
-                return false;
-            w->cost += b->root_area > 0 ? (double)half_area(&child[i].box) / b->root_area : 1;
-        }
-    for (int i = 0; i < n; i++)
-        if (!leaf[i]) {
-            node.child[i] = (uint32_t)(w->used / WIDE_LINE);
-            if (!add_node(b, &child[i], depth + 1))
+    for (int k = 0; k < n; k++) {
+        const struct part *c = &b->part[child[k]];
+        if (c->left != 0)
+            continue;
+        const struct range r = {.first = c->first, .count = c->count};
+        if ((node.child[k] = add_leaf(b, &r)) == WIDE_PLACE)
+            return false;
+        w->cost += chance(b, &c->box);
+    }
+    for (int k = 0; k < n; k++)
+        if (b->part[child[k]].left != 0) {
+            node.child[k] = (uint32_t)(w->used / WIDE_LINE);
+            if (!add_node(b, child[k], depth + 1))
                 return false;
         }
     memcpy(w->arena + place, &node, sizeof node);
     return true;
+}
+
+static bool add_tree(struct build *b, struct range *all)
+{
+    if (!reserve_parts(b))
+        return false;
+    b->num_parts = 1;
+    return add_part(b, 0, all) && add_node(b, 0, 0);
 }
 
 static bool add_list(struct build *b, struct range *all)
@@ -275,12 +371,14 @@ struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
         w->min[a] = all.box.v[a];
         w->max[a] = -all.box.v[4 + a];
     }
-    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : add_node(&b, &all, 0)))
+    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : add_tree(&b, &all)))
         goto fail;
     free(b.item);
+    free(b.part);
     return w;
 fail:
     free(b.item);
+    free(b.part);
     wide_free(w);
     err_set(e, "out of memory for the acceleration structure of %u primitives", all.count);
     return NULL;
