@@ -53,6 +53,8 @@ static bool reserve(struct build *b, size_t size)
     struct wide *w = b->w;
     if (w->used + size <= b->capacity)
         return true;
+    if (w->used + size > WIDE_PLACE)
+        return false; /* references end here, at some 8 10^7 triangles */
     size_t capacity = b->capacity + b->capacity / 2 + size;
     char *larger = alloc_aligned(capacity);
     if (larger == NULL)
@@ -144,7 +146,7 @@ static uint32_t add_leaf(struct build *b, const struct range *r)
     if (!reserve(b, sizeof(struct wide_leaf)))
         return WIDE_PLACE;
     struct wide *w = b->w;
-    uint32_t ref = (uint32_t)(w->used / WIDE_LINE) | WIDE_LEAF;
+    uint32_t ref = (uint32_t)w->used | WIDE_LEAF;
     if (is_sphere(b, r->first))
         ref |= WIDE_SPHERES;
     fill_leaf(b, b->item + r->first, r->count, (struct wide_leaf *)(w->arena + w->used));
@@ -311,7 +313,7 @@ static bool add_node(struct build *b, uint32_t i, int depth)
     }
     for (int k = 0; k < n; k++)
         if (b->part[child[k]].left != 0) {
-            node.child[k] = (uint32_t)(w->used / WIDE_LINE);
+            node.child[k] = (uint32_t)w->used;
             if (!add_node(b, child[k], depth + 1))
                 return false;
         }

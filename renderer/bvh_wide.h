@@ -13,10 +13,11 @@
 
 enum { WIDTH = 8, WIDE_FLAT = 32, WIDE_LINE = 64, WIDE_MAX_BINS = 32 };
 
-/* A reference to a node or leaf: its place in the arena in lines of 64 bytes, and what it is. */
-#define WIDE_LEAF    0x80000000u
-#define WIDE_SPHERES 0x40000000u
-#define WIDE_PLACE   0x3fffffffu
+/* A reference to a node or leaf: its place in the arena in bytes, a multiple of 64, and in the low bits
+ * what it is; nothing for a node. */
+#define WIDE_LEAF    1u
+#define WIDE_SPHERES 2u
+#define WIDE_PLACE   0xffffffc0u
 
 /* Planes: x low, x high, y low, ...; an empty child has low = infinity, high = -infinity. */
 struct wide_node {
@@ -35,7 +36,7 @@ struct wide_leaf {
 struct wide_kernel;
 
 struct wide {
-    char *arena; /* node or leaf i at i lines; the root node, or the leaves of a list, at 0 */
+    char *arena; /* nodes and leaves; at 0 the root, or the leaves of a list */
     size_t used; /* bytes */
     const struct wide_kernel *kernel;
     float min[3], max[3];           /* of the scene */

@@ -19,14 +19,14 @@ enum {
     NOTHING = INT32_MAX /* no primitive yet: more than any */
 };
 
-struct stacked {
-    float t;
-    uint32_t ref;
-};
+/* A node or leaf that waits: the bits of the distance where it begins, and its reference. As numbers
+ * they are in order of distance as far as that is positive; elsewhere only the order of visits
+ * suffers. */
+typedef int64_t stacked;
 
 static inline const void *at(const struct wide *w, uint32_t ref)
 {
-    return w->arena + (size_t)(ref & WIDE_PLACE) * WIDE_LINE;
+    return w->arena + (ref & WIDE_PLACE);
 }
 
 /* Eight rays as the lists of them are read, lane by lane what boxes and primitives want of each. */
@@ -297,48 +297,85 @@ INLINE void fetch_ahead(const struct wide *w, uint32_t ref)
     __builtin_prefetch(p + 192);
 }
 
-/* Pushes the children, the farthest first, and returns the nearest. */
+INLINE stacked stack_entry(float t, uint32_t ref)
+{
+    uint32_t of_t;
+    memcpy(&of_t, &t, sizeof t);
+    return (stacked)((uint64_t)of_t << 32 | ref);
+}
+
+INLINE float stacked_t(stacked s)
+{
+    uint32_t of_t = (uint32_t)((uint64_t)s >> 32);
+    float t;
+    memcpy(&t, &of_t, sizeof t);
+    return t;
+}
+
+INLINE uint32_t stacked_ref(stacked s)
+{
+    return (uint32_t)s;
+}
+
+/* Without a branch: which of two is nearer cannot be predicted. */
+INLINE void order(stacked *near, stacked *far)
+{
+    stacked a = *near, b = *far;
+    *near = a < b ? a : b;
+    *far = a < b ? b : a;
+}
+
+/* Pushes the children, two or more, the farthest first, but returns the nearest. */
 INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
-                            struct stacked **top)
+                            stacked **top)
 {
     float t[LANES] __attribute__((aligned(32)));
     vf_store(t, enter);
-    int i = __builtin_ctz(hit), j = __builtin_ctz(hit & (hit - 1));
+    int i = __builtin_ctz(hit);
     hit &= hit - 1;
+    int j = __builtin_ctz(hit);
     hit &= hit - 1;
-    struct stacked *base = *top, *p = base;
-    *p++ = (struct stacked){t[i], n->child[i]};
-    *p++ = (struct stacked){t[j], n->child[j]};
-    fetch_ahead(w, base[0].ref);
-    fetch_ahead(w, base[1].ref);
-    if (base[0].t < base[1].t) {
-        struct stacked swap = base[0];
-        base[0] = base[1];
-        base[1] = swap;
-    }
-    while (hit) {
+    stacked near = stack_entry(t[i], n->child[i]), far = stack_entry(t[j], n->child[j]);
+    fetch_ahead(w, n->child[i]);
+    fetch_ahead(w, n->child[j]);
+    order(&near, &far);
+    stacked *p = *top;
+    if (hit) {
         i = __builtin_ctz(hit);
         hit &= hit - 1;
         fetch_ahead(w, n->child[i]);
-        struct stacked *q = p++;
-        for (; q > base && q[-1].t < t[i]; q--)
-            *q = q[-1];
-        *q = (struct stacked){t[i], n->child[i]};
+        stacked third = stack_entry(t[i], n->child[i]);
+        order(&near, &third);
+        order(&far, &third);
+        *p++ = third;
+        while (hit) {
+            i = __builtin_ctz(hit);
+            hit &= hit - 1;
+            fetch_ahead(w, n->child[i]);
+            stacked next = stack_entry(t[i], n->child[i]);
+            order(&near, &next);
+            order(&far, &next);
+            stacked *q = p++;
+            for (; q > *top && q[-1] < next; q--)
+                *q = q[-1];
+            *q = next;
+        }
     }
-    *top = p - 1;
-    return p[-1].ref;
+    *p++ = far;
+    *top = p;
+    return stacked_ref(near);
 }
 
 static void single_closest(const struct wide *w, struct single *s, struct bvh_stats *stats)
 {
-    struct stacked stack[STACK], *top = stack;
+    stacked stack[STACK], *top = stack;
     uint32_t ref = 0;
     const struct slabs b = single_slabs(s);
     vf limit = vf_set(s->limit), t, u, v;
     uint64_t nodes = 0, leaves = 0;
     for (;;) {
         while (!(ref & WIDE_LEAF)) {
-            const struct wide_node *n = at(w, ref);
+            const struct wide_node *n = (const struct wide_node *)(w->arena + ref);
             nodes++;
             unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
@@ -360,8 +397,8 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
             if (top == stack)
                 goto done;
             top--;
-        } while (top->t > s->limit);
-        ref = top->ref;
+        } while (stacked_t(*top) > s->limit);
+        ref = stacked_ref(*top);
     }
 done:
     stats->box_tests += nodes;
@@ -379,7 +416,7 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
     bool met_something = false;
     for (;;) {
         while (!(ref & WIDE_LEAF)) {
-            const struct wide_node *n = at(w, ref);
+            const struct wide_node *n = (const struct wide_node *)(w->arena + ref);
             nodes++;
             unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
@@ -542,13 +579,13 @@ INLINE unsigned bundle_node(const struct wide_node *n, const struct bundle *b, v
 INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct packet *p,
                             bool any, struct bvh_stats *stats)
 {
-    struct stacked stack[STACK], *top = stack;
+    stacked stack[STACK], *top = stack;
     uint32_t ref = 0;
     float farthest = largest(p->limit);
     vf limit = vf_set(farthest), t;
     for (;;) {
         while (!(ref & WIDE_LEAF)) {
-            const struct wide_node *n = at(w, ref);
+            const struct wide_node *n = (const struct wide_node *)(w->arena + ref);
             stats->box_tests++;
             unsigned hit = bundle_node(n, b, limit, &t);
             if (hit == 0)
@@ -569,8 +606,8 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
             if (top == stack)
                 return;
             top--;
-        } while (top->t > farthest);
-        ref = top->ref;
+        } while (stacked_t(*top) > farthest);
+        ref = stacked_ref(*top);
     }
 }
 
