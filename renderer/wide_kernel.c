@@ -407,7 +407,7 @@ done:
 
 static bool single_occluded(const struct wide *w, const struct single *s, struct bvh_stats *stats)
 {
-    uint32_t stack[STACK], *top = stack;
+    stacked stack[STACK], *top = stack;
     uint32_t ref = 0;
     const struct slabs b = single_slabs(s);
     const vf limit = vf_set(s->limit);
@@ -421,9 +421,10 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
             unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
                 goto pop;
-            ref = n->child[__builtin_ctz(hit)];
-            for (hit &= hit - 1; hit; hit &= hit - 1)
-                *top++ = n->child[__builtin_ctz(hit)];
+            if ((hit & (hit - 1)) == 0)
+                ref = n->child[__builtin_ctz(hit)];
+            else
+                ref = push_sorted(w, n, hit, t, &top);
         }
         const struct wide_leaf *l = at(w, ref);
         leaves++;
@@ -439,7 +440,7 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
     pop:
         if (top == stack)
             break;
-        ref = *--top;
+        ref = stacked_ref(*--top);
     }
     stats->box_tests += nodes;
     stats->primitive_tests += leaves;
