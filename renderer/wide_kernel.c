@@ -184,6 +184,8 @@ struct single {
     int k[3];      /* axes of the shear */
     float limit, u, v;
     int32_t prim;
+    unsigned hit; /* children of the root, and where the ray enters them */
+    vf enter;
 };
 
 INLINE float lane_of(const vf *a, int i)
@@ -366,10 +368,29 @@ INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, uns
     return stacked_ref(near);
 }
 
+INLINE uint32_t next_of(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
+                        stacked **top)
+{
+    if ((hit & (hit - 1)) == 0)
+        return n->child[__builtin_ctz(hit)];
+    return push_sorted(w, n, hit, enter, top);
+}
+
+/* The root: for all rays of an octet before any of them goes on, so that one does not wait for
+ * another. */
+INLINE void single_root(const struct wide *w, struct single *s)
+{
+    const struct slabs b = single_slabs(s);
+    s->hit = single_node((const struct wide_node *)w->arena, &b, vf_set(s->limit), &s->enter);
+}
+
 static void single_closest(const struct wide *w, struct single *s, struct bvh_stats *stats)
 {
+    stats->box_tests++;
+    if (s->hit == 0)
+        return;
     stacked stack[STACK], *top = stack;
-    uint32_t ref = 0;
+    uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, &top);
     const struct slabs b = single_slabs(s);
     vf limit = vf_set(s->limit), t, u, v;
     uint64_t nodes = 0, leaves = 0;
@@ -380,10 +401,7 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
             unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
                 goto pop;
-            if ((hit & (hit - 1)) == 0)
-                ref = n->child[__builtin_ctz(hit)];
-            else
-                ref = push_sorted(w, n, hit, t, &top);
+            ref = next_of(w, n, hit, t, &top);
         }
         const struct wide_leaf *l = at(w, ref);
         leaves++;
@@ -407,8 +425,11 @@ done:
 
 static bool single_occluded(const struct wide *w, const struct single *s, struct bvh_stats *stats)
 {
+    stats->box_tests++;
+    if (s->hit == 0)
+        return false;
     stacked stack[STACK], *top = stack;
-    uint32_t ref = 0;
+    uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, &top);
     const struct slabs b = single_slabs(s);
     const vf limit = vf_set(s->limit);
     vf t, u, v;
@@ -421,10 +442,7 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
             unsigned hit = single_node(n, &b, limit, &t);
             if (hit == 0)
                 goto pop;
-            if ((hit & (hit - 1)) == 0)
-                ref = n->child[__builtin_ctz(hit)];
-            else
-                ref = push_sorted(w, n, hit, t, &top);
+            ref = next_of(w, n, hit, t, &top);
         }
         const struct wide_leaf *l = at(w, ref);
         leaves++;
@@ -591,10 +609,7 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
             unsigned hit = bundle_node(n, b, limit, &t);
             if (hit == 0)
                 goto pop;
-            if ((hit & (hit - 1)) == 0)
-                ref = n->child[__builtin_ctz(hit)];
-            else
-                ref = push_sorted(w, n, hit, t, &top);
+            ref = next_of(w, n, hit, t, &top);
         }
         stats->primitive_tests++;
         const struct wide_leaf *l = at(w, ref);
@@ -734,20 +749,24 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
                 packet_result(&p, r, eight, LANES, h);
             continue;
         }
+        struct single single[LANES];
+        for (int j = 0; j < some; j++) {
+            single_init(o, j, &single[j]);
+            single_root(w, &single[j]);
+        }
         for (int j = 0; j < some; j++) {
             int i = eight[j];
-            struct single s;
-            single_init(o, j, &s);
+            struct single *s = &single[j];
             if (any) {
-                occluded[i] = single_occluded(w, &s, stats);
+                occluded[i] = single_occluded(w, s, stats);
                 continue;
             }
-            single_closest(w, &s, stats);
-            bool none = s.prim == NOTHING;
-            h->t[i] = none ? r->tmax[i] : s.limit;
-            h->u[i] = s.u;
-            h->v[i] = s.v;
-            h->prim[i] = none ? NO_HIT : (uint32_t)s.prim;
+            single_closest(w, s, stats);
+            bool none = s->prim == NOTHING;
+            h->t[i] = none ? r->tmax[i] : s->limit;
+            h->u[i] = s->u;
+            h->v[i] = s->v;
+            h->prim[i] = none ? NO_HIT : (uint32_t)s->prim;
         }
     }
 }
