@@ -375,6 +375,8 @@ struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
     }
     if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : add_tree(&b, &all)))
         goto fail;
+    float extent = maxf(maxf(w->max[0] - w->min[0], w->max[1] - w->min[1]), w->max[2] - w->min[2]);
+    w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);
     free(b.item);
     free(b.part);
     return w;

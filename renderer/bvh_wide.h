@@ -44,6 +44,9 @@ struct wide {
     uint32_t num_sphere_leaves;     /* of a list: the last ones */
     uint32_t num_triangles;         /* of the scene: sphere i is primitive num_triangles + i */
     int depth;
+    float
+        alike; /* rays that start as near to each other may go as a packet: a few leaves of a surface
+                    that fills the scene */
     double cost; /* expected tests of a node or leaf for a random ray */
 };
 

@@ -551,7 +551,7 @@ struct bundle {
 };
 
 /* Are the rays alike enough to go together? One sign and one largest axis, directions within a few
- * degrees, origins within a few percent of the scene. */
+ * degrees, origins within w->alike. */
 INLINE bool are_alike(const struct wide *w, const struct octet *q)
 {
     vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
@@ -559,9 +559,8 @@ INLINE bool are_alike(const struct wide *w, const struct octet *q)
         unsigned negative = bits((vi)q->inv[a]);
         if (negative != 0 && negative != 255)
             return false;
-        float far = 0.03f * (w->max[a] - w->min[a]) + 0.001f * fabsf(q->o[a][0]);
         alike &= vf_lt(vf_abs(q->d[a] - q->d[a][0]), vf_set(0.1f));
-        alike &= vf_le(vf_abs(q->o[a] - q->o[a][0]), vf_set(far));
+        alike &= vf_le(vf_abs(q->o[a] - q->o[a][0]), vf_set(w->alike));
     }
     return bits(alike) == 255;
 }
@@ -633,10 +632,12 @@ INLINE void packet_list(const struct wide *w, struct packet *p, bool any, struct
     const struct wide_leaf *l = (const struct wide_leaf *)w->arena;
     uint32_t triangles = w->num_leaves - w->num_sphere_leaves;
     stats->primitive_tests += w->num_leaves;
-    for (uint32_t i = 0; i < triangles; i++)
-        packet_leaf(l + i, p, false, any);
-    for (uint32_t i = triangles; i < w->num_leaves; i++)
-        packet_leaf(l + i, p, true, any);
+    for (uint32_t i = 0; i < w->num_leaves; i++) {
+        bool met =
+            i < triangles ? packet_leaf(l + i, p, false, any) : packet_leaf(l + i, p, true, any);
+        if (any && met && !bits(vf_lt(vf_set(-INFINITY), p->limit)))
+            return;
+    }
 }
 
 static void packet_result(const struct packet *p, const struct rays *r, const uint16_t *lane, int n,

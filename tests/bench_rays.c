@@ -551,8 +551,10 @@ static json_t *json_of(const struct subject *of, const struct result *r)
     json_t *sets = json_object();
     for (int k = 0; k < NUM_SETS; k++)
         json_object_set_new(sets, set_names[k],
-                            json_pack("{s:f,s:f,s:f}", "ratio", r->ratio[k], "ratio_to_robust",
-                                      r->robust[k], "mrays_per_cpu_second", r->mrays[k]));
+                            json_pack("{s:f,s:f,s:f,s:f,s:f}", "ratio", r->ratio[k],
+                                      "ratio_to_robust", r->robust[k], "mrays_per_cpu_second",
+                                      r->mrays[k], "nodes_per_ray", r->nodes[k], "leaves_per_ray",
+                                      r->leaves[k]));
     return json_pack("{s:s,s:I,s:I,s:b,s:o,s:f,s:f,s:f}", "scene", of->name, "triangles",
                      (json_int_t)of->scene.num_triangles, "spheres",
                      (json_int_t)of->scene.num_spheres, "list", (int)r->list, "sets", sets,
