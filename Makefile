@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -38,7 +38,7 @@ RENDERER := $(filter-out renderer/main.c renderer/wide_kernel.c,$(wildcard rende
   $(wildcard renderer/*.cc) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/bench_%.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/bench_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -51,18 +51,37 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
 check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%) \
-  $(BUILD)/tests/student_tracer
+  $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
 	tests/run.sh $(BUILD)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
-	tests/mutants.sh $(BUILD) $(ONLY)
+	tests/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
+
+# Brings golden/diagnose/, by which `assay diagnose` names bugs, up to date with tests/mutants.
+catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
+	tests/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_catalogue $(BUILD) tests/mutants golden/diagnose
+
+# How often bugs are named rightly, and that the correct renderer is not accused (an hour).
+diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
+	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
+	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
+
+# Error rates and power of the tester, published: tests/calibration ; SHARE=0.01: a hundredth of it, into BUILD/calibration.
+calibrate: $(BUILD)/tests/make_calibration
+	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
+	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
 bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench_rays
 	$(BUILD)/tests/bench_rays --json $(BUILD)/bench_rays.json
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
+
+# What our gate and the rules of other renderers' tests find on the same pictures: tests/anchors.
+anchors: $(BUILD)/tests/make_anchors
+	$(BUILD)/tests/make_anchors tests/anchors $(BUILD)/anchors
 
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
@@ -100,6 +119,11 @@ help:
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
+	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
+	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
+	@echo 'make catalogue   bring what assay diagnose knows of these bugs up to date'
+	@echo 'make diagnose-rates  measure how often it is right (an hour)'
+	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench-rays  rays per second against Embree, one thread (a minute)'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
@@ -180,13 +204,21 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates: \
+  $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
+  tests/anchors_plot.c tests/anchor_images.c tests/anchor_rules.c) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c tests/bench_*.c))
+  $(wildcard tests/make_*.c tests/bench_*.c tests/diagnose_rates.c))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -223,7 +255,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bench-rays bvh-table golden report deps deps-live install format clean help FORCE \
+.PHONY: all validate check mutants print-compile print-libs bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -26,7 +26,8 @@ static bool write_seeds(const struct reference_job *job, json_t **seeds, struct 
     snprintf(path, sizeof path, "%s/seeds.json", job->dir);
     *seeds = json_array();
     for (int k = 0; k < job->ref->replicates; k++)
-        if (json_array_append_new(*seeds, json_integer(replicate_seed(job->opt->seed, k))) != 0)
+        if (json_array_append_new(*seeds, json_integer(replicate_seed(
+                                              job->opt->seed, job->opt->first_replicate + k))) != 0)
             return err_set(e, "out of memory");
     return json_write(path, *seeds, e);
 }

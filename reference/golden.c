@@ -305,7 +305,8 @@ bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **
     bool ok = *names != NULL || err_set(e, "out of memory");
     struct dirent *entry;
     while (ok && (entry = readdir(d)) != NULL)
-        if (entry->d_name[0] != '.')
+        /* The catalogue of bugs (tools/catalogue.h) has a manifest of its own kind. */
+        if (entry->d_name[0] != '.' && strcmp(entry->d_name, "diagnose") != 0)
             ok = add_orphans(golden_dir, suite, entry->d_name, *names, e);
     closedir(d);
     if (!ok) {

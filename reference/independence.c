@@ -217,17 +217,32 @@ static int block_side(const struct replicates *r)
     return side;
 }
 
+static double square_ratio(int i, double r)
+{
+    return 1 + (double)((2 << i) * (2 << i) - 1) * r;
+}
+
+static void test_squares(struct independence *out)
+{
+    for (int i = 0; i < NUM_SQUARES; i++)
+        if (square_ratio(i, out->square_r[i] - out->square_limit * out->square_se[i]) >
+            SQUARES_VARY_MOST)
+            out->square_failed = 2 << i;
+}
+
 static void judge(const struct sums *s, double alpha, struct independence *out)
 {
     double pairs = (double)s->k * (double)(s->k - 1) / 2;
     test_pairs(s, out);
     test_neighbours(s, out);
     test_batches(s, out);
-    out->limit = gsl_cdf_ugaussian_Qinv(alpha / 3 / 2);
-    out->pair_limit = gsl_cdf_ugaussian_Qinv(alpha / 3 / 2 / pairs);
+    out->limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / 2);
+    out->pair_limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / 2 / pairs);
+    out->square_limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / NUM_SQUARES);
+    test_squares(out);
     out->tested = true;
     out->passed = fabs(out->pair_z) <= out->pair_limit && fabs(out->neighbours_z) <= out->limit &&
-                  fabs(out->batches_z) <= out->limit;
+                  fabs(out->batches_z) <= out->limit && out->square_failed == 0;
 }
 
 bool independence_test(const struct replicates *r, double alpha, struct independence *out,
@@ -289,6 +304,16 @@ bool independence_check(const struct replicates *r, json_t *manifest, struct err
         return err_set(e, "independence of replicates: out of memory");
     if (t.passed)
         return true;
+    if (t.square_failed > 0) {
+        int i = 0;
+        while (2 << i < t.square_failed)
+            i++;
+        return err_set(
+            e,
+            "pixels share their noise: sums over %d x %d pixels vary %.2g times as much as "
+            "independent pixels would, and intervals would be too narrow",
+            t.square_failed, t.square_failed, square_ratio(i, t.square_r[i]));
+    }
     /* Of those that failed, the one that failed most clearly. */
     double pair = fabs(t.pair_z) / t.pair_limit, neighbours = fabs(t.neighbours_z) / t.limit,
            batches = fabs(t.batches_z) / t.limit;

@@ -15,14 +15,15 @@
  * all replicates share is their bias, and only another image (a closed form, another engine, the same
  * engine with other seeds) can show it.
  *
- * Tests, each with a third of alpha, two-sided:
+ * Tests, each with a quarter of alpha, the first three two-sided:
  *   pair        the largest |z| of a single r, over K (K-1)/2 pairs: a copy, a seed used twice
  *   neighbours  the mean r of replicates k, k+1: seeds that are too near each other
  *   batches     B Var(mean of B successive replicates) / Var, B near sqrt K; 1 under H0: anything that
  *               comes and goes slowly
- * Beside them, what compare_moments() relies on and what no test of replicates needs: whether the
- * pixels of one replicate are independent, as the variance between replicates of the sum over a
- * square against the sum of its pixels' variances. */
+ *   pixels      the variance between replicates of the sum over a square of 2, 4, 8 or 16 pixels is no more than
+ *               SQUARES_VARY_MOST times the sum of its pixels' variances, H0. Replicates may be independent
+ *               without it, but compare_moments() takes pixels for independent: with more, its intervals
+ *               would be too narrow, and tests above that take blocks to be independent are off, too. */
 #ifndef ASSAY_INDEPENDENCE_H
 #define ASSAY_INDEPENDENCE_H
 
@@ -42,9 +43,12 @@ bool replicates_alloc(struct replicates *r, int width, int height, int count, st
 void replicates_add(struct replicates *r, const float *pixels_rgb);
 void replicates_free(struct replicates *r);
 
-/* Chance that independent replicates fail, over all three tests. Small, as a whole suite with both engines is
+/* Chance that independent replicates fail, over all four tests. Small, as a whole suite with both engines is
  * rendered again and again, and a replicate that was used twice is seen at any alpha. */
 #define INDEPENDENCE_ALPHA 1e-6
+
+/* An interval is too narrow by the square root of this, at most, without anybody being told. */
+#define SQUARES_VARY_MOST 1.5
 
 struct independence {
     bool tested;    /* false: fewer than 4 replicates, or than 64 noisy blocks */
@@ -58,10 +62,12 @@ struct independence {
     double neighbours_r, neighbours_z;
     int batch; /* B */
     double batches_ratio, batches_z;
-    double limit;
+    double limit;        /* of |z|, for neighbours and batches */
+    double square_limit; /* one-sided */
     /* Squares of side 2, 4, 8, 16: the mean correlation of two pixels in one square and its standard error under
      * independence; the ratio of variances is 1 + (pixels in it - 1) x that. */
     double square_r[NUM_SQUARES], square_se[NUM_SQUARES];
+    int square_failed; /* side of the square whose ratio is shown to be too large; 0: none */
 };
 
 /* False only out of memory. */

@@ -36,6 +36,7 @@ static struct povray_picture window(const struct crew *w, int j, int pass)
 
 static struct povray_picture replicate(const struct crew *w, int i, int pass, bool indirect)
 {
+    i += w->job->opt->first_replicate;
     return povray_replicate(w->plan, w->job->suite->width, w->job->suite->height,
                             w->job->ref->subgrid, i, replicate_seed(w->job->opt->seed, i), pass,
                             indirect);
@@ -246,7 +247,8 @@ static bool describe(const struct crew *w, json_t *manifest, struct err *e)
         snprintf(command + strlen(command), sizeof command - strlen(command), " %s", argv[i]);
     json_t *seeds = json_array(), *blocks = json_array();
     for (int i = 0; i < replicates; i++) {
-        json_array_append_new(seeds, json_integer(replicate_seed(w->job->opt->seed, i)));
+        json_array_append_new(seeds, json_integer(replicate_seed(
+                                         w->job->opt->seed, w->job->opt->first_replicate + i)));
         json_array_append_new(blocks, json_integer(replicate(w, i, 0, true).block));
     }
     double top = POVRAY_TOP_VALUE / w->plan->radiance;

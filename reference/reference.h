@@ -8,6 +8,9 @@
 
 struct reference_options {
     uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
+    /* k of the first of ref->replicates: more of what an earlier call began, or, far from all that
+     * has been used, a fresh start. */
+    int first_replicate;
     int threads;
     double timeout_s; /* of one engine process; it is killed (whole process group) after that */
     const char

@@ -7,6 +7,7 @@
 #include "../renderer/fs.h"
 #include "../renderer/sha256.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -74,6 +75,7 @@ static bool hash_povray(const struct reference_job *job, const char *path, char 
 bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
                    const struct reference_options *opt, char key[65], struct err *e)
 {
+    assert(opt->first_replicate == 0);
     bool cycles = strcmp(ref->engine, "cycles") == 0;
     if (!cycles && strcmp(ref->engine, "povray") != 0)
         return err_set(e, "%s: '%s' is no engine that is rendered", scene->name, ref->engine);

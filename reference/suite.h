@@ -13,7 +13,11 @@
  *     "variants": [{"name": "hemisphere", "options": ["--direct", "hemisphere"], "spp": 4096,
  *                   "margin_global": 0.01, "margin_tile": 0.05}],
  *                                                (optional: ours by other means, judged too)
- *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1},  (optional: tools/consistency.h)
+ *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1,  (optional: tools/consistency.h)
+ *                     "noise_margin": 0.05,      (optional: tools/efficiency.h; with a truth whose noise
+ *                                                 has a closed form)
+ *                     "adaptive": {"batch": 16, "tolerance": 0.1, "spp": 512}},
+ *                                                (optional: tools/stop_rule.h)
  *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
  *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
  *     "references": {
@@ -78,6 +82,9 @@ struct suite_scene {
     struct {
         int renders, spp;
         double margin;
+        double noise_margin; /* 0: not asked */
+        int batch, most;     /* of one adaptive render; 0: not asked */
+        double tolerance;
     } consistency;
     json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
     char references_of[64];  /* name of the scene whose references are used; its own name by default

@@ -1,6 +1,7 @@
 #include "suite_json.h"
 
 #include "json_node.h"
+#include "truth_noise.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -140,14 +141,35 @@ static bool read_variants(const struct json_node *n, struct suite_scene *s, stru
 
 static bool read_consistency(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    static const char *const keys[] = {"renders", "spp", "margin", NULL};
+    static const char *const keys[] = {"renders",      "spp",      "margin",
+                                       "noise_margin", "adaptive", NULL};
+    static const char *const adaptive_keys[] = {"batch", "tolerance", "spp", NULL};
     struct json_node c = {n->file, "consistency.", NULL};
+    struct json_node a = {n->file, "consistency.adaptive.", NULL};
     if (json_object_get(n->object, "consistency") == NULL)
         return true;
-    return json_get_object(n, "consistency", &c.object, e) && json_only_keys(&c, keys, e) &&
-           json_get_int(&c, "renders", 4, 256, &s->consistency.renders, e) &&
-           json_get_int(&c, "spp", 2, 1 << 16, &s->consistency.spp, e) &&
-           json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e);
+    if (!json_get_object(n, "consistency", &c.object, e) || !json_only_keys(&c, keys, e) ||
+        !json_get_int(&c, "renders", 4, 256, &s->consistency.renders, e) ||
+        !json_get_int(&c, "spp", 2, 1 << 16, &s->consistency.spp, e) ||
+        !json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e))
+        return false;
+    if (json_object_get(c.object, "noise_margin") != NULL &&
+        !json_get_number(&c, "noise_margin", 0, 10, &s->consistency.noise_margin, e))
+        return false;
+    return json_object_get(c.object, "adaptive") == NULL ||
+           (json_get_object(&c, "adaptive", &a.object, e) && json_only_keys(&a, adaptive_keys, e) &&
+            json_get_int(&a, "batch", 2, 1 << 16, &s->consistency.batch, e) &&
+            json_get_int(&a, "spp", 2, 1 << 24, &s->consistency.most, e) &&
+            json_get_number(&a, "tolerance", 0, 1, &s->consistency.tolerance, e));
+}
+
+static bool check_noise(const char *file, const struct suite_scene *s, struct err *e)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (truth_noise_has(s->reference[i].kind))
+            return true;
+    return s->consistency.noise_margin == 0 ||
+           err_set(e, "%s: 'consistency.noise_margin' needs a truth whose noise is known", file);
 }
 
 /* An engine either has a reference or a reason, not both. */
@@ -218,5 +240,6 @@ bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
     memcpy(s->references_of, s->name, sizeof s->name);
     json_t *references;
     return json_get_object(&n, "references", &references, e) &&
-           read_references(file, references, s, e) && read_not_expressible(&n, s, e);
+           read_references(file, references, s, e) && read_not_expressible(&n, s, e) &&
+           check_noise(file, s, e);
 }

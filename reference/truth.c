@@ -1,11 +1,13 @@
 #include "truth.h"
 
 #include "truth_ggx.h"
+#include "truth_lamps.h"
 #include "truth_lens.h"
 #include "truth_lights.h"
 #include "truth_optics.h"
 #include "truth_sky.h"
 #include "truth_sun.h"
+#include "truth_window.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -53,8 +55,9 @@ static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct
 
 static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, NULL}};
 
-static const struct truth_kind *const families[] = {
-    furnaces, truth_lights, truth_lens, truth_optics, truth_ggx, truth_sky, truth_sun};
+static const struct truth_kind *const families[] = {furnaces,   truth_lights, truth_lamps,
+                                                    truth_lens, truth_optics, truth_window,
+                                                    truth_ggx,  truth_sky,    truth_sun};
 
 static const struct truth_kind *find_kind(const char *name)
 {

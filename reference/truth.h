@@ -5,8 +5,8 @@
  * kind      "values" in the .json (all keys needed, no others; triples are R, G, B)
  * furnace   emission [W sr^-1 m^-2], albedo
  *
- * The other kinds are listed in truth_lights.h, truth_sun.h, truth_lens.h, truth_optics.h, truth_ggx.h
- * and truth_sky.h. */
+ * The other kinds are listed in truth_lights.h, truth_lamps.h, truth_sun.h, truth_lens.h,
+ * truth_optics.h, truth_window.h, truth_ggx.h and truth_sky.h. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
 

@@ -27,10 +27,36 @@ static double lambda_cos(double alpha, double c)
     return 0.5 * (sqrt(c * c + alpha * alpha * (1 - c * c)) - c);
 }
 
-double truth_ggx_albedo(double alpha, double eta, double k, double cos_o, int points)
+static double ggx_d(double alpha, double z)
+{
+    double e = 1 + z * z * (alpha * alpha - 1);
+    return alpha * alpha / (M_PI * e * e);
+}
+
+/* 1/a = alpha tan is infinite on the horizon, where the product is alpha/(2 sqrt pi). */
+static double beckmann_lambda_cos(double alpha, double c)
+{
+    double s = sqrt(1 - c * c), a = c / (alpha * s);
+    return s == 0 ? 0 : 0.5 * (alpha * s * exp(-a * a) / sqrt(M_PI) - c * erfc(a));
+}
+
+static double beckmann_d(double alpha, double z)
+{
+    double z2 = z * z, a2 = alpha * alpha;
+    return exp((1 - 1 / z2) / a2) / (M_PI * a2 * z2 * z2);
+}
+
+struct facets {
+    double (*d)(double alpha, double cosine);
+    double (*lambda_cos)(double alpha, double cosine);
+};
+static const struct facets ggx = {ggx_d, lambda_cos}, beckmann = {beckmann_d, beckmann_lambda_cos};
+
+static double albedo_of(const struct facets *facets, double alpha, double eta, double k,
+                        double cos_o, int points)
 {
     gsl_integration_glfixed_table *rule = gsl_integration_glfixed_table_alloc((size_t)points);
-    double a2 = alpha * alpha, sin_o = sqrt(1 - cos_o * cos_o), sum = 0;
+    double sin_o = sqrt(1 - cos_o * cos_o), sum = 0, lo = facets->lambda_cos(alpha, cos_o);
     if (rule == NULL)
         return NAN;
     for (size_t i = 0; i < rule->n; i++) {
@@ -39,23 +65,32 @@ double truth_ggx_albedo(double alpha, double eta, double k, double cos_o, int po
         double c = cos(theta), s = sin(theta);
         /* G2/cos_i, with cos_i cos_o (1 + lambda_o + lambda_i) as the denominator of G2/(cos_i cos_o)
          */
-        double g =
-            cos_o / (c * cos_o + c * lambda_cos(alpha, cos_o) + cos_o * lambda_cos(alpha, c));
+        double g = cos_o / (c * cos_o + c * lo + cos_o * facets->lambda_cos(alpha, c));
         for (size_t j = 0; j < rule->n; j++) {
             double azimuth, w_azimuth;
             gsl_integration_glfixed_point(0, M_PI, j, &azimuth, &w_azimuth, rule);
             double cos_both = cos_o * c + sin_o * s * cos(azimuth);
             double cos_h = sqrt(0.5 * (1 + cos_both)), z = (cos_o + c) / (2 * cos_h);
-            double e = 1 + z * z * (a2 - 1), d = a2 / (M_PI * e * e);
-            sum += w_theta * w_azimuth * s * c * d * g * truth_fresnel_conductor(cos_h, eta, k) /
-                   (4 * cos_o);
+            sum += w_theta * w_azimuth * s * c * facets->d(alpha, z) * g *
+                   truth_fresnel_conductor(cos_h, eta, k) / (4 * cos_o);
         }
     }
     gsl_integration_glfixed_table_free(rule);
     return 2 * sum;
 }
 
+double truth_ggx_albedo(double alpha, double eta, double k, double cos_o, int points)
+{
+    return albedo_of(&ggx, alpha, eta, k, cos_o, points);
+}
+
+double truth_beckmann_albedo(double alpha, double eta, double k, double cos_o, int points)
+{
+    return albedo_of(&beckmann, alpha, eta, k, cos_o, points);
+}
+
 struct ggx_sphere {
+    const struct facets *facets;
     double centre[3], radius, sky[3], alpha, eta[3], k[3];
     gsl_cheb_series *albedo[3]; /* in the cosine */
     int channel;                /* of the one being fitted */
@@ -64,7 +99,7 @@ struct ggx_sphere {
 static double albedo_at(double cos_o, void *form)
 {
     const struct ggx_sphere *s = form;
-    return truth_ggx_albedo(s->alpha, s->eta[s->channel], s->k[s->channel], cos_o, POINTS);
+    return albedo_of(s->facets, s->alpha, s->eta[s->channel], s->k[s->channel], cos_o, POINTS);
 }
 
 static bool fit_albedo(struct ggx_sphere *s, double min_cos, struct err *e)
@@ -79,7 +114,7 @@ static bool fit_albedo(struct ggx_sphere *s, double min_cos, struct err *e)
         for (int i = 0; i <= CHECKS; i++) {
             double at = min_cos + (1 - min_cos) * i / CHECKS;
             double fit = gsl_cheb_eval(s->albedo[c], at);
-            double a = truth_ggx_albedo(s->alpha, s->eta[c], s->k[c], at, CHECK_POINTS);
+            double a = albedo_of(s->facets, s->alpha, s->eta[c], s->k[c], at, CHECK_POINTS);
             if (!(fabs(fit - a) <= max_albedo_error * a))
                 return err_set(e, "albedo at cosine %g is not converged: %.12g and %.12g", at, fit,
                                a);
@@ -114,10 +149,10 @@ static bool ggx_values(json_t *values, json_t **view, struct ggx_sphere *s, stru
            truth_check_triple("k", s->k, HUGE_VAL, e);
 }
 
-static bool fill_ggx(const struct suite_scene *scene, json_t *values, struct moments *out,
-                     struct err *e)
+static bool fill_sphere(const struct facets *facets, const struct suite_scene *scene,
+                        json_t *values, struct moments *out, struct err *e)
 {
-    struct ggx_sphere s = {0};
+    struct ggx_sphere s = {.facets = facets};
     struct truth_view view;
     double min_cos;
     json_t *v;
@@ -132,4 +167,17 @@ static bool fill_ggx(const struct suite_scene *scene, json_t *values, struct mom
     return ok;
 }
 
-const struct truth_kind truth_ggx[] = {{"ggx_sphere", fill_ggx}, {NULL, NULL}};
+static bool fill_ggx(const struct suite_scene *scene, json_t *values, struct moments *out,
+                     struct err *e)
+{
+    return fill_sphere(&ggx, scene, values, out, e);
+}
+
+static bool fill_beckmann(const struct suite_scene *scene, json_t *values, struct moments *out,
+                          struct err *e)
+{
+    return fill_sphere(&beckmann, scene, values, out, e);
+}
+
+const struct truth_kind truth_ggx[] = {
+    {"ggx_sphere", fill_ggx}, {"beckmann_sphere", fill_beckmann}, {NULL, NULL}};

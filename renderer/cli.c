@@ -122,6 +122,23 @@ bool cli_double(const char *what, const char *text, double lo, double hi, double
     return true;
 }
 
+const struct cli_unit cli_time_units[] = {{"s", 1}, {"m", 60}, {"h", 3600}, {NULL, 1}};
+
+bool cli_with_unit(const char *what, const char *text, const struct cli_unit *unit, double hi,
+                   double *out, struct err *e)
+{
+    char number[64];
+    size_t n = strlen(text);
+    while (unit->name != NULL && (n == 0 || strcmp(text + n - 1, unit->name) != 0))
+        unit++;
+    n -= unit->name != NULL;
+    snprintf(number, sizeof number, "%.*s", (int)(n < 63 ? n : 63), text);
+    if (!cli_double(what, number, 1e-9, hi, out, e))
+        return false;
+    *out *= unit->value;
+    return true;
+}
+
 bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                 struct err *e)
 {

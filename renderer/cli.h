@@ -43,6 +43,16 @@ bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e
 bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
                 struct err *e) __attribute__((warn_unused_result));
 
+/* A number above 0 and at most hi, times the value of the unit (one character) behind it or, without
+ * one, of the last, whose name is NULL. */
+struct cli_unit {
+    const char *name;
+    double value;
+};
+extern const struct cli_unit cli_time_units[]; /* 90, 90s, 5m or 2h, in seconds */
+bool cli_with_unit(const char *what, const char *text, const struct cli_unit *unit, double hi,
+                   double *out, struct err *e) __attribute__((warn_unused_result));
+
 /* What --threads is where nobody says: the processors of the machine, at most 1024. */
 int cli_processors(void);
 

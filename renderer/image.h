@@ -40,6 +40,24 @@ int image_channel(const struct image *im, const char *name);
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
 
+/* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
+enum image_type {
+    IMAGE_INT8,
+    IMAGE_INT16,
+    IMAGE_HALF,
+    IMAGE_FLOAT,
+    IMAGE_OTHER /* fewer than 8 bits, 32-bit integers, doubles */
+};
+struct image_info {
+    char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
+    enum image_type type; /* the smallest of its channels */
+    int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
+    int parts;            /* pictures in one file (EXR parts, TIFF pages), 1 .. */
+    bool is_cropped;      /* the file holds another rectangle than the picture shown */
+};
+bool image_inspect(const char *path, struct image_info *out, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* Writes a float32, ZIP-compressed scan-line OpenEXR with all channels and attributes. The file
  * appears whole, by rename, or not at all. */
 bool image_write_exr(const char *path, const struct image *im, struct err *e)

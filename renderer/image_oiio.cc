@@ -124,6 +124,47 @@ extern "C" bool image_read(const char *path, struct image *out, bool *half, stru
     return true;
 }
 
+extern "C" bool image_inspect(const char *path, struct image_info *out, struct err *e)
+{
+    *out = {};
+    return guarded(path, e, [&](std::string &why) {
+        if (access(path, R_OK) != 0) {
+            why = std::string("cannot read: ") + std::strerror(errno);
+            return false;
+        }
+        auto in = OIIO::ImageInput::open(path);
+        if (!in) {
+            why = "cannot read: " + OIIO::geterror();
+            return false;
+        }
+        const OIIO::ImageSpec spec = in->spec();
+        std::snprintf(out->format, sizeof out->format, "%s", in->format_name());
+        size_t smallest = 8;
+        bool other = spec.deep;
+        for (int c = 0; c < spec.nchannels; c++) {
+            OIIO::TypeDesc type = spec.channelformat(c);
+            if (type.size() < smallest) {
+                smallest = type.size();
+                out->type = type == OIIO::TypeDesc::UINT8    ? IMAGE_INT8
+                            : type == OIIO::TypeDesc::UINT16 ? IMAGE_INT16
+                            : type == OIIO::TypeDesc::HALF   ? IMAGE_HALF
+                            : type == OIIO::TypeDesc::FLOAT  ? IMAGE_FLOAT
+                                                             : IMAGE_OTHER;
+            }
+        }
+        int bits = spec.get_int_attribute("oiio:BitsPerSample", int(8 * smallest));
+        if (other || smallest == 8 || bits != int(8 * smallest))
+            out->type = IMAGE_OTHER;
+        out->orientation = spec.get_int_attribute("Orientation", 1);
+        out->is_cropped = spec.x != spec.full_x || spec.y != spec.full_y ||
+                          spec.width != spec.full_width || spec.height != spec.full_height;
+        for (out->parts = 1; in->seek_subimage(out->parts, 0);)
+            out->parts++;
+        in->close();
+        return true;
+    });
+}
+
 extern "C" bool image_write_exr(const char *path, const struct image *im, struct err *e)
 {
     return by_rename(path, e, [&](const std::string &temp, std::string &why) {

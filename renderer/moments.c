@@ -29,6 +29,7 @@ void moments_free(struct moments *m)
     free(m->mean);
     free(m->m2);
     free(m->m3);
+    free(m->tolerance);
     *m = (struct moments){0};
 }
 
@@ -61,6 +62,8 @@ bool moments_merge(struct moments *dst, const struct moments *src, struct err *e
     if (strcmp(dst->unit, src->unit) != 0 || dst->spp != src->spp)
         return err_set(e, "cannot merge moments over a %s of %g spp and a %s of %g spp", dst->unit,
                        dst->spp, src->unit, src->spp);
+    if (dst->tolerance != NULL || src->tolerance != NULL)
+        return err_set(e, "cannot merge moments of rounded numbers");
     size_t pixels = (size_t)dst->width * (size_t)dst->height;
     for (size_t p = 0; p < pixels; p++) {
         double na = dst->n[p], nb = src->n[p], n = na + nb;
@@ -170,7 +173,8 @@ bool moments_read(const char *path, struct moments *out, struct image *image, st
         goto fail;
     }
     if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
-        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0) {
+        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0 &&
+        strcmp(unit, "picture") != 0) {
         err_set(e, "%s: unknown unit of observation '%s'", path, unit);
         goto fail;
     }

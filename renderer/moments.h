@@ -16,9 +16,14 @@ struct moments {
     double *m3;   /* 3 per pixel */
     /* What one observation is: "sample", "replicate", "exact" (a closed form: n = 1, M2 = M3 = 0, no
      * uncertainty), or "stratified": a sample that is not independent of the pixel's others, so that
-     * M2 tells nothing about the error of the mean. */
+     * M2 tells nothing about the error of the mean. Of a comparison also "picture": a mean of
+     * unknown samples, whose M2 was guessed from its neighbours (tools/spatial.h); n counts nothing. */
     char unit[16];
     double spp; /* paths per pixel in one observation; 0 where that has no meaning */
+    /* How far the mean may be off on top of its variance, because its numbers were rounded: 3 per
+     * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
+     * memory only: no file has it, and moments_merge() refuses it. */
+    double *tolerance;
 };
 
 /* All zero, unit "sample", spp 1. */

@@ -182,28 +182,7 @@ static bool add_output(struct options *s, const char *path, struct err *e)
     return true;
 }
 
-struct unit {
-    const char *name;
-    double value;
-};
-static const struct unit time_units[] = {{"s", 1}, {"m", 60}, {"h", 3600}, {NULL, 1}};
-static const struct unit percent[] = {{"%", 0.01}, {NULL, 0.01}};
-
-/* A number above 0, with a unit or without. */
-static bool parse_unit(const char *what, const char *text, const struct unit *unit, double max,
-                       double *out, struct err *e)
-{
-    char number[64];
-    size_t n = strlen(text);
-    while (unit->name != NULL && (n == 0 || strcmp(text + n - 1, unit->name) != 0))
-        unit++;
-    n -= unit->name != NULL;
-    snprintf(number, sizeof number, "%.*s", (int)(n < 63 ? n : 63), text);
-    if (!cli_double(what, number, 1e-9, max, out, e))
-        return false;
-    *out *= unit->value;
-    return true;
-}
+static const struct cli_unit percent[] = {{"%", 0.01}, {NULL, 0.01}};
 
 static bool parse_range(struct options *s, const char *text, struct err *e)
 {
@@ -249,10 +228,10 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_ADAPTIVE_UNBIASED:
         return cli_double("--adaptive-unbiased", v, 0, 1e6, &s->pilot_tolerance, e);
     case OPT_PILOT: return cli_int("--pilot", v, 2, 1 << 20, &s->pilot, e);
-    case OPT_TIME: return parse_unit("--time", v, time_units, 1e9, &s->max_seconds, e);
-    case OPT_ERROR: return parse_unit("--error", v, percent, 100, &s->max_error, e);
+    case OPT_TIME: return cli_with_unit("--time", v, cli_time_units, 1e9, &s->max_seconds, e);
+    case OPT_ERROR: return cli_with_unit("--error", v, percent, 100, &s->max_error, e);
     case OPT_WRITE_EVERY:
-        return parse_unit("--write-every", v, time_units, 1e9, &s->write_every, e);
+        return cli_with_unit("--write-every", v, cli_time_units, 1e9, &s->write_every, e);
     case OPT_RESUME: s->resume = v; return true;
     case OPT_KEEP_STATE: s->keep_state = true; return true;
     case OPT_ENVIRONMENT: s->environment_file = v; return true;

@@ -78,7 +78,7 @@ else
     ok "failures leave no files"
 fi
 
-# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds them.)
+# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds all of them.)
 stale=0
 for patch in tests/mutants/*.patch; do
     patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
@@ -86,6 +86,11 @@ for patch in tests/mutants/*.patch; do
         { stale=1; not_ok "mutant $(basename "$patch")" "does not begin with the lines 'Bug: ' and 'Where: '"; }
 done
 [ $stale -eq 0 ] && ok "mutants apply and say what they are"
+# Three of them are built and found, and the renderer as it is passes the same scenes.
+if tests/mutants.sh --quick "$build" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
+    not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
+fi
+rm -f "$tmp/mutants.out"
 
 # Pictures.
 expect "render" 0 "mean radiance" \
@@ -129,7 +134,7 @@ interrupt() {
         timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
-    expect "$1: the picture has moments" 0 "EQUIVALENT" \
+    expect "$1: the picture has moments, and is not judged by itself" 3 "the same observations" \
         "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
     $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
         -f "$tmp/long.exr" >/dev/null
@@ -148,7 +153,7 @@ $pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" 
 for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
 kill -9 $!
 wait $! 2>/dev/null
-expect "--write-every: the picture of a killed render" 0 "EQUIVALENT" \
+expect "--write-every: the picture of a killed render has moments" 3 "the same observations" \
     "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
 if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
     not_ok "--write-every: its state" "none"
@@ -214,13 +219,76 @@ expect "compare: different" 1 "^DIFFERENT" \
 expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
     "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/few.exr" "$tmp/two.exr"
 expect "compare: missing file" 3 "gone.exr" "$san_assay" compare "$tmp/gone.exr" "$tmp/two.exr"
-expect "compare: not moments" 3 "not a moments EXR" "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
+expect "compare: a PNG without its curve" 3 "what light is a code" \
+    "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
 expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
 "$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
 expect "compare: samples that are not independent" 3 "only replicates" \
     "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
+# compare: inputs from elsewhere. Replicates are any float pictures, so moments images do.
+for option in --alpha --margin --margin-tile --margin-variance --again --exchangeable --curve --spp-a --spp-b; do
+    expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
+done
+for k in 1 2 3 4 5; do
+    for set in a b c a2 b2 c2; do
+        mkdir -p "$tmp/runs_$set"
+        case $set in c*) bounces=1 ;; *) bounces=5 ;; esac
+        case $set in a) seed=10 ;; b) seed=20 ;; c) seed=30 ;; a2) seed=40 ;; b2) seed=50 ;; c2) seed=60 ;; esac
+        "$pathtracer" -q -r 32 32 -s 32 -m $bounces --seed $((seed + k)) -f "$tmp/runs_$set/$k.exr" $scene \
+            >/dev/null || not_ok "render runs_$set" "failed"
+    done
+done
+expect "compare: directories" 1 "5 replicates" "$san_assay" compare "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, equal" 2 "could have been missed" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_a" "$tmp/runs_b"
+expect "compare: exchangeable, different" 1 "^DIFFERENT.*p = 0.00794 by 252 labellings" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: too few replicates" 2 "7 a side are needed" \
+    "$san_assay" compare --exchangeable "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable in two stages" 1 "^DIFFERENT.*fresh seeds.*p = 0.0079 and 0.004" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b2" \
+    --json "$tmp/perm/results.json" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, the same seeds again" 3 "fresh seeds" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: results have the notes" 0 "judged by permutation" grep '"notes"' -A 3 "$tmp/perm/results.json"
+expect "report of directories" 0 "index.html" "$san_assay" report "$tmp/perm/results.json"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy.exr"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy2.exr"
+expect "compare: a seed that was ignored" 3 "copy.exr and copy2.exr are the same picture" \
+    "$san_assay" compare "$tmp/runs_a2" "$tmp/runs_b"
+expect "compare: exchangeable files" 3 "one.exr: cannot read" \
+    "$san_assay" compare --exchangeable "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: exchangeable with a margin" 3 "no margin" \
+    "$san_assay" compare --exchangeable --margin 0.1 "$tmp/runs_a" "$tmp/runs_b"
+render -s 256 --seed 7 -m 4 -f "$tmp/shallow2.exr"
+render -s 256 --seed 8 -f "$tmp/two2.exr"
+expect "compare: two stages" 1 "^DIFFERENT.*confirmed" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: two stages, not needed" 0 "were not needed" "$san_assay" compare --alpha 1e-3 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: two stages of the same files" 3 "fresh seeds" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+"$pathtracer" -q -r 64 64 -s 256 --seed 3 -f "$tmp/one.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 4 -f "$tmp/two.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 5 -m 1 -f "$tmp/shallow.png" $scene >/dev/null
+expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]* of 4096" \
+    "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
+expect "compare: PNG, different" 1 "^DIFFERENT" \
+    "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
+expect "compare: PNG against moments" 1 "is not used" \
+    "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
+expect "compare: the same PNG" 3 "the same picture" \
+    "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
+expect "compare: a curve for nothing" 3 "neither" \
+    "$san_assay" compare --curve srgb "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: unknown curve" 3 "none of" \
+    "$san_assay" compare --curve film "$tmp/one.png" "$tmp/two.png"
+expect "compare: samples of a file that says them" 3 "says itself" \
+    "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
+
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
@@ -288,6 +356,25 @@ if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "ju
 expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
 expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
 
+# More and more samples: cheap scenes are decided with fewer than the 64 and 256 declared.
+expect "validate --budget" 0 "EQUIVALENT" \
+    $validate --budget 5m --only 10_furnace_one --only 12_point_plane --only 31_spot_plane
+# (Nine claims of ours, each with one look.)
+if [ "$(grep -c '"n_a": 16.0' "$out/results.json")" -eq 18 ]; then
+    ok "--budget decides with fewer samples than declared"
+else not_ok "--budget decides with fewer samples than declared" "$(grep '"n_a"' "$out/results.json" | head -40)"; fi
+expect "a spent budget is inconclusive" 2 "INCONCLUSIVE" $validate --budget 1s --only 41_cornell --only 45_many_lights
+if grep -q '"passed": true' "$out/results.json"; then not_ok "a spent budget passes nothing" "it does"; else
+    ok "a spent budget passes nothing"
+fi
+expect "a spent budget says so" 2 "budget spent" $validate --budget 0.001s --only 12_point_plane
+expect "validate: alpha 1e-9 means two stages" 0 "EQUIVALENT" $validate --alpha 1e-9 --only 31_spot_plane
+if [ "$(grep -c '"stages": 2' "$out/results.json")" -eq 2 ] && [ "$(grep -c '"stages": 1' "$out/results.json")" -eq 4 ]; then
+    ok "two stages against the closed form, one against goldens"
+else not_ok "two stages against the closed form, one against goldens" "$(grep '"stages"' "$out/results.json")"; fi
+expect "validate: --budget is no time" 3 "5d" $validate --budget 5d
+expect "validate: --stages" 3 "stages" $validate --stages 3
+
 # Negative controls: wrong programs under test.
 wrong() {
     printf '#!/bin/sh\n%s\n' "$1" >"$tmp/wrong"
@@ -295,6 +382,13 @@ wrong() {
 }
 wrong "exec $pathtracer \"\$@\" -m 4"
 expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails at the first look" 1 "DIFFERENT" \
+    $validate --until-different --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails twice, with fresh seeds" 1 "DIFFERENT" \
+    $validate --budget 5m --stages 2 --only 11_furnace --pathtracer "$tmp/wrong"
+if grep -q 'with fresh seeds, confirmed' "$out/results.json"; then ok "a second stage confirms"; else
+    not_ok "a second stage confirms" "$(grep '"reason"' "$out/results.json")"
+fi
 wrong "exit 5"
 expect "a program that dies is not judged" 3 "exit status 5" \
     $validate --only 11_furnace --pathtracer "$tmp/wrong"
@@ -397,6 +491,36 @@ expect "golden approve: not in the suite" 3 "no such reference" \
 cp -R golden/41_cornell "$tmp/store/98_deleted"
 expect "golden status: an orphan" 3 "orphan   .*98_deleted/cycles" $golden status --golden "$tmp/store"
 expect "golden: unknown" 3 "none of render" $golden forget
+
+# diagnose: names a bug, and none where there is none.
+expect "diagnose: help lists the views" 0 "12_point_plane" "$san_assay" diagnose --help
+expect "diagnose: the correct renderer" 0 "nothing wrong found" "$assay" diagnose --seed 5
+expect "bugs can be built" 0 "" tests/mutants.sh --build-only "$build" point_light_linear \
+    seed_ignored variance_halved
+for bug in point_light_linear seed_ignored variance_halved; do
+    expect "diagnose: $bug" 1 "tests/mutants/$bug.patch" "$assay" diagnose --seed 6 \
+        --pathtracer "$build/mutants/$bug/pathtracer" --json "$tmp/diagnosis.json"
+    expect "diagnose: $bug alone" 0 "\"named\":\[\"$bug\"\]" bash -c "tr -d ' \n' <'$tmp/diagnosis.json'"
+done
+expect "diagnose: left out of the catalogue" 1 "none of the" "$assay" diagnose --seed 6 \
+    --pathtracer "$build/mutants/point_light_linear/pathtracer" --without point_light_linear
+expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only 12_point_plane \
+    --pathtracer "$build/mutants/point_light_linear/pathtracer" --out "$tmp/wrong"
+expect "diagnose: the pictures of a validation" 1 "tests/mutants/point_light_linear.patch" \
+    "$assay" diagnose "$tmp/wrong/results.json"
+plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
+$plane -r 48 48 -f "$tmp/plane.exr" && $plane -r 40 40 -f "$tmp/odd.exr"
+expect "diagnose: one picture, larger than the catalogue's" 0 "nothing wrong found" \
+    "$san_assay" diagnose --scene 12_point_plane "$tmp/plane.exr"
+expect "diagnose: a size that is no multiple" 3 "40 x 40 pixels: the width has to be" \
+    "$san_assay" diagnose --scene 12_point_plane "$tmp/odd.exr"
+expect "diagnose: another shape" 3 "width by height is not" \
+    "$san_assay" diagnose --scene 39_three_lamps-four_light_samples "$tmp/plane.exr"
+expect "diagnose: unknown view" 3 "has no '99_none'" "$san_assay" diagnose --scene 99_none "$tmp/plane.exr"
+expect "diagnose: no picture" 3 "needs the picture" "$san_assay" diagnose --scene 12_point_plane
+expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --without x
+expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
+expect "diagnose: no program" 3 "not found" "$san_assay" diagnose --pathtracer "$tmp/none"
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

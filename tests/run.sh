@@ -31,10 +31,10 @@ done
 {
     echo "end_to_end tests/end_to_end.sh $build"
     for program in "${programs[@]}"; do
-        case $program in */test_cycles* | */test_povray* | */test_embree | */test_lights) echo "$(basename "$program") $program" ;; esac
+        case $program in */test_calibration | */test_cycles* | */test_povray* | */test_embree | */test_lights) echo "$(basename "$program") $program" ;; esac
     done
     for program in "${programs[@]}"; do
-        case $program in */test_cycles* | */test_povray* | */test_embree | */test_lights) ;; *) echo "$(basename "$program") $program" ;; esac
+        case $program in */test_calibration | */test_cycles* | */test_povray* | */test_embree | */test_lights) ;; *) echo "$(basename "$program") $program" ;; esac
     done
 } | xargs -L 1 -P "$(nproc)" bash -c 'run_job "$0" "$@"' "$log"
 

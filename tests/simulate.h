@@ -25,17 +25,28 @@ enum law {
     LAW_BLACK,       /* 90 % are 0, the rest exponential of mean 10: skewness 6.5 */
     LAW_RARE,        /* 0.2, and 0.8/0.02 = 40 more in 2 % */
     LAW_FIREFLY,     /* 0.5, and 500 more in 0.1 % */
+    LAW_LOGNORMAL,   /* sigma 1: skewness 6.2 */
+    LAW_PARETO,      /* exponential of mean 0.5, and in 0.1 % a Pareto firefly of mean 500 and index
+                        2.5 more: no third moment */
 };
+
+static inline double draw_normal(double u, uint64_t *state)
+{
+    return sqrt(-2 * log(u)) * cos(6.283185307179586 * uniform(state));
+}
 
 static inline double draw(enum law law, uint64_t *state)
 {
     double u = uniform(state);
     switch (law) {
-    case LAW_NORMAL: return 1 + 0.3 * sqrt(-2 * log(u)) * cos(6.283185307179586 * uniform(state));
+    case LAW_NORMAL: return 1 + 0.3 * draw_normal(u, state);
     case LAW_EXPONENTIAL: return -log(u);
     case LAW_BLACK: return u < 0.9 ? 0 : -10 * log((u - 0.9) / 0.1 + 1e-17);
     case LAW_RARE: return 0.2 + (u < 0.02 ? 40 : 0);
     case LAW_FIREFLY: return 0.5 + (u < 0.001 ? 500 : 0);
+    case LAW_LOGNORMAL: return exp(draw_normal(u, state) - 0.5);
+    case LAW_PARETO:
+        return -0.5 * log(uniform(state)) + (u < 0.001 ? 300 * pow(uniform(state), -0.4) : 0);
     }
     abort();
 }

@@ -161,6 +161,10 @@ static void records_are_checked(void **state)
          "results: consistency 1: 'pixels' is not a number"},
         {"[0.8, 1.2]", "[0.8]", "'pixels_ci' or 'image_range' is not an interval"},
         {"EQUIVALENT", "EQUAL", "'verdict' or 'reason' is missing or unknown"},
+        {"\"seconds\": 2", "\"seconds\": 2, \"noise\": 1, \"noise_ci\": [0.9, 1.1]", NULL},
+        {"\"seconds\": 2", "\"seconds\": 2, \"noise\": 1", "'noise_ci' is not an interval"},
+        {"\"seconds\": 2", "\"seconds\": 2, \"too_early\": 1.5, \"too_late\": 0",
+         "'too_early' or 'too_late' is not a whole number"},
         {"EQUIVALENT", "DIFFERENT", "'passed' contradicts 'verdict'"},
         {"\"passed\": false", "\"passed\": true", "consistency 2: has an 'error' and yet 'passed'"},
         {"\"scene\": \"41\"", "\"seen\": 41", "'scene' or 'engine' is missing"},
@@ -199,7 +203,7 @@ static void records_are_shown(void **state)
     fclose(f);
     assert_non_null(strstr(text, "8 x 32 spp  0.980 [0.800, 1.200]  0.50  EQUIVALENT"));
     assert_non_null(strstr(text, "41  NOT JUDGED: no <file>"));
-    assert_non_null(strstr(text, "| 41 | | | | NOT JUDGED: no <file> |"));
+    assert_non_null(strstr(text, "| 41 | | | | | | NOT JUDGED: no <file> |"));
     assert_non_null(strstr(text, "1 of 2 scenes"));
     assert_non_null(strstr(text, "12_&lt;b&gt;"));
     assert_non_null(strstr(text, "no &lt;file&gt;"));

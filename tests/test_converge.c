@@ -4,6 +4,7 @@
 #include "../renderer/fs.h"
 #include "../tools/converge.h"
 #include "../tools/convergence.h"
+#include "../tools/convergence_matrix.h"
 #include "../tools/report.h"
 
 #include <math.h>
@@ -531,6 +532,26 @@ static void remember_row(void *ctx, const struct convergence_row *r)
              r->quantity, r->value, r->verdict);
 }
 
+static void results_become_a_matrix(void **state)
+{
+    (void)state;
+    json_t *scene, *root = results_with(&scene);
+    char *text;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    json_object_set_new(json_array_get(json_object_get(scene, "engines"), 0), "floor_verdict",
+                        json_string("INCONCLUSIVE"));
+    convergence_print_matrix(f, json_object_get(root, "convergence"));
+    fclose(f);
+    /* No Sobol here, and Cycles could not be judged: empty cells. */
+    const char *row = strstr(text, "| 41_cornell");
+    assert_non_null(row);
+    assert_string_equal(row, "| 41_cornell | -0.500 ± 0.010 | | | 0.40 **INCONCLUSIVE** | |"
+                             " 1.50 [1.00, 2.00] | 2.50 [2.00, 3.00] | | |\n");
+    free(text);
+    json_decref(root);
+}
+
 static void results_become_rows_and_an_exit_code(void **state)
 {
     (void)state;
@@ -676,6 +697,7 @@ int main(void)
         cmocka_unit_test(variance_ratio_covers),
         cmocka_unit_test(bad_rungs_are_refused),
         cmocka_unit_test(results_become_rows_and_an_exit_code),
+        cmocka_unit_test(results_become_a_matrix),
         cmocka_unit_test(the_page_shows_the_rungs),
         cmocka_unit_test(broken_results_are_refused),
     };

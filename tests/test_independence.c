@@ -67,7 +67,11 @@ static void independent_replicates_pass(void **state)
             struct replicates r = draw_all(rows[i].law, rows[i].count, rows[i].blur, &seed);
             struct independence t = test(&r, 0.01);
             assert_true(t.tested);
-            failed += !t.passed;
+            /* Blurred pixels are correlated and are refused for that: here it is the other tests. */
+            failed += rows[i].blur
+                          ? fabs(t.pair_z) > t.pair_limit || fabs(t.neighbours_z) > t.limit ||
+                                fabs(t.batches_z) > t.limit
+                          : !t.passed;
             neighbours += fabs(t.neighbours_z) > 1.959964;
             batches += fabs(t.batches_z) > 1.959964;
             replicates_free(&r);
@@ -175,21 +179,55 @@ static void groups_are_found(void **state)
 }
 
 /* The reported correlation of pixels, as it was built: neighbours in a row 1/2, so of the 6 pairs in a square of 2
- * two are correlated: 1/6 on average. One standard error at 32 replicates: 1/sqrt(1536 x 31) = 0.005. */
+ * two are correlated: 1/6 on average. One standard error at 32 replicates: 1/sqrt(1536 x 31) = 0.005. A row of n has
+ * the variance 2n - 1 of n: in a square of 4, 7/4 = 1.75 times too much, refused (one standard error of that
+ * is 15/sqrt(64 x 120 x 31) = 0.03, the limit 5 of them above 1.5). */
 static void correlated_pixels_are_measured(void **state)
 {
     (void)state;
     uint64_t seed = 3;
     struct replicates r = draw_all(LAW_NORMAL, 32, true, &seed);
     struct independence t = test(&r, 1e-6);
-    assert_true(t.passed);
+    assert_false(t.passed);
+    assert_true(t.square_failed >= 4);
     assert_float_equal(t.square_se[0], 1 / sqrt(1536 * 31.0), 1e-9);
     assert_float_equal(t.square_r[0], 1 / 6.0, 0.03);
     replicates_free(&r);
     r = draw_all(LAW_NORMAL, 32, false, &seed);
     t = test(&r, 1e-6);
+    assert_true(t.passed);
     assert_float_equal(t.square_r[0], 0, 0.025);
     replicates_free(&r);
+}
+
+/* Adds one normal number to all pixels of each replicate, with `variance` of a pixel's own. */
+static void share(struct replicates *r, double variance, uint64_t *state)
+{
+    for (int k = 0; k < r->num; k++) {
+        double g = sqrt(variance) * (draw(LAW_NORMAL, state) - 1);
+        for (int p = 0; p < PIXELS; p++)
+            r->luminance[k * PIXELS + p] += (float)(g * (1 + p % 7));
+    }
+}
+
+/* One number added to all pixels of a replicate, with 2 % of the variance of each: no pair of pixels is
+ * conspicuous, but sums over 16 x 16 vary 1 + 255 x 0.02 = 6 times too much (48
+ * replicates, 4 squares of 256 pixels: one standard error of r is 1/sqrt(4 x 32640 x 47) = 0.0004). Control: with 0.05 % the ratio is 1.13, allowed. */
+static void pixels_that_share_noise_are_refused(void **state)
+{
+    (void)state;
+    uint64_t seed = 11;
+    for (int n = 0; n < 20; n++) {
+        struct replicates r = draw_all(LAW_NORMAL, 48, false, &seed);
+        struct independence before = test(&r, 1e-6);
+        assert_true(before.passed);
+        share(&r, 0.0005, &seed);
+        assert_true(test(&r, 1e-6).square_failed == 0);
+        share(&r, 0.02, &seed);
+        assert_true(test(&r, 1e-6).square_failed == 16);
+        assert_refused(&r, "pixels share their noise: sums over 16 x 16 pixels");
+        replicates_free(&r);
+    }
 }
 
 int main(void)
@@ -201,6 +239,7 @@ int main(void)
         cmocka_unit_test(correlated_replicates_are_found),
         cmocka_unit_test(groups_are_found),
         cmocka_unit_test(correlated_pixels_are_measured),
+        cmocka_unit_test(pixels_that_share_noise_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

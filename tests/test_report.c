@@ -140,6 +140,17 @@ static void add_claim(struct run *r, const char *scene, const char *b, const cha
     json_object_set_new(c, "tile_log10_p", json_pack("[f f f n]", -0.1, -2.0, -0.9));
     json_object_set_new(c, "tile_t", json_pack("[f f f n]", 0.3, 2.6, 1.5));
     json_object_set_new(c, "seeds_b", json_pack("[i i]", 7, 8));
+    json_object_set_new(c, "statistics",
+                        json_pack("[{ss sf si sf ss} {ss sf si sf ss} {ss sf si sf ss}]", "name",
+                                  "image", "share", 0.4, "num_tests", 4, "log10_p", -0.2, "what",
+                                  "the image <red>", "name", "pyramid", "share", 0.6, "num_tests",
+                                  99, "log10_p", -12.0, "what", "2 x 2 pixels at 4,6 (green)",
+                                  "name", "noise", "share", 0.0, "num_tests", 0, "log10_p", 0.0,
+                                  "what", ""));
+    json_object_set_new(c, "direction",
+                        json_pack("{ss sf sf s[ff] ss}", "name", "shift by x", "explained", 0.93,
+                                  "amount", 0.48, "ci", 0.46, 0.5, "unit", "px"));
+    json_object_set_new(c, "variance_ratio", json_pack("{sf s[ff]}", "ratio", 1.9, "ci", 1.8, 2.0));
     json_object_set_new(c, "files",
                         json_pack("{ss ss ss ss}", "a", files[0], "b", files[1], "z", files[2],
                                   "relative", files[3]));
@@ -528,6 +539,12 @@ static void page_is_whole(void **state)
     }
     assert_text_has(doc, "//article[@id='claim-0']", 0, "assay validate --only this");
     assert_text_has(doc, "//article[@id='claim-0']", 0, "7, 8");
+    assert_text_has(doc, "//article[@id='claim-0']//table", 0, "the image <red>");
+    assert_text_has(doc, "//article[@id='claim-0']//tr[@class='bad']", 0, "2 x 2 pixels at 4,6");
+    assert_text_has(doc, "//article[@id='claim-0']//table", 0, "not asked for");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "shift by x of 0.48 [0.46, 0.5] px");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "explains 93");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "1.9 times that of B [1.8, 2]");
     assert_text_has(doc, "//section[@class='scene']", 1, "64 replicates of 1 samples per pixel");
 
     /* Two scenes of two images, two maps and two colour scales each, all described, none from

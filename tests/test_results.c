@@ -30,6 +30,10 @@ static const char judged_claim[] =
     "             \"difference\": 0.1, \"ci\": [-0.1, 0.3], \"t\": 3},"
     " \"rms_bias\": 0.001, \"extra_factor\": 1, \"skew_limited\": false,"
     " \"tiles_x\": 2, \"tiles_y\": 1, \"tile_log10_p\": [-0.1, null], \"tile_t\": [0.5, null],"
+    " \"statistics\": [{\"name\": \"image\", \"share\": 0.28, \"num_tests\": 4, \"log10_p\": -0.1,"
+    "   \"what\": \"the image (red)\"}],"
+    " \"direction\": {\"name\": \"shift by x\", \"explained\": 0.9, \"amount\": 0.5, \"ci\": [0.4, 0.6],"
+    "   \"unit\": \"px\"}, \"variance_ratio\": {\"ratio\": 1.9, \"ci\": [1.8, 2]},"
     " \"n_a\": 2048, \"n_b\": 16, \"unit_b\": \"replicate\", \"spp_b\": 256, \"seconds_a\": 1.5,"
     " \"seconds_b\": 120, \"seed_a\": 1, \"seeds_b\": [7, 8], \"version_b\": \"Blender 3.4.1\","
     " \"files\": {\"a\": \"a.exr\", \"b\": \"b.exr\", \"z\": \"z.exr\", \"relative\": \"r.exr\"},"
@@ -183,10 +187,12 @@ static void missing_or_mistyped_member(void **state)
                                            "tiles_y",
                                            "tile_log10_p",
                                            "tile_t",
+                                           "statistics",
                                            "files"};
-    static const char *const optional[] = {
-        "title", "detects",   "blind_to",  "class",  "n_a",     "n_b",       "unit_b",
-        "spp_b", "seconds_a", "seconds_b", "seed_a", "seeds_b", "version_b", "rerun"};
+    static const char *const optional[] = {"title",     "detects",   "blind_to",  "class",
+                                           "n_a",       "n_b",       "unit_b",    "spp_b",
+                                           "seconds_a", "seconds_b", "seed_a",    "seeds_b",
+                                           "version_b", "rerun",     "direction", "variance_ratio"};
     char wanted[128];
     for (size_t i = 0; i < sizeof required / sizeof *required; i++) {
         json_t *claim = parse(judged_claim);
@@ -223,11 +229,25 @@ static void missing_or_mistyped_member(void **state)
 static void nested_members(void **state)
 {
     (void)state;
-    static const char *const member[][2] = {
-        {"worst_tile", "x"},  {"worst_tile", "y"},  {"worst_tile", "difference"},
-        {"worst_tile", "ci"}, {"worst_tile", "t"},  {"worst", "width"},
-        {"worst", "height"},  {"worst", "channel"}, {"files", "a"},
-        {"files", "b"},       {"files", "z"},       {"files", "relative"}};
+    static const char *const member[][2] = {{"worst_tile", "x"},
+                                            {"worst_tile", "y"},
+                                            {"worst_tile", "difference"},
+                                            {"worst_tile", "ci"},
+                                            {"worst_tile", "t"},
+                                            {"worst", "width"},
+                                            {"worst", "height"},
+                                            {"worst", "channel"},
+                                            {"files", "a"},
+                                            {"files", "b"},
+                                            {"files", "z"},
+                                            {"files", "relative"},
+                                            {"direction", "name"},
+                                            {"direction", "explained"},
+                                            {"direction", "amount"},
+                                            {"direction", "ci"},
+                                            {"direction", "unit"},
+                                            {"variance_ratio", "ratio"},
+                                            {"variance_ratio", "ci"}};
     for (size_t i = 0; i < sizeof member / sizeof *member; i++) {
         json_t *claim = parse(judged_claim);
         assert_int_equal(json_object_del(json_object_get(claim, member[i][0]), member[i][1]), 0);
@@ -235,6 +255,21 @@ static void nested_members(void **state)
         snprintf(wanted, sizeof wanted, "'%s.%s' is missing", member[i][0], member[i][1]);
         expect_claim_rejected(claim, wanted);
     }
+    static const char *const statistic[] = {"name", "share", "num_tests", "log10_p", "what"};
+    for (size_t i = 0; i < sizeof statistic / sizeof *statistic; i++) {
+        json_t *claim = parse(judged_claim);
+        json_t *first = json_array_get(json_object_get(claim, "statistics"), 0);
+        assert_int_equal(json_object_del(first, statistic[i]), 0);
+        char wanted[128];
+        snprintf(wanted, sizeof wanted, "'statistics.%s' is missing", statistic[i]);
+        expect_claim_rejected(claim, wanted);
+    }
+    json_t *claim = parse(judged_claim);
+    json_array_clear(json_object_get(claim, "statistics"));
+    expect_claim_rejected(claim, "'statistics' is not an array with at least one");
+    claim = parse(judged_claim);
+    json_array_set_new(json_object_get(claim, "statistics"), 0, json_integer(1));
+    expect_claim_rejected(claim, "'statistics' has an element 0 that is not an object");
 }
 
 static void set(json_t *claim, const char *name, const char *json)
@@ -276,6 +311,17 @@ static void values_out_of_order(void **state)
     set(claim, "passed", "true");
     expect_claim_rejected(claim, "claim 1 (12_furnace against povray): has an 'error' and yet");
     expect_claim_rejected(json_string("x"), "claim 1 (? against ?): not an object");
+
+    /* An error and a verdict: only for want of time. */
+    claim = parse(error_claim);
+    set(claim, "verdict", "\"DIFFERENT\"");
+    expect_claim_rejected(claim, "has an 'error' and yet a 'verdict' that is not INCONCLUSIVE");
+    claim = parse(judged_claim);
+    set(claim, "looks", "[{\"n_a\": 1, \"n_b\": 1, \"alpha\": 0.1, \"stage\": 1}]");
+    expect_claim_rejected(claim, "'looks.verdict' is missing");
+    claim = parse(judged_claim);
+    set(claim, "cost_s", "{\"a\": 1}");
+    expect_claim_rejected(claim, "'cost_s.b' is missing");
 }
 
 static void bad_file(void **state)
@@ -345,6 +391,14 @@ static void exit_codes(void **state)
             fail_msg("row %zu: %d, not %d", i, results_exit_code(root), row[i].code);
         json_decref(root);
     }
+    /* Without time it is inconclusive: worse than a pass, better than a difference. */
+    json_t *late = parse(error_claim);
+    set(late, "verdict", "\"INCONCLUSIVE\"");
+    json_t *root = results_of(2, (json_t *[]){parse(judged_claim), late});
+    assert_int_equal(results_exit_code(root), 2);
+    json_array_append_new(json_object_get(root, "claims"), claim_with("DIFFERENT", "EQUIVALENT"));
+    assert_int_equal(results_exit_code(root), 1);
+    json_decref(root);
 }
 
 /* Four claims that need every width rule: a scene name with a two-byte letter, a value that rounds

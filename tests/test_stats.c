@@ -166,6 +166,41 @@ static void test_normal_equivalent(void **state)
 
 /* By hand: va = 4/10, vb = 9/5 of n = 10 and 5: V = 2.2, nu = 4.84 / (.16/9 + 3.24/4) = 5.84690...
  */
+/* Chi-square tails. Even k in closed form: e^-y sum_{i < k/2} y^i/i!, in logarithms, far beyond what a
+ * double p can hold; k = 1 is 2 Q(sqrt x) of the normal law; and GSL near the centre of large k. */
+static void test_chi2(void **state)
+{
+    (void)state;
+    for (int k = 2; k <= 8; k += 2)
+        for (double x = 0.01; x < 1e7; x *= 1.9) {
+            double y = x / 2, term = 1, sum = 1;
+            for (int i = 1; i < k / 2; i++)
+                sum += term *= y / i;
+            assert_close(stats_chi2_log10_p(x, k), log10(sum) - y / M_LN10, 1e-10);
+        }
+    assert_true(stats_chi2_log10_p(1e7, 8) < -1e6);
+    for (double x = 0.01; x < 1e7; x *= 1.9)
+        assert_close(stats_chi2_log10_p(x, 1), gsl_sf_log_erfc(sqrt(x / 2)) / M_LN10, 1e-9);
+    for (double k = 10; k <= 1e6; k *= 10)
+        for (double z = -5; z <= 5; z += 0.5) {
+            double x = k + z * sqrt(2 * k);
+            if (x > 0)
+                assert_close(stats_chi2_log10_p(x, k), log10(gsl_cdf_chisq_Q(x, k)), 1e-7);
+        }
+}
+
+/* Hill's equivalent has the p of t: relative 1e-4 of ln p for nu >= 20, t up to 8. */
+static void test_hill(void **state)
+{
+    (void)state;
+    for (double nu = 20; nu < 1e7; nu *= 7)
+        for (double t = -8; t <= 8; t += 0.5)
+            assert_close(stats_t_log10_p(stats_hill_z(t, nu), INFINITY), stats_t_log10_p(t, nu),
+                         1e-4);
+    assert_true(stats_hill_z(-2, 20) == -stats_hill_z(2, 20));
+    assert_true(stats_hill_z(3, INFINITY) == 3);
+}
+
 static void test_dof(void **state)
 {
     (void)state;
@@ -189,6 +224,8 @@ int main(void)
         cmocka_unit_test(test_quantile_closed_forms),
         cmocka_unit_test(test_quantile_gsl),
         cmocka_unit_test(test_normal_equivalent),
+        cmocka_unit_test(test_chi2),
+        cmocka_unit_test(test_hill),
         cmocka_unit_test(test_dof),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -361,6 +361,14 @@ static const struct fault {
     {false, "\"spp\": 16",
      "\"spp\": 16, \"consistency\": {\"renders\": 3, \"spp\": 4, \"margin\": 1}",
      "'consistency.renders' is 3, not in 4..256"},
+    {false, "\"spp\": 16",
+     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, "
+     "\"noise_margin\": 0.1}",
+     "42_good.json: 'consistency.noise_margin' needs a truth whose noise is known"},
+    {false, "\"spp\": 16",
+     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, "
+     "\"adaptive\": {\"batch\": 1, \"tolerance\": 0.1, \"spp\": 64}}",
+     "'consistency.adaptive.batch' is 1, not in 2.."},
     {true, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {}", "unknown key 'not_expressible'"},
     {false, "  }\n}", "  }\n", "42_good.json:14: '}' expected near end of file"},
     {true, "DIFFERENT", "EQUIVALENT", "93_good.json: 'expect' is 'EQUIVALENT', but scenes of"},

@@ -24,6 +24,36 @@ static json_t *tile_array(const double *value, int n)
     return a;
 }
 
+static json_t *statistics_json(const struct comparison *r)
+{
+    json_t *all = json_array();
+    for (int s = 0; s < NUM_STATISTICS; s++) {
+        const struct statistic *st = &r->statistic[s];
+        json_array_append_new(all, json_pack("{s:s, s:f, s:i, s:f, s:s}", "name", statistic_name[s],
+                                             "share", st->share, "num_tests", st->num_tests,
+                                             "log10_p", st->log10_p, "what", st->what));
+    }
+    return all;
+}
+
+/* Only what is known: a direction that could be tested, a variance ratio with an interval. */
+static bool add_findings(json_t *claim, const struct comparison *r)
+{
+    const struct direction *d = &r->direction;
+    const struct variance_ratio *v = &r->variance;
+    bool ok = true;
+    if (d->name != NULL)
+        ok = json_object_set_new(claim, "direction",
+                                 json_pack("{s:s, s:f, s:f, s:[f, f], s:s}", "name", d->name,
+                                           "explained", d->explained, "amount", d->amount, "ci",
+                                           d->lo, d->hi, "unit", d->unit)) == 0;
+    if (v->valid)
+        ok = ok && json_object_set_new(
+                       claim, "variance_ratio",
+                       json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci", v->lo, v->hi)) == 0;
+    return ok;
+}
+
 static json_t *claim_head(const struct claim_context *c)
 {
     json_t *j =
@@ -50,7 +80,7 @@ json_t *claim_judged(const struct claim_context *c, const struct comparison *r)
     int tiles = r->tiles_x * r->tiles_y;
     json_t *more = json_pack(
         "{s:s, s:b, s:s, s:f, s:[f, f], s:[f, f, f], s:f, s:f, s:f, s:i, s:f, s:f, s:b, s:i, s:i, "
-        "s:i, s:o, s:o, s:o, s:o}",
+        "s:i, s:o, s:o, s:o, s:o, s:o}",
         "verdict", verdict_name(r->verdict), "passed", r->verdict == c->expected, "reason",
         r->reason, "difference", g[3].difference, "ci", g[3].ci_lo, g[3].ci_hi,
         "channel_difference", g[0].difference, g[1].difference, g[2].difference, "log10_p",
@@ -58,8 +88,9 @@ json_t *claim_judged(const struct claim_context *c, const struct comparison *r)
         r->num_tests, "rms_bias", r->rms_bias, "extra_factor", r->extra_factor, "skew_limited",
         r->skew_limited, "finest_side", r->finest_side, "tiles_x", r->tiles_x, "tiles_y",
         r->tiles_y, "worst", region_json(&r->worst), "worst_tile", region_json(&r->worst_tile),
-        "tile_log10_p", tile_array(r->tile_log10_p, tiles), "tile_t", tile_array(r->tile_t, tiles));
-    if (j == NULL || more == NULL || json_object_update(j, more) != 0) {
+        "tile_log10_p", tile_array(r->tile_log10_p, tiles), "tile_t", tile_array(r->tile_t, tiles),
+        "statistics", statistics_json(r));
+    if (j == NULL || more == NULL || json_object_update(j, more) != 0 || !add_findings(j, r)) {
         json_decref(j);
         j = NULL;
     }

@@ -1,5 +1,10 @@
 #include "compare.h"
 
+#include "dense.h"
+#include "directed.h"
+#include "directions.h"
+#include "hygiene.h"
+#include "noise.h"
 #include "pyramid.h"
 #include "region.h"
 #include "stats.h"
@@ -7,128 +12,19 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-static const double floor_fraction = 0.05; /* of the mean luminance of B */
 static const double largest_z = 1e4;
 const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense", "directed",
                                                     "noise"};
 
-static bool check_options(const struct compare_options *opt, int width, int height, struct err *e)
-{
-    if (!(opt->alpha > 0 && opt->alpha < 0.5))
-        return err_set(e, "alpha is %g, must lie in (0, 0.5)", opt->alpha);
-    if (!(opt->margin_global >= 0 && opt->margin_global <= opt->margin_tile &&
-          opt->margin_tile < 1))
-        return err_set(e, "margins %g (image) and %g (tile): must be 0 <= image <= tile < 1",
-                       opt->margin_global, opt->margin_tile);
-    if ((opt->margin_global == 0) != (opt->margin_tile == 0))
-        return err_set(e, "margins %g (image) and %g (tile): both or none must be 0",
-                       opt->margin_global, opt->margin_tile);
-    if (opt->tile < 1 || width % opt->tile != 0 || height % opt->tile != 0)
-        return err_set(e, "tile side %d does not divide the image's %d x %d pixels", opt->tile,
-                       width, height);
-    return true;
-}
-
-static bool check_pixel(const struct moments *m, size_t p, bool exact, struct err *e)
-{
-    int x = (int)(p % (size_t)m->width), y = (int)(p / (size_t)m->width);
-    if (!(m->n[p] >= (exact ? 1 : 3)) || isinf(m->n[p]))
-        return err_set(e, "pixel %d,%d has %g observations, at least 3 are needed", x, y, m->n[p]);
-    for (size_t i = 3 * p; i < 3 * p + 3; i++) {
-        if (isnan(m->mean[i]) || isnan(m->m2[i]) || isnan(m->m3[i]))
-            return err_set(e, "pixel %d,%d is not a number", x, y);
-        if (isinf(m->mean[i]) || isinf(m->m2[i]) || isinf(m->m3[i]))
-            return err_set(e, "pixel %d,%d is infinite", x, y);
-        if (m->mean[i] < 0)
-            return err_set(e, "pixel %d,%d has negative radiance %g", x, y, m->mean[i]);
-        if (m->m2[i] < 0)
-            return err_set(e, "pixel %d,%d has a negative sum of squares %g", x, y, m->m2[i]);
-        if (exact && m->m2[i] != 0)
-            return err_set(e, "pixel %d,%d is called exact but has variance", x, y);
-    }
-    return true;
-}
-
-/* Checks one side and gathers what it contributes to the judge. An observation's typical brightness
- * where it matters is E[x^2]/E[x], for something seen rarely its brightness when seen. */
-static bool check_side(const struct moments *m, struct judge *j, struct err *e)
-{
-    bool exact = strcmp(m->unit, "exact") == 0, replicates = strcmp(m->unit, "replicate") == 0;
-    if (strcmp(m->unit, "stratified") == 0)
-        return err_set(e, "its samples depend on each other (--sampler sobol), so its variance is "
-                          "unknown: only replicates with seeds of their own may be compared");
-    if (!exact && !replicates && strcmp(m->unit, "sample") != 0)
-        return err_set(e, "unknown unit '%s' of an observation", m->unit);
-    bool varies = false;
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    for (size_t p = 0; p < pixels; p++) {
-        if (!check_pixel(m, p, exact, e))
-            return false;
-        if (!exact)
-            j->n_min = fmin(j->n_min, m->n[p]);
-        for (size_t c = 0; c < 3; c++) {
-            double mean = m->mean[3 * p + c], m2 = m->m2[3 * p + c];
-            varies = varies || m2 > 0;
-            if (mean > 0)
-                j->event[c] = fmax(j->event[c], mean + m2 / (m->n[p] * mean));
-        }
-    }
-    if (replicates && !varies)
-        return err_set(e, "%g replicates without any variance: was the seed ignored?", m->n[0]);
-    return true;
-}
-
-/* Parts of alpha. What does not apply gives its part to the others, in proportion. That is a matter of
- * options and kind of input: by the data it would be a choice among tests. */
-static void set_shares(struct judge *j)
-{
-    static const double part[NUM_STATISTICS] = {.25, .40, 0, 0, 0};
-    bool applies[NUM_STATISTICS] = {
-        [STATISTIC_IMAGE] = true,
-        [STATISTIC_PYRAMID] = j->width * j->height > 1,
-    };
-    double sum = 0;
-    for (int s = 0; s < NUM_STATISTICS; s++)
-        sum += applies[s] ? part[s] : 0;
-    for (int s = 0; s < NUM_STATISTICS; s++)
-        j->share[s] = applies[s] ? part[s] / sum : 0;
-}
-
-static bool check(const struct moments *a, const struct moments *b,
-                  const struct compare_options *opt, struct judge *j, struct err *e)
-{
-    if (a->width != b->width || a->height != b->height)
-        return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
-                       b->height);
-    if (!check_options(opt, a->width, a->height, e))
-        return false;
-    *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
-    set_shares(j);
-    if (!check_side(a, j, e))
-        return err_prefix(e, "A");
-    if (!check_side(b, j, e))
-        return err_prefix(e, "B");
-    size_t pixels = (size_t)b->width * (size_t)b->height;
-    double luminance = 0;
-    for (int c = 0; c < 3; c++) {
-        j->event[CHANNEL_LUMINANCE] += luminance_weight[c] * j->event[c];
-        for (size_t p = 0; p < pixels; p++)
-            luminance += luminance_weight[c] * b->mean[3 * p + (size_t)c];
-    }
-    if (!(luminance > 0))
-        return err_set(e, "B is black: relative differences have no unit");
-    j->floor = floor_fraction * luminance / (double)pixels;
-    return true;
-}
-
 /* Skewness is judged where a statistic's part of alpha would be divided by all its regions. */
 static void set_guards(struct judge *j, size_t regions)
 {
-    double tests[2] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1)};
-    for (int s = 0; s < 2; s++)
+    double tests[NUM_STATISTICS] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1), 6,
+                                    NUM_DIRECTIONS, 1};
+    for (int s = 0; s < NUM_STATISTICS; s++)
         if (j->share[s] > 0)
             j->z_guard[s] = stats_normal_quantile(j->opt.alpha * j->share[s] / (2 * tests[s]));
 }
@@ -244,17 +140,49 @@ static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct co
     return true;
 }
 
-static void fill_statistic(const struct judge *j, int s, const struct worst *worst,
-                           struct comparison *out)
+/* log10_p: the smallest. False if the statistic has no test. */
+static bool fill_statistic(const struct judge *j, int s, double log10_p, struct comparison *out)
 {
     struct statistic *st = &out->statistic[s];
     assert(j->num_tests[s] < 1u << 31);
+    st->share = j->share[s];
     st->num_tests = (int)j->num_tests[s];
     out->num_tests += st->num_tests;
-    if (st->num_tests == 0)
-        return;
-    st->log10_p = fmin(0, worst->log10_p + log10(st->num_tests));
-    region_name(j->width, j->height, worst->rect, worst->channel, st->what, sizeof st->what);
+    if (st->num_tests > 0)
+        st->log10_p = fmin(0, log10_p + log10(st->num_tests));
+    return st->num_tests > 0;
+}
+
+static void fill_statistics(struct judge *j, const struct worst worst[2], const struct dense *dense,
+                            double directed, double noise, struct comparison *out)
+{
+    struct statistic *st = out->statistic;
+    for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
+        if (fill_statistic(j, s, worst[s].log10_p, out))
+            region_name(j->width, j->height, worst[s].rect, worst[s].channel, st[s].what,
+                        sizeof st[s].what);
+    if (fill_statistic(j, STATISTIC_DENSE, dense->log10_p, out))
+        snprintf(st[STATISTIC_DENSE].what, sizeof st->what,
+                 "%d regions of %d x %d pixels or more (%s)", dense->regions, dense->side,
+                 dense->side, channel_name[dense->channel]);
+    if (fill_statistic(j, STATISTIC_DIRECTED, directed, out))
+        snprintf(st[STATISTIC_DIRECTED].what, sizeof st->what, "%s", out->direction.name);
+    if (fill_statistic(j, STATISTIC_NOISE, noise, out))
+        snprintf(st[STATISTIC_NOISE].what, sizeof st->what, "variance of a path: %.3g times",
+                 out->variance.ratio);
+}
+
+/* The statistics besides those of the regions. */
+static bool test_rest(const struct moments *a, const struct moments *b, struct judge *j,
+                      double *directed, double *noise, struct comparison *out, struct err *e)
+{
+    bool testable;
+    *directed = 0;
+    if (j->share[STATISTIC_DIRECTED] > 0 && !directed_test(a, b, j, &out->direction, directed, e))
+        return false;
+    out->variance = noise_ratio(a, b, j, noise, &testable);
+    j->num_tests[STATISTIC_NOISE] = j->share[STATISTIC_NOISE] > 0 && testable;
+    return true;
 }
 
 /* How far below the level it is held to the smallest p of a statistic is; above 0: rejected. */
@@ -273,8 +201,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct region *tiles = NULL;
     struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
     struct cell image[NUM_CHANNELS];
-    double squared = 0, mean = 0;
-    if (!check(a, b, opt, &j, e))
+    struct dense dense = {0};
+    double squared = 0, mean = 0, directed, noise;
+    if (!hygiene_check(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
     for (int c = 0; c < NUM_CHANNELS; c++) {
@@ -285,13 +214,15 @@ bool compare_moments(const struct moments *a, const struct moments *b,
             set_guards(&j, pyramid_regions(&p));
         image[c] = p.level[p.num_levels - 1].cell[0];
         scan(&j, &p, c, worst, out);
+        if (c < CHANNEL_LUMINANCE && j.share[STATISTIC_DENSE] > 0 &&
+            !dense_scan(&j, &p, c, &dense, e))
+            goto fail;
         if (c < CHANNEL_LUMINANCE)
             squared += luminance_weight[c] * squared_bias(&p);
     }
-    for (int s = 0; s < NUM_STATISTICS; s++)
-        out->statistic[s].share = j.share[s];
-    for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
-        fill_statistic(&j, s, &worst[s], out);
+    if (!test_rest(a, b, &j, &directed, &noise, out, e))
+        goto fail;
+    fill_statistics(&j, worst, &dense, directed, noise, out);
     if (!fill_images(&j, &p, out, e) || !fill_tiles(&j, &p, out, &tiles, e))
         goto fail;
     mean = image[CHANNEL_LUMINANCE].b;

@@ -34,6 +34,23 @@ struct statistic {
     double log10_p; /* of its smallest p, times num_tests (Bonferroni), at most 0 */
     char what[96];  /* which test that was: "shift by x", "16 x 16 pixels at 32,48 (red)" */
 };
+/* The known kind of error that looks most like A - B. */
+struct direction {
+    const char *name; /* "shift by x", static; NULL if none could be tested */
+    double
+        explained; /* share of the squared difference, noise removed, that lies in this direction,
+                         0..1; an estimate */
+    double amount; /* its size to first order, and its 1 - 2 alpha interval: 0 where unit is "" */
+    double lo, hi;
+    const char *unit; /* "%", "% of the mean", "in the exponent", "px", "" */
+};
+
+/* VA/VB: the variance of one path (or, where the number of paths is unknown, of one observation), RGB
+ * together, and its 1 - 2 alpha interval. lo may be 0. */
+struct variance_ratio {
+    double ratio, lo, hi;
+    bool valid; /* both sides have noise of a kind that compares, and enough of it to know */
+};
 extern const char *const statistic_name[NUM_STATISTICS]; /* "image", "pyramid", .. */
 
 /* A square region (or the image) in one channel (0..2 RGB, 3 luminance .2126 .7152 .0722). Relative
@@ -59,6 +76,8 @@ struct comparison {
     char reason[256]; /* one sentence: what decided */
     int num_tests;    /* of all statistics together */
     struct statistic statistic[NUM_STATISTICS];
+    struct direction direction; /* of the smallest p of STATISTIC_DIRECTED */
+    struct variance_ratio variance;
     struct region global[4];  /* per channel and luminance */
     struct region worst;      /* of all regions, smallest p in units of the level it is held to */
     struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
@@ -80,8 +99,8 @@ struct comparison {
 
 /* Hygiene first, each a line in e and false (could not judge): sizes differ, NaN, infinity,
  * negative radiance, negative M2, n < 3 where not exact (skewness is unknown then), an unknown
- * unit, noise in an exact side, replicates without any variance (the seed was ignored), a black
- * reference, options out of range. A is the tested side, B the reference. The caller frees with
+ * unit, noise in an exact side, replicates without any variance (the seed was ignored), the same
+ * observations on both sides, a black reference, options out of range. A is the tested side, B the reference. The caller frees with
  * comparison_free(). */
 bool compare_moments(const struct moments *a, const struct moments *b,
                      const struct compare_options *opt, struct comparison *out, struct err *e)

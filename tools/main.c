@@ -13,7 +13,8 @@ static const struct {
     const char *help;
 } verbs[] = {
     {"validate", verb_validate, "render the suite and judge it against its references"},
-    {"compare", verb_compare, "judge two moments images"},
+    {"compare", verb_compare, "judge two renders, of any kind of file"},
+    {"diagnose", verb_diagnose, "name the known bug that explains how a renderer is wrong"},
     {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
     {"report", verb_report, "make the HTML page of a results.json"},
     {"golden", verb_golden, "render, inspect and approve the stored references"},

@@ -10,6 +10,7 @@ bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
 {
     const struct suite_scene *s = job->scene;
     char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
+    char range[32];
     snprintf(width, sizeof width, "%d", s->width);
     snprintf(height, sizeof height, "%d", s->height);
     snprintf(spp, sizeof spp, "%d", job->spp);
@@ -18,6 +19,7 @@ bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
     snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
     snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
+    snprintf(range, sizeof range, "%d:%d", job->first, job->spp);
     const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,       "-s",
                                        spp,          "-m", depth, "-t",         threads,
                                        "--seed",     seed, "-f",  job->picture, s->dae};
@@ -31,6 +33,10 @@ bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
         argv[argc++] = lens;
         argv[argc++] = "-d";
         argv[argc++] = focus;
+    }
+    if (job->first > 0) {
+        argv[argc++] = "--samples";
+        argv[argc++] = range;
     }
     for (const char *const *o = job->options; o != NULL && *o != NULL; o++) {
         if (argc == MAX_ARGUMENTS - 1)

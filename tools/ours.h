@@ -8,7 +8,7 @@
 struct ours_job {
     const char *program; /* pathtracer, or what stands in for it */
     const struct suite_scene *scene;
-    int spp;
+    int first, spp; /* samples first .. spp-1 of each pixel; 0 and spp: one render */
     uint64_t seed;
     const char *const *options; /* further ones, NULL at the end; NULL: none */
     int threads;

@@ -7,11 +7,12 @@
 
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-static struct estimate estimate(double mean, double v, double k3, double n)
+struct estimate estimate_from(double mean, double v, double k3, double n)
 {
     struct estimate est = {.mean = mean, .v = v, .k3 = k3};
     if (v > 0) {
-        est.var_v = fmax(2 * v * v / (n - 1), k3 * k3 / v);
+        est.var_v_normal = 2 * v * v / (n - 1);
+        est.var_v = fmax(est.var_v_normal, k3 * k3 / v);
         est.var_k3 = 6 * v * v * v / ((n - 1) * (n - 2));
     }
     return est;
@@ -25,15 +26,36 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
     double v_scale = exact ? 0 : 1 / (n * (n - 1));
     double k_scale = exact ? 0 : v_scale / (n - 2);
     const double *mean = m->mean + 3 * pixel, *m2 = m->m2 + 3 * pixel, *m3 = m->m3 + 3 * pixel;
-    if (channel < CHANNEL_LUMINANCE)
-        return estimate(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
-    double sum = 0, deviation = 0, root = 0;
+    const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
+    if (channel < CHANNEL_LUMINANCE) {
+        struct estimate est =
+            estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
+        est.tolerance = tolerance[channel];
+        return est;
+    }
+    double sum = 0, deviation = 0, root = 0, rounding = 0;
     for (int c = 0; c < 3; c++) {
         sum += luminance_weight[c] * mean[c];
         deviation += luminance_weight[c] * sqrt(m2[c] * v_scale);
         root += luminance_weight[c] * cbrt(m3[c] * k_scale);
+        rounding += luminance_weight[c] * tolerance[c];
     }
-    return estimate(sum, deviation * deviation, root * root * root, n);
+    struct estimate est = estimate_from(sum, deviation * deviation, root * root * root, n);
+    est.tolerance = rounding;
+    return est;
+}
+
+void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
+{
+    dst->a += a->mean;
+    dst->b += b->mean;
+    dst->va += a->v;
+    dst->vb += b->v;
+    dst->k3 += a->k3 - b->k3;
+    dst->var_v += a->var_v + b->var_v;
+    dst->var_v_normal += a->var_v_normal + b->var_v_normal;
+    dst->var_k3 += a->var_k3 + b->var_k3;
+    dst->tolerance += a->tolerance + b->tolerance;
 }
 
 static void add_cell(struct cell *dst, const struct cell *src)
@@ -44,7 +66,9 @@ static void add_cell(struct cell *dst, const struct cell *src)
     dst->vb += src->vb;
     dst->k3 += src->k3;
     dst->var_v += src->var_v;
+    dst->var_v_normal += src->var_v_normal;
     dst->var_k3 += src->var_k3;
+    dst->tolerance += src->tolerance;
 }
 
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
@@ -53,15 +77,8 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
     size_t pixels = (size_t)level->nx * (size_t)level->ny;
     for (size_t p = 0; p < pixels; p++) {
         struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
-        level->cell[p] = (struct cell){
-            .a = ea.mean,
-            .b = eb.mean,
-            .va = ea.v,
-            .vb = eb.v,
-            .k3 = ea.k3 - eb.k3,
-            .var_v = ea.var_v + eb.var_v,
-            .var_k3 = ea.var_k3 + eb.var_k3,
-        };
+        level->cell[p] = (struct cell){0};
+        cell_add_pixel(&level->cell[p], &ea, &eb);
     }
 }
 

@@ -13,11 +13,13 @@ extern const double luminance_weight[3]; /* Rec. 709: .2126 .7152 .0722 */
 /* One side's mean in one pixel (or the sum of such means over a region), as an estimate. */
 struct estimate {
     double mean;
-    double v;      /* its estimated variance, M2/(n(n-1)); 0 if exact */
-    double k3;     /* its third cumulant, M3/(n(n-1)(n-2)) */
-    double var_v;  /* variance of v: the larger of 2 v^2/(n-1) (normal) and k3^2/v (Cauchy-Schwarz:
+    double v;     /* its estimated variance, M2/(n(n-1)); 0 if exact */
+    double k3;    /* its third cumulant, M3/(n(n-1)(n-2)) */
+    double var_v; /* variance of v: the larger of 2 v^2/(n-1) (normal) and k3^2/v (Cauchy-Schwarz:
                       the covariance of mean and variance is k3) */
-    double var_k3; /* variance of k3 if normal, 6 v^3/((n-1)(n-2)) */
+    double var_v_normal; /* variance of v if normal: 2 v^2/(n-1) */
+    double var_k3;       /* variance of k3 if normal, 6 v^3/((n-1)(n-2)) */
+    double tolerance;    /* of the mean, from rounded numbers (moments.h) */
 };
 
 /* Channel 3 is luminance, whose variance the moments do not hold: the bound for any correlation of
@@ -25,13 +27,18 @@ struct estimate {
  * if the channels are perfectly correlated. n must be >= 3 unless exact. */
 struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channel);
 
-/* Sums over the pixels of a region. */
+/* From the moments of any sum of a pixel's channels. v = 0: no noise. */
+struct estimate estimate_from(double mean, double v, double k3, double n);
+
+/* Sums over the pixels of a region, or of their products with weights. */
 struct cell {
     double a, b;   /* means of A and B */
     double va, vb; /* their variances */
     double k3;     /* third cumulant of A - B */
     double var_v;  /* variance of va + vb */
-    double var_k3; /* variance of k3 */
+    double var_v_normal;
+    double var_k3;    /* variance of k3 */
+    double tolerance; /* of a and b together, from rounded numbers */
 };
 
 struct pyramid_level {
@@ -51,6 +58,8 @@ struct pyramid {
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
+
+void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);
 
 /* Number of regions over all levels. */
 size_t pyramid_regions(const struct pyramid *p);

@@ -8,9 +8,11 @@
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
 static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
 static const double float_tolerance = 1e-5; /* relative: two engines' float32 arithmetic */
-static const double smallest_log10_p = -1e6;
+static const double least_dof = 0.2; /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
+const double region_smallest_log10_p = -1e6;
 const double region_mdb_none = 1e6;
+const char *const channel_name[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
 
 static bool is_image(const struct judge *j, struct rect r)
 {
@@ -32,20 +34,35 @@ static double margin_of(const struct judge *j, struct rect r)
     return opt->margin_tile + f * (opt->margin_global - opt->margin_tile);
 }
 
-struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
+static struct measured measure(const struct cell *cell, double unit, double size, double margin,
+                               int statistic)
 {
-    struct measured m = {.d = cell->a - cell->b, .margin = margin_of(j, r)};
-    m.statistic = is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID;
-    m.unit = fmax(cell->b, j->floor * r.width * r.height);
-    m.tolerance = float_tolerance * fmax(cell->a, cell->b);
+    struct measured m = {.d = cell->a - cell->b,
+                         .unit = unit,
+                         .margin = margin,
+                         .tolerance = float_tolerance * size + cell->tolerance,
+                         .statistic = statistic};
     m.v = cell->va + cell->vb;
     m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
-    m.noise_free = m.v <= m.tolerance * m.tolerance;
+    m.noise_free = m.v <= pow(float_tolerance * size, 2);
     if (!m.noise_free) {
         m.dof = stats_dof(m.v, cell->var_v);
+        m.dof_normal = stats_dof(m.v, cell->var_v_normal);
         m.skew = (fabs(cell->k3) + sqrt(cell->var_k3)) / (m.v * sqrt(m.v));
     }
     return m;
+}
+
+struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
+{
+    return measure(cell, fmax(cell->b, j->floor * r.width * r.height), fmax(cell->a, cell->b),
+                   margin_of(j, r), is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID);
+}
+
+struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
+                                        double size)
+{
+    return measure(cell, unit, size, j->opt.margin_tile, STATISTIC_DIRECTED);
 }
 
 /* ln of the factor by which a tail probability at x may be off [Shao99]. */
@@ -56,8 +73,11 @@ static double skew_factor(const struct measured *m, double x)
 
 bool region_testable(const struct judge *j, const struct measured *m)
 {
-    return m->noise_free ||
-           skew_factor(m, stats_t_of_z(j->z_guard[m->statistic], m->dof)) <= skew_limit;
+    double z = j->z_guard[m->statistic];
+    if (m->noise_free)
+        return true;
+    /* t is beyond z: most small regions fail already there. */
+    return skew_factor(m, z) <= skew_limit && skew_factor(m, stats_t_of_z(z, m->dof)) <= skew_limit;
 }
 
 double region_excess_t(const struct measured *m)
@@ -72,14 +92,14 @@ static double log10_p_missed(const struct judge *j, double excess, int channel)
 {
     if (excess <= 0)
         return 0;
-    return fmax(smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
+    return fmax(region_smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
 }
 
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
 {
     if (m->noise_free)
         return log10_p_missed(j, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
-    return fmax(smallest_log10_p, stats_t_log10_p(fmax(0, region_excess_t(m)), m->dof));
+    return fmax(region_smallest_log10_p, stats_t_log10_p(fmax(0, region_excess_t(m)), m->dof));
 }
 
 double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel)
@@ -90,7 +110,7 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
     double t = excess / sqrt(m->v);
     /* Beyond x = 1/g the expansion behind the factor has turned round. */
     double factor = skew_factor(m, fmin(t, 1 / m->skew)) / log(10);
-    return fmin(0, fmax(smallest_log10_p, stats_t_log10_p(t, m->dof) + factor));
+    return fmin(0, fmax(region_smallest_log10_p, stats_t_log10_p(t, m->dof) + factor));
 }
 
 double region_t(const struct measured *m)
@@ -123,15 +143,14 @@ static bool half_width(const struct judge *j, const struct measured *m, double *
 {
     double factor = 0;
     for (int i = 0; i < 4; i++) {
-        *x = stats_t_quantile(j->opt.alpha * exp(-factor), m->dof);
+        *x = stats_t_quantile(j->opt.alpha * exp(-factor), fmax(least_dof, m->dof));
         factor = fmin(skew_limit_widened, skew_factor(m, *x));
     }
-    return factor < skew_limit_widened;
+    return factor < skew_limit_widened && m->dof >= least_dof;
 }
 
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size)
 {
-    static const char *const channel_name[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
     if (r.width == width && r.height == height)
         snprintf(text, size, "the image (%s)", channel_name[channel]);
     else

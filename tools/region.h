@@ -9,13 +9,14 @@
 struct judge {
     struct compare_options opt;
     int width, height;
+    double mean_b;                /* luminance of the image B */
     double floor;                 /* lower bound of the unit of relative quantities, radiance */
     double event[NUM_CHANNELS];   /* brightness of the brightest kind of single observation seen */
     double n_min;                 /* fewest observations of any pixel; INFINITY if both are exact */
     double share[NUM_STATISTICS]; /* of alpha */
-    /* Of the image and of all smaller regions: */
-    double z_guard[2];   /* normal critical value at which skewness is judged */
-    size_t num_tests[2]; /* set once known: for mdb */
+    /* Per statistic: */
+    double z_guard[NUM_STATISTICS];   /* normal critical value at which skewness is judged */
+    size_t num_tests[NUM_STATISTICS]; /* set once known: for mdb */
 };
 
 /* A region's sums in the form the test needs. Sums over pixels, not means. */
@@ -23,16 +24,22 @@ struct measured {
     double d;         /* A - B */
     double unit;      /* of relative quantities */
     double margin;    /* relative */
-    double tolerance; /* what float32 arithmetic may do to d */
+    double tolerance; /* what float32 arithmetic and rounded files may do to d */
     double v;         /* variance of d */
     double v_margin; /* variance of A - (1 + margin) B: for every test and interval with a margin */
     double dof;
-    double skew;     /* of d: |g| plus one standard error */
-    bool noise_free; /* the standard error is within the tolerance */
-    int statistic;   /* STATISTIC_IMAGE or STATISTIC_PYRAMID */
+    double dof_normal; /* if the law is normal; for heavier tails it says more of the mean of t^2 */
+    double skew;       /* of d: |g| plus one standard error */
+    bool noise_free;   /* the standard error is within that of float32 arithmetic */
+    int statistic;     /* by which it is tested */
 };
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
+
+/* The same for sums over the image with weights w, which may be negative: unit = sum |w| unit, size =
+ * sum |w| max(A, B). A bias inside the margin of a tile in each pixel is inside the margin of this. */
+struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
+                                        double size);
 
 /* Skew guard: |g| x^3 / 3 <= 0.2 at the critical x. */
 bool region_testable(const struct judge *j, const struct measured *m);
@@ -52,11 +59,14 @@ double region_t(const struct measured *m);
 /* Relative bias that is found with 95 %, at most region_mdb_none; for a region that is tested. */
 double region_mdb(const struct judge *j, const struct measured *m, int channel);
 
+extern const double region_smallest_log10_p; /* -1e6 */
 /* The mdb of a region that no test covers: 1e6. */
 extern const double region_mdb_none;
 
 /* The end of the interval that is further from 0. */
 double region_reach(const struct region *r);
+
+extern const char *const channel_name[NUM_CHANNELS];
 
 /* "the image (red)" or "16 x 16 pixels at 32,48 (luminance)". */
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size);

@@ -2,6 +2,7 @@
 
 #include "../renderer/fs.h"
 #include "report_consistency.h"
+#include "report_cost.h"
 #include "report_converge.h"
 #include "report_html.h"
 #include "report_page.h"
@@ -287,6 +288,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     }
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
+    report_cost(f, root);
     fputs("</main>\n", f);
     write_layers(p);
     fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);

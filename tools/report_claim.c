@@ -3,6 +3,7 @@
 #include "report_colour.h"
 #include "report_html.h"
 #include "report_plot.h"
+#include "report_statistics.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +32,7 @@ void report_badge(FILE *f, const struct claim_ref *claim)
     static const char *const mark[] = {"!", "✗", "✗", "✓"};
     fprintf(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> ",
             style[claim->outcome], mark[claim->outcome]);
-    if (claim->outcome == OUTCOME_NOT_JUDGED)
+    if (claim->outcome == OUTCOME_NOT_JUDGED && !claim_lacks_time(claim->json))
         fputs("not judged", f);
     else
         html_text(f, member_text(claim->json, "verdict"));
@@ -49,10 +50,12 @@ void report_claim_error(struct page *p, const struct claim_ref *claim)
     report_badge(f, claim);
     fputs("</h3>\n<p class=\"error-line\">This claim could not be judged: ", f);
     html_text(f, member_text(claim->json, "error"));
-    fputs(
-        "</p>\n<p class=\"caption\">That is neither a pass nor a failure of the renderer. It makes "
-        "the exit code 3 until the cause is gone.</p>\n",
-        f);
+    fputs(claim_lacks_time(claim->json)
+              ? "</p>\n<p class=\"caption\">It counts as inconclusive. A larger budget would "
+                "judge it.</p>\n"
+              : "</p>\n<p class=\"caption\">That is neither a pass nor a failure of the "
+                "renderer. It makes the exit code 3 until the cause is gone.</p>\n",
+          f);
     const char *rerun = member_text(claim->json, "rerun");
     if (rerun != NULL) {
         fputs("<p>To judge this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
@@ -381,6 +384,7 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct im
     write_regions(f, json);
     write_provenance(f, json);
     fputs("</dl>\n", f);
+    report_statistics(f, json);
     const char *rerun = member_text(json, "rerun");
     if (rerun != NULL) {
         fputs("<p class=\"caption\">To run this claim again:</p>\n<pre tabindex=\"0\"><code>", f);

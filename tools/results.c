@@ -23,11 +23,21 @@ static const struct member root_members[] = {{"command", STRING, true},  {"versi
                                              {"seconds", NUMBER, false}};
 
 /* A claim that could not be judged has these and no more. */
-static const struct member any_claim_members[] = {
-    {"scene", STRING, true},     {"a", STRING, true},         {"b", STRING, true},
-    {"expected", STRING, true},  {"passed", BOOLEAN, true},   {"title", STRING, false},
-    {"detects", STRING, false},  {"blind_to", STRING, false}, {"error", STRING, false},
-    {"quantity", STRING, false}, {"rerun", STRING, false}};
+static const struct member any_claim_members[] = {{"scene", STRING, true},
+                                                  {"a", STRING, true},
+                                                  {"b", STRING, true},
+                                                  {"expected", STRING, true},
+                                                  {"passed", BOOLEAN, true},
+                                                  {"title", STRING, false},
+                                                  {"detects", STRING, false},
+                                                  {"blind_to", STRING, false},
+                                                  {"error", STRING, false},
+                                                  {"quantity", STRING, false},
+                                                  {"rerun", STRING, false},
+                                                  {"stages", COUNT, false},
+                                                  {"alpha_claim", NUMBER, false},
+                                                  {"alpha_spent", NUMBER, false},
+                                                  {"cost_s", OBJECT, false}};
 
 static const struct member judged_members[] = {
     {"quantity", STRING, true},      {"verdict", STRING, true},
@@ -41,6 +51,7 @@ static const struct member judged_members[] = {
     {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
     {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
     {"tiles_y", COUNT, true},        {"files", OBJECT, true},
+    {"direction", OBJECT, false},    {"variance_ratio", OBJECT, false},
     {"class", STRING, false},        {"n_a", NUMBER, false},
     {"n_b", NUMBER, false},          {"unit_b", STRING, false},
     {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
@@ -57,6 +68,21 @@ static const struct member worst_members[] = {
     {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},
     {"height", COUNT, true}, {"channel", COUNT, true}, {"difference", NUMBER, true},
     {"ci", INTERVAL, true},  {"t", NUMBER, true}};
+
+static const struct member statistic_members[] = {{"name", STRING, true},
+                                                  {"share", NUMBER, true},
+                                                  {"num_tests", COUNT, true},
+                                                  {"log10_p", NUMBER, true},
+                                                  {"what", STRING, true}};
+
+static const struct member direction_members[] = {{"name", STRING, true},
+                                                  {"explained", NUMBER, true},
+                                                  {"amount", NUMBER, true},
+                                                  {"ci", INTERVAL, true},
+                                                  {"unit", STRING, true}};
+
+static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
+                                                       {"ci", INTERVAL, true}};
 
 static const struct member file_members[] = {
     {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
@@ -141,6 +167,38 @@ static bool check_tiles(const json_t *claim, const char *name, size_t num, const
     return true;
 }
 
+static bool check_statistics(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *all = json_object_get(claim, "statistics");
+    if (all == NULL)
+        return err_set(e, "%s: 'statistics' is missing", where);
+    if (!json_is_array(all) || json_array_size(all) == 0)
+        return err_set(e, "%s: 'statistics' is not an array with at least one statistic", where);
+    for (size_t i = 0; i < json_array_size(all); i++) {
+        const json_t *s = json_array_get(all, i);
+        if (!json_is_object(s))
+            return err_set(e, "%s: 'statistics' has an element %zu that is not an object", where,
+                           i);
+        if (!check_members(s, statistic_members, LENGTH(statistic_members), where, "statistics.",
+                           e))
+            return false;
+    }
+    return true;
+}
+
+/* Members that may be absent. */
+static bool check_findings(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *direction = json_object_get(claim, "direction");
+    const json_t *ratio = json_object_get(claim, "variance_ratio");
+    return (direction == NULL ||
+            check_members(direction, direction_members, LENGTH(direction_members), where,
+                          "direction.", e)) &&
+           (ratio == NULL ||
+            check_members(ratio, variance_ratio_members, LENGTH(variance_ratio_members), where,
+                          "variance_ratio.", e));
+}
+
 static bool check_judged(const json_t *claim, const char *where, struct err *e)
 {
     if (!check_members(claim, judged_members, LENGTH(judged_members), where, "", e) ||
@@ -149,7 +207,8 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
         !check_members(json_object_get(claim, "worst"), worst_members, LENGTH(worst_members), where,
                        "worst.", e) ||
         !check_members(json_object_get(claim, "files"), file_members, LENGTH(file_members), where,
-                       "files.", e))
+                       "files.", e) ||
+        !check_statistics(claim, where, e) || !check_findings(claim, where, e))
         return false;
 
     json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));
@@ -174,11 +233,32 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
     return true;
 }
 
+static const struct member look_members[] = {{"n_a", NUMBER, true},
+                                             {"n_b", NUMBER, true},
+                                             {"alpha", NUMBER, true},
+                                             {"stage", COUNT, true},
+                                             {"verdict", STRING, true}};
+static const struct member cost_members[] = {{"a", NUMBER, true}, {"b", NUMBER, true}};
+
+static bool check_looks(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *looks = json_object_get(claim, "looks"), *cost = json_object_get(claim, "cost_s");
+    if (looks != NULL && !json_is_array(looks))
+        return err_set(e, "%s: 'looks' is not an array", where);
+    for (size_t i = 0; i < json_array_size(looks); i++)
+        if (!check_members(json_array_get(looks, i), look_members, LENGTH(look_members), where,
+                           "looks.", e))
+            return false;
+    return cost == NULL ||
+           check_members(cost, cost_members, LENGTH(cost_members), where, "cost_s.", e);
+}
+
 static bool check_claim(const json_t *claim, const char *where, struct err *e)
 {
     if (!json_is_object(claim))
         return err_set(e, "%s: not an object", where);
-    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e))
+    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e) ||
+        !check_looks(claim, where, e))
         return false;
     enum verdict expected;
     const char *name = member_text(claim, "expected");
@@ -188,6 +268,8 @@ static bool check_claim(const json_t *claim, const char *where, struct err *e)
         return check_judged(claim, where, e);
     if (json_is_true(json_object_get(claim, "passed")))
         return err_set(e, "%s: has an 'error' and yet 'passed'", where);
+    if (json_object_get(claim, "verdict") != NULL && !claim_lacks_time(claim))
+        return err_set(e, "%s: has an 'error' and yet a 'verdict' that is not INCONCLUSIVE", where);
     return true;
 }
 
@@ -262,12 +344,21 @@ enum outcome claim_outcome(const json_t *claim)
     return OUTCOME_UNDECIDED;
 }
 
+bool claim_lacks_time(const json_t *claim)
+{
+    const char *verdict = member_text(claim, "verdict");
+    return json_object_get(claim, "error") != NULL && verdict != NULL &&
+           strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
 int results_exit_code(const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims");
     size_t count[4] = {0};
     for (size_t i = 0; i < json_array_size(claims); i++)
-        count[claim_outcome(json_array_get(claims, i))]++;
+        count[claim_lacks_time(json_array_get(claims, i))
+                  ? OUTCOME_UNDECIDED
+                  : claim_outcome(json_array_get(claims, i))]++;
     const json_t *convergence = json_object_get(results, "convergence");
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");

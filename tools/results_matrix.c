@@ -23,7 +23,7 @@ static void print_cell(FILE *f, const json_t *c)
         return;
     }
     if (claim_outcome(c) == OUTCOME_NOT_JUDGED) {
-        fputs(" **NOT JUDGED** |", f);
+        fputs(claim_lacks_time(c) ? " **INCONCLUSIVE** |" : " **NOT JUDGED** |", f);
         return;
     }
     const json_t *ci = json_object_get(c, "ci");

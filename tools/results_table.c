@@ -48,10 +48,10 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
     r->cell[TESTED] = member_text(claim, "a");
     r->cell[AGAINST] = member_text(claim, "b");
     r->cell[EXPECTED] = member_text(claim, "expected");
-    r->cell[MARK] = mark[markdown][outcome];
+    r->cell[MARK] = mark[markdown][claim_lacks_time(claim) ? OUTCOME_UNDECIDED : outcome];
     if (outcome == OUTCOME_NOT_JUDGED) {
         r->cell[DIFFERENCE] = r->cell[MDB] = r->cell[MARGIN] = "-";
-        r->cell[VERDICT] = "NOT JUDGED";
+        r->cell[VERDICT] = claim_lacks_time(claim) ? "INCONCLUSIVE" : "NOT JUDGED";
         return;
     }
     const json_t *ci = json_object_get(claim, "ci");

@@ -131,6 +131,37 @@ double stats_t_of_z(double z, double nu)
     return copysign(sqrt(nu * expm1(fmin(w * w / nu, 600))), z);
 }
 
+double stats_hill_z(double t, double nu)
+{
+    return copysign(hill_z(fabs(t), nu), t);
+}
+
+/* ln of Gamma(a, y) / (y^a e^-y) = 1/(y+1-a - 1(1-a)/(y+3-a - ..)), y > a + 1, modified Lentz. */
+static double log_gamma_fraction(double a, double y)
+{
+    double b = y + 1 - a, c = INFINITY, d = 1 / b, f = d;
+    for (int i = 1; i < 100000; i++) {
+        double an = -i * (i - a);
+        b += 2;
+        d = 1 / (an * d + b);
+        c = b + an / c;
+        double step = c * d;
+        f *= step;
+        if (fabs(step - 1) < 1e-15)
+            break;
+    }
+    return log(f);
+}
+
+double stats_chi2_log10_p(double x, double k)
+{
+    assert(x >= 0 && k > 0);
+    double a = k / 2, y = x / 2;
+    if (y <= a + 1)
+        return log10(gsl_cdf_chisq_Q(x, k));
+    return (a * log(y) - y - gsl_sf_lngamma(a) + log_gamma_fraction(a, y)) / M_LN10;
+}
+
 double stats_dof(double v, double var_v)
 {
     assert(v >= 0 && var_v >= 0);

@@ -24,6 +24,15 @@ double stats_normal_quantile(double q);
 double stats_z_of_t(double t, double nu);
 double stats_t_of_z(double z, double nu);
 
+/* Hill's normal equivalent of t [Hill70]: P(|T| >= |t|) = P(|Z| >= |z|) up to O(nu^-4): to be
+ * squared and summed. nu as above. */
+double stats_hill_z(double t, double nu);
+
+/* log10 of P(X >= x) for X of the chi-square law with k > 0 degrees of freedom, x >= 0; without a
+ * floor, relative error of p about 1e-10 for k up to 1e6. Q(k/2, x/2) by its continued fraction
+ * [DLMF 8.9.2] in logarithms above the centre, GSL below. */
+double stats_chi2_log10_p(double x, double k);
+
 /* Degrees of freedom of an estimate v of a variance that itself has the variance var_v: 2 v^2 /
  * var_v, the general form of Welch-Satterthwaite [Satterthwaite46]. INFINITY if var_v is 0. */
 double stats_dof(double v, double var_v);

@@ -24,14 +24,30 @@ struct validate_options {
     int threads;
     double timeout_s; /* of one program */
     bool quiet;
-    /* Cheapest scenes first, and stop after the scene that holds the first claim that came out
-     * DIFFERENT against expectation: to find out fast that a renderer is wrong. alpha is still
-     * divided by all claims. */
+    /* Looks up to the declared samples (sequence_declared), the small ones of all scenes first, and stop
+     * at the first claim that comes out DIFFERENT against expectation: to find out fast that a renderer
+     * is wrong. alpha is still divided by all claims; those undecided by then are
+     * INCONCLUSIVE, those not looked at are not in the results. */
     bool until_different;
+    /* Wall time. Above 0: each claim is looked at again and again, with samples that double, until it is
+     * decided or the time is over (sequence_open), and alpha is spent over the looks (sequence.h). 0: one
+     * look, at the declared samples. */
+    double budget_s;
+    /* 2: what DIFFERENT flags at sqrt(alpha) is confirmed with fresh seeds at sqrt(alpha) (gate.h), where
+     * both sides can be had again: not against goldens, whose noise is in both stages, so that no product
+     * bounds the error. 1: one stage. 0: 2 below alpha 1e-5, where no tail is known well enough, else 1. */
+    int stages;
 };
 
-/* Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr,
- * z_<engine>.exr and rel_<engine>.exr, for a further engine also its manifest <engine>.json. Scenes
+/* What cannot be looked at in parts is judged once, at its declared size: adaptive variants, the further
+ * engine (rendered once), and the claims of consistency. Goldens and closed forms do not grow; ours grows
+ * by ranges of sample numbers, with --live engines by further replicates.
+ *
+ * A claim that the budget left undecided is INCONCLUSIVE, with what its last look saw. One that had no look
+ * is INCONCLUSIVE with an error line and no numbers; never a pass.
+ *
+ * Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr (in parts:
+ * <engine>_<observations>.exr), z_<a>_<b>.exr and rel_<a>_<b>.exr, for a further engine also its manifest <engine>.json. Scenes
  * that it cannot express are the results' "not_expressible": [{"scene":, "engine":, "reason":}].
  * With `live`, "loader" in the results is what import_check() says of the same scenes. A claim that
  * cannot be judged is in the results with its error; false only if nothing could be judged at all

@@ -1,18 +1,24 @@
 #include "../renderer/cli.h"
-#include "../renderer/fs.h"
-#include "claim.h"
+#include "comparing.h"
+#include "region.h"
 #include "results.h"
 #include "verbs.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum option {
     OPT_ALPHA,
     OPT_MARGIN,
     OPT_MARGIN_TILE,
+    OPT_MARGIN_VARIANCE,
     OPT_TILE,
+    OPT_AGAIN,
+    OPT_EXCHANGEABLE,
+    OPT_MIN_SIDE,
+    OPT_CURVE,
+    OPT_SPP_A,
+    OPT_SPP_B,
     OPT_EXPECT,
     OPT_JSON,
     OPT_QUIET,
@@ -21,31 +27,77 @@ enum option {
 
 static const struct cli_option options[] = {
     [OPT_ALPHA] = {0, "alpha", 1, "A",
-                   "chance of a wrong DIFFERENT, and of a wrong EQUIVALENT (1e-3)"},
+                   "chance of a wrong DIFFERENT, and of a wrong EQUIVALENT, 1e-12 to\n"
+                   "0.4 (1e-3)"},
     [OPT_MARGIN] = {0, "margin", 1, "D",
                     "largest relative difference of the image mean that\n"
                     "counts as equal; 0: any difference counts (0)"},
     [OPT_MARGIN_TILE] = {0, "margin-tile", 1, "D", "the same for one tile (4 x --margin)"},
+    [OPT_MARGIN_VARIANCE] = {0, "margin-variance", 1, "D",
+                             "the same for the variance of one sample or replicate; 0:\n"
+                             "variances are not judged (0)"},
     [OPT_TILE] = {0, "tile", 1, "N", "side of a reporting tile, pixels (16, or the whole image)"},
+    [OPT_AGAIN] = {0, "again", 2, "A2 B2",
+                   "the same renders with fresh seeds: DIFFERENT only if they\n"
+                   "confirm what A and B show, each stage at the root of alpha"},
+    [OPT_EXCHANGEABLE] = {0, "exchangeable", 0, "",
+                          "A and B are directories of replicates of what should be the\n"
+                          "same program: an exact test by permutation, without margins"},
+    [OPT_MIN_SIDE] = {0, "min-side", 1, "N",
+                      "smallest region of that test, pixels (about 1/32 of the image)"},
+    [OPT_CURVE] = {0, "curve", 1, "CURVE",
+                   "of PNG files, from light to code: srgb, linear, gamma=G\n"
+                   "(G in 0.2 to 5), or cgl, the assignment's"},
+    [OPT_SPP_A] = {0, "spp-a", 1, "N", "samples per pixel of A, if its file has a variance only"},
+    [OPT_SPP_B] = {0, "spp-b", 1, "N", "the same for B"},
     [OPT_EXPECT] = {0, "expect", 1, "VERDICT", "what exit code 0 stands for (EQUIVALENT)"},
     [OPT_JSON] = {0, "json", 1, "FILE", "write the claim as results.json"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "print nothing; the exit code says it"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
+static const char help_head[] =
+    "usage: assay compare [options] A B\n\n"
+    "A is tested, B is the reference. Each is one of\n"
+    "  a moments EXR (of pathtracer or assay)\n"
+    "  a directory of at least 3 replicates: float EXR or PFM, each with a seed of its own\n"
+    "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (--spp-a, --spp-b)\n"
+    "  a picture without moments: EXR, HDR, PFM; its noise is then told by its neighbours\n"
+    "  a PNG of 8 or 16 bits (--curve)\n"
+    "What had to be assumed is printed with the verdict. Procedure: tools/README.md.\n";
+
 struct settings {
-    const char *path[2];
+    struct compare_job job;
     int num_paths;
     const char *json;
-    struct compare_options opt;
     enum verdict expect;
     bool quiet, done;
 };
+
+/* Rules between options. */
+static bool check(struct settings *s, bool has_tile_margin, struct err *e)
+{
+    struct compare_options *opt = &s->job.opt;
+    if (s->num_paths != 2)
+        return err_set(e, "compare needs two images (see --help)");
+    if (!has_tile_margin)
+        opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
+    if (s->job.exchangeable && (opt->margin_tile > 0 || opt->margin_variance > 0))
+        return err_set(e, "--exchangeable asks if anything differs at all: it takes no margin");
+    if (s->job.exchangeable &&
+        (s->job.input[0].curve != NULL || s->job.input[0].spp > 0 || s->job.input[1].spp > 0))
+        return err_set(e, "--exchangeable takes directories of replicates, to which --curve and "
+                          "--spp-a do not apply");
+    if (!s->job.exchangeable && s->job.min_side > 0)
+        return err_set(e, "--min-side is for --exchangeable");
+    return true;
+}
 
 static bool parse(int argc, char **argv, struct settings *s, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true, has_tile_margin = false;
+    struct compare_options *opt = &s->job.opt;
     for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return false;
@@ -53,17 +105,29 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         if (i == CLI_POSITIONAL) {
             if (s->num_paths == 2)
                 return err_set(e, "compare takes two images, '%s' is one more", v);
-            s->path[s->num_paths++] = v;
+            s->job.path[s->num_paths++] = v;
             continue;
         }
         switch ((enum option)i) {
-        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &s->opt.alpha, e); break;
-        case OPT_MARGIN: ok = cli_double("--margin", v, 0, 0.99, &s->opt.margin_global, e); break;
+        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &opt->alpha, e); break;
+        case OPT_MARGIN: ok = cli_double("--margin", v, 0, 0.99, &opt->margin_global, e); break;
         case OPT_MARGIN_TILE:
-            ok = cli_double("--margin-tile", v, 0, 0.99, &s->opt.margin_tile, e);
+            ok = cli_double("--margin-tile", v, 0, 0.99, &opt->margin_tile, e);
             has_tile_margin = true;
             break;
-        case OPT_TILE: ok = cli_int("--tile", v, 1, 65536, &s->opt.tile, e); break;
+        case OPT_MARGIN_VARIANCE:
+            ok = cli_double("--margin-variance", v, 0, 100, &opt->margin_variance, e);
+            break;
+        case OPT_TILE: ok = cli_int("--tile", v, 1, 65536, &opt->tile, e); break;
+        case OPT_AGAIN:
+            s->job.again[0] = c.value[0];
+            s->job.again[1] = c.value[1];
+            break;
+        case OPT_EXCHANGEABLE: s->job.exchangeable = true; break;
+        case OPT_MIN_SIDE: ok = cli_int("--min-side", v, 1, 65536, &s->job.min_side, e); break;
+        case OPT_CURVE: s->job.input[0].curve = s->job.input[1].curve = v; break;
+        case OPT_SPP_A: ok = cli_double("--spp-a", v, 3, 1e12, &s->job.input[0].spp, e); break;
+        case OPT_SPP_B: ok = cli_double("--spp-b", v, 3, 1e12, &s->job.input[1].spp, e); break;
         case OPT_EXPECT:
             if (!verdict_parse(v, &s->expect))
                 return err_set(e, "--expect: '%s' is none of: EQUIVALENT, DIFFERENT, INCONCLUSIVE",
@@ -72,102 +136,66 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         case OPT_JSON: s->json = v; break;
         case OPT_QUIET: s->quiet = true; break;
         case OPT_HELP:
-            puts("usage: assay compare [options] A.exr B.exr\n\n"
-                 "A is tested, B is the reference; both are moments images.\n");
+            puts(help_head);
             cli_print_options(stdout, options);
             s->done = true;
             return true;
         }
     }
-    if (!ok)
-        return false;
-    if (s->num_paths != 2)
-        return err_set(e, "compare needs two images (see --help)");
-    if (!has_tile_margin)
-        s->opt.margin_tile = fmin(4 * s->opt.margin_global, 0.99);
-    return true;
+    return ok && check(s, has_tile_margin, e);
 }
 
-static void print_result(const struct comparison *r)
+/* "1.25 %", or "nothing" where no test covers it. */
+static const char *detectable(double mdb, int digits, char text[32])
 {
+    if (mdb < region_mdb_none)
+        snprintf(text, 32, "%.*f %%", digits, 100 * mdb);
+    else
+        snprintf(text, 32, "nothing");
+    return text;
+}
+
+static void print_result(const struct compared *c, bool exchangeable)
+{
+    const struct comparison *r = &c->r;
     const struct region *g = &r->global[3];
+    char image[32], tile[32];
+    detectable(r->mdb_global, 3, image);
+    detectable(r->mdb_tile, 2, tile);
     printf("%s: %s\n", verdict_name(r->verdict), r->reason);
-    printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %.3f %% of the image, %.2f %% "
-           "of a tile; %d tests\n",
-           100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, 100 * r->mdb_global,
-           100 * r->mdb_tile, r->num_tests);
+    if (exchangeable)
+        printf("difference %+.3f %%, smallest detectable %s of the image; p = %.3g, smallest "
+               "possible %.2g; %d regions\n",
+               100 * g->difference, image, c->perm.p, c->perm.smallest_p, c->perm.num_regions);
+    else
+        printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %s of the image, %s of a "
+               "tile; %d tests\n",
+               100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, image, tile, r->num_tests);
     if (r->verdict == VERDICT_INCONCLUSIVE && r->extra_factor > 1)
         printf("about %.1f times the samples would decide\n", r->extra_factor);
-}
-
-/* The z and difference maps stand beside the JSON file and the report can be made of it. */
-static bool write_json(const struct settings *s, const struct comparison *r,
-                       const struct moments m[2], int argc, char **argv, struct err *e)
-{
-    const struct claim_context c = {
-        .a = s->path[0], .b = s->path[1], .expected = s->expect, .opt = s->opt};
-    char z[4096], relative[4096];
-    const char *slash = strrchr(s->json, '/');
-    const char *base = slash ? slash + 1 : s->json;
-    snprintf(z, sizeof z, "%s.z.exr", s->json);
-    snprintf(relative, sizeof relative, "%s.relative.exr", s->json);
-    if (!make_parent_dirs(s->json, e) || !image_write_exr(z, &r->z, e) ||
-        !image_write_exr(relative, &r->relative, e))
-        return false;
-    char *path[2] = {realpath(s->path[0], NULL), realpath(s->path[1], NULL)};
-    json_t *root = results_new(argc, argv, s->opt.alpha);
-    json_t *claim = claim_judged(&c, r);
-    bool ok = root != NULL && claim != NULL && path[0] != NULL && path[1] != NULL;
-    if (ok) {
-        claim_add_observations(claim, "a", &m[0]);
-        claim_add_observations(claim, "b", &m[1]);
-        json_object_set_new(claim, "files",
-                            json_pack("{s:s, s:s, s:s+, s:s+}", "a", path[0], "b", path[1], "z",
-                                      base, ".z.exr", "relative", base, ".relative.exr"));
-        json_array_append(json_object_get(root, "claims"), claim);
-        ok = json_write(s->json, root, e);
-    } else {
-        err_set(e, "%s: out of memory, or an image's full path is not known", s->json);
-    }
-    free(path[0]);
-    free(path[1]);
-    json_decref(claim);
-    json_decref(root);
-    return ok;
+    for (int i = 0; i < c->notes.num; i++)
+        printf("note: %s\n", c->notes.line[i]);
 }
 
 int verb_compare(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.opt = {.alpha = 1e-3}, .expect = VERDICT_EQUIVALENT};
-    struct moments m[2] = {{0}};
-    struct comparison r = {0};
-    int code = EXIT_NOT_JUDGED;
+    struct settings s = {.job.opt.alpha = 1e-3, .expect = VERDICT_EQUIVALENT};
+    struct compared c;
     if (!parse(argc, argv, &s, e))
-        return code;
+        return EXIT_NOT_JUDGED;
     if (s.done)
         return 0;
-    if (!moments_read(s.path[0], &m[0], NULL, e) || !moments_read(s.path[1], &m[1], NULL, e))
-        goto done;
-    if (s.opt.tile == 0) {
-        s.opt.tile = 16;
-        if (m[1].width % 16 != 0 || m[1].height % 16 != 0)
-            s.opt.tile = m[1].width == m[1].height ? m[1].width : 1;
-    }
-    if (!compare_moments(&m[0], &m[1], &s.opt, &r, e))
-        goto done;
-    if (!s.quiet)
-        print_result(&r);
-    if (s.json != NULL && !write_json(&s, &r, m, argc, argv, e))
-        goto done;
-    if (r.verdict == s.expect)
+    if (!compared_run(&s.job, &c, e))
+        return EXIT_NOT_JUDGED;
+    int code = EXIT_DIFFERENT;
+    if (c.r.verdict == s.expect)
         code = EXIT_EQUIVALENT;
-    else if (r.verdict == VERDICT_INCONCLUSIVE)
+    else if (c.r.verdict == VERDICT_INCONCLUSIVE)
         code = EXIT_INCONCLUSIVE;
-    else
-        code = EXIT_DIFFERENT;
-done:
-    comparison_free(&r);
-    moments_free(&m[0]);
-    moments_free(&m[1]);
+    if (!s.quiet)
+        print_result(&c, s.job.exchangeable);
+    if (s.json != NULL && !compared_write_json(&s.job, &c, s.expect, s.json, argc, argv, e))
+        code = EXIT_NOT_JUDGED;
+    compared_free(&c);
     return code;
 }

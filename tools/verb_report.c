@@ -1,6 +1,7 @@
 #include "../renderer/cli.h"
 #include "consistency_run.h"
 #include "convergence.h"
+#include "convergence_matrix.h"
 #include "report.h"
 #include "results.h"
 #include "results_matrix.h"
@@ -15,7 +16,8 @@ static const struct cli_option options[] = {
     [OPT_OUT] = {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
     [OPT_MARKDOWN] = {0, "markdown", 0, "", "no page; print the verdict table as Markdown"},
     [OPT_MATRIX] = {0, "matrix", 0, "",
-                    "the same, a row for each scene: ours against each reference"},
+                    "the same, a row for each scene: ours against each reference,\n"
+                    "and with convergence its slopes, biases and ratios to Cycles"},
     [OPT_CONVERGE] = {0, "converge", 1, "FILE",
                       "results.json of `assay converge`, to go into the same page or table"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
@@ -41,6 +43,23 @@ static bool print_markdown(const char *path, struct err *e)
     free(table);
     json_decref(results);
     return ok;
+}
+
+static bool print_matrix(const char *path, struct err *e)
+{
+    json_t *results;
+    if (!results_read(path, &results, e))
+        return false;
+    const json_t *convergence = json_object_get(results, "convergence");
+    bool has_claims = json_array_size(json_object_get(results, "claims")) > 0;
+    if (has_claims)
+        results_print_matrix(stdout, results);
+    if (has_claims && convergence != NULL)
+        putchar('\n');
+    if (convergence != NULL)
+        convergence_print_matrix(stdout, convergence);
+    json_decref(results);
+    return true;
 }
 
 /* index.html in the directory of the results. */
@@ -83,12 +102,12 @@ int verb_report(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     }
     if (matrix) {
-        json_t *r;
-        if (!results_read(results, &r, e))
-            return EXIT_NOT_JUDGED;
-        results_print_matrix(stdout, r);
-        json_decref(r);
-        return 0;
+        bool ok = print_matrix(results, e);
+        if (ok && converge != NULL) {
+            putchar('\n');
+            ok = print_matrix(converge, e);
+        }
+        return ok ? 0 : EXIT_NOT_JUDGED;
     }
     if (markdown) {
         bool ok = print_markdown(results, e);

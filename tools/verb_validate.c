@@ -2,6 +2,7 @@
 #include "../renderer/fs.h"
 #include "places.h"
 #include "consistency_run.h"
+#include "cost.h"
 #include "import_lines.h"
 #include "report.h"
 #include "results.h"
@@ -28,6 +29,8 @@ enum option {
     OPT_REFERENCE_SEED,
     OPT_THREADS,
     OPT_TIMEOUT,
+    OPT_BUDGET,
+    OPT_STAGES,
     OPT_UNTIL_DIFFERENT,
     OPT_QUIET,
     OPT_HELP
@@ -38,7 +41,15 @@ static const struct cli_option options[] = {
     [OPT_ONLY] = {0, "only", 1, "SCENE", "judge only this scene; may be given again"},
     [OPT_ALPHA] = {0, "alpha", 1, "A",
                    "chance of any wrong verdict in the whole run, for wrong\n"
-                   "DIFFERENT and for wrong EQUIVALENT each (1e-3)"},
+                   "DIFFERENT and for wrong EQUIVALENT each, down to 1e-12 (1e-3)"},
+    [OPT_BUDGET] = {0, "budget", 1, "T",
+                    "look at each claim with more and more samples until it is\n"
+                    "decided or the time is over: 90, 90s, 10m, 1h; alpha is spent\n"
+                    "over the looks (off: one look at the declared samples)"},
+    [OPT_STAGES] = {0, "stages", 1, "1|2",
+                    "2: DIFFERENT must be confirmed with fresh seeds, each stage at\n"
+                    "sqrt(alpha), where both sides can be rendered again, so not\n"
+                    "against goldens (2 if alpha < 1e-5, else 1)"},
     [OPT_OUT] = {'o', "out", 1, "DIR", "report, results and images (build/report)"},
     [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
@@ -55,8 +66,8 @@ static const struct cli_option options[] = {
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
     [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
     [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
-                             "cheapest scenes first; stop at the first that differs where it\n"
-                             "should not"},
+                             "few samples first, then more, up to the declared; stop at the\n"
+                             "first claim that differs where it should not"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -114,6 +125,10 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
             break;
         case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &o->threads, e); break;
         case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e); break;
+        case OPT_BUDGET:
+            ok = cli_with_unit("--budget", v, cli_time_units, 1e7, &o->budget_s, e);
+            break;
+        case OPT_STAGES: ok = cli_int("--stages", v, 1, 2, &o->stages, e); break;
         case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
@@ -147,7 +162,7 @@ static void print_not_expressible(const json_t *results)
                member_text(entry, "scene"), member_text(entry, "reason"));
 }
 
-static bool write_all(const json_t *results, const char *out_dir, struct err *e)
+static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
 {
     char json[4096], junit[4096], html[4096], *table;
     snprintf(json, sizeof json, "%s/results.json", out_dir);
@@ -165,6 +180,8 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
         import_print(stdout, loader);
     }
     print_not_expressible(results);
+    if (!quiet)
+        cost_print(stderr, results);
     printf("\n%s\n", html);
     return true;
 }
@@ -176,9 +193,18 @@ static void tell_not_judged(const json_t *results, struct err *e)
     size_t n = 0;
     for (size_t i = json_array_size(claims); i-- > 0;) {
         const json_t *claim = json_array_get(claims, i);
-        if (claim_outcome(claim) == OUTCOME_NOT_JUDGED) {
+        if (claim_outcome(claim) == OUTCOME_NOT_JUDGED && !claim_lacks_time(claim)) {
             first = claim;
             n++;
+        }
+    }
+    json_t *consistency = json_object_get(results, "consistency");
+    for (size_t i = 0; first == NULL && i < json_array_size(consistency); i++) {
+        const json_t *c = json_array_get(consistency, i);
+        if (consistency_outcome(c) == OUTCOME_NOT_JUDGED) {
+            err_set(e, "%s, its stated errors: %s", member_text(c, "scene"),
+                    member_text(c, "error"));
+            return;
         }
     }
     err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
@@ -225,7 +251,7 @@ int verb_validate(int argc, char **argv, struct err *e)
     if (o.threads == 0)
         o.threads = cli_processors();
     int code = EXIT_NOT_JUDGED;
-    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, e))
+    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, o.quiet, e))
         code = with_loader(results_exit_code(results), results, e);
     if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
         tell_not_judged(results, e);

@@ -13,6 +13,7 @@ int verb_golden(int argc, char **argv, struct err *e);
 int verb_export(int argc, char **argv, struct err *e);
 int verb_import_check(int argc, char **argv, struct err *e);
 int verb_merge(int argc, char **argv, struct err *e);
+int verb_diagnose(int argc, char **argv, struct err *e);
 int verb_report(int argc, char **argv, struct err *e);
 
 #endif

@@ -6,9 +6,12 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 static const double regression_mdb = 0.05; /* margins 0: a pass must have been able to see this */
-static const double largest_factor = 1e4;  /* of extra_factor */
+static const double named_share =
+    0.5; /* of the difference that a direction must explain to be named */
+static const double largest_factor = 1e4; /* of extra_factor */
 
 static bool inside_margin(const struct region *r)
 {
@@ -96,27 +99,77 @@ static void judge_regression(struct comparison *c)
     }
 }
 
+static bool rejects(const struct comparison *c, const struct compare_options *opt, int s)
+{
+    const struct statistic *st = &c->statistic[s];
+    return st->num_tests > 0 && st->log10_p <= log10(opt->alpha * st->share);
+}
+
+/* "shift by x +0.48 px [0.46, 0.50]" */
+static void name_direction(const struct direction *d, char *text, size_t size)
+{
+    if (d->unit[0] == '\0')
+        snprintf(text, size, "%s", d->name);
+    else
+        snprintf(text, size, "%s %+.3g %s [%.3g, %.3g]", d->name, d->amount, d->unit, d->lo, d->hi);
+}
+
+/* Regions say where; without one, the statistic whose p is furthest below its level. */
+static void judge_different(struct comparison *c, const struct compare_options *opt)
+{
+    char where[96], direction[128] = "";
+    size_t size = sizeof c->reason;
+    bool directed = rejects(c, opt, STATISTIC_DIRECTED);
+    int first = -1;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        if (rejects(c, opt, s) &&
+            (first < 0 || (first > STATISTIC_PYRAMID &&
+                           c->statistic[s].log10_p - log10(c->statistic[s].share) <
+                               c->statistic[first].log10_p - log10(c->statistic[first].share))))
+            first = s;
+    const struct statistic *st = &c->statistic[first];
+    c->verdict = VERDICT_DIFFERENT;
+    if (directed)
+        name_direction(&c->direction, direction, sizeof direction);
+    if (first <= STATISTIC_PYRAMID) {
+        place(c, &c->worst, where, sizeof where);
+        snprintf(c->reason, size,
+                 "%s: difference %+.3g %% (standard error %.2g %%) is beyond the margin of %.3g "
+                 "%%, p = 10^%.1f",
+                 where, 100 * c->worst.difference, 100 * c->worst.std_error, 100 * c->worst.margin,
+                 c->worst.log10_p);
+    } else if (first == STATISTIC_DENSE) {
+        snprintf(c->reason, size,
+                 "many differences, each too small to be found alone: %s are together beyond "
+                 "their margins, p = 10^%.1f",
+                 st->what, st->log10_p);
+    } else if (first == STATISTIC_DIRECTED) {
+        snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, p = 10^%.1f",
+                 direction, st->log10_p);
+    } else {
+        snprintf(c->reason, size,
+                 "the variance of a path is %.3g times that of B [%.3g, %.3g], beyond the margin "
+                 "of %.3g %%, p = 10^%.1f",
+                 c->variance.ratio, c->variance.lo, c->variance.hi, 100 * opt->margin_variance,
+                 st->log10_p);
+    }
+    size_t used = strlen(c->reason);
+    if (directed && c->direction.explained >= named_share)
+        snprintf(c->reason + used, size - used, "; looks like %s, %.0f %% of it",
+                 first == STATISTIC_DIRECTED ? "that" : direction, 100 * c->direction.explained);
+}
+
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles)
 {
     bool rejected = false;
     for (int s = 0; s < NUM_STATISTICS; s++)
-        rejected =
-            rejected || (c->statistic[s].num_tests > 0 &&
-                         c->statistic[s].log10_p <= log10(opt->alpha * c->statistic[s].share));
+        rejected = rejected || rejects(c, opt, s);
     c->extra_factor = 1;
-    if (rejected) {
-        char where[96];
-        place(c, &c->worst, where, sizeof where);
-        c->verdict = VERDICT_DIFFERENT;
-        snprintf(c->reason, sizeof c->reason,
-                 "%s: difference %+.3g %% (standard error %.2g %%) is beyond the margin of %.3g "
-                 "%%, p = 10^%.1f",
-                 where, 100 * c->worst.difference, 100 * c->worst.std_error, 100 * c->worst.margin,
-                 c->worst.log10_p);
-    } else if (opt->margin_global > 0) {
+    if (rejected)
+        judge_different(c, opt);
+    else if (opt->margin_global > 0)
         judge_equivalence(c, tiles);
-    } else {
+    else
         judge_regression(c);
-    }
 }

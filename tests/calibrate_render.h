@@ -1,0 +1,22 @@
+/* Null pairs of real renders: two pictures of one scene of the suite from disjoint seeds, by the
+ * renderer in this process. */
+#ifndef ASSAY_CALIBRATE_RENDER_H
+#define ASSAY_CALIBRATE_RENDER_H
+
+#include "calibrate_null.h"
+#include "calibrate_work.h"
+
+struct render_cell {
+    const char *scene; /* of the suite */
+    int side, spp;     /* side x side pixels, spp samples on both sides */
+    int replicates;    /* 0: B is like A; else B is that many replicates of spp samples each */
+    uint64_t seed;     /* the cell's seeds are its 2^32 successors' */
+};
+
+/* The suite in `scenes` ("reference/scenes"). Every pair runs at all levels. */
+bool render_run(struct work *w, const char *scenes, const struct render_cell *cell,
+                enum weakness weakness, size_t pairs, struct null_result *out, struct err *e)
+    __attribute__((warn_unused_result));
+double render_cost(const struct render_cell *cell, size_t pairs);
+
+#endif

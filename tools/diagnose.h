@@ -1,0 +1,65 @@
+/* Which known bug explains these pictures? Method, formulas and limits: tools/README.md, "How a bug is
+ * named". */
+#ifndef ASSAY_DIAGNOSE_H
+#define ASSAY_DIAGNOSE_H
+
+#include "catalogue.h"
+
+enum { DIAGNOSE_CANDIDATES = 8 };
+
+/* One look at the tested renderer. */
+struct clue {
+    const struct view *view;
+    struct sight seen;  /* with the facts that are known */
+    bool is_consistent; /* false: a claim of consistency came out DIFFERENT at its share of alpha */
+};
+
+struct diagnose_options {
+    double alpha; /* bounds the chance that a correct renderer is accused of anything */
+    const char
+        *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
+};
+
+enum finding { FINDING_CORRECT, FINDING_BUG, FINDING_UNKNOWN };
+
+struct candidate {
+    int bug;
+    double amplitude;      /* 1: its full effect; else the factor that fits best */
+    double log_likelihood; /* natural logarithm, over that of "correct" */
+    double explained;      /* share of the difference from the correct renderer, at most 1 */
+    double excess;         /* chi^2 of what is left over its mean, in its standard deviations */
+};
+
+/* How a bug explains one view. */
+struct evidence {
+    double t;                /* directed statistic, 0 where the bug does nothing here */
+    double log_lead;         /* log likelihood over "correct" of this view alone */
+    double explained;        /* as of a candidate, of this view alone; NAN where nothing differs */
+    int x, y, columns, rows; /* the square of 4 x 4 cells that says most, in cells */
+    double change;           /* the difference there, relative to the correct mean there */
+};
+
+struct diagnosis {
+    enum finding finding;
+    char gate[320]; /* what showed that the renderer is wrong, or why it is not called wrong */
+    double log10_p; /* of the most telling test, times the number of tests */
+    struct candidate candidate[DIAGNOSE_CANDIDATES]; /* most likely first; none if CORRECT */
+    int num_candidates;
+    int num_named;      /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
+    double probability; /* of those together, among all known bugs, equally likely beforehand */
+};
+
+/* clues: at least one, of views of c, each seen at most once and independent of each other. */
+bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
+              const struct diagnose_options *opt, struct diagnosis *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+struct evidence diagnose_evidence(const struct catalogue *c, const struct clue *clue,
+                                  const struct candidate *candidate);
+
+/* Only for tests of the bound: the largest log likelihood of any bug, full strength, over "correct". */
+double diagnose_largest_lead(const struct catalogue *c, const struct clue *clue, int num_clues);
+/* What a lead has to exceed. */
+double diagnose_bound(const struct catalogue *c, double alpha);
+
+#endif

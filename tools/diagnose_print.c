@@ -1,0 +1,138 @@
+#include "diagnose_print.h"
+
+#include <math.h>
+
+#define LN10 2.302585092994046
+
+enum { NEXT = 3 };
+
+static double log10_of(double natural)
+{
+    return natural / LN10;
+}
+
+static void print_bug(FILE *f, const struct catalogue *c, const struct candidate *k)
+{
+    const struct bug *b = &c->bug[k->bug];
+    fprintf(f, "  %s\n    where: %s   (tests/mutants/%s.patch)\n", b->what, b->where, b->name);
+    if (k->amplitude != 1)
+        fprintf(f, "    with %.2f times its effect\n", k->amplitude);
+}
+
+static void print_views(FILE *f, const struct catalogue *c, const struct clue *clue, int num_clues,
+                        const struct candidate *best)
+{
+    fprintf(f, "\n%-36s %9s %9s %10s  %s\n", "view", "T", "log10 L", "explained",
+            "where it shows most (pixels)");
+    for (int i = 0; i < num_clues; i++) {
+        struct evidence v = diagnose_evidence(c, &clue[i], best);
+        int cell = clue[i].seen.cell;
+        fprintf(f, "%-36s %9.1f %9.1f ", clue[i].view->name, v.t, log10_of(v.log_lead));
+        if (isnan(v.explained))
+            fprintf(f, "%10s", "-");
+        else
+            fprintf(f, "%8.1f %%", 100 * v.explained);
+        if (v.columns > 0)
+            fprintf(f, "  %d x %d at %d,%d: %+.3g %%", cell * v.columns, cell * v.rows, cell * v.x,
+                    cell * v.y, 100 * v.change);
+        fputc('\n', f);
+    }
+}
+
+static void print_bugs(FILE *f, const struct catalogue *c, const struct diagnosis *d)
+{
+    const struct candidate *best = &d->candidate[0];
+    fputs(d->num_named == 1 ? "likely bug:\n" : "likely one of these, which look the same here:\n",
+          f);
+    for (int i = 0; i < d->num_named; i++)
+        print_bug(f, c, &d->candidate[i]);
+    fprintf(f, "  probability %.4g among %d known bugs; explains %.1f %% of the difference",
+            d->probability, c->num_bugs, 100 * best->explained);
+    if (d->num_candidates > d->num_named)
+        fprintf(f, "; 10^%.1f times likelier than the next",
+                log10_of(best->log_likelihood - d->candidate[d->num_named].log_likelihood));
+    fputc('\n', f);
+}
+
+static void print_next(FILE *f, const struct catalogue *c, const struct diagnosis *d)
+{
+    int last = d->num_named + NEXT < d->num_candidates ? d->num_named + NEXT : d->num_candidates;
+    fputs("\nnext candidates (log10 likelihood under the best, explained)\n", f);
+    for (int i = d->num_named; i < last; i++) {
+        const struct candidate *k = &d->candidate[i];
+        fprintf(f, "  %8.1f %6.1f %%  %s (%s)",
+                log10_of(k->log_likelihood - d->candidate[0].log_likelihood), 100 * k->explained,
+                c->bug[k->bug].what, c->bug[k->bug].name);
+        if (k->amplitude != 1)
+            fprintf(f, ", %.2f times", k->amplitude);
+        fputc('\n', f);
+    }
+}
+
+void diagnosis_print(FILE *f, const struct catalogue *c, const struct clue *clue, int num_clues,
+                     const struct diagnosis *d, const json_t *skipped)
+{
+    switch (d->finding) {
+    case FINDING_CORRECT: fprintf(f, "nothing wrong found: %s\n", d->gate); break;
+    case FINDING_BUG:
+        print_bugs(f, c, d);
+        fprintf(f, "it is wrong because %s\n", d->gate);
+        break;
+    case FINDING_UNKNOWN:
+        fprintf(f, "wrong, but none of the %d known bugs explains it: %s\n", c->num_bugs, d->gate);
+        break;
+    }
+    if (d->num_candidates > 0) {
+        print_views(f, c, clue, num_clues, &d->candidate[0]);
+        print_next(f, c, d);
+    }
+    size_t i;
+    const json_t *s;
+    json_array_foreach(skipped, i, s)
+    {
+        fprintf(f, "not looked at: %s: %s\n", json_string_value(json_object_get(s, "view")),
+                json_string_value(json_object_get(s, "reason")));
+    }
+}
+
+static json_t *view_json(const struct catalogue *c, const struct clue *clue,
+                         const struct candidate *best)
+{
+    struct evidence v = diagnose_evidence(c, clue, best);
+    int cell = clue->seen.cell;
+    json_t *region = v.columns > 0
+                         ? json_pack("{si,si,si,si,sf}", "x", cell * v.x, "y", cell * v.y, "width",
+                                     cell * v.columns, "height", cell * v.rows, "change", v.change)
+                         : json_null();
+    return json_pack("{ss,sf,sf,so,so}", "view", clue->view->name, "t", v.t, "log10_lead",
+                     log10_of(v.log_lead), "explained",
+                     isnan(v.explained) ? json_null() : json_real(v.explained), "region", region);
+}
+
+json_t *diagnosis_json(const struct catalogue *c, const struct clue *clue, int num_clues,
+                       const struct diagnosis *d, const json_t *skipped)
+{
+    static const char *const finding[] = {
+        [FINDING_CORRECT] = "correct", [FINDING_BUG] = "bug", [FINDING_UNKNOWN] = "unknown"};
+    json_t *named = json_array(), *candidates = json_array(), *views = json_array();
+    for (int i = 0; i < d->num_named; i++)
+        json_array_append_new(named, json_string(c->bug[d->candidate[i].bug].name));
+    for (int i = 0; i < d->num_candidates; i++) {
+        const struct candidate *k = &d->candidate[i];
+        const struct bug *b = &c->bug[k->bug];
+        json_array_append_new(
+            candidates, json_pack("{ss,ss,ss,sf,sf,sf}", "name", b->name, "bug", b->what, "where",
+                                  b->where, "amplitude", k->amplitude, "log10_likelihood",
+                                  log10_of(k->log_likelihood), "explained", k->explained));
+    }
+    for (int i = 0; i < num_clues; i++)
+        json_array_append_new(views, d->num_candidates > 0
+                                         ? view_json(c, &clue[i], &d->candidate[0])
+                                         : json_pack("{ss}", "view", clue[i].view->name));
+    json_t *root = json_pack("{ss,ss,sf,si,so,so,so,sO}", "finding", finding[d->finding], "gate",
+                             d->gate, "log10_p", d->log10_p, "known_bugs", c->num_bugs, "named",
+                             named, "candidates", candidates, "views", views, "skipped", skipped);
+    if (root != NULL && d->finding == FINDING_BUG)
+        json_object_set_new(root, "probability", json_real(d->probability));
+    return root;
+}
