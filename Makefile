@@ -32,9 +32,11 @@ WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(pkg_cflags)
 cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 
-# Compiled once for each instruction set (renderer/isa.h), under these names.
-KERNELS  := $(foreach i,sse42 avx2 avx512,renderer/wide_kernel_$(i).c)
-RENDERER := $(filter-out renderer/main.c renderer/wide_kernel.c,$(wildcard renderer/*.c)) \
+# Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
+ISAS     := sse42 avx2 avx512
+BY_ISA   := renderer/wide_kernel renderer/wide_split
+KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
+RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) \
   $(wildcard renderer/*.cc) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
@@ -175,11 +177,12 @@ isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
 # -Wno-psabi: no vector of 32 bytes leaves the file.
 define kernel_object
-$(1)/renderer/wide_kernel_$(2).c.o: CFLAGS += -DISA=$(2) $(isa_$(2)) -Wno-psabi
-$(1)/renderer/wide_kernel_$(2).c.o: renderer/wide_kernel.c | $(BUILD)/deps
+$(1)/$(2)_$(3).c.o: CFLAGS += -DISA=$(3) $(isa_$(3)) -Wno-psabi
+$(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
 	$$(compile_c)
 endef
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(foreach i,sse42 avx2 avx512,$(eval $(call kernel_object,$(b),$(i)))))
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
+  $(eval $(call kernel_object,$(b),$(k),$(i))))))
 
 $(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
 	$(link)

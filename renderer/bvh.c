@@ -1,5 +1,6 @@
 #include "bvh.h"
 #include "bvh_wide.h"
+#include "wide_kernel.h"
 #include "shape.h"
 
 #include <float.h>

@@ -14,6 +14,11 @@ enum { LANES = 8 };
 typedef float vf __attribute__((vector_size(32)));
 typedef int32_t vi __attribute__((vector_size(32)));
 
+/* name_avx2, say: the Makefile defines ISA, once for each set. */
+#define FOR_ISA(name)  JOIN(name, ISA)
+#define JOIN(a, b)     JOIN_NOW(a, b)
+#define JOIN_NOW(a, b) a##_##b
+
 #define INLINE static inline __attribute__((always_inline))
 
 INLINE vf vf_set(float x)
