@@ -40,6 +40,9 @@ RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c))
   $(wildcard renderer/*.cc) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
+# Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
+RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
+CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
 SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/bench_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
@@ -52,9 +55,8 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang $(TESTS:%=$(BUILD)/san/%) \
-  $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
-	tests/run.sh $(BUILD)
+check: $(BUILD)/deps-test all programs-san programs-clang $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
+	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
@@ -119,7 +121,7 @@ help:
 	@echo 'make            build pathtracer and assay'
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
-	@echo 'make check      unit tests under ASan and UBSan, end-to-end tests'
+	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'

@@ -59,13 +59,26 @@ static bool stages_chunk(void *arg, int chunk, struct err *e)
     return ok;
 }
 
+/* Never all black, which two pictures could both be: the same picture twice is refused. */
+static void draw_picture(enum law law, uint64_t *state, float *pixels)
+{
+    float sum = 0;
+    while (sum == 0)
+        for (int p = 0; p < PERMUTED_SIDE * PERMUTED_SIDE; p++) {
+            float x = (float)fmax(0, draw(law, state));
+            for (int c = 0; c < 3; c++)
+                pixels[3 * p + c] = x;
+            sum += x;
+        }
+}
+
 static bool permutation_chunk(void *arg, int chunk, struct err *e)
 {
     struct gate_job *job = arg;
     uint64_t state = (job->permutation->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
     float pixels[2 * REPLICATES][3 * PERMUTED_SIDE * PERMUTED_SIDE];
     float *picture[2 * REPLICATES];
-    char name[2 * REPLICATES][4], *names[2 * REPLICATES];
+    char name[2 * REPLICATES][16], *names[2 * REPLICATES];
     for (int k = 0; k < 2 * REPLICATES; k++) {
         snprintf(name[k], sizeof name[k], "%d", k);
         picture[k] = pixels[k];
@@ -79,9 +92,7 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
     for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
         struct permutation p;
         for (int k = 0; k < 2 * REPLICATES; k++)
-            for (int v = 0; v < 3 * PERMUTED_SIDE * PERMUTED_SIDE; v++)
-                pixels[k][v] = v % 3 > 0 ? pixels[k][v - 1]
-                                         : (float)fmax(0, draw(job->permutation->law, &state));
+            draw_picture(job->permutation->law, &state, pixels[k]);
         if (!permutation_test(&a, &b, &opt, &p, e))
             return false;
         for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)

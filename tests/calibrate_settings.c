@@ -80,7 +80,7 @@ struct settings settings_published(double share)
     static const double margin_alpha[] = {0.05, 0.01, 0.001};
     struct settings s = {
         .blocks = 65536,
-        .synthetic_pairs = {part(share, 1e4), part(share, 1e5), 0},
+        .synthetic_pairs = {part(share, 1e4), part(share, 3e4), 0},
         .render_pairs = part(share, 200),
         .power_pairs = part(share, 2000),
         .cover_pairs = part(share, 2e4),
@@ -92,9 +92,9 @@ struct settings settings_published(double share)
         static const int n[][2] = {{16, 16}, {64, 64}, {1024, 1024}, {64, 1024}, {1024, 0}};
         for (size_t k = 0; k < sizeof n / sizeof *n; k++)
             add_synthetic(&s, laws[i], n[k][0], n[k][1]);
-        add_tail(&s, laws[i], 64, 64, part(share, 1.5e7));
+        add_tail(&s, laws[i], 64, 64, part(share, 5e6));
     }
-    add_tail(&s, LAW_NORMAL, 16, 16, part(share, 1.5e7));
+    add_tail(&s, LAW_NORMAL, 16, 16, part(share, 5e6));
     add_tail(&s, LAW_EXPONENTIAL, 64, 1024, part(share, 1e5));
     add_tail(&s, LAW_EXPONENTIAL, 1024, 0, part(share, 1e5));
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {

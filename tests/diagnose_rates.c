@@ -21,14 +21,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum {
-    POOL = 200,
-    TRIES = 10000,
-    LEADS = 500,
-    CONSISTENT_DRAWS = 1000,
-    MOST_VIEWS = 64,
-    MOST_THREADS = 64
-};
+enum { POOL = 200, TRIES = 10000, CONSISTENT_DRAWS = 1000, MOST_VIEWS = 64, MOST_THREADS = 64 };
 static const double alpha = 1e-6;
 
 struct rates {
@@ -368,12 +361,11 @@ static bool rate_synthetic(const struct rates *r, struct pool *p, struct err *e)
             break;
         accused += count_accused(&d);
         log10_p = fmin(log10_p, d.log10_p);
-        if (t < LEADS)
-            lead = fmax(lead, diagnose_largest_lead(&r->c, clue, r->c.num_views));
+        lead = fmax(lead, d.largest_lead);
     }
     if (ok)
-        printf("| synthetic | %d | %d | %.2f | %.1f (of the first %d; bound %.1f) |\n", TRIES,
-               accused, log10_p, lead / log(10), LEADS, diagnose_bound(&r->c, alpha) / log(10));
+        printf("| synthetic | %d | %d | %.2f | %.1f (bound %.1f) |\n", TRIES, accused, log10_p,
+               lead / log(10), diagnose_bound(&r->c, alpha) / log(10));
     free(clue);
     return ok;
 }
@@ -401,7 +393,7 @@ static bool rate_correct(const struct rates *r, struct err *e)
         if (ok) {
             accused += count_accused(&d);
             log10_p = fmin(log10_p, d.log10_p);
-            lead = fmax(lead, diagnose_largest_lead(&r->c, task[k].clue, r->c.num_views));
+            lead = fmax(lead, d.largest_lead);
             if (d.finding != FINDING_CORRECT)
                 fprintf(stderr, "correct render %d accused: %s\n", k, d.gate);
         }

@@ -50,6 +50,8 @@ static const struct {
     {"44_mesh", "", "", "", 32, 32, 16, 32, 1, false},
     {"45_many_lights", "", "", "", 32, 32, 16, 48, 1, false},
     {"46_sky", "", "", "", 32, 32, 16, 48, 1, false},
+    {"43_cornell_metal", "", "", "", 32, 32, 16, 48, 1, false},
+    {"28_beckmann_furnace", "", "", "", 32, 32, 16, 32, 1, false},
 };
 enum { NUM_VIEWS = sizeof views / sizeof views[0] };
 

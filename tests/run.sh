@@ -1,8 +1,10 @@
 #!/bin/bash
-# Runs every test program of BUILD/san/tests and the end-to-end tests, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs and the end-to-end tests, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
-build=${1:?usage: tests/run.sh BUILD}
+build=${1:?usage: tests/run.sh BUILD PROGRAM...}
+shift
+programs=("$@")
 passed=0 failed=0 skipped=0
 log=$build/check
 rm -rf "$log"
@@ -13,30 +15,26 @@ count() {
     grep -c "^\[ *$1 *\] [a-z]" "$2"
 }
 
-# One job: its output, exit status and seconds into files, so that jobs may run side by side.
+# run_job LOG PROGRAM BUILD: its output, exit status and seconds into files, so that jobs may run side by
+# side. Test programs take no arguments; the end-to-end tests take BUILD.
 run_job() {
-    local log=$1 name=$2 start=$SECONDS
-    shift 2
-    "$@" >"$log/$name.out" 2>&1
+    local log=$1 name start=$SECONDS
+    name=$(basename "$2" .sh)
+    case $2 in
+    *.sh) "$2" "$3" ;;
+    *) "$2" ;;
+    esac >"$log/$name.out" 2>&1
     echo "$? $((SECONDS - start))" >"$log/$name.status"
 }
 export -f run_job
 
-programs=()
-for program in "$build"/san/tests/test_*; do
-    case $program in *.o | *.d) continue ;; esac
-    programs+=("$program")
-done
 # The longest first: as many as there are processors at a time.
 {
-    echo "end_to_end tests/end_to_end.sh $build"
-    for program in "${programs[@]}"; do
-        case $program in */test_calibration | */test_cycles* | */test_povray* | */test_embree | */test_lights) echo "$(basename "$program") $program" ;; esac
-    done
-    for program in "${programs[@]}"; do
-        case $program in */test_calibration | */test_cycles* | */test_povray* | */test_embree | */test_lights) ;; *) echo "$(basename "$program") $program" ;; esac
-    done
-} | xargs -L 1 -P "$(nproc)" bash -c 'run_job "$0" "$@"' "$log"
+    echo tests/end_to_end.sh
+    long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
+    printf '%s\n' "${programs[@]}" | grep -E "$long"
+    printf '%s\n' "${programs[@]}" | grep -vE "$long"
+} | xargs -I{} -P "$(nproc)" bash -c 'run_job "$0" {} "$1"' "$log" "$build"
 
 for program in "${programs[@]}"; do
     name=$(basename "$program")

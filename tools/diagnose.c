@@ -10,10 +10,13 @@
 
 /* Student's law instead of the normal one: a cell with a firefly costs a hypothesis a few units, not
  * hundreds [Lange89]. */
-static const double dof = 5;
+static const double cell_dof = 5;
+/* Facts are sums over whole pictures: no firefly decides them. */
+static const double fact_dof = 30;
 /* How well an effect is known to be the same at another size. */
 static const double model_error = 0.01;
-static const double fact_error = 0.05;
+static const double fact_error[NUM_FACTS] = {
+    [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
 /* What floats, stored and rendered, are good for. */
 static const double rounding = 1e-5;
 /* Of the variance that the correct renderer's predicts: a cell that by luck states less is not believed. */
@@ -43,7 +46,7 @@ struct tally {
     double left, all;              /* in the same weights: what is left, and without the bug */
 };
 
-static double student(double z2, double var)
+static double student(double z2, double var, double dof)
 {
     return -0.5 * (dof + 1) * log1p(z2 / dof) - 0.5 * log(var);
 }
@@ -71,7 +74,7 @@ static void add_cell(const struct clue *clue, const struct effect *e, double amp
         double fuzz = pow(rounding * (a->mean[i] + c->mean[i] + scale), 2);
         double var = noise + fuzz + pow(model_error * effect, 2);
         double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
-        log_likelihood += student(z2, var) / 3;
+        log_likelihood += student(z2, var, cell_dof) / 3;
         chi2 += fmin(z2, 100) / 3;
         chi2_mean += noise / var / 3;
         t->left += (fmin(z2, 1e4) - noise / var) / 3;
@@ -97,10 +100,10 @@ static void add_facts(const struct clue *clue, const struct effect *e, double am
             fact += amplitude * (e->fact[f] - fact);
             sd = e->fact_sd[f];
         }
-        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error * fact_error;
+        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
         double z2 = pow(clue->seen.fact[f] - fact, 2) / var;
         double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
-        t->log_likelihood += student(z2, var);
+        t->log_likelihood += student(z2, var, fact_dof);
         t->chi2 += fmin(z2, 100);
         t->left += fmin(z2, 1e4) - 1;
         t->all += fmin(all, 1e4) - 1;
@@ -323,19 +326,24 @@ static void keep_likelier(struct candidate *c, const struct candidate *other)
         *c = *other;
 }
 
-/* Each bug at its full strength or, unless the best explains all that way, at the amplitude that fits best,
- * whichever is likelier. */
-static int rank(const struct hypotheses *h, const struct diagnose_options *opt,
-                struct candidate *all)
+/* Each bug at its full strength, likeliest first. */
+static int rank_full(const struct hypotheses *h, const struct diagnose_options *opt,
+                     struct candidate *all)
 {
-    enum { REFINED = 6 };
     int num = 0;
     for (int b = 0; b < h->c->num_bugs; b++)
         if (b != excluded(h->c, opt))
             all[num++] = candidate_of(h, b, 1);
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
+    return num;
+}
+
+/* Unless the best explains all at full strength, each at the amplitude that fits best, if that is likelier. */
+static void rank_free(const struct hypotheses *h, struct candidate *all, int num)
+{
+    enum { REFINED = 6 };
     if (num > 0 && all[0].excess <= largest_excess)
-        return num;
+        return;
     for (int i = 0; i < num; i++) {
         struct candidate free_one = candidate_of(h, all[i].bug, first_amplitude(h, all[i].bug));
         keep_likelier(&all[i], &free_one);
@@ -347,7 +355,19 @@ static int rank(const struct hypotheses *h, const struct diagnose_options *opt,
         keep_likelier(&all[i], &refined);
     }
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
-    return num;
+}
+
+/* A bug that is so much likelier than "correct" shows that the renderer is wrong. */
+static bool gate_lead(const struct hypotheses *h, const struct candidate *best, double alpha,
+                      struct diagnosis *out)
+{
+    if (best->log_likelihood < diagnose_bound(h->c, alpha))
+        return false;
+    if (out->gate[0] == '\0')
+        snprintf(out->gate, sizeof out->gate,
+                 "a known bug explains the pictures 10^%.0f times better than no bug",
+                 best->log_likelihood / log(10));
+    return true;
 }
 
 static void name(const struct candidate *all, int num, double bound, struct diagnosis *out)
@@ -395,37 +415,30 @@ bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
     assert(num_clues > 0 && opt->alpha > 0 && opt->alpha < 0.5);
     *out = (struct diagnosis){0};
     struct hypotheses h = {.c = c, .clue = clue, .num_clues = num_clues};
-    bool differs = false, ok = true;
+    bool differs = false, by_verdict = false, ok = true;
     for (int k = 0; ok && k < num_clues; k++)
         ok = check(&clue[k], e);
-    ok = ok && gate(clue, num_clues, opt->alpha, &differs, out, e);
+    struct candidate *all = calloc((size_t)c->num_bugs, sizeof *all);
+    ok = ok && (all != NULL || err_set(e, "out of memory")) && tally_correct(&h, e) &&
+         gate(clue, num_clues, opt->alpha, &differs, out, e);
+    int num = ok ? rank_full(&h, opt, all) : 0;
+    if (ok && num > 0) {
+        out->largest_lead = all[0].log_likelihood;
+        by_verdict = differs;
+        differs = gate_lead(&h, &all[0], opt->alpha, out) || differs;
+    }
     if (ok && !differs) {
         out->finding = FINDING_CORRECT;
         snprintf(out->gate, sizeof out->gate,
                  "no difference from the correct renderer in %d view%s", num_clues,
                  num_clues == 1 ? "" : "s");
     } else if (ok) {
-        struct candidate *all = calloc((size_t)c->num_bugs, sizeof *all);
-        ok = (all != NULL || err_set(e, "out of memory")) && tally_correct(&h, e);
-        if (ok)
-            name(all, rank(&h, opt, all), diagnose_bound(c, opt->alpha), out);
-        free(h.correct);
-        free(all);
+        rank_free(&h, all, num);
+        name(all, num, by_verdict ? log(tie * c->num_bugs) : diagnose_bound(c, opt->alpha), out);
     }
-    return ok;
-}
-
-double diagnose_largest_lead(const struct catalogue *c, const struct clue *clue, int num_clues)
-{
-    struct hypotheses h = {.c = c, .clue = clue, .num_clues = num_clues};
-    struct err e;
-    double largest = -INFINITY;
-    if (!tally_correct(&h, &e))
-        return NAN;
-    for (int b = 0; b < c->num_bugs; b++)
-        largest = fmax(largest, candidate_of(&h, b, 1).log_likelihood);
     free(h.correct);
-    return largest;
+    free(all);
+    return ok;
 }
 
 /* ---- evidence */

@@ -45,8 +45,9 @@ struct diagnosis {
     double log10_p; /* of the most telling test, times the number of tests */
     struct candidate candidate[DIAGNOSE_CANDIDATES]; /* most likely first; none if CORRECT */
     int num_candidates;
-    int num_named;      /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
-    double probability; /* of those together, among all known bugs, equally likely beforehand */
+    double largest_lead; /* of any bug at full strength over "correct", natural logarithm */
+    int num_named;       /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
+    double probability;  /* of those together, among all known bugs, equally likely beforehand */
 };
 
 /* clues: at least one, of views of c, each seen at most once and independent of each other. */
@@ -57,9 +58,7 @@ bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
 struct evidence diagnose_evidence(const struct catalogue *c, const struct clue *clue,
                                   const struct candidate *candidate);
 
-/* Only for tests of the bound: the largest log likelihood of any bug, full strength, over "correct". */
-double diagnose_largest_lead(const struct catalogue *c, const struct clue *clue, int num_clues);
-/* What a lead has to exceed. */
+/* What a lead has to reach. */
 double diagnose_bound(const struct catalogue *c, double alpha);
 
 #endif

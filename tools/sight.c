@@ -12,12 +12,6 @@ static bool check(const struct moments *m, int columns, struct err *e)
     if (m->width % columns != 0 || m->height % cell != 0 || m->height / cell > SIGHT_SIDE)
         return err_set(
             e,
-            "%d x %d pixels: the longer side has to be a multiple of %d, and the other of "
-            "a %dth of it",
-            m->width, m->height, SIGHT_SIDE, SIGHT_SIDE);
-    if (strcmp(m->unit, "sample") != 0 && strcmp(m->unit, "replicate") != 0)
-        return err_set(
-            e,
             "%d x %d pixels: the width has to be a multiple of %d, and the height of the "
             "%dth of the width",
             m->width, m->height, columns, columns);

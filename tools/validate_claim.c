@@ -26,8 +26,8 @@ static void rerun_command(const struct validation *v, const struct task *t, char
         snprintf(how, sizeof how, " --budget %gs", o->budget_s);
     else if (v->sequence != &sequence_single)
         snprintf(how, sizeof how, " --until-different");
-    snprintf(how + strlen(how), sizeof how - strlen(how), v->stages == 1 ? "" : " --stages %d",
-             v->stages);
+    if (v->stages != 1)
+        snprintf(how + strlen(how), sizeof how - strlen(how), " --stages %d", v->stages);
     int claims = 0;
     for (int i = 0; i < v->num_tasks; i++)
         claims += v->task[i].scene == t->scene;
