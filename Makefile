@@ -43,7 +43,8 @@ TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/bench_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
+BENCH    := $(wildcard tests/bench*.c)
+SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -77,8 +78,8 @@ calibrate: $(BUILD)/tests/make_calibration
 	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
 	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
-bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench_rays
-	$(BUILD)/tests/bench_rays --json $(BUILD)/bench_rays.json
+bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench
+	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -100,6 +101,8 @@ print-compile:
 	@echo $(CC) $(filter-out -g,$(cflags))
 print-libs:
 	@echo $(LIBS)
+print-kernels:
+	@$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
@@ -129,7 +132,7 @@ help:
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
-	@echo 'make bench-rays  rays per second against Embree, one thread (a minute)'
+	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
@@ -178,8 +181,9 @@ isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
 # -Wno-psabi: no vector of 32 bytes leaves the file.
+isa_flags   = -DISA=$(1) $(isa_$(1)) -Wno-psabi
 define kernel_object
-$(1)/$(2)_$(3).c.o: CFLAGS += -DISA=$(3) $(isa_$(3)) -Wno-psabi
+$(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
 $(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
 	$$(compile_c)
 endef
@@ -199,12 +203,14 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
-$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench_rays: TEST_LIBS := -lcmocka -lembree3
+$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
+$(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH) tests/mesh.c tests/calibrate_plot.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
@@ -223,7 +229,7 @@ $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c tests/bench_*.c tests/diagnose_rates.c))
+  $(wildcard tests/make_*.c tests/diagnose_rates.c) $(BENCH))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -260,7 +266,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+.PHONY: all validate check mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:
