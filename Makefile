@@ -12,17 +12,19 @@ V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
-DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
+DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
+  nettle-dev
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenImageIO jansson gsl nettle
+PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
-LIBS       = $(shell pkg-config --libs $(PKGS)) -lm -pthread
+# --as-needed: pathtracer starts at once, without the libraries that only the harness uses.
+LIBS       = -Wl,--as-needed $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
 SANITIZE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 OPT      := -O3 -g -fno-math-errno -fno-trapping-math
@@ -36,9 +38,8 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 ISAS     := sse42 avx2 avx512
 BY_ISA   := renderer/wide_kernel renderer/wide_split
 KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
-RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) \
-  $(wildcard renderer/*.cc) $(KERNELS)
-HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
+RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
+HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
