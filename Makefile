@@ -44,7 +44,7 @@ TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
-BENCH    := $(wildcard tests/bench*.c)
+BENCH    := $(wildcard tests/bench*.c) tests/embree_tracer.c
 SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
@@ -212,6 +212,8 @@ $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH) tests/mesh.c tests/calibrate_plot.c) $(BUILD)/libassay.a
 	$(link)
+# The peer gets all that this machine has; ours chooses when it starts.
+$(BUILD)/tests/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
 $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a

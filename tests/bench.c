@@ -1,6 +1,6 @@
 /* bench [--build DIR] [--out DIR] [--isa NAME] [--rounds N] [--smoke] [--only SCENE]... [PART...]
  *
- * Measures the parts named, or all: rays. Tables on standard output; OUT/results.json and plots as SVG.
+ * Measures the parts named, or all: rays paths. Tables on standard output; OUT/results.json and plots as SVG.
  * Exits with 1 where results differ, with 3 where it could not measure. */
 #include "bench.h"
 
@@ -15,6 +15,7 @@ static const struct {
     json_t *(*measure)(const struct bench_options *o, bool *wrong, struct err *e);
 } parts[] = {
     {"rays", bench_rays},
+    {"paths", bench_paths},
 };
 enum { NUM_PARTS = sizeof parts / sizeof parts[0], MAX_ONLY = 16 };
 

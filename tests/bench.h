@@ -25,5 +25,6 @@ bool bench_wanted(const struct bench_options *o, const char *scene);
 /* Each prints its table and gives what it shows, a new reference. *wrong: results differ, which is also
  * said; nothing is then timed. A failure to measure is a line in *e and NULL. */
 json_t *bench_rays(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_paths(const struct bench_options *o, bool *wrong, struct err *e);
 
 #endif

@@ -14,6 +14,7 @@ static const struct {
     {"18_mirror_box", NULL, 0, 0},
     {"41_cornell", NULL, 0, 0},
     {"CBspheres_lambertian", "sky", 0, 0},
+    {"CBspheres", "sky", 0, 0},
     {"44_mesh", NULL, 0, 0},
     {"CBbunny", "sky", 0, 0},
     {"CBgems", "sky", 0, 0},

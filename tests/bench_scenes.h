@@ -12,7 +12,7 @@ struct bench_scene {
     bool framed; /* the file has a camera; else one looks at the mesh from outside */
 };
 
-enum { BENCH_NUM_SCENES = 15 };
+enum { BENCH_NUM_SCENES = 16 };
 const char *bench_scene_name(int i);
 
 /* Loads the one of that name; scene_free(&out->scene). False, saying so on standard output, if it is the course's
