@@ -35,8 +35,8 @@ const char *image_get_attr(const struct image *im, const char *name);
 /* Index of a channel by exact name, -1 if absent. */
 int image_channel(const struct image *im, const char *name);
 
-/* Reads any file that OpenImageIO knows. Integer formats come scaled to [0,1], no colour
- * conversion. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+/* Reads OpenEXR, Radiance HDR, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1],
+ * no colour conversion. Refuses, unread, what is too large or more than a file of that length can hold. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
 
@@ -52,7 +52,7 @@ struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
     enum image_type type; /* the smallest of its channels */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
-    int parts;            /* pictures in one file (EXR parts, TIFF pages), 1 .. */
+    int parts;            /* pictures in one file (EXR parts), 1 .. */
     bool is_cropped;      /* the file holds another rectangle than the picture shown */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)

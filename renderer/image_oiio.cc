@@ -1,26 +1,33 @@
 // The one C++ file: image.h over OpenImageIO. Exceptions end here, as text in struct err.
 extern "C" {
+#include "exr_header.h"
 #include "image.h"
 }
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <string>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <vector>
 
 namespace
 {
 
-// 16384 x 16384 pixels of a dozen channels; a header that asks for more is refused unread.
+// 16384 x 16384 pixels of a dozen channels; a header that asks for more is refused unread. So is one that
+// promises more numbers than the file can hold: deflate, the densest of the compressions in use, makes one byte of
+// 1032, and there is a table entry for each row or tile besides.
 constexpr int max_side = 1 << 16;
 constexpr double max_floats = 4e9;
+constexpr double max_expansion = 1032;
 
 // Runs f; an exception or false becomes a line that starts with `path`.
 template <typename F> bool guarded(const char *path, struct err *e, F &&f)
@@ -31,9 +38,6 @@ template <typename F> bool guarded(const char *path, struct err *e, F &&f)
             return true;
         while (!why.empty() && (why.back() == '\n' || why.back() == ' '))
             why.pop_back();
-        for (char &c : why)
-            if (c == '\n')
-                c = ' ';
         return err_set(e, "%s: %s", path, why.empty() ? "unknown image error" : why.c_str());
     } catch (const std::exception &x) {
         return err_set(e, "%s: %s", path, x.what());
@@ -50,6 +54,65 @@ template <typename F> bool by_rename(const char *path, struct err *e, F &&write)
     if (!ok)
         unlink(temp.c_str());
     return ok;
+}
+
+// The four formats that are documented. The library would try every reader that it has, for minutes and with gigabytes
+// if the file is none of theirs.
+std::unique_ptr<OIIO::ImageInput> open_image(const char *path, std::string &why)
+{
+    struct stat st;
+    std::FILE *f = std::fopen(path, "rb");
+    unsigned char head[8] = {};
+    if (f == nullptr || fstat(fileno(f), &st) != 0 || S_ISDIR(st.st_mode)) {
+        why = std::string("cannot read: ") +
+              std::strerror(f != nullptr && S_ISDIR(st.st_mode) ? EISDIR : errno);
+        if (f != nullptr)
+            std::fclose(f);
+        return nullptr;
+    }
+    size_t n = std::fread(head, 1, sizeof head, f);
+    bool is_exr = n == 8 && std::memcmp(head, "\x76\x2f\x31\x01", 4) == 0;
+    bool is_whole =
+        !is_exr || exr_header_is_whole(f, head[4] | unsigned(head[5]) << 8, st.st_size - 8);
+    std::fclose(f);
+    const char *format = nullptr;
+    if (is_exr)
+        format = "openexr";
+    else if (n == 8 && std::memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0)
+        format = "png";
+    else if (n >= 2 && head[0] == '#' && head[1] == '?')
+        format = "hdr";
+    else if (n >= 3 && head[0] == 'P' && std::strchr("123456Ff", head[1]) != nullptr &&
+             std::isspace(head[2]))
+        format = "pnm";
+    if (format == nullptr) {
+        why = "not an OpenEXR, Radiance, PNG or PFM file";
+        return nullptr;
+    }
+    if (!is_whole) {
+        why = "cannot read: the file ends within its header";
+        return nullptr;
+    }
+    OIIO::ImageSpec spec;
+    auto in = OIIO::ImageInput::create(format);
+    if (!in || !in->open(path, spec)) {
+        why = "cannot read: " + (in ? in->geterror() : OIIO::geterror());
+        return nullptr;
+    }
+    if (spec.width < 1 || spec.height < 1 || spec.width > max_side || spec.height > max_side ||
+        spec.nchannels < 1 || spec.nchannels > 4096 || spec.depth > 1 ||
+        double(spec.width) * spec.height * spec.nchannels > max_floats) {
+        why = "an image of " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
+              " x " + std::to_string(spec.nchannels) + " is more than this program takes";
+        return nullptr;
+    }
+    if (double(spec.image_bytes(true)) > max_expansion * double(st.st_size)) {
+        why = "an image of " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
+              " x " + std::to_string(spec.nchannels) + " cannot be in " +
+              std::to_string(st.st_size) + " bytes";
+        return nullptr;
+    }
+    return in;
 }
 
 bool write_png_to(OIIO::ImageOutput &out, const std::string &name, int width, int height,
@@ -71,24 +134,10 @@ extern "C" bool image_read(const char *path, struct image *out, bool *half, stru
     struct image im = {};
     bool small = false;
     bool ok = guarded(path, e, [&](std::string &why) {
-        if (access(path, R_OK) != 0) {
-            why = std::string("cannot read: ") + std::strerror(errno);
+        auto in = open_image(path, why);
+        if (!in)
             return false;
-        }
-        auto in = OIIO::ImageInput::open(path);
-        if (!in) {
-            why = "cannot read: " + OIIO::geterror();
-            return false;
-        }
         const OIIO::ImageSpec &spec = in->spec();
-        if (spec.width < 1 || spec.height < 1 || spec.width > max_side || spec.height > max_side ||
-            spec.nchannels < 1 || spec.nchannels > 4096 || spec.depth > 1 ||
-            double(spec.width) * spec.height * spec.nchannels > max_floats) {
-            why = "an image of " + std::to_string(spec.width) + " x " +
-                  std::to_string(spec.height) + " x " + std::to_string(spec.nchannels) +
-                  " is more than this program takes";
-            return false;
-        }
         std::vector<std::string> names(spec.channelnames);
         names.resize(size_t(spec.nchannels));
         std::vector<const char *> cnames;
@@ -128,15 +177,9 @@ extern "C" bool image_inspect(const char *path, struct image_info *out, struct e
 {
     *out = {};
     return guarded(path, e, [&](std::string &why) {
-        if (access(path, R_OK) != 0) {
-            why = std::string("cannot read: ") + std::strerror(errno);
+        auto in = open_image(path, why);
+        if (!in)
             return false;
-        }
-        auto in = OIIO::ImageInput::open(path);
-        if (!in) {
-            why = "cannot read: " + OIIO::geterror();
-            return false;
-        }
         const OIIO::ImageSpec spec = in->spec();
         std::snprintf(out->format, sizeof out->format, "%s", in->format_name());
         size_t smallest = 8;
