@@ -86,7 +86,7 @@ std::unique_ptr<OIIO::ImageInput> open_image(const char *path, std::string &why)
              std::isspace(head[2]))
         format = "pnm";
     if (format == nullptr) {
-        why = "not an OpenEXR, Radiance, PNG or PFM file";
+        why = "cannot read: not an OpenEXR, Radiance, PNG or PFM file";
         return nullptr;
     }
     if (!is_whole) {
