@@ -12,7 +12,7 @@ V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
-DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev
+DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev bubblewrap
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
