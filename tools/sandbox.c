@@ -419,8 +419,22 @@ bool sandbox_pack(const char *path, const char *tar, size_t most, struct err *e)
     }
     char limit[64];
     snprintf(limit, sizeof limit, "--fsize=%zu", most);
-    const char *const argv[] = {"prlimit",      limit,  "--", "tar", "-C", parent,
-                                "--mode=u+rwX", "-cSf", tar,  "--",  name, NULL};
+    const char *const argv[] = {"prlimit",
+                                limit,
+                                "--",
+                                "tar",
+                                "-C",
+                                parent,
+                                "--mode=u+rwX",
+                                "--sort=name",
+                                "--owner=0",
+                                "--group=0",
+                                "--numeric-owner",
+                                "-cSf",
+                                tar,
+                                "--",
+                                name,
+                                NULL};
     const struct process p = {.argv = argv, .timeout_s = 120};
     struct err why;
     if (process_run(&p, NULL, &why))
