@@ -1,13 +1,16 @@
 #include "agreement.h"
 
-#include "hygiene.h"
 #include "rubric.h"
-#include "spatial.h"
 #include "stats.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
+
+static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.05;
+/* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
+static const double unknown_dof = 30;
+static const double least_used = 0.25; /* of a tile, of the picture */
+enum { FEWEST = 60 };                  /* second differences */
 
 double interval_distance(const struct interval *i)
 {
@@ -19,133 +22,218 @@ double interval_half(const struct interval *i)
     return (i->hi - i->lo) / 2;
 }
 
-static bool side(const struct student *s, const unsigned char *use, struct moments *m,
-                 struct err *e)
+/* A pair of pictures being compared. */
+struct pair {
+    const struct student *a, *b;
+    const unsigned char *use;
+};
+
+/* Sums for the slope of r^2 - c on m: kappa = xy/xx, and of squared residuals once kappa is known. */
+struct slope {
+    double num, xx, xy, residual;
+};
+
+static bool all_used(const struct pair *p, int x, int y)
 {
-    size_t pixels = (size_t)s->width * (size_t)s->height;
-    if (!moments_alloc(m, s->width, s->height, e))
+    int width = p->a->width;
+    if (x < 1 || y < 1 || x >= width - 1 || y >= p->a->height - 1)
         return false;
-    m->tolerance = calloc(3 * pixels, sizeof *m->tolerance);
-    if (m->tolerance == NULL)
-        return err_set(e, "out of memory for %zu pixels", pixels);
-    for (size_t i = 0; i < 3 * pixels; i++) {
-        m->mean[i] = use[i / 3] ? s->mean[i] : 0;
-        m->tolerance[i] = use[i / 3] ? s->tolerance[i] : 0;
-    }
+    for (int k = 0; k < 9; k++)
+        if (!p->use[(size_t)(y - 1 + k / 3) * (size_t)width + (size_t)(x - 1 + k % 3)])
+            return false;
     return true;
 }
 
-static struct interval interval_of(const struct region *r)
+/* At each place that has noise: r^2 = kappa m + c, weight 1/(m + c)^2. */
+static void add_place(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
 {
-    return (struct interval){r->difference, r->ci_lo, r->ci_hi, r->std_error};
+    static const double kernel[3] = {1, -2, 1};
+    double r = 0, m = 0, rounding = 0;
+    for (int k = 0; k < 9; k++) {
+        size_t i =
+            3 * ((size_t)(y - 1 + k / 3) * (size_t)p->a->width + (size_t)(x - 1 + k % 3)) + c;
+        double w = kernel[k / 3] * kernel[k % 3] / 6;
+        r += w * (p->a->mean[i] - p->b->mean[i]);
+        m += w * w * (p->a->variance[i] + p->b->variance[i]);
+        rounding += w * w * (p->a->rounding[i] + p->b->rounding[i]);
+    }
+    /* Where rounding is the larger, r^2 says nothing of noise: a flat area is rounded alike everywhere. */
+    if (m <= rounding)
+        return;
+    double weight = 1 / ((m + rounding) * (m + rounding));
+    s->num++;
+    s->xx += weight * m * m;
+    s->xy += weight * m * (r * r - rounding);
+    s->residual += pow(weight * m * (r * r - rounding - kappa * m), 2);
 }
 
-static double share_used(const unsigned char *use, int width, struct rect r)
+static struct slope sum_places(const struct pair *p, struct rect r, double kappa)
 {
-    double num = 0;
+    struct slope s = {0};
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++)
-            num += use[(size_t)y * (size_t)width + (size_t)x] != 0;
-    return num / ((double)r.width * r.height);
+            for (size_t c = 0; c < 3 && all_used(p, x, y); c++)
+                add_place(p, x, y, c, kappa, &s);
+    return s;
 }
 
-static void measure_tiles(const struct judge *j, const struct pyramid *p, const unsigned char *use,
-                          struct agreement *out)
+struct noise {
+    double kappa;
+    double dof; /* of kappa as a variance */
+    bool known;
+};
+
+static struct noise noise_in(const struct pair *p, struct rect r)
 {
-    static const double least_used = 0.25;
-    const struct pyramid_level *level = &p->level[p->tile_level];
-    double furthest = -1;
-    for (int i = 0; i < level->nx * level->ny; i++) {
-        struct rect rect = pyramid_rect(p, p->tile_level, (size_t)i);
-        struct region r = region_fill(j, &level->cell[i], rect, CHANNEL_LUMINANCE);
-        out->relative[i] = r.difference;
-        if (!r.ci_valid || share_used(use, j->width, rect) < least_used) {
-            out->relative[i] = NAN;
-            continue;
-        }
-        struct interval interval = interval_of(&r);
-        /* Among tiles that agree: the one that is least sure to. */
-        double distance =
-            interval_distance(&interval) + 1e-9 * fmax(fabs(interval.lo), fabs(interval.hi));
-        out->tiles++;
-        if (distance > furthest) {
-            furthest = distance;
-            out->tile = interval;
-            out->tile_x = rect.x;
-            out->tile_y = rect.y;
-        }
+    struct slope s = sum_places(p, r, 0);
+    if (s.num < FEWEST)
+        return (struct noise){.kappa = 1, .dof = unknown_dof};
+    struct noise n = {.kappa = s.xy / s.xx, .known = s.xy > 0};
+    n.kappa = fmax(least_kappa, n.kappa);
+    s = sum_places(p, r, n.kappa);
+    double variance = overlap * channels_alike * s.residual / (s.xx * s.xx);
+    n.dof = fmax(3, stats_dof(n.kappa, variance));
+    return n;
+}
+
+/* Sums over a region, one channel. */
+struct sums {
+    double d, b, v, k3, tolerance, used;
+};
+
+static double weighted(const double *x, int channel)
+{
+    return channel < CHANNEL_LUMINANCE ? x[channel]
+                                       : luminance_weight[0] * x[0] + luminance_weight[1] * x[1] +
+                                             luminance_weight[2] * x[2];
+}
+
+/* For any correlation of the channels (pyramid.h). */
+static double weighted_root(const double *x, int channel, double power)
+{
+    double sum = 0;
+    if (channel < CHANNEL_LUMINANCE)
+        return x[channel];
+    for (int c = 0; c < 3; c++)
+        sum += luminance_weight[c] * copysign(pow(fabs(x[c]), 1 / power), x[c]);
+    return copysign(pow(fabs(sum), power), sum);
+}
+
+static void add_pixel(const struct pair *p, size_t i, int channel, double kappa, struct sums *s)
+{
+    double v[3], k3[3], tolerance[3];
+    for (size_t c = 0; c < 3; c++) {
+        size_t k = 3 * i + c;
+        v[c] =
+            kappa * (p->a->variance[k] + p->b->variance[k]) + p->a->rounding[k] + p->b->rounding[k];
+        k3[c] = kappa * sqrt(kappa) * (p->a->k3[k] - p->b->k3[k]);
+        tolerance[c] = p->a->tolerance[k] + p->b->tolerance[k];
     }
+    s->used++;
+    s->b += weighted(p->b->mean + 3 * i, channel);
+    s->d += weighted(p->a->mean + 3 * i, channel) - weighted(p->b->mean + 3 * i, channel);
+    s->v += weighted_root(v, channel, 2);
+    s->k3 += weighted_root(k3, channel, 3);
+    s->tolerance += weighted(tolerance, channel);
 }
 
-static bool measure(const struct moments *a, const struct moments *b, const unsigned char *use,
-                    double alpha, struct agreement *out, struct err *e)
+static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, double kappa)
 {
-    size_t tiles = (size_t)(a->width / RUBRIC_TILE) * (size_t)(a->height / RUBRIC_TILE);
-    /* region_fill() gives 1 - 2 alpha. */
-    struct compare_options opt = {.alpha = alpha / 2 / (double)(NUM_CHANNELS + tiles),
-                                  .tile = RUBRIC_TILE};
-    struct judge j;
-    struct rect whole = {0, 0, a->width, a->height};
-    out->relative = calloc(tiles, sizeof *out->relative);
-    if (out->relative == NULL)
-        return err_set(e, "out of memory for %zu tiles", tiles);
-    if (!hygiene_check(a, b, &opt, &j, e))
-        return false;
-    for (int c = 0; c < NUM_CHANNELS; c++) {
-        struct pyramid p;
-        if (!pyramid_build(a, b, c, RUBRIC_TILE, &p, e))
-            return false;
-        struct region r = region_fill(&j, &p.level[p.num_levels - 1].cell[0], whole, c);
-        out->image[c] = interval_of(&r);
-        if (c == CHANNEL_LUMINANCE)
-            measure_tiles(&j, &p, use, out);
-        pyramid_free(&p);
+    struct sums s = {0};
+    for (int y = r.y; y < r.y + r.height; y++)
+        for (int x = r.x; x < r.x + r.width; x++) {
+            size_t i = (size_t)y * (size_t)p->a->width + (size_t)x;
+            if (p->use[i])
+                add_pixel(p, i, channel, kappa, &s);
+        }
+    return s;
+}
+
+/* False: too skewed. `alpha` two-sided; divided by what skewness may do to the tail of a sum whose variance is known
+ * from elsewhere, exp(g x^3/6) (Cramer), at most e. */
+static bool interval_from(const struct sums *s, double unit, double dof, double alpha,
+                          struct interval *out)
+{
+    double factor = 0, x = 0, sd = sqrt(s->v);
+    for (int i = 0; i < 4 && sd > 0; i++) {
+        x = stats_t_quantile(alpha / 2 * exp(-factor), dof);
+        factor = fmin(1, fabs(s->k3) / (s->v * sd) * x * x * x / 6);
     }
-    return true;
+    double half = x * sd + s->tolerance;
+    *out = (struct interval){s->d / unit, (s->d - half) / unit, (s->d + half) / unit, sd / unit};
+    return factor < 1;
 }
 
-/* Where all that is compared is the same, there is no noise to find: both sides are exact. */
-static bool is_same(const struct student *a, const struct student *b, const unsigned char *use)
+static struct rect around(const struct student *s, struct rect r)
 {
-    for (size_t i = 0; i < 3 * (size_t)a->width * (size_t)a->height; i++)
-        if (use[i / 3] && a->mean[i] != b->mean[i])
-            return false;
-    return true;
+    int x0 = r.x - RUBRIC_TILE, y0 = r.y - RUBRIC_TILE, x1 = r.x + 2 * RUBRIC_TILE,
+        y1 = r.y + 2 * RUBRIC_TILE;
+    x0 = x0 < 0 ? 0 : x0;
+    y0 = y0 < 0 ? 0 : y0;
+    x1 = x1 > s->width ? s->width : x1;
+    y1 = y1 > s->height ? s->height : y1;
+    return (struct rect){x0, y0, x1 - x0, y1 - y0};
+}
+
+static void measure_tile(const struct pair *p, struct rect r, const struct noise *whole,
+                         double floor, double alpha, double *furthest, double *relative,
+                         struct agreement *out)
+{
+    struct noise noise = noise_in(p, around(p->a, r));
+    if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
+        noise = *whole;
+    struct sums s = sum_pixels(p, r, CHANNEL_LUMINANCE, noise.kappa);
+    struct interval interval;
+    *relative = NAN;
+    if (s.used < least_used * r.width * r.height ||
+        !interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &interval))
+        return;
+    *relative = interval.value;
+    out->tiles++;
+    /* Among tiles that agree: the one that is least sure to. */
+    double distance =
+        interval_distance(&interval) + 1e-9 * fmax(fabs(interval.lo), fabs(interval.hi));
+    if (distance <= *furthest)
+        return;
+    *furthest = distance;
+    out->tile = interval;
+    out->tile_x = r.x;
+    out->tile_y = r.y;
 }
 
 bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
                        double alpha, struct agreement *out, struct err *e)
 {
-    size_t pixels = (size_t)a->width * (size_t)a->height, used = 0;
-    struct moments ma = {0}, mb = {0};
-    struct spatial noise;
-    unsigned char *left = malloc(pixels);
+    const struct pair p = {a, b, use};
+    const struct rect whole = {0, 0, a->width, a->height};
+    int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
+    double pixels = (double)a->width * a->height, furthest = -1;
     *out = (struct agreement){0};
-    bool ok = left != NULL || err_set(e, "out of memory for %zu pixels", pixels);
-    for (size_t p = 0; ok && p < pixels; p++) {
-        left[p] = !use[p];
-        used += use[p] != 0;
+    struct noise noise = noise_in(&p, whole);
+    struct sums luminance = sum_pixels(&p, whole, CHANNEL_LUMINANCE, noise.kappa);
+    out->compared = luminance.used / pixels;
+    out->kappa = noise.kappa;
+    if (out->compared < least_used)
+        return err_set(e, "only %.0f %% of the pixels can be compared, the others are saturated",
+                       100 * out->compared);
+    if (!(luminance.b > 0))
+        return err_set(e, "there is no light to compare with");
+    double floor = floor_fraction * luminance.b / luminance.used;
+    alpha /= NUM_CHANNELS + columns * rows;
+    for (int c = 0; c < NUM_CHANNELS; c++) {
+        struct sums s = sum_pixels(&p, whole, c, noise.kappa);
+        if (!interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &out->image[c]))
+            return err_set(e, "rare bright pixels keep it from being judged");
     }
-    out->compared = (double)used / (double)pixels;
-    ok = ok && (4 * used >= pixels ||
-                err_set(e, "only %.0f %% of the pixels can be compared: the others are saturated",
-                        100 * out->compared));
-    ok = ok && side(a, use, &ma, e) && side(b, use, &mb, e);
-    if (ok && is_same(a, b, use)) {
-        strcpy(ma.unit, "exact");
-        strcpy(mb.unit, "exact");
-        for (size_t p = 0; p < pixels; p++)
-            ma.n[p] = mb.n[p] = 1;
-    } else {
-        ok = ok && spatial_variance(&ma, &mb, a->rounding, b->rounding, left, &noise, e);
+    out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);
+    if (out->relative == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < columns * rows; i++) {
+        struct rect r = {i % columns * RUBRIC_TILE, i / columns * RUBRIC_TILE, RUBRIC_TILE,
+                         RUBRIC_TILE};
+        measure_tile(&p, r, &noise, floor, alpha, &furthest, &out->relative[i], out);
     }
-    ok = ok && measure(&ma, &mb, use, alpha, out, e);
-    moments_free(&ma);
-    moments_free(&mb);
-    free(left);
-    if (!ok)
-        agreement_free(out);
-    return ok;
+    return true;
 }
 
 void agreement_free(struct agreement *a)
@@ -154,62 +242,18 @@ void agreement_free(struct agreement *a)
     *a = (struct agreement){0};
 }
 
-/* Sums of squares and fourth powers of second differences of picture less reference. */
-struct sums {
-    double num, s2, s4, rounding;
-};
-
-static bool all_used(const unsigned char *use, int width, int x, int y)
+bool agreement_noise(const struct student *p, const struct student *reference_p,
+                     const struct student *q, const struct student *reference_q,
+                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
 {
-    for (int v = y - 1; v <= y + 1; v++)
-        for (int u = x - 1; u <= x + 1; u++)
-            if (!use[(size_t)v * (size_t)width + (size_t)u])
-                return false;
-    return true;
-}
-
-static struct sums noise_sums(const struct student *s, const double *reference,
-                              const unsigned char *use)
-{
-    static const double kernel[3] = {1, -2, 1};
-    struct sums out = {0};
-    for (int y = 1; y < s->height - 1; y++)
-        for (int x = 1; x < s->width - 1; x++) {
-            if (!all_used(use, s->width, x, y))
-                continue;
-            for (size_t c = 0; c < 3; c++) {
-                double r = 0, rounding = 0;
-                for (int k = 0; k < 9; k++) {
-                    size_t i =
-                        3 * ((size_t)(y - 1 + k / 3) * (size_t)s->width + (size_t)(x - 1 + k % 3)) +
-                        c;
-                    double w = kernel[k / 3] * kernel[k % 3] / 6;
-                    r += w * (s->mean[i] - reference[i]);
-                    rounding += w * w * s->rounding[i];
-                }
-                out.num++;
-                out.s2 += r * r;
-                out.s4 += pow(r, 4);
-                out.rounding += rounding;
-            }
-        }
-    return out;
-}
-
-bool agreement_noise(const struct student *p, const double *reference_p, const struct student *q,
-                     const double *reference_q, const unsigned char *use, double alpha,
-                     struct interval *out, struct err *e)
-{
-    static const double tail_factor = 4, least = 100;
-    const struct sums a = noise_sums(p, reference_p, use), b = noise_sums(q, reference_q, use);
-    double va = a.s2 - a.rounding, vb = b.s2 - b.rounding;
-    if (a.num < 3 * least)
-        return err_set(e, "too few pixels can be compared to tell their noise");
-    if (!(va > 0) || !(vb > 0))
+    const struct rect whole = {0, 0, p->width, p->height};
+    const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};
+    struct noise na = noise_in(&a, whole), nb = noise_in(&b, whole);
+    if (!na.known || !nb.known)
         return err_set(e, "there is no noise in one of the pictures");
-    /* Three channels of one lamp vary together: as if a third of them. */
-    double sd = sqrt(3 * tail_factor * (a.s4 / (va * va) + b.s4 / (vb * vb)));
-    double half = stats_normal_quantile(alpha / 2) * sd, value = log(va / vb);
+    /* Var ln v = 2/dof. */
+    double sd = sqrt(2 / na.dof + 2 / nb.dof), value = log(na.kappa / nb.kappa);
+    double half = stats_normal_quantile(alpha / 2) * sd;
     *out = (struct interval){value, value - half, value + half, sd};
     return true;
 }

@@ -2,7 +2,7 @@
 #ifndef ASSAY_AGREEMENT_H
 #define ASSAY_AGREEMENT_H
 
-#include "region.h"
+#include "pyramid.h"
 #include "student.h"
 
 /* A quantity that should be 0 and the interval that holds its true value with 1 - alpha. */
@@ -21,24 +21,35 @@ struct agreement {
     int tile_x, tile_y;      /* pixels */
     int tiles;               /* that could be judged */
     double compared;         /* share of the pixels */
+    double kappa;            /* noise variance over that of our renderer */
     double *relative;        /* per tile, difference in luminance; NAN where not judged */
 };
 
-/* A against B over the pixels with use[p] != 0. In a tile too skewed for an interval (region.h), or with less
- * than a quarter of its pixels in use, nothing is judged. alpha is that of all intervals together. Noise is that of
- * the difference (spatial.h), which needs 32 x 32 pixels; `exact`: there is none, as in two pictures that are the
- * same. Means of a and b where use[p] is 0 are set to 0. Fails where nothing can be compared: a line fit for the
- * student. The caller frees with agreement_free(). */
+/* A against B over the pixels with use[p] != 0; means elsewhere are not looked at.
+ *
+ * Noise. Neither file states any. What is known is the variance that a render of as many samples by our own
+ * renderer has in each pixel (struct student: variance), and that neighbouring pixels of A - B differ by noise alone
+ * where the pictures agree: r = second differences, as in spatial.h, with E[r^2] = kappa m + c, m from those
+ * variances, c from rounding. kappa, the noise of this program over ours, is their weighted least squares slope,
+ * one for the picture, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
+ * from the residuals, times 4 for r that overlap (spatial.h) and 3 for channels that one lamp makes alike, gives
+ * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide.
+ * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
+ * a tile (tools/README.md, "EQUIVALENT").
+ *
+ * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
+ * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
+ * frees with agreement_free(). */
 bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
                        double alpha, struct agreement *out, struct err *e)
     __attribute__((warn_unused_result));
 void agreement_free(struct agreement *a);
 
-/* ln of the variance of P over that of Q in a pixel, from second differences of each less its reference (means,
- * 3 per pixel), over pixels with use[p] != 0, RGB together; rounding is taken off. Var(sum r^2) is at most
- * 4 sum r^4 (spatial.h). Fails where there is no noise in one of them. */
-bool agreement_noise(const struct student *p, const double *reference_p, const struct student *q,
-                     const double *reference_q, const unsigned char *use, double alpha,
-                     struct interval *out, struct err *e) __attribute__((warn_unused_result));
+/* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
+ * that of ours does. Fails where there is no noise in one of them. */
+bool agreement_noise(const struct student *p, const struct student *reference_p,
+                     const struct student *q, const struct student *reference_q,
+                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -117,6 +117,17 @@ static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
     return truth_render(&scene, ref, out, e) || err_prefix(e, "%s:%d", r->path, p->line);
 }
 
+/* How samples vary, from a render of ours. */
+static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
+                     const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    enum { NOISE_SPP = 256 };
+    struct rubric_picture ours = *p;
+    if (p->reference != REFERENCE_OURS)
+        ours.reference_spp = NOISE_SPP;
+    return render_ours(r, &ours, opt, out, e);
+}
+
 bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
                   struct err *e)
 {
@@ -128,6 +139,7 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
         const struct rubric_picture *p = &r->picture[i];
         struct answer *a = &out->picture[i];
         ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
+        ok = ok && noise_of(r, p, opt, &a->noise, e);
         for (int k = 0; ok && k < p->num_accepted; k++) {
             snprintf(path, sizeof path, "%s/%s", r->dir, p->accept[k].file);
             ok = moments_read(path, &a->accepted[k], NULL, e);
@@ -146,6 +158,7 @@ void answers_free(struct answers *a)
 {
     for (int i = 0; i < RUBRIC_PICTURES; i++) {
         moments_free(&a->picture[i].m);
+        moments_free(&a->picture[i].noise);
         for (int k = 0; k < RUBRIC_ACCEPTED; k++)
             moments_free(&a->picture[i].accepted[k]);
     }

@@ -97,7 +97,7 @@ static json_t *picture_json(const struct rubric_picture *p, const struct made *m
                      s->mean != NULL ? s->sha256 : NULL);
 }
 
-static bool add_checks(const struct grade_job *job, const struct handed_in *h, json_t *grade,
+static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t *grade,
                        struct err *e)
 {
     const struct rubric *r = job->rubric;

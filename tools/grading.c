@@ -35,7 +35,7 @@ struct work {
     const struct rubric *r;
     const struct rubric_check *check;
     const struct answers *answers;
-    const struct handed_in *h;
+    struct handed_in *h;
     double alpha;
 };
 
@@ -56,45 +56,24 @@ static const struct moments *reference(const struct work *w, int k)
     return m->width > 0 ? m : NULL;
 }
 
+static const struct moments *expected_noise(const struct work *w, int k)
+{
+    return &w->answers->picture[w->check->picture[k]].noise;
+}
+
 static unsigned char *usable(const struct work *w, struct err *e)
 {
     size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
     unsigned char *use = malloc(pixels);
-    if (use == NULL)
-        err_set(e, "out of memory for %zu pixels", pixels);
-    for (size_t p = 0; use != NULL && p < pixels; p++) {
-        use[p] = 1;
-        for (int k = 0; k < w->check->num_pictures; k++)
-            if (!student_comparable(student(w, k), reference(w, k), picture(w, k)->spp, p))
-                use[p] = 0;
-    }
-    return use;
-}
-
-static bool blank(const struct student *like, struct student *out, struct err *e)
-{
-    size_t n = 3 * (size_t)like->width * (size_t)like->height;
-    *out = (struct student){.width = like->width, .height = like->height, .clip = like->clip};
-    out->mean = calloc(n, sizeof *out->mean);
-    out->tolerance = calloc(n, sizeof *out->tolerance);
-    out->rounding = calloc(n, sizeof *out->rounding);
-    out->clipped = calloc(n, 1);
-    if (out->mean != NULL && out->tolerance != NULL && out->rounding != NULL &&
-        out->clipped != NULL)
-        return true;
-    student_free(out);
-    return err_set(e, "out of memory for %zu values", n);
-}
-
-/* What the student's file would hold at best. */
-static bool from_moments(const struct moments *m, const struct student *like, struct student *out,
-                         struct err *e)
-{
-    if (!blank(like, out, e))
-        return false;
-    for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++)
-        out->mean[i] = fmin(m->mean[i], like->clip);
-    return true;
+    bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
+    if (ok)
+        memset(use, 1, pixels);
+    for (int k = 0; ok && k < w->check->num_pictures; k++)
+        ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
+    if (ok)
+        return use;
+    free(use);
+    return NULL;
 }
 
 /* The noise of the reference itself, in a picture that should have noise of its own: a copy. A share of values
@@ -181,7 +160,7 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
     for (int k = -1; ok && k < p->num_accepted && out->share < 1; k++) {
         struct result tried = {.judged = true};
         struct student b;
-        ok = from_moments(k < 0 ? &answer->m : &answer->accepted[k], student(w, 0), &b, e);
+        ok = student_from(k < 0 ? &answer->m : &answer->accepted[k], student(w, 0), &b, e);
         if (!ok)
             break;
         compare(w, student(w, 0), &b, use, &tried);
@@ -234,16 +213,15 @@ static bool check_sum(const struct work *w, struct result *out, struct err *e)
 {
     struct student sum;
     unsigned char *use = usable(w, e);
-    bool ok = use != NULL && blank(student(w, 0), &sum, e);
+    bool ok = use != NULL && student_from(NULL, student(w, 0), &sum, e);
     snprintf(out->expected, sizeof out->expected,
              "%s is the sum of the other %d pictures, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
              picture(w, 0)->name, w->check->num_pictures - 1, 100 * w->check->image.full,
              100 * w->check->tile.full);
     for (int k = 1; ok && k < w->check->num_pictures; k++)
         student_add(&sum, student(w, k));
-    for (size_t p = 0; ok && p < (size_t)sum.width * (size_t)sum.height; p++)
-        if (!student_comparable(&sum, NULL, 1, p))
-            use[p] = 0;
+    if (ok)
+        student_unclipped(&sum, use);
     if (ok) {
         compare(w, student(w, 0), &sum, use, out);
         student_free(&sum);
@@ -304,25 +282,21 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     struct student rp, rq;
     struct interval i;
     struct err why;
-    bool ok = use != NULL && from_moments(reference(w, 0), p, &rp, e);
-    if (ok && !from_moments(reference(w, 1), q, &rq, e)) {
+    bool ok = use != NULL && student_from(reference(w, 0), p, &rp, e);
+    if (ok && !student_from(reference(w, 1), q, &rq, e)) {
         student_free(&rp);
         ok = false;
     }
     snprintf(out->expected, sizeof out->expected,
-             "the variance of %s is %.4g times that of %s, within a factor of %.3g",
-             picture(w, 0)->name, w->check->ratio, picture(w, 1)->name,
-             exp(w->check->log_ratio.full));
+             "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
+             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
     if (!ok) {
         free(use);
         return false;
     }
-    if (agreement_noise(p, rp.mean, q, rq.mean, use, w->alpha, &i, &why)) {
-        snprintf(out->seen, sizeof out->seen, "%.3g times (%.3g to %.3g)", exp(i.value), exp(i.lo),
-                 exp(i.hi));
-        i.value -= log(w->check->ratio);
-        i.lo -= log(w->check->ratio);
-        i.hi -= log(w->check->ratio);
+    if (agreement_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+        snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
+                 exp(i.lo), exp(i.hi));
         out->share = score_share(&w->check->log_ratio, &i);
         out->chance = score_chance(&w->check->log_ratio, &i);
     } else {
@@ -361,9 +335,17 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
+/* The noise that a picture should have. */
+static void expect_noise(const struct work *w)
+{
+    for (int k = 0; k < w->check->num_pictures; k++)
+        student_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
+                       picture(w, k)->spp);
+}
+
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, const struct handed_in *h, double alpha,
-                   struct result *out, struct err *e)
+                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
+                   struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
                                                 struct err *) = {
@@ -380,6 +362,7 @@ bool grading_check(const struct rubric *r, const struct rubric_check *check,
         out->judged = h->made[i].end != SANDBOX_LOST;
         return true;
     }
+    expect_noise(&w);
     return kinds[check->kind](&w, out, e);
 }
 

@@ -8,6 +8,8 @@
 /* What the pictures of a rubric should be; made once for all submissions. */
 struct answer {
     struct moments m; /* of the reference; width 0: none */
+    struct moments
+        noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments accepted[RUBRIC_ACCEPTED];
 };
 struct answers {
@@ -56,8 +58,8 @@ struct handed_in {
 /* alpha: of one check: the chance that a program which is right loses points in it. Fails only for our own
  * trouble. The caller frees with result_free(). */
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, const struct handed_in *h, double alpha,
-                   struct result *out, struct err *e) __attribute__((warn_unused_result));
+                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
+                   struct err *e) __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

@@ -288,7 +288,6 @@ static bool read_in_check(struct statement *s, const char *word)
     else if (strcmp(word, "share") == 0)
         take_margin(s, word, &c->share);
     else if (strcmp(word, "ratio") == 0) {
-        take_number(s, word, 1e-6, 1e6, &c->ratio);
         take_margin(s, word, &c->log_ratio);
     } else if (strcmp(word, "batch") == 0)
         take_int(s, word, 1, 1 << 20, &c->batch);

@@ -35,7 +35,7 @@
  *     image D0 D1, tile D0 D1           relative difference: full points inside +-D0, none outside +-D1 (equal,
  *                                       agree, sum; tiles are SIDE = 8 pixels)
  *     share D0 D1                       of pixels that are wrong (exact, rates)
- *     ratio R D0 D1                     D0, D1 on the natural logarithm (noise)
+ *     ratio D0 D1                       on the natural logarithm (noise)
  *     batch N                           samples (rates)
  *     title TEXT, hint TEXT, where TEXT (the place in the assignment)
  *     visibility hidden | after_due_date | after_published | visible (default) */
@@ -104,7 +104,6 @@ struct rubric_check {
     enum check_kind kind;
     int picture[CHECK_PICTURES], num_pictures; /* indices */
     struct margin image, tile, share, log_ratio;
-    double ratio;
     int batch;
     char title[160], hint[512], where[160], visibility[24];
 };

@@ -27,8 +27,11 @@ static bool allocate(struct student *s, struct err *e)
     s->mean = calloc(n, sizeof *s->mean);
     s->tolerance = calloc(n, sizeof *s->tolerance);
     s->rounding = calloc(n, sizeof *s->rounding);
+    s->variance = calloc(n, sizeof *s->variance);
+    s->k3 = calloc(n, sizeof *s->k3);
     s->clipped = calloc(n, 1);
-    return (s->mean != NULL && s->tolerance != NULL && s->rounding != NULL && s->clipped != NULL) ||
+    return (s->variance != NULL && s->k3 != NULL && s->mean != NULL && s->tolerance != NULL &&
+            s->rounding != NULL && s->clipped != NULL) ||
            err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
 }
 
@@ -104,8 +107,54 @@ void student_free(struct student *s)
     free(s->mean);
     free(s->tolerance);
     free(s->rounding);
+    free(s->variance);
+    free(s->k3);
     free(s->clipped);
     *s = (struct student){0};
+}
+
+void student_expect(struct student *s, const struct moments *m, double spp)
+{
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++)
+            for (size_t c = 0; c < 3; c++) {
+                double v = 0, k3 = 0, num = 0;
+                for (int k = 0; k < 9; k++) {
+                    int u = x - 1 + k % 3, w = y - 1 + k / 3;
+                    if (u < 0 || w < 0 || u >= s->width || w >= s->height)
+                        continue;
+                    size_t p = (size_t)w * (size_t)s->width + (size_t)u;
+                    double n = m->n[p], paths = fmax(1, m->spp) / spp;
+                    if (m->mean[3 * p + c] >= s->clip)
+                        continue;
+                    v += n > 1 ? m->m2[3 * p + c] / (n - 1) * paths : 0;
+                    k3 += n > 2 ? n * m->m3[3 * p + c] / ((n - 1) * (n - 2)) * paths * paths : 0;
+                    num++;
+                }
+                size_t i = 3 * ((size_t)y * (size_t)s->width + (size_t)x) + c;
+                bool varies = m->mean[i] < s->clip;
+                s->variance[i] = varies ? v / num : 0;
+                s->k3[i] = varies ? k3 / num : 0;
+            }
+}
+
+bool student_from(const struct moments *m, const struct student *like, struct student *out,
+                  struct err *e)
+{
+    *out = (struct student){.width = like->width, .height = like->height, .clip = like->clip};
+    if (!allocate(out, e)) {
+        student_free(out);
+        return false;
+    }
+    for (size_t i = 0; m != NULL && i < 3 * (size_t)m->width * (size_t)m->height; i++) {
+        double n = m->n[i / 3];
+        out->mean[i] = fmin(m->mean[i], like->clip);
+        if (m->mean[i] >= like->clip)
+            continue;
+        out->variance[i] = n > 1 ? m->m2[i] / (n * (n - 1)) : 0;
+        out->k3[i] = n > 2 ? m->m3[i] / (n * (n - 1) * (n - 2)) : 0;
+    }
+    return true;
 }
 
 void student_add(struct student *dst, const struct student *src)
@@ -114,6 +163,8 @@ void student_add(struct student *dst, const struct student *src)
         dst->mean[i] += src->mean[i];
         dst->tolerance[i] += src->tolerance[i];
         dst->rounding[i] += src->rounding[i];
+        dst->variance[i] += src->variance[i];
+        dst->k3[i] += src->k3[i];
         dst->clipped[i] |= src->clipped[i];
     }
 }
@@ -124,24 +175,82 @@ double student_expected_sd(const struct moments *reference, size_t i, double spp
     return n > 1 ? sqrt(reference->m2[i] / (n - 1) * paths / spp) : 0;
 }
 
-bool student_comparable(const struct student *s, const struct moments *reference, double spp,
-                        size_t p)
+/* Clears use[p] where mark[] is `kind` or more in p or beside it, but not where p itself is `spared`. */
+static void clear_around(const struct student *s, const unsigned char *mark, unsigned char kind,
+                         unsigned char spared, unsigned char *use)
 {
-    if (reference != NULL) {
-        for (size_t i = 3 * p; i < 3 * p + 3; i++)
-            if (fabs(reference->mean[i] - s->clip) <
-                clip_sd * student_expected_sd(reference, i, spp) + s->tolerance[i])
-                return false;
-        return true;
-    }
-    int x = (int)(p % (size_t)s->width), y = (int)(p / (size_t)s->width);
-    for (int v = y - 1; v <= y + 1; v++)
-        for (int u = x - 1; u <= x + 1; u++) {
-            if (u < 0 || v < 0 || u >= s->width || v >= s->height)
-                continue;
-            const unsigned char *c = s->clipped + 3 * ((size_t)v * (size_t)s->width + (size_t)u);
-            if (c[0] || c[1] || c[2])
-                return false;
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++) {
+            size_t p = (size_t)y * (size_t)s->width + (size_t)x;
+            bool beside = false;
+            for (int k = 0; k < 9; k++) {
+                int u = x - 1 + k % 3, v = y - 1 + k / 3;
+                if (u >= 0 && v >= 0 && u < s->width && v < s->height)
+                    beside |= mark[(size_t)v * (size_t)s->width + (size_t)u] >= kind;
+            }
+            if (beside && mark[p] != spared)
+                use[p] = 0;
         }
+}
+
+/* A few pixels at the rim of a lamp, or of a caustic, can hold most of a picture's noise and all of its skewness. */
+static void drop_loudest(const struct student *s, const struct moments *m, double spp, double *v,
+                         unsigned char *use)
+{
+    static const double loudest = 20; /* times the mean variance */
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    double num = 0, total = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        double sum = 0;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++)
+            sum += m->mean[i] < s->clip ? pow(student_expected_sd(m, i, spp), 2) : 0;
+        v[p] = sum;
+        if (use[p] && sum > 0) {
+            total += sum;
+            num++;
+        }
+    }
+    for (size_t p = 0; p < pixels; p++)
+        if (num > 0 && v[p] > loudest * total / num)
+            use[p] = 0;
+}
+
+enum mark { MARK_NONE, MARK_CLIPPED, MARK_UNKNOWN };
+
+bool student_comparable(const struct student *s, const struct moments *m, double spp,
+                        unsigned char *use, struct err *e)
+{
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    unsigned char *mark = calloc(pixels, 1);
+    double *v = calloc(pixels, sizeof *v);
+    if (mark == NULL || v == NULL) {
+        free(mark);
+        free(v);
+        return err_set(e, "out of memory for %zu pixels", pixels);
+    }
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        double far = m->mean[i] - s->clip;
+        if (fabs(far) < clip_sd * student_expected_sd(m, i, spp) + s->tolerance[i])
+            mark[i / 3] = MARK_UNKNOWN;
+        else if (far > 0 && mark[i / 3] == MARK_NONE)
+            mark[i / 3] = MARK_CLIPPED;
+    }
+    clear_around(s, mark, MARK_CLIPPED, MARK_CLIPPED, use);
+    drop_loudest(s, m, spp, v, use);
+    free(mark);
+    free(v);
     return true;
+}
+
+void student_unclipped(const struct student *s, unsigned char *use)
+{
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++)
+            for (int k = 0; k < 9; k++) {
+                int u = x - 1 + k % 3, v = y - 1 + k / 3;
+                const unsigned char *c =
+                    s->clipped + 3 * ((size_t)v * (size_t)s->width + (size_t)u);
+                if (u >= 0 && v >= 0 && u < s->width && v < s->height && (c[0] || c[1] || c[2]))
+                    use[(size_t)y * (size_t)s->width + (size_t)x] = 0;
+            }
 }
