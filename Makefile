@@ -12,17 +12,19 @@ V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
-DEPS      := gcc g++ make pkg-config libxml2-dev libopenimageio-dev libjansson-dev libgsl-dev nettle-dev bubblewrap
+DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
+  nettle-dev bubblewrap
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenImageIO jansson gsl nettle
+PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
-LIBS       = $(shell pkg-config --libs $(PKGS)) -lm -pthread
+# --as-needed: pathtracer starts at once, without the libraries that only the harness uses.
+LIBS       = -Wl,--as-needed $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
 SANITIZE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 OPT      := -O3 -g -fno-math-errno -fno-trapping-math
@@ -32,13 +34,18 @@ WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(pkg_cflags)
 cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 
-RENDERER := $(filter-out renderer/main.c,$(wildcard renderer/*.c)) $(wildcard renderer/*.cc)
-HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
+# Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
+ISAS     := sse42 avx2 avx512
+BY_ISA   := renderer/wide_kernel renderer/wide_split
+KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
+RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
+HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
-SUPPORT  := $(filter-out $(TESTS:=.c) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
+BENCH    := $(wildcard tests/bench*.c) tests/embree_tracer.c
+SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -72,6 +79,9 @@ calibrate: $(BUILD)/tests/make_calibration
 	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
 	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
+bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench
+	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
@@ -92,6 +102,8 @@ print-compile:
 	@echo $(CC) $(filter-out -g,$(cflags))
 print-libs:
 	@echo $(LIBS)
+print-kernels:
+	@$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
@@ -121,6 +133,7 @@ help:
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
+	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
@@ -165,6 +178,19 @@ $(BUILD)/san/%.cc.o: %.cc | $(BUILD)/deps
 $(BUILD)/clang/%.cc.o: %.cc | $(BUILD)/deps-test
 	$(compile_cxx)
 
+isa_sse42  := -msse4.2
+isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
+isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
+# -Wno-psabi: no vector of 32 bytes leaves the file.
+isa_flags   = -DISA=$(1) $(isa_$(1)) -Wno-psabi
+define kernel_object
+$(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
+$(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
+	$$(compile_c)
+endef
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
+  $(eval $(call kernel_object,$(b),$(k),$(i))))))
+
 $(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
 	$(link)
 $(BUILD)/assay: $(call obj,$(BUILD),tools/main.c $(HARNESS) $(RENDERER))
@@ -178,12 +204,16 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
-$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
+$(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
+$(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH) tests/mesh.c tests/calibrate_plot.c) $(BUILD)/libassay.a
+	$(link)
+# The peer gets all that this machine has; ours chooses when it starts.
+$(BUILD)/tests/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
 $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
@@ -202,7 +232,7 @@ $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c tests/diagnose_rates.c))
+  $(wildcard tests/make_*.c tests/diagnose_rates.c) $(BENCH))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -239,7 +269,7 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+.PHONY: all validate check mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
   programs-san programs-clang
 .SECONDARY:
 .DELETE_ON_ERROR:

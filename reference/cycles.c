@@ -60,7 +60,7 @@ static float *read_replicate(const struct reference_job *job, const char *path, 
 {
     struct image im = {0};
     bool half;
-    if (!image_read(path, &im, &half, e))
+    if (!image_read_exr(path, &im, &half, e))
         return NULL;
     size_t pixels = (size_t)im.width * (size_t)im.height;
     int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};

@@ -66,7 +66,7 @@ static bool add_picture(const struct crew *w, const struct povray_picture *p, co
 {
     int width = w->job->suite->width, height = w->job->suite->height, k = p->grid;
     struct image im = {0};
-    if (!image_read(path, &im, NULL, e))
+    if (!image_read_exr(path, &im, NULL, e))
         return false;
     bool ok = im.width == k * width && im.height == k * height && im.channels >= 3;
     if (!ok)

@@ -5,15 +5,18 @@
 #define ASSAY_BVH_H
 
 #include "batch.h"
+#include "isa.h"
 #include "scene.h"
 
 enum bvh_kind {
     BVH_BRUTE_FORCE, /* every primitive for every ray: the oracle */
     BVH_CENTROID,    /* the assignment's: split the longest axis at the mean centroid */
-    BVH_SAH          /* binned surface area heuristic [Wald07] */
+    BVH_SAH,         /* binned surface area heuristic [Wald07] */
+    BVH_WIDE         /* eight wide, by vector kernels (bvh_wide.h) */
 };
 
-/* What the rays of one thread cost. */
+/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves, of up to eight each, and those
+ * that a packet of rays visits together once. */
 struct bvh_stats {
     uint64_t rays, box_tests, primitive_tests;
 };
@@ -23,13 +26,17 @@ struct bvh; /* opaque; refers to the scene, which must outlive it */
 /* NULL on failure (out of memory). */
 struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
     __attribute__((warn_unused_result));
+/* The same with the instructions of BVH_WIDE chosen; fails too if the machine lacks them. */
+struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
+    __attribute__((warn_unused_result));
 void bvh_free(struct bvh *b);
 
 /* Expected cost of a random ray in primitive tests, a box test counting as one [MacDonald90];
- * and the size of the tree. */
+ * and the size of the tree, also in bytes. */
 double bvh_sah_cost(const struct bvh *b);
 int bvh_depth(const struct bvh *b);
 uint32_t bvh_num_nodes(const struct bvh *b);
+size_t bvh_size(const struct bvh *b);
 
 /* For the listed lanes: nearest hit inside (tmin, tmax) into h, h->prim = NO_HIT if none. */
 void bvh_closest(const struct bvh *b, const struct rays *r, const uint16_t *lane, int num_lanes,

@@ -1,5 +1,5 @@
-/* The C face of image files (OpenImageIO behind it, image_oiio.cc). Pixels are float32,
- * interleaved, row 0 at the top. No C++ exception crosses this line. */
+/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Pictures of other kinds,
+ * which only the harness reads: image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
 #ifndef ASSAY_IMAGE_H
 #define ASSAY_IMAGE_H
 
@@ -35,28 +35,17 @@ const char *image_get_attr(const struct image *im, const char *name);
 /* Index of a channel by exact name, -1 if absent. */
 int image_channel(const struct image *im, const char *name);
 
-/* Reads any file that OpenImageIO knows. Integer formats come scaled to [0,1], no colour
- * conversion. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
-bool image_read(const char *path, struct image *out, bool *half, struct err *e)
-    __attribute__((warn_unused_result));
+/* What the readers take at most. */
+enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
+#define IMAGE_MAX_FLOATS 4e9 /* 16384 x 16384 pixels of a dozen channels */
 
-/* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
-enum image_type {
-    IMAGE_INT8,
-    IMAGE_INT16,
-    IMAGE_HALF,
-    IMAGE_FLOAT,
-    IMAGE_OTHER /* fewer than 8 bits, 32-bit integers, doubles */
-};
-struct image_info {
-    char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
-    enum image_type type; /* the smallest of its channels */
-    int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
-    int parts;            /* pictures in one file (EXR parts, TIFF pages), 1 .. */
-    int width, height, channels;
-    bool is_cropped;      /* the file holds another rectangle than the picture shown */
-};
-bool image_inspect(const char *path, struct image_info *out, struct err *e)
+/* Reads an OpenEXR file (its first part; rows or tiles of halves or floats) with its text attributes.
+ * Channels are in the file's order. *half (may be NULL) tells if it stored fewer than 32 bits per
+ * channel. */
+bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
+    __attribute__((warn_unused_result));
+/* Reads a Radiance picture (RGBE, rows from the top) as R G B. */
+bool image_read_hdr(const char *path, struct image *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* Writes a float32, ZIP-compressed scan-line OpenEXR with all channels and attributes. The file
@@ -71,7 +60,7 @@ bool image_write_png(const char *path, int width, int height, const uint8_t *rgb
 bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes, size_t *size,
                       struct err *e) __attribute__((warn_unused_result));
 
-/* Text that names the libraries: "OpenImageIO 2.4.7". */
+/* Text that names the libraries: "OpenEXR 3.1.5, libpng 1.6.39". */
 const char *image_library_version(void);
 
 #endif

@@ -1,6 +1,6 @@
-// The one C++ file: image.h over OpenImageIO. Exceptions end here, as text in struct err.
+// The one C++ file: image_oiio.h. Exceptions end here, as text in struct err.
 extern "C" {
-#include "image.h"
+#include "image_oiio.h"
 }
 
 #include <OpenImageIO/filesystem.h>
@@ -17,10 +17,6 @@ extern "C" {
 
 namespace
 {
-
-// 16384 x 16384 pixels of a dozen channels; a header that asks for more is refused unread.
-constexpr int max_side = 1 << 16;
-constexpr double max_floats = 4e9;
 
 // Runs f; an exception or false becomes a line that starts with `path`.
 template <typename F> bool guarded(const char *path, struct err *e, F &&f)
@@ -40,30 +36,6 @@ template <typename F> bool guarded(const char *path, struct err *e, F &&f)
     }
 }
 
-// Writes beside `path` and renames, so that a reader never sees half a file.
-template <typename F> bool by_rename(const char *path, struct err *e, F &&write)
-{
-    std::string temp = std::string(path) + ".tmp" + std::to_string(getpid());
-    bool ok = guarded(path, e, [&](std::string &why) { return write(temp, why); });
-    if (ok && std::rename(temp.c_str(), path) != 0)
-        ok = err_set(e, "%s: cannot write: %s", path, std::strerror(errno));
-    if (!ok)
-        unlink(temp.c_str());
-    return ok;
-}
-
-bool write_png_to(OIIO::ImageOutput &out, const std::string &name, int width, int height,
-                  const uint8_t *rgb8, std::string &why)
-{
-    OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
-    spec.attribute("oiio:ColorSpace", "sRGB");
-    if (!out.open(name, spec) || !out.write_image(OIIO::TypeDesc::UINT8, rgb8) || !out.close()) {
-        why = "cannot write: " + out.geterror();
-        return false;
-    }
-    return true;
-}
-
 } // namespace
 
 extern "C" bool image_read(const char *path, struct image *out, bool *half, struct err *e)
@@ -81,9 +53,10 @@ extern "C" bool image_read(const char *path, struct image *out, bool *half, stru
             return false;
         }
         const OIIO::ImageSpec &spec = in->spec();
-        if (spec.width < 1 || spec.height < 1 || spec.width > max_side || spec.height > max_side ||
-            spec.nchannels < 1 || spec.nchannels > 4096 || spec.depth > 1 ||
-            double(spec.width) * spec.height * spec.nchannels > max_floats) {
+        if (spec.width < 1 || spec.height < 1 || spec.width > IMAGE_MAX_SIDE ||
+            spec.height > IMAGE_MAX_SIDE || spec.nchannels < 1 ||
+            spec.nchannels > IMAGE_MAX_CHANNELS || spec.depth > 1 ||
+            double(spec.width) * spec.height * spec.nchannels > IMAGE_MAX_FLOATS) {
             why = "an image of " + std::to_string(spec.width) + " x " +
                   std::to_string(spec.height) + " x " + std::to_string(spec.nchannels) +
                   " is more than this program takes";
@@ -168,65 +141,7 @@ extern "C" bool image_inspect(const char *path, struct image_info *out, struct e
     });
 }
 
-extern "C" bool image_write_exr(const char *path, const struct image *im, struct err *e)
-{
-    return by_rename(path, e, [&](const std::string &temp, std::string &why) {
-        auto out = OIIO::ImageOutput::create("exr");
-        if (!out) {
-            why = "cannot write: " + OIIO::geterror();
-            return false;
-        }
-        OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeDesc::FLOAT);
-        for (int c = 0; c < im->channels; c++)
-            spec.channelnames[size_t(c)] = im->names[c];
-        spec.attribute("compression", "zip");
-        /* Else the time of writing goes in, and the same picture has other bytes each time. */
-        spec.attribute("DateTime", "");
-        for (int i = 0; i < im->num_attrs; i++)
-            spec.attribute(im->attr[2 * i], im->attr[2 * i + 1]);
-        if (!out->open(temp, spec) || !out->write_image(OIIO::TypeDesc::FLOAT, im->data) ||
-            !out->close()) {
-            why = "cannot write: " + out->geterror();
-            return false;
-        }
-        return true;
-    });
-}
-
-extern "C" bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8,
-                                struct err *e)
-{
-    return by_rename(path, e, [&](const std::string &temp, std::string &why) {
-        auto out = OIIO::ImageOutput::create("png");
-        return write_png_to(*out, temp, width, height, rgb8, why);
-    });
-}
-
-extern "C" bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes,
-                                 size_t *size, struct err *e)
-{
-    return guarded("PNG in memory", e, [&](std::string &why) {
-        std::vector<unsigned char> buffer;
-        OIIO::Filesystem::IOVecOutput io(buffer);
-        auto out = OIIO::ImageOutput::create("memory.png", &io);
-        if (!out) {
-            why = OIIO::geterror();
-            return false;
-        }
-        if (!write_png_to(*out, "memory.png", width, height, rgb8, why))
-            return false;
-        *bytes = static_cast<uint8_t *>(std::malloc(buffer.size()));
-        if (*bytes == nullptr) {
-            why = "out of memory";
-            return false;
-        }
-        std::memcpy(*bytes, buffer.data(), buffer.size());
-        *size = buffer.size();
-        return true;
-    });
-}
-
-extern "C" const char *image_library_version(void)
+extern "C" const char *image_oiio_version(void)
 {
     return "OpenImageIO " OIIO_VERSION_STRING;
 }

@@ -151,7 +151,7 @@ bool moments_read(const char *path, struct moments *out, struct image *image, st
     struct image im = {0};
     struct moments m = {0};
     bool half;
-    if (!image_read(path, &im, &half, e))
+    if (!image_read_exr(path, &im, &half, e))
         return false;
     const char *unit = image_get_attr(&im, "assay:unit");
     const char *spp = image_get_attr(&im, "assay:spp");

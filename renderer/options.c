@@ -44,6 +44,7 @@ enum option {
     OPT_SAMPLER,
     OPT_INTEGRATOR,
     OPT_ACCEL,
+    OPT_ISA,
     OPT_DIALECT,
     OPT_FRESNEL,
     OPT_QUIET,
@@ -108,7 +109,10 @@ static const struct cli_option options[] = {
     [OPT_SAMPLER] = {0, "sampler", 1, "NAME",
                      "independent or sobol: less noise, but unknown error (independent)"},
     [OPT_INTEGRATOR] = {0, "integrator", 1, "NAME", "path or normals (path)"},
-    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid or sah (sah)"},
+    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid, sah or wide (sah)"},
+    [OPT_ISA] = {0, "isa", 1, "NAME",
+                 "vector instructions of --accel wide: auto, sse4.2, avx2 or\n"
+                 "avx512; all give the same picture (auto)"},
     [OPT_DIALECT] = {0, "dialect", 1, "NAME",
                      "auto, collada or cgl: whose rules for camera and lights;\n"
                      "auto: cgl if the file has CGL extras (auto)"},
@@ -248,6 +252,7 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_FRESNEL: return cli_choice("--fresnel", v, fresnel_names, &s->fresnel, e);
     case OPT_INTEGRATOR: return cli_choice("--integrator", v, integrator_kind_names, &s->kind, e);
     case OPT_ACCEL: return cli_choice("--accel", v, bvh_kind_names, &s->accel, e);
+    case OPT_ISA: return cli_choice("--isa", v, isa_names, &s->isa, e);
     case OPT_DIALECT: return cli_choice("--dialect", v, dialect_names, &s->dialect, e);
     case OPT_QUIET: s->quiet = true; return true;
     case OPT_LIST: s->action = ACTION_LIST; return true;
@@ -282,6 +287,8 @@ static bool complete(struct options *s, int accumulate, struct err *e)
                        "--adaptive and --error estimate the error from samples that have to be "
                        "independent: not with --sampler %s",
                        sampler_kind_names[s->sampler]);
+    if (s->isa != ISA_AUTO && s->accel != BVH_WIDE)
+        return err_set(e, "--isa: only --accel wide has vector instructions to choose");
     if (s->adaptive_batch > 0 && s->pilot_tolerance >= 0)
         return err_set(e, "--adaptive and --adaptive-unbiased exclude each other");
     if (s->pilot_tolerance >= 0 && s->last > 0 && s->spp == 0)
@@ -353,6 +360,7 @@ void options_print(const struct options *o)
         print_names("integrators", integrator_kind_names);
         print_names("direct", direct_kind_names);
         print_names("accels", bvh_kind_names);
+        print_names("isas", isa_names);
         print_names("samplers", sampler_kind_names);
         print_names("dialects", dialect_names);
         break;

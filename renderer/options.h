@@ -16,7 +16,7 @@ struct options {
     const char *resume;  /* the picture to go on with; NULL: from the start */
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
-    int dialect, accel, kind, direct, fresnel, sampler;
+    int dialect, accel, isa, kind, direct, fresnel, sampler;
     int spp;         /* of the whole picture, the most if adaptive */
     int first, last; /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;

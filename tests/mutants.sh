@@ -36,10 +36,12 @@ fi
 # The flags that make compiled the renderer with.
 compile=$(make -s --no-print-directory BUILD="$build" print-compile)
 libs=$(make -s --no-print-directory BUILD="$build" print-libs)
+# "object source flags" of what is compiled once for each instruction set.
+kernels=$(make -s --no-print-directory BUILD="$build" print-kernels)
 
 # build_mutant NAME: into $build/mutants/NAME/pathtracer
 build_mutant() {
-    local dir=$build/mutants/$1 changed file objects=()
+    local dir=$build/mutants/$1 changed file source flags objects=()
     rm -rf "$dir"
     mkdir -p "$dir"
     [ "$1" = none ] && { cp "$build/pathtracer" "$dir" && return; }
@@ -52,14 +54,18 @@ build_mutant() {
         *) changed+=" $file" ;;
         esac
     done
-    changed=$(echo $changed | tr ' ' '\n' | sort -u)
+    # A kernel is as many objects as there are instruction sets.
+    changed=$(for file in $changed; do
+        awk -v file="$file" '$2 == file { print $1; found = 1 } END { if (!found) print file }' <<<"$kernels"
+    done | sort -u)
     [ -n "$changed" ] || return 1
     case " $(echo $changed) " in
     *" renderer/main.c "*) ;;
     *) objects=("$build/renderer/main.c.o") ;;
     esac
     for file in $changed; do
-        $compile -c -o "$dir/$(basename "$file").o" "$dir/$file" || return 1
+        read -r source flags <<<"$(awk -v file="$file" '$1 == file { $1 = ""; print }' <<<"$kernels")"
+        $compile $flags -c -o "$dir/$(basename "$file").o" "$dir/${source:-$file}" || return 1
         objects+=("$dir/$(basename "$file").o")
     done
     g++ -o "$dir/pathtracer" "${objects[@]}" "$build/libassay.a" $libs
@@ -114,7 +120,7 @@ one_and_tell() {
 }
 
 mkdir -p "$build/mutants"
-export build build_only compile libs
+export build build_only compile libs kernels
 export only_scenes="${only[*]:-}" budget="--until-different --budget ${seconds}s"
 [ -n "$quick" ] && export budget=''
 export -f build_mutant find_claim run_mutant one_and_tell

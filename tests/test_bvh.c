@@ -12,6 +12,8 @@
 #include <string.h>
 #include <cmocka.h>
 
+enum { KINDS = BVH_WIDE + 1 };
+
 enum layout { SCATTERED, COINCIDENT, FLAT, WIDE_RANGE, ONE, NUM_LAYOUTS };
 
 static vec3 random_point(uint32_t i, uint32_t k)
@@ -67,28 +69,28 @@ static void hierarchies_equal_brute_force(void **state)
     struct err e = {0};
     for (enum layout layout = SCATTERED; layout < NUM_LAYOUTS; layout++) {
         struct scene s = make_scene(layout);
-        struct bvh *tree[3];
-        for (int k = 0; k < 3; k++) {
+        struct bvh *tree[KINDS];
+        for (int k = 0; k < KINDS; k++) {
             tree[k] = bvh_build(&s, (enum bvh_kind)k, &e);
             assert_non_null(tree[k]);
         }
         struct rays r;
         uint16_t lane[BATCH_LANES];
         uint32_t hits = 0, rays = 0;
-        struct bvh_stats stats[3] = {{0}};
+        struct bvh_stats stats[KINDS] = {{0}};
         for (uint32_t first = 0; first < 20 * BATCH_LANES; first += BATCH_LANES) {
             for (int i = 0; i < BATCH_LANES; i++) {
                 rays_set(&r, i, make_ray(&s, first + (uint32_t)i));
                 r.ignore[i] = NO_HIT;
                 lane[i] = (uint16_t)i;
             }
-            struct hits h[3];
-            bool occluded[3][BATCH_LANES];
-            for (int k = 0; k < 3; k++) {
+            struct hits h[KINDS];
+            bool occluded[KINDS][BATCH_LANES];
+            for (int k = 0; k < KINDS; k++) {
                 bvh_closest(tree[k], &r, lane, BATCH_LANES, &h[k], &stats[k]);
                 bvh_occluded(tree[k], &r, lane, BATCH_LANES, occluded[k], &stats[k]);
             }
-            for (int k = 1; k < 3; k++)
+            for (int k = 1; k < KINDS; k++)
                 for (int i = 0; i < BATCH_LANES; i++) {
                     /* Two primitives at the very same distance may swap; nothing else may. */
                     assert_true(h[k].t[i] == h[0].t[i]);
@@ -103,9 +105,9 @@ static void hierarchies_equal_brute_force(void **state)
         /* The comparison has to have seen both answers. */
         assert_true(hits > rays / 1000 && hits < rays);
         if (layout == SCATTERED)
-            for (int k = 1; k < 3; k++)
+            for (int k = 1; k < KINDS; k++)
                 assert_true(stats[k].primitive_tests < stats[0].primitive_tests / 10);
-        for (int k = 0; k < 3; k++) {
+        for (int k = 0; k < KINDS; k++) {
             assert_true(stats[k].rays == 2 * rays);
             bvh_free(tree[k]);
         }

@@ -76,7 +76,7 @@ static void threads_change_nothing(void **state)
     (void)state;
     struct scene s = room();
     for (int sampler = SAMPLER_INDEPENDENT; sampler <= SAMPLER_SOBOL; sampler++)
-        for (int accel = BVH_BRUTE_FORCE; accel <= BVH_SAH; accel++) {
+        for (int accel = BVH_BRUTE_FORCE; accel <= BVH_WIDE; accel++) {
             struct how how = {{(enum sampler_kind)sampler, 3}, (enum bvh_kind)accel, 4, 4, 1};
             struct render_stats one, many;
             struct moments a = picture(&s, how, &one);

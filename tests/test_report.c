@@ -2,6 +2,7 @@
  * hand, its markup is read by libxml2's HTML parser, its drawings against brute force. */
 #include "../tools/report.h"
 
+#include "../renderer/image_oiio.h"
 #include "../renderer/fs.h"
 #include "../renderer/moments.h"
 #include "../tools/report_colour.h"

@@ -5,6 +5,7 @@
 #include "../reference/truth_sky.h"
 #include "../reference/truth_view.h"
 #include "optics.h"
+#include "../renderer/image_oiio.h"
 
 #include <gsl/gsl_integration.h>
 

@@ -332,7 +332,7 @@ static bool get_picture(const char *dir, struct view *v, const struct catalogue 
         return false;
     if (strcmp(sha256, stored) != 0)
         return err_set(e, "%s: is not the file that the manifest describes", path);
-    if (!image_read(path, &im, NULL, e))
+    if (!image_read_exr(path, &im, NULL, e))
         return false;
     int cs = image_channel(&im, "cs");
     struct sight *s = &v->correct;

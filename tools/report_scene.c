@@ -56,7 +56,7 @@ static bool load_map(const struct page *p, const struct scene *s, const json_t *
 {
     char path[8192];
     if (!full_path(p, member_text(json_object_get(claim, "files"), which), path, e) ||
-        !image_read(path, out, NULL, e))
+        !image_read_exr(path, out, NULL, e))
         return false;
     const struct moments *m = &s->shot[0].m;
     if (out->channels != 1 || out->width != m->width || out->height != m->height)

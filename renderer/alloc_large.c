@@ -1,0 +1,17 @@
+#define _DEFAULT_SOURCE /* madvise */
+#include "alloc_large.h"
+
+#include <stdlib.h>
+#include <sys/mman.h>
+
+enum { CACHE_LINE = 64, HUGE_PAGE = 2 << 20 };
+
+void *alloc_large(size_t size)
+{
+    size_t page = size >= HUGE_PAGE ? HUGE_PAGE : CACHE_LINE;
+    size = (size + page - 1) / page * page;
+    void *p = aligned_alloc(page, size);
+    if (p != NULL && page == HUGE_PAGE)
+        madvise(p, size, MADV_HUGEPAGE); /* only advice: without it all works as well */
+    return p;
+}

@@ -1,0 +1,11 @@
+/* Memory for large arrays. */
+#ifndef ASSAY_ALLOC_LARGE_H
+#define ASSAY_ALLOC_LARGE_H
+
+#include <stddef.h>
+
+/* `size` bytes, aligned to 64; an array of megabytes lies on large pages where the system has them:
+ * fewer misses of the page table. Not zeroed. The caller's, to free(); NULL if out of memory. */
+void *alloc_large(size_t size) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,35 @@
+/* The C face of OpenImageIO (image_oiio.cc), for pictures from elsewhere. Not part of pathtracer: the
+ * library takes a fifth of a second to load. No C++ exception crosses this line. */
+#ifndef ASSAY_IMAGE_OIIO_H
+#define ASSAY_IMAGE_OIIO_H
+
+#include "image.h"
+
+/* Reads any file that OpenImageIO knows. Integer formats come scaled to [0,1], no colour
+ * conversion. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+bool image_read(const char *path, struct image *out, bool *half, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
+enum image_type {
+    IMAGE_INT8,
+    IMAGE_INT16,
+    IMAGE_HALF,
+    IMAGE_FLOAT,
+    IMAGE_OTHER /* fewer than 8 bits, 32-bit integers, doubles */
+};
+struct image_info {
+    char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
+    enum image_type type; /* the smallest of its channels */
+    int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
+    int parts;            /* pictures in one file (EXR parts, TIFF pages), 1 .. */
+    int width, height, channels;
+    bool is_cropped;      /* the file holds another rectangle than the picture shown */
+};
+bool image_inspect(const char *path, struct image_info *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Text that names the library: "OpenImageIO 2.4.7". */
+const char *image_oiio_version(void);
+
+#endif

@@ -1,0 +1,311 @@
+/* Paths per CPU second, and 1/(relative variance x CPU seconds), of our renderer, of a tracer on Embree,
+ * of Cycles and of POV-Ray: the same view, one thread. Each engine renders pictures of FEW and of MANY
+ * samples in turn; what a sample costs is the slope between the two, so no start is counted. Image means
+ * have to agree first. */
+#include "bench.h"
+#include "bench_engines.h"
+#include "bench_scenes.h"
+#include "bench_timing.h"
+#include "calibrate_plot.h"
+
+#include "../reference/process.h"
+#include "../renderer/fs.h"
+#include "../tools/converge.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FEW, MANY, NUM_RUNGS, COUNT = 4, MAX_ROUNDS = 9 };
+
+static const struct {
+    const char *name;
+    bool course;
+    int width, height; /* of the course's: the view of 480 x 360, with fewer pixels */
+} views[] = {
+    {"CBspheres_lambertian", true, 240, 180},
+    {"CBbunny", true, 240, 180},
+    {"CBspheres", true, 240, 180},
+    {"41_cornell", false, 0, 0},
+    {"44_mesh", false, 0, 0},
+    {"21_mirror", false, 0, 0},
+    {"42_cornell_glass", false, 0, 0},
+    {"43_cornell_metal", false, 0, 0},
+    {"46_sky", false, 0, 0},
+    {"45_many_lights", false, 0, 0},
+};
+enum { NUM_VIEWS = sizeof views / sizeof views[0] };
+
+/* What one engine did. */
+struct runs {
+    bool done;
+    char why[256];                  /* not done */
+    float *images[NUM_RUNGS];       /* rounds x COUNT pictures */
+    double cost[MAX_ROUNDS];        /* CPU seconds of a sample of all pixels */
+    double mpaths, share, share_se; /* M paths per CPU s; image mean over ours - 1 */
+    double variance[NUM_RUNGS];     /* relative, of one picture */
+    double log_variance_se, efficiency, efficiency_lo, efficiency_hi; /* at MANY */
+};
+
+static bool load_view(int i, const struct bench_options *o, struct bench_view *v, struct err *e)
+{
+    *v = (struct bench_view){.name = views[i].name, .depth = 5};
+    if (views[i].course) {
+        struct bench_scene of;
+        if (!bench_scene_load(v->name, &of))
+            return false;
+        v->scene = of.scene;
+        if (!camera_init(&v->camera, &v->scene, 480, 360, e))
+            return false;
+        v->camera.width = views[i].width;
+        v->camera.height = views[i].height;
+    } else {
+        struct suite suite;
+        if (!suite_load("reference/scenes", &suite, e))
+            return false;
+        const struct suite_scene *s = suite_find(&suite, v->name);
+        bool ok = s != NULL ? suite_open(s, &v->scene, &v->camera, e)
+                            : err_set(e, "no scene %s", v->name);
+        v->depth = s != NULL ? s->depth : 0;
+        suite_free(&suite);
+        if (!ok)
+            return false;
+    }
+    if (o->smoke)
+        v->camera.width = v->camera.height = 16;
+    struct err why = {""};
+    v->embree = embree_tracer_new(&v->scene, &why);
+    v->bvh = bvh_build_for(&v->scene, BVH_WIDE, o->isa, e);
+    return v->bvh != NULL;
+}
+
+static void free_view(struct bench_view *v)
+{
+    embree_tracer_free(v->embree);
+    bvh_free(v->bvh);
+    scene_free(&v->scene);
+}
+
+static int samples(const struct bench_options *o, int rung)
+{
+    return rung == FEW ? (o->smoke ? 1 : 4) : o->smoke ? 4 : 16;
+}
+
+/* One round of one engine. */
+static bool run(enum bench_engine engine, const struct bench_options *o, const struct bench_view *v,
+                int round, struct runs *r, struct err *e)
+{
+    char work[4096];
+    double cpu[NUM_RUNGS];
+    size_t size = 3 * (size_t)v->camera.width * (size_t)v->camera.height;
+    snprintf(work, sizeof work, "%s/work", o->out);
+    if (!make_dirs(work, e))
+        return false;
+    for (int k = 0; k < NUM_RUNGS; k++) {
+        uint32_t seed = (uint32_t)(1000 * engine + 10 * round + k);
+        if (!bench_engine_render(engine, v, samples(o, k), COUNT, seed, work,
+                                 r->images[k] + (size_t)round * COUNT * size, &cpu[k], e))
+            return false;
+    }
+    r->cost[round] = (cpu[MANY] - cpu[FEW]) / (COUNT * (samples(o, MANY) - samples(o, FEW)));
+    return true;
+}
+
+/* Mean over all values, and the variance of it by the spread between pictures. */
+static double mean_of(const float *images, int count, size_t size, double *var)
+{
+    double sum = 0, sum2 = 0;
+    for (int k = 0; k < count; k++) {
+        double m = 0;
+        for (size_t i = 0; i < size; i++)
+            m += (double)images[(size_t)k * size + i] / (double)size;
+        sum += m;
+        sum2 += m * m;
+    }
+    *var = fmax(0, sum2 - sum * sum / count) / (count - 1) / count;
+    return sum / count;
+}
+
+static bool judge(const struct bench_options *o, const struct bench_view *v,
+                  const struct converge_reference *ref, struct runs *r, const struct runs *ours,
+                  struct err *e)
+{
+    int count = o->rounds * COUNT;
+    double cost[MAX_ROUNDS], log_cost = 0, log_cost2 = 0, var, our_var;
+    memcpy(cost, r->cost, sizeof cost);
+    double seconds = bench_median(cost, o->rounds);
+    r->mpaths = v->camera.width * v->camera.height / seconds * 1e-6;
+    double mean = mean_of(r->images[MANY], count, ref->size, &var);
+    double our_mean = mean_of(ours->images[MANY], count, ref->size, &our_var);
+    r->share = mean / our_mean - 1;
+    r->share_se = sqrt(var + our_var) / our_mean;
+    for (int k = 0; k < NUM_RUNGS; k++) {
+        struct rung rung;
+        if (!converge_rung(r->images[k], count, samples(o, k), ref, &rung, e))
+            return false;
+        r->variance[k] = exp(rung.log_variance.value);
+        r->log_variance_se = rung.log_variance.se;
+    }
+    for (int k = 0; k < o->rounds; k++) {
+        double x = log(fmax(r->cost[k], 1e-9));
+        log_cost += x / o->rounds;
+        log_cost2 += x * x / o->rounds;
+    }
+    double cost_var =
+        o->rounds > 1 ? fmax(0, log_cost2 - log_cost * log_cost) / (o->rounds - 1) : 0;
+    struct estimate log_efficiency = {-log(r->variance[MANY] * samples(o, MANY) * seconds),
+                                      sqrt(r->log_variance_se * r->log_variance_se + cost_var),
+                                      fmax(1, o->rounds - 1)};
+    struct interval i = estimate_interval(log_efficiency, 0.05);
+    r->efficiency = exp(log_efficiency.value);
+    r->efficiency_lo = exp(i.lo);
+    r->efficiency_hi = exp(i.hi);
+    return true;
+}
+
+/* Why an engine is left out, or NULL. */
+static const char *absent(enum bench_engine engine, const struct bench_view *v)
+{
+    char path[4096];
+    if (engine == BENCH_EMBREE && v->embree == NULL)
+        return "diffuse scenes only";
+    if (engine == BENCH_CYCLES && !process_find("blender", path, sizeof path))
+        return "SKIPPED: no blender in PATH (make deps-live)";
+    if (engine == BENCH_POVRAY && !process_find("povray", path, sizeof path))
+        return "SKIPPED: no povray in PATH (make deps-live)";
+    return NULL;
+}
+
+static json_t *show(const struct bench_options *o, const struct bench_view *v,
+                    const struct runs runs[BENCH_NUM_ENGINES], bool *wrong)
+{
+    json_t *engines = json_object();
+    for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
+        const struct runs *r = &runs[k], *of = &runs[k == BENCH_EMBREE ? BENCH_LIGHT : BENCH_MIS];
+        printf("%-21s %-12s", k == 0 ? v->name : "", bench_engine_names[k]);
+        if (!r->done) {
+            printf(" %s\n", r->why);
+            continue;
+        }
+        printf(" %8.3f %8.2f %9.4f %9.4f %9.2f [%.2f, %.2f] %+8.3f +- %.3f\n", r->mpaths,
+               of->mpaths / r->mpaths, r->variance[FEW], r->variance[MANY], r->efficiency,
+               r->efficiency_lo, r->efficiency_hi, 100 * r->share, 100 * r->share_se);
+        if (!o->smoke && fabs(r->share) > 1e-3 + 5 * r->share_se) {
+            printf("%-21s another image mean: no ratio holds\n", "");
+            *wrong = true;
+        }
+        json_object_set_new(
+            engines, bench_engine_names[k],
+            json_pack("{s:f,s:f,s:[f,f],s:f,s:[f,f],s:[f,f]}", "mpaths_per_cpu_second", r->mpaths,
+                      "ours_faster", of->mpaths / r->mpaths, "relative_variance", r->variance[FEW],
+                      r->variance[MANY], "efficiency", r->efficiency, "efficiency_95",
+                      r->efficiency_lo, r->efficiency_hi, "mean_over_ours", r->share, r->share_se));
+    }
+    return json_pack("{s:s,s:i,s:i,s:i,s:o}", "scene", v->name, "width", v->camera.width, "height",
+                     v->camera.height, "depth", v->depth, "engines", engines);
+}
+
+/* Relative error against CPU seconds, engine by engine. */
+static bool plot(const struct bench_options *o, const struct bench_view *v,
+                 const struct runs runs[BENCH_NUM_ENGINES], struct err *e)
+{
+    char path[4096], title[128];
+    snprintf(path, sizeof path, "%s/error_%s.svg", o->out, v->name);
+    snprintf(title, sizeof title, "%s: error of a picture against its CPU time", v->name);
+    struct plot p = {.title = title,
+                     .x_label = "CPU s",
+                     .y_label = "relative RMS error",
+                     .is_log_x = true,
+                     .is_log_y = true,
+                     .x0 = 1e-3,
+                     .x1 = 1e3,
+                     .y0 = 1e-2,
+                     .y1 = 1e1};
+    for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
+        if (!runs[k].done)
+            continue;
+        struct plot_series *s = &p.series[p.num++];
+        snprintf(s->name, sizeof s->name, "%s", bench_engine_names[k]);
+        double seconds = v->camera.width * v->camera.height / (runs[k].mpaths * 1e6);
+        for (int r = 0; r < NUM_RUNGS; r++) {
+            double y = sqrt(runs[k].variance[r]);
+            plot_add(s, samples(o, r) * seconds, y, y, y);
+        }
+    }
+    return plot_write(path, &p, e);
+}
+
+static bool measure(const struct bench_options *o, const struct bench_view *v, json_t *scenes,
+                    bool *wrong, struct err *e)
+{
+    struct runs runs[BENCH_NUM_ENGINES] = {{.done = false}};
+    size_t size = 3 * (size_t)v->camera.width * (size_t)v->camera.height;
+    struct converge_reference ref = {0};
+    struct moments m = {0};
+    bool ok = true;
+    for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
+        const char *why = absent((enum bench_engine)k, v);
+        runs[k].done = why == NULL;
+        snprintf(runs[k].why, sizeof runs[k].why, "%s", why != NULL ? why : "");
+        for (int r = 0; r < NUM_RUNGS; r++)
+            runs[k].images[r] = bench_allocate((size_t)(o->rounds * COUNT) * size * sizeof(float));
+    }
+    for (int round = 0; round < o->rounds; round++)
+        for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
+            struct err inner = {""};
+            if (!runs[k].done || run((enum bench_engine)k, o, v, round, &runs[k], &inner))
+                continue;
+            runs[k].done = false; /* what it cannot express, too */
+            snprintf(runs[k].why, sizeof runs[k].why, "%.200s", inner.msg);
+        }
+    /* In units of each value's mean over our own pictures. */
+    ok = runs[BENCH_MIS].done || err_set(e, "%s", runs[BENCH_MIS].why);
+    ok = ok && moments_alloc(&m, v->camera.width, v->camera.height, e);
+    for (int k = 0; ok && k < o->rounds * COUNT; k++)
+        moments_add_image(&m, runs[BENCH_MIS].images[MANY] + (size_t)k * size);
+    ok = ok && converge_reference_init(&ref, &m, 1, e);
+    for (int k = 0; ok && k < BENCH_NUM_ENGINES; k++)
+        if (runs[k].done)
+            ok = judge(o, v, &ref, &runs[k], &runs[BENCH_MIS], e);
+    if (ok) {
+        json_array_append_new(scenes, show(o, v, runs, wrong));
+        ok = plot(o, v, runs, e);
+    }
+    for (int k = 0; k < BENCH_NUM_ENGINES; k++)
+        for (int r = 0; r < NUM_RUNGS; r++)
+            free(runs[k].images[r]);
+    moments_free(&m);
+    converge_reference_free(&ref);
+    return ok;
+}
+
+json_t *bench_paths(const struct bench_options *given, bool *wrong, struct err *e)
+{
+    struct bench_options o = *given;
+    o.rounds = o.smoke ? 1 : o.rounds < MAX_ROUNDS ? o.rounds : MAX_ROUNDS;
+    printf(
+        "One thread, %d rounds of %d pictures of %d and of %d samples. faster: our paths per CPU second "
+        "over the\nengine's, at the same estimator. Efficiency: 1/(relative variance x CPU s), with 95 %% "
+        "intervals. mean: over\nours, in %%.\n%-21s %-12s %8s %8s %9s %9s %9s\n",
+        o.rounds, COUNT, samples(&o, FEW), samples(&o, MANY), "scene", "", "Mpaths/s", "faster",
+        "variance", "", "efficiency");
+    json_t *scenes = json_array();
+    bool ok = true;
+    for (int i = 0; ok && i < NUM_VIEWS; i++) {
+        struct bench_view v = {0};
+        if (!bench_wanted(&o, views[i].name) ||
+            (o.smoke && strcmp(views[i].name, "41_cornell") != 0))
+            continue;
+        e->msg[0] = '\0';
+        if (load_view(i, &o, &v, e))
+            ok = measure(&o, &v, scenes, wrong, e);
+        else
+            ok = e->msg[0] == '\0'; /* not here */
+        free_view(&v);
+    }
+    if (ok)
+        return scenes;
+    json_decref(scenes);
+    return NULL;
+}
