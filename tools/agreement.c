@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.05;
+static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.25;
 /* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
 static const double unknown_dof = 30;
 static const double least_used = 0.25; /* of a tile, of the picture */

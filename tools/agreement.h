@@ -37,6 +37,7 @@ struct agreement {
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
  * a tile (tools/README.md, "EQUIVALENT").
  *
+ * Differences are relative to B's mean in the same place, but to no less than a quarter of the picture's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
  * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
  * frees with agreement_free(). */
