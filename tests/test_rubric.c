@@ -154,7 +154,7 @@ static void each_mistake_is_named_with_its_line(void **state)
         {5, 5, " spp many", "spp"},
         {6, 6, " bounces", "needs a whole number"},
         {7, 7, " reference luck", "reference 'luck'"},
-        {4, 2, " size 32 32\n reference povray", "the golden of"},
+        {7, 2, " bounces 3\n reference cycles", "the golden of"},
         {7, 7, " referense truth", "'referense'"},
         {8, 8, "part 1 Light\npart 2 Nothing", "has no checks"},
         {9, 9, "check c 4 equal q", "no picture 'q'"},
