@@ -113,7 +113,7 @@ install: all
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
 	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
-	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
+	cp -R reference/scenes reference/engines golden tools/rubrics $(DESTDIR)$(PREFIX)/share/assay
 
 format:
 	clang-format -i $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])

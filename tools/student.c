@@ -26,8 +26,9 @@ static bool check_header(const char *path, int width, int height, struct image_i
         known |= strncmp(first, magic[i], strlen(magic[i])) == 0;
     if (!known)
         return err_set(e, "the picture is no PNG, EXR, HDR or PFM file");
-    if (!image_inspect(path, info, e))
-        return false;
+    struct err why; /* has our path in it */
+    if (!image_inspect(path, info, &why))
+        return err_set(e, "the picture cannot be decoded");
     if (info->width != width || info->height != height)
         return err_set(e, "the picture is %d x %d pixels, not %d x %d", info->width, info->height,
                        width, height);
