@@ -585,7 +585,7 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
         [ "$(points $bad)" = 0.00 ] && ok "grade: $bad has none" || not_ok "grade: $bad has none" "$(points $bad)"
     done
     for why in "crash signal 11" "hang no end after 10 s" "huge_file all 16 MiB of its directory are full" "link_out wrote no out.png" \
-        "nothing wrote no out.png" "noise no PNG" "bomb 65536 x 65536" "empty cannot execute\|No such file\|failed to execute"; do
+        "nothing wrote no out.png" "noise not an OpenEXR" "bomb 65536 x 65536" "empty cannot execute\|No such file\|failed to execute"; do
         expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
     done
     expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"

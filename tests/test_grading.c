@@ -433,7 +433,7 @@ static void bad_pictures_get_a_line(void **state)
         assert_false(student_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
         assert_true(e.msg[0] != '\0' && strchr(e.msg, '\n') == NULL);
         if (strcmp(files[i].name, "bomb") == 0)
-            assert_string_equal(e.msg, "the picture is 65536 x 65536 pixels, not 64 x 48");
+            assert_non_null(strstr(e.msg, "65536 x 65536"));
     }
     struct student s;
     struct err e;

@@ -5,7 +5,6 @@
 #include "picture.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,21 +13,11 @@ static const double clip_sd = 5; /* of the clipping point, where nothing is comp
 static bool check_header(const char *path, int width, int height, struct image_info *info,
                          struct err *e)
 {
-    static const char *const magic[] = {"\x89PNG", "\x76\x2f\x31\x01", "#?", "PF", "Pf"};
-    char first[5] = "";
-    bool known = false;
-    FILE *f = fopen(path, "rb");
-    if (f == NULL)
-        return err_set(e, "the picture cannot be read");
-    size_t n = fread(first, 1, 4, f);
-    fclose(f);
-    for (size_t i = 0; n == 4 && i < sizeof magic / sizeof *magic; i++)
-        known |= strncmp(first, magic[i], strlen(magic[i])) == 0;
-    if (!known)
-        return err_set(e, "the picture is no PNG, EXR, HDR or PFM file");
-    struct err why; /* has our path in it */
-    if (!image_inspect(path, info, &why))
-        return err_set(e, "the picture cannot be decoded");
+    struct err why;
+    if (!image_inspect(path, info, &why)) {
+        const char *what = strstr(why.msg, ": "); /* without our path */
+        return err_set(e, "the picture: %.300s", what != NULL ? what + 2 : "cannot be read");
+    }
     if (info->width != width || info->height != height)
         return err_set(e, "the picture is %d x %d pixels, not %d x %d", info->width, info->height,
                        width, height);
