@@ -14,7 +14,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev zlib1g-dev
+  nettle-dev zlib1g-dev bubblewrap
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LIVE := blender povray python3-numpy
@@ -116,7 +116,7 @@ install: all
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
 	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
-	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
+	cp -R reference/scenes reference/engines golden tools/rubrics $(DESTDIR)$(PREFIX)/share/assay
 
 format:
 	clang-format -i $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])
