@@ -3,8 +3,8 @@
  * samples in turn; what a sample costs is the slope between the two, so no start is counted. Image means
  * have to agree first.
  *
- * POV-Ray is slow by the recipe that makes its picture ours: it renders once, the view with a quarter of
- * the pixels, pictures of 4 points a pixel; what one costs is the slope between 3 and 6 of them. */
+ * POV-Ray is slow by the recipe that makes its picture ours: it renders the view with a quarter of the
+ * pixels, and fewer samples. */
 #include "bench.h"
 #include "bench_engines.h"
 #include "bench_scenes.h"
@@ -21,7 +21,7 @@
 #include <string.h>
 
 enum { FEW, MANY, NUM_RUNGS, COUNT = 4, MAX_ROUNDS = 9 };
-enum { POVRAY_SHRINK = 2, POVRAY_SPP = 4, POVRAY_FEW = 3, POVRAY_MANY = 6 };
+enum { POVRAY_SHRINK = 2 };
 
 static const struct {
     const char *name;
@@ -47,7 +47,7 @@ struct runs {
     char why[256]; /* not done */
     float *images[NUM_RUNGS];
     int count[NUM_RUNGS], spp[NUM_RUNGS]; /* pictures, all rounds; samples of one */
-    int rounds, shrink;                   /* shrink: of both sides */
+    int shrink;                           /* of both sides */
     double cost[MAX_ROUNDS];              /* CPU seconds of a sample of all pixels */
     double mpaths, share, share_se;       /* M paths per CPU s; image mean over ours - 1 */
     double variance[NUM_RUNGS];           /* relative, of one picture */
@@ -102,14 +102,13 @@ static int samples(const struct bench_options *o, int rung)
 static void plan(enum bench_engine engine, const struct bench_options *o,
                  const struct bench_view *v, struct runs *r)
 {
-    bool slow = engine == BENCH_POVRAY;
-    r->rounds = slow ? 1 : o->rounds;
-    r->shrink = slow ? POVRAY_SHRINK : 1;
+    r->shrink = engine == BENCH_POVRAY ? POVRAY_SHRINK : 1;
     size_t size =
         3 * (size_t)(v->camera.width / r->shrink) * (size_t)(v->camera.height / r->shrink);
     for (int k = 0; k < NUM_RUNGS; k++) {
-        r->spp[k] = slow ? POVRAY_SPP : samples(o, k);
-        r->count[k] = slow ? (k == FEW ? POVRAY_FEW : POVRAY_MANY) : r->rounds * COUNT;
+        r->spp[k] = samples(o, k) / (r->shrink * r->shrink);
+        r->spp[k] += r->spp[k] == 0;
+        r->count[k] = o->rounds * COUNT;
         r->images[k] = bench_allocate((size_t)r->count[k] * size * sizeof(float));
     }
 }
@@ -129,13 +128,12 @@ static bool run(enum bench_engine engine, const struct bench_options *o, const s
         return false;
     for (int k = 0; k < NUM_RUNGS; k++) {
         uint32_t seed = (uint32_t)(1000 * engine + 10 * round + k);
-        int count = r->count[k] / r->rounds;
-        if (!bench_engine_render(engine, &view, r->spp[k], count, seed, work,
-                                 r->images[k] + (size_t)(round * count) * size, &cpu[k], e))
+        if (!bench_engine_render(engine, &view, r->spp[k], COUNT, seed, work,
+                                 r->images[k] + (size_t)(round * COUNT) * size, &cpu[k], e))
             return false;
     }
-    double more = (double)(r->count[MANY] * r->spp[MANY] - r->count[FEW] * r->spp[FEW]) / r->rounds;
-    r->cost[round] = (cpu[MANY] - cpu[FEW]) / more * r->shrink * r->shrink;
+    r->cost[round] =
+        (cpu[MANY] - cpu[FEW]) / (COUNT * (r->spp[MANY] - r->spp[FEW])) * r->shrink * r->shrink;
     return true;
 }
 
@@ -154,8 +152,9 @@ static double mean_of(const float *images, int count, size_t size, double *var)
     return sum / count;
 }
 
-static bool judge(const struct bench_view *v, const struct moments *units, struct runs *r,
-                  const struct runs *ours, struct err *e)
+static bool judge(const struct bench_options *o, const struct bench_view *v,
+                  const struct moments *units, struct runs *r, const struct runs *ours,
+                  struct err *e)
 {
     struct converge_reference ref;
     double cost[MAX_ROUNDS], log_cost = 0, log_cost2 = 0, var, our_var, var_se = 0;
@@ -173,20 +172,19 @@ static bool judge(const struct bench_view *v, const struct moments *units, struc
                               3 * (size_t)units->width * (size_t)units->height, &our_var);
     converge_reference_free(&ref);
     memcpy(cost, r->cost, sizeof cost);
-    double seconds = bench_median(cost, r->rounds);
+    double seconds = bench_median(cost, o->rounds);
     r->mpaths = v->camera.width * v->camera.height / seconds * 1e-6;
     r->share = mean / our_mean - 1;
     r->share_se = sqrt(var + our_var) / our_mean;
-    for (int k = 0; k < r->rounds; k++) {
+    for (int k = 0; k < o->rounds; k++) {
         double x = log(fmax(r->cost[k], 1e-9));
-        log_cost += x / r->rounds;
-        log_cost2 += x * x / r->rounds;
+        log_cost += x / o->rounds;
+        log_cost2 += x * x / o->rounds;
     }
     double cost_var =
-        r->rounds > 1 ? fmax(0, log_cost2 - log_cost * log_cost) / (r->rounds - 1) : 0;
+        o->rounds > 1 ? fmax(0, log_cost2 - log_cost * log_cost) / (o->rounds - 1) : 0;
     struct estimate log_efficiency = {-log(r->variance[MANY] * r->spp[MANY] * seconds),
-                                      sqrt(var_se * var_se + cost_var),
-                                      r->rounds > 1 ? r->rounds - 1 : r->count[MANY] - 1};
+                                      sqrt(var_se * var_se + cost_var), fmax(1, o->rounds - 1)};
     struct interval i = estimate_interval(log_efficiency, 0.05);
     r->efficiency = exp(log_efficiency.value);
     r->efficiency_lo = exp(i.lo);
@@ -281,8 +279,7 @@ static bool measure(const struct bench_options *o, const struct bench_view *v, j
     for (int round = 0; round < o->rounds; round++)
         for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
             struct err inner = {""};
-            if (!runs[k].done || round >= runs[k].rounds ||
-                run((enum bench_engine)k, o, v, round, &runs[k], &inner))
+            if (!runs[k].done || run((enum bench_engine)k, o, v, round, &runs[k], &inner))
                 continue;
             runs[k].done = false; /* what it cannot express, too */
             snprintf(runs[k].why, sizeof runs[k].why, "%.200s", inner.msg);
@@ -294,7 +291,7 @@ static bool measure(const struct bench_options *o, const struct bench_view *v, j
         moments_add_image(&m, runs[BENCH_MIS].images[MANY] + (size_t)k * size);
     for (int k = 0; ok && k < BENCH_NUM_ENGINES; k++)
         if (runs[k].done)
-            ok = judge(v, &m, &runs[k], &runs[BENCH_MIS], e);
+            ok = judge(o, v, &m, &runs[k], &runs[BENCH_MIS], e);
     if (ok) {
         json_array_append_new(scenes, show(o, v, runs, wrong));
         ok = plot(o, v, runs, e);
