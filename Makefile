@@ -8,6 +8,7 @@ PREFIX ?= /usr/local
 LIVE   ?=
 ONLY   ?=
 ALPHA  ?= 1e-3
+SECONDS_EACH ?= 60
 V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
@@ -26,7 +27,7 @@ pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
 # --as-needed: pathtracer starts at once, without the libraries that only the harness uses.
 LIBS       = -Wl,--as-needed $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
-SANITIZE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
 OPT      := -O3 -g -fno-math-errno -fno-trapping-math
 WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
 WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
@@ -57,7 +58,7 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
+check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
 	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
@@ -132,6 +133,7 @@ help:
 	@echo 'make catalogue   bring what assay diagnose knows of these bugs up to date'
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
+	@echo 'make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
@@ -140,12 +142,13 @@ help:
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'
 
-# Three builds of everything: the programs, the same under sanitizers, and all of it by clang only to
-# see that it compiles without a warning there too.
+# Three builds of everything: the programs, the same under sanitizers, and all of it by clang, to see that
+# it compiles without a warning there too, and for the fuzzers.
 $(BUILD)/san/%: OPT := $(SANITIZE)
 $(BUILD)/san/%: WERROR := 1
 $(BUILD)/clang/%: CC := clang
 $(BUILD)/clang/%: CXX := clang++
+$(BUILD)/clang/%: OPT := $(SANITIZE),fuzzer-no-link
 $(BUILD)/clang/%: WERROR := 1
 
 define compile_c
@@ -230,6 +233,18 @@ $(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(
 	$(link)
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
+# Readers of files under libFuzzer: one program for each tests/fuzz/fuzz_NAME.c.
+FUZZ := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+$(BUILD)/clang/libassay.a: $(call obj,$(BUILD)/clang,$(HARNESS) $(RENDERER))
+	$(archive)
+$(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): TEST_LIBS := -fsanitize=fuzzer
+$(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): $(BUILD)/clang/fuzz_%: \
+  $(BUILD)/clang/tests/fuzz/fuzz_%.c.o $(BUILD)/clang/tests/fuzz/fuzz.c.o $(BUILD)/clang/libassay.a
+	$(link)
+programs-fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ))
+fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
+	tests/fuzz/run.sh $(BUILD) $(SECONDS_EACH) $(or $(ONLY),$(FUZZ))
+
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
   $(wildcard tests/make_*.c tests/diagnose_rates.c) $(BENCH))
@@ -269,8 +284,8 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
-  programs-san programs-clang
+.PHONY: all validate check fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+  programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

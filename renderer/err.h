@@ -12,8 +12,8 @@ struct err {
     char msg[1024];
 };
 
-/* Formats the line into e (truncating quietly at its size; e may be NULL). Always returns false, so
- * that a failing function can `return err_set(e, "...")`. */
+/* Formats the line into e (truncating quietly at its size; e may be NULL), a '?' for each control character.
+ * Always returns false, so that a failing function can `return err_set(e, "...")`. */
 bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
 /* Puts "prefix: " in front of a line that is already set: who was doing what when it failed. Always

@@ -38,6 +38,9 @@ int image_channel(const struct image *im, const char *name);
 /* What the readers take at most. */
 enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
 #define IMAGE_MAX_FLOATS 4e9 /* 16384 x 16384 pixels of a dozen channels */
+/* Bytes of pixels for a byte of file: deflate, the densest of the compressions in use, makes one of 1032. A header
+ * that promises more is refused before memory is asked for. */
+#define IMAGE_MAX_EXPANSION 1032
 
 /* Reads an OpenEXR file (its first part; rows or tiles of halves or floats) with its text attributes.
  * Channels are in the file's order. *half (may be NULL) tells if it stored fewer than 32 bits per

@@ -183,15 +183,21 @@ static bool read_header(exr_context_t f, const char *path, const struct stream *
         return err_set(e, "%s: an image of %lld x %lld x %d is more than this program takes", path,
                        (long long)width, (long long)height, channels);
     const char *names[IMAGE_MAX_CHANNELS];
+    double bytes = 0;
     *half = false;
     for (int c = 0; c < channels; c++) {
         const exr_attr_chlist_entry_t *ch = &list->entries[c];
         names[c] = ch->name.str;
         *half |= ch->pixel_type == EXR_PIXEL_HALF;
+        bytes += (double)width * (double)height * (ch->pixel_type == EXR_PIXEL_HALF ? 2 : 4);
         if (ch->pixel_type == EXR_PIXEL_UINT || ch->x_sampling != 1 || ch->y_sampling != 1 ||
             ch->name.length >= (int)sizeof im->names[0])
             return err_set(e, "%s: channel %.64s is not a float for each pixel", path, names[c]);
     }
+    off_t size = lseek(s->fd, 0, SEEK_END);
+    if (bytes > IMAGE_MAX_EXPANSION * (double)size)
+        return err_set(e, "%s: an image of %lld x %lld x %d cannot be in %lld bytes", path,
+                       (long long)width, (long long)height, channels, (long long)size);
     if (!image_alloc(im, (int)width, (int)height, channels, names, e))
         return err_prefix(e, "%s", path);
     for (int i = 0; i < num_attrs; i++) {

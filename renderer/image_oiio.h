@@ -5,8 +5,8 @@
 
 #include "image.h"
 
-/* Reads any file that OpenImageIO knows. Integer formats come scaled to [0,1], no colour
- * conversion. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+/* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
+ * colour conversion. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
 
@@ -22,7 +22,7 @@ struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
     enum image_type type; /* the smallest of its channels */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
-    int parts;            /* pictures in one file (EXR parts, TIFF pages), 1 .. */
+    int parts;            /* pictures in one file (EXR parts), 1 .. */
     bool is_cropped;      /* the file holds another rectangle than the picture shown */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)

@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/run.sh BUILD PROGRAM...: runs the test programs and the end-to-end tests, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and ten seconds of each fuzzer, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
 build=${1:?usage: tests/run.sh BUILD PROGRAM...}
@@ -16,11 +16,12 @@ count() {
 }
 
 # run_job LOG PROGRAM BUILD: its output, exit status and seconds into files, so that jobs may run side by
-# side. Test programs take no arguments; the end-to-end tests take BUILD.
+# side. Test programs take no arguments; scripts take BUILD.
 run_job() {
     local log=$1 name start=$SECONDS
     name=$(basename "$2" .sh)
     case $2 in
+    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" 10 ;;
     *.sh) "$2" "$3" ;;
     *) "$2" ;;
     esac >"$log/$name.out" 2>&1
@@ -31,6 +32,7 @@ export -f run_job
 # The longest first: as many as there are processors at a time.
 {
     echo tests/end_to_end.sh
+    echo tests/fuzz.sh
     long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
     printf '%s\n' "${programs[@]}" | grep -E "$long"
     printf '%s\n' "${programs[@]}" | grep -vE "$long"
@@ -54,16 +56,19 @@ for program in "${programs[@]}"; do
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
-status=127 seconds=0
-read -r status seconds <"$log/end_to_end.status"
-p=$(grep -c '^ok ' "$log/end_to_end.out") f=$(grep -c '^not ok ' "$log/end_to_end.out")
-if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f)) -eq 0 ]; then
-    f=$((f + 1))
-    echo "end_to_end: died with status $status"
-fi
-[ "$f" -gt 0 ] && cat "$log/end_to_end.out"
-printf '%-24s %3d passed, %d failed  (%d s)\n' end_to_end "$p" "$f" "$seconds"
-passed=$((passed + p)) failed=$((failed + f))
+# Lines "ok ..." and "not ok ...".
+for name in end_to_end fuzz; do
+    status=127 seconds=0
+    read -r status seconds <"$log/$name.status"
+    p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")
+    if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f)) -eq 0 ]; then
+        f=$((f + 1))
+        echo "$name: died with status $status"
+    fi
+    [ "$f" -gt 0 ] && cat "$log/$name.out"
+    printf '%-24s %3d passed, %d failed  (%d s)\n' "$name" "$p" "$f" "$seconds"
+    passed=$((passed + p)) failed=$((failed + f))
+done
 
 if [ $skipped -gt 0 ]; then
     echo "$passed passed, $failed failed, $skipped skipped"

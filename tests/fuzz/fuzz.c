@@ -1,0 +1,44 @@
+#include "fuzz.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static char path[64];
+
+static void remove_file(void)
+{
+    unlink(path);
+}
+
+void fuzz_require(int ok, const char *what)
+{
+    if (ok)
+        return;
+    fprintf(stderr, "fuzz: %s\n", what);
+    abort();
+}
+
+const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix)
+{
+    if (path[0] == '\0') {
+        snprintf(path, sizeof path, "/dev/shm/assay_fuzz_%d%s", (int)getpid(), suffix);
+        atexit(remove_file);
+    }
+    FILE *f = fopen(path, "wb");
+    fuzz_require(f != NULL && fwrite(data, 1, size, f) == size && fclose(f) == 0,
+                 "cannot write to /dev/shm");
+    return path;
+}
+
+void fuzz_check_line(const struct err *e, const char *name)
+{
+    fuzz_require(e->msg[0] != '\0', "a failure without a line");
+    fuzz_require(strchr(e->msg, '\n') == NULL, "a failure of more than one line");
+    for (const char *c = e->msg; *c != '\0'; c++)
+        fuzz_require((unsigned char)*c >= ' ' && *c != 127,
+                     "control characters in a failure's line");
+    fuzz_require(name == NULL || strncmp(e->msg, name, strlen(name)) == 0,
+                 "a failure that does not begin with the file's name");
+}

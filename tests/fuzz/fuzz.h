@@ -1,0 +1,22 @@
+/* What the fuzz targets share (libFuzzer [LLVM libFuzzer]; `make fuzz`). A target gives the bytes to a reader and
+ * aborts where the reader breaks its word: a failure has one line of text, and leaves nothing behind. */
+#ifndef ASSAY_TESTS_FUZZ_H
+#define ASSAY_TESTS_FUZZ_H
+
+#include "../../renderer/err.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+/* A file in memory with these bytes, its name ending in `suffix`; the same name at every call of a process. */
+const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix);
+
+/* Aborts unless a failed call left one line that says something, and names the file where `path` is not NULL. */
+void fuzz_check_line(const struct err *e, const char *path);
+
+/* Aborts with the line if `ok` is false. */
+void fuzz_require(int ok, const char *what);
+
+#endif

@@ -1,0 +1,62 @@
+/* COLLADA files, and that a scene which loaded is one that a renderer may trust. */
+#include "../../renderer/camera.h"
+#include "../../renderer/collada.h"
+#include "fuzz.h"
+
+#include <math.h>
+
+static int finite3(vec3 v)
+{
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+static void check_light(const struct scene *s, const struct light *l)
+{
+    if (l->kind == LIGHT_TRIANGLES)
+        fuzz_require(l->count > 0 && l->first < s->num_triangles &&
+                         l->count <= s->num_triangles - l->first && l->area > 0,
+                     "a light of triangles that are not there");
+    if (l->kind == LIGHT_SPHERE)
+        fuzz_require(l->first < s->num_spheres && l->area > 0,
+                     "a light of a sphere that is not there");
+}
+
+static void check_scene(const struct scene *s)
+{
+    fuzz_require(s->dialect != DIALECT_AUTO, "a dialect left open");
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        fuzz_require(s->tri_material[i] < s->num_materials && s->tri_object[i] < s->num_objects &&
+                         s->tri_light[i] < (int32_t)s->num_lights,
+                     "a triangle's index is out of range");
+        for (uint32_t k = 3 * i; k < 3 * i + 3; k++)
+            fuzz_require(finite3(s->position[k]) && fabsf(length(s->normal[k]) - 1) < 1e-3f,
+                         "a corner or a normal is not a number");
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++)
+        fuzz_require(s->sphere_material[i] < s->num_materials &&
+                         s->sphere_object[i] < s->num_objects &&
+                         s->sphere_light[i] < (int32_t)s->num_lights && s->spheres[i].radius > 0 &&
+                         isfinite(s->spheres[i].radius) && finite3(s->spheres[i].centre),
+                     "a sphere's index or size is out of range");
+    for (uint32_t i = 0; i < s->num_lights; i++)
+        check_light(s, &s->lights[i]);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const enum dialect dialects[] = {DIALECT_AUTO, DIALECT_COLLADA, DIALECT_CGL};
+    for (int i = 0; i < 3; i++) {
+        struct scene s;
+        struct camera c;
+        struct err e = {""};
+        if (!collada_parse((const char *)data, size, "fuzz.dae", dialects[i], &s, &e)) {
+            fuzz_check_line(&e, "fuzz.dae");
+            continue;
+        }
+        check_scene(&s);
+        if (!camera_init(&c, &s, 40, 30, &e))
+            fuzz_check_line(&e, NULL);
+        scene_free(&s);
+    }
+    return 0;
+}

@@ -1,0 +1,15 @@
+/* Descriptions of other renderers (reference/ENGINES.md). */
+#include "../../reference/engine.h"
+#include "fuzz.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    const char *path = fuzz_file(data, size, ".json");
+    struct engine en;
+    struct err e = {""};
+    if (!engine_load(path, &en, &e))
+        fuzz_check_line(&e, path);
+    else
+        engine_free(&en);
+    return 0;
+}

@@ -1,0 +1,22 @@
+/* Pictures from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies by our reader. */
+#include "../../renderer/image_oiio.h"
+#include "fuzz.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    const char *path = fuzz_file(data, size, ".picture");
+    struct image im;
+    struct image_info info;
+    struct err e = {""};
+    if (!image_inspect(path, &info, &e))
+        fuzz_check_line(&e, path);
+    if (image_read(path, &im, NULL, &e))
+        image_free(&im);
+    else
+        fuzz_check_line(&e, path);
+    if (image_read_hdr(path, &im, &e))
+        image_free(&im);
+    else
+        fuzz_check_line(&e, path);
+    return 0;
+}
