@@ -50,8 +50,9 @@ struct wide {
     double cost; /* expected tests of a node or leaf for a random ray */
 };
 
-/* ISA_AUTO: the widest. NULL on failure (out of memory; no such instructions). */
-struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
+/* ISA_AUTO: the widest. The same bits on any number of threads. NULL on failure (out of memory; no such
+ * instructions). */
+struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
     __attribute__((warn_unused_result));
 void wide_free(struct wide *w);
 
