@@ -95,6 +95,12 @@ void diagnosis_print(FILE *f, const struct catalogue *c, const struct clue *clue
     }
 }
 
+/* null where there is no number: nothing could be explained, or p underflows. */
+static json_t *number(double v)
+{
+    return isfinite(v) ? json_real(v) : json_null();
+}
+
 static json_t *view_json(const struct catalogue *c, const struct clue *clue,
                          const struct candidate *best)
 {
@@ -104,9 +110,9 @@ static json_t *view_json(const struct catalogue *c, const struct clue *clue,
                          ? json_pack("{si,si,si,si,sf}", "x", cell * v.x, "y", cell * v.y, "width",
                                      cell * v.columns, "height", cell * v.rows, "change", v.change)
                          : json_null();
-    return json_pack("{ss,sf,sf,so,so}", "view", clue->view->name, "t", v.t, "log10_lead",
-                     log10_of(v.log_lead), "explained",
-                     isnan(v.explained) ? json_null() : json_real(v.explained), "region", region);
+    return json_pack("{ss,so,so,so,so}", "view", clue->view->name, "t", number(v.t), "log10_lead",
+                     number(log10_of(v.log_lead)), "explained", number(v.explained), "region",
+                     region);
 }
 
 json_t *diagnosis_json(const struct catalogue *c, const struct clue *clue, int num_clues,
@@ -120,19 +126,21 @@ json_t *diagnosis_json(const struct catalogue *c, const struct clue *clue, int n
     for (int i = 0; i < d->num_candidates; i++) {
         const struct candidate *k = &d->candidate[i];
         const struct bug *b = &c->bug[k->bug];
-        json_array_append_new(
-            candidates, json_pack("{ss,ss,ss,sf,sf,sf}", "name", b->name, "bug", b->what, "where",
-                                  b->where, "amplitude", k->amplitude, "log10_likelihood",
-                                  log10_of(k->log_likelihood), "explained", k->explained));
+        json_array_append_new(candidates,
+                              json_pack("{ss,ss,ss,so,so,so}", "name", b->name, "bug", b->what,
+                                        "where", b->where, "amplitude", number(k->amplitude),
+                                        "log10_likelihood", number(log10_of(k->log_likelihood)),
+                                        "explained", number(k->explained)));
     }
     for (int i = 0; i < num_clues; i++)
         json_array_append_new(views, d->num_candidates > 0
                                          ? view_json(c, &clue[i], &d->candidate[0])
                                          : json_pack("{ss}", "view", clue[i].view->name));
-    json_t *root = json_pack("{ss,ss,sf,si,so,so,so,sO}", "finding", finding[d->finding], "gate",
-                             d->gate, "log10_p", d->log10_p, "known_bugs", c->num_bugs, "named",
-                             named, "candidates", candidates, "views", views, "skipped", skipped);
+    json_t *root =
+        json_pack("{ss,ss,so,si,so,so,so,sO}", "finding", finding[d->finding], "gate", d->gate,
+                  "log10_p", number(d->log10_p), "known_bugs", c->num_bugs, "named", named,
+                  "candidates", candidates, "views", views, "skipped", skipped);
     if (root != NULL && d->finding == FINDING_BUG)
-        json_object_set_new(root, "probability", json_real(d->probability));
+        json_object_set_new(root, "probability", number(d->probability));
     return root;
 }

@@ -123,7 +123,7 @@ void sight_set_spread(struct sight *s, const struct sight *correct)
         sum += s->spread[i];
         sum_correct += correct->spread[i];
     }
-    if (!(sum > 0 && sum_correct > 0)) {
+    if (!(sum > 0 && sum_correct > 0 && s->cell == correct->cell)) {
         s->fact[FACT_SPREAD] = s->fact_sd[FACT_SPREAD] = NAN;
         return;
     }
