@@ -235,7 +235,7 @@ struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa is
     if (t == NULL)
         goto fail;
     if (kind == BVH_WIDE) {
-        t->wide = wide_build(s, isa, e);
+        t->wide = wide_build(s, isa == ISA_SCALAR ? ISA_AUTO : isa, e);
         if (t->wide != NULL)
             return t;
         free(t);

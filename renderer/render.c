@@ -292,6 +292,11 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     it.opt.first_hits = film->first != NULL;
     if (opt->integrator.sampler.kind != SAMPLER_INDEPENDENT)
         strcpy(film->m.unit, "stratified");
+    if (!integrator_prepare(&it, e)) {
+        integrator_free(&it);
+        light_table_free(lights);
+        return false;
+    }
     struct job j = {.it = &it, .opt = opt, .film = film};
     double wall = now_seconds(), cpu = cpu_seconds();
     double pixels = (double)opt->width * opt->height;
@@ -321,6 +326,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     stats->samples += (double)atomic_load(&j.samples_done);
     stats->wall_seconds = now_seconds() - wall;
     stats->cpu_seconds = cpu_seconds() - cpu;
+    integrator_free(&it);
     light_table_free(lights);
     return ok;
 }

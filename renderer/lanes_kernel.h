@@ -1,0 +1,16 @@
+/* The stages of the integrator on eight paths at a time, compiled once for each instruction set. Every
+ * path gets the bits that the scalar stages of integrator.c would give it. */
+#ifndef ASSAY_LANES_KERNEL_H
+#define ASSAY_LANES_KERNEL_H
+
+#include "integrator.h"
+#include "isa.h"
+
+struct lanes_kernel {
+    /* As integrate(), of INTEGRATE_PATHS and without DIRECT_HEMISPHERE. */
+    void (*integrate)(const struct integrator *it, struct batch *b, int num_lanes);
+};
+
+extern const struct lanes_kernel lanes_kernel_sse42, lanes_kernel_avx2, lanes_kernel_avx512;
+
+#endif
