@@ -6,6 +6,7 @@
 #include "first_hit.h"
 #include "integrator_lane.h"
 #include "lanes_bsdf.h"
+#include "lanes_film.h"
 #include "lanes_light.h"
 #include "lanes_sampler.h"
 
@@ -504,4 +505,5 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
     }
 }
 
-const struct lanes_kernel FOR_ISA(lanes_kernel) = {.integrate = integrate_lanes};
+const struct lanes_kernel FOR_ISA(lanes_kernel) = {.integrate = integrate_lanes,
+                                                    .film_add = film_add_lanes};

@@ -1,5 +1,7 @@
 #include "render.h"
 
+#include "lanes_kernel.h"
+
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -71,9 +73,15 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         }
         integrate(j->it, b, n);
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
+        const bool plain = j->it->lanes != NULL && f->first == NULL;
+        if (plain)
+            j->it->lanes->film_add(f, at, n, b);
+        if (plain && f->target == NULL && o->adaptive_batch == 0)
+            continue;
         int kept = 0;
         for (int i = 0; i < n; i++) {
-            film_add(f, at[i], b, i);
+            if (!plain)
+                film_add(f, at[i], b, i);
             at[kept] = at[i];
             pixel[kept] = pixel[i];
             kept += !has_stopped(o, f, at[i], k + 1);
