@@ -170,27 +170,4 @@ INLINE void rgb_store(struct rgbs *a, int i, rgbv v)
     vf_store_any(a->b + i, v.b);
 }
 
-/* column[k] lane i = base[stride * index[i] + k]: eight rows of eight, turned. */
-INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
-                           vf column[LANES])
-{
-    vf a[LANES], b[LANES];
-    for (int i = 0; i < LANES; i++)
-        a[i] = vf_load_any(base + stride * (size_t)index[i]);
-    for (int i = 0; i < LANES; i += 2) {
-        b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-        b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    for (int i = 0; i < LANES; i += 4) {
-        a[i] = __builtin_shufflevector(b[i], b[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 1] = __builtin_shufflevector(b[i], b[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        a[i + 2] = __builtin_shufflevector(b[i + 1], b[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 3] = __builtin_shufflevector(b[i + 1], b[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    for (int i = 0; i < 4; i++) {
-        column[i] = __builtin_shufflevector(a[i], a[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        column[i + 4] = __builtin_shufflevector(a[i], a[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-}
-
 #endif

@@ -69,7 +69,7 @@ INLINE vf vf_abs(vf a)
 }
 
 /* vf_min, vf_max: as minf and maxf, if either is NaN the second wins. any_bits: bit k is set where
- * lane k is true. mul_sub: a b - c, rounded once where the machine can. */
+ * lane k is true. mul_sub: a b - c, mul_add: a b + c, rounded once where the machine can. */
 #ifdef __AVX2__
 INLINE vf vf_min(vf a, vf b)
 {
@@ -98,6 +98,10 @@ INLINE vf vf_hypot(vf a, vf b)
 INLINE vf mul_sub(vf a, vf b, vf c)
 {
     return (vf)_mm256_fmsub_ps((__m256)a, (__m256)b, (__m256)c);
+}
+INLINE vf mul_add(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
 }
 INLINE vi vf_lt(vf a, vf b)
 {
@@ -191,6 +195,10 @@ INLINE vf vf_hypot(vf a, vf b)
 INLINE vf mul_sub(vf a, vf b, vf c)
 {
     return a * b - c;
+}
+INLINE vf mul_add(vf a, vf b, vf c)
+{
+    return a * b + c;
 }
 INLINE vi vf_lt(vf a, vf b)
 {
@@ -363,6 +371,29 @@ INLINE vw vw_xor(vw a, vw b, uint32_t k)
 INLINE vi vi_select(vi mask, vi yes, vi no)
 {
     return (vi)vf_select(mask, (vf)yes, (vf)no);
+}
+
+/* column[k] lane i = base[stride * index[i] + k]: eight rows of eight, turned. */
+INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
+                           vf column[LANES])
+{
+    vf a[LANES], b[LANES];
+    for (int i = 0; i < LANES; i++)
+        a[i] = vf_load_any(base + stride * (size_t)index[i]);
+    for (int i = 0; i < LANES; i += 2) {
+        b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < LANES; i += 4) {
+        a[i] = __builtin_shufflevector(b[i], b[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+        a[i + 1] = __builtin_shufflevector(b[i], b[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+        a[i + 2] = __builtin_shufflevector(b[i + 1], b[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
+        a[i + 3] = __builtin_shufflevector(b[i + 1], b[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    for (int i = 0; i < 4; i++) {
+        column[i] = __builtin_shufflevector(a[i], a[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        column[i + 4] = __builtin_shufflevector(a[i], a[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
 }
 
 #endif
