@@ -37,6 +37,11 @@ static float power_heuristic(float a, float b)
     return a > 0 ? 1 / (1 + r * r) : 0;
 }
 
+static bool counts(const struct integrator *it, int bounces)
+{
+    return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
+}
+
 /* Camera rays for all lanes. */
 static int generate(const struct integrator *it, struct batch *b, int num_lanes)
 {
@@ -66,7 +71,8 @@ static uint32_t material_of(const struct scene *s, uint32_t prim)
                                    : s->sphere_material[prim - s->num_triangles];
 }
 
-bool integrator_chooses_light(const struct integrator *it)
+/* One light, chosen by power, is sampled at a vertex and not each of them. */
+static bool chooses_light(const struct integrator *it)
 {
     switch (it->opt.many_lights) {
     case LIGHTS_AUTO: break;
@@ -89,7 +95,7 @@ static float emission_weight(const struct integrator *it, const struct batch *b,
     float pdf_light = s == NULL
                           ? environment_pdf_w(it->scene->environment, d)
                           : light_pdf_w(it->lights, l, vec3s_get(&b->ray.o, i), d, b->hit.t[i], s);
-    if (integrator_chooses_light(it))
+    if (chooses_light(it))
         pdf_light *= light_choice_probability(it->lights, l);
     return power_heuristic(b->pdf_w[i], (float)it->opt.light_samples * pdf_light);
 }
@@ -124,7 +130,7 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
         int i = b->active[k];
         uint32_t prim = b->hit.prim[i];
         if (prim == NO_HIT) {
-            if (integrator_counts(it, vertex))
+            if (counts(it, vertex))
                 rgbs_add(&b->radiance, i, lane_environment(it, b, i));
             continue;
         }
@@ -134,7 +140,7 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
         b->material[i] = material_of(it->scene, prim);
         const struct material *m = &it->scene->materials[b->material[i]];
         int32_t light = light_of(it->scene, prim);
-        if (light >= 0 && integrator_counts(it, vertex))
+        if (light >= 0 && counts(it, vertex))
             rgbs_add(&b->radiance, i, lane_emission(it, b, i, (uint32_t)light, m, &s));
         if (vertex == it->opt.max_bounces || bsdf_is_black(m))
             continue;
@@ -289,7 +295,7 @@ static void connect(const struct integrator *it, struct batch *b, int num_active
     const struct scene *s = it->scene;
     uint32_t purpose = PURPOSE_LIGHT;
     bool only_delta = it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
-    bool choose = integrator_chooses_light(it);
+    bool choose = chooses_light(it);
     int n = 0;
     for (int k = 0; k < num_active; k++) {
         b->diffuse[n] = b->active[k];
@@ -410,7 +416,7 @@ void integrate(const struct integrator *it, struct batch *b, int num_lanes)
         if (vertex == 0 && it->opt.first_hits)
             first_hits_record(it, b, active);
         active = shade_hits(it, b, active, vertex);
-        if (integrator_counts(it, vertex + 1))
+        if (counts(it, vertex + 1))
             connect(it, b, active, vertex);
         bool only_delta = vertex + 1 == it->opt.max_bounces && !last_ray;
         active = scatter(it, b, active, vertex, only_delta);

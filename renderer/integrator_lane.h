@@ -16,12 +16,4 @@ rgb lane_emission(const struct integrator *it, const struct batch *b, int i, uin
 rgb lane_scatter_towards(const struct integrator *it, const struct batch *b, int i, vec3 wi,
                          float *pdf_w);
 
-/* Does light with so many bounces count? */
-static inline bool integrator_counts(const struct integrator *it, int bounces)
-{
-    return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
-}
-/* One light, chosen by power, is sampled at a vertex and not each of them. */
-bool integrator_chooses_light(const struct integrator *it);
-
 #endif

@@ -12,6 +12,22 @@
 
 static const vi lane_number = {0, 1, 2, 3, 4, 5, 6, 7};
 
+static bool counts(const struct integrator *it, int bounces)
+{
+    return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
+}
+
+/* One light, chosen by power, is sampled at a vertex and not each of them. */
+static bool chooses_light(const struct integrator *it)
+{
+    switch (it->opt.many_lights) {
+    case LIGHTS_AUTO: break;
+    case LIGHTS_ALL: return false;
+    case LIGHTS_ONE: return true;
+    }
+    return it->scene->num_lights > MANY_LIGHTS;
+}
+
 /* Bits of the lanes of eight paths from k that a batch of n has. */
 INLINE unsigned lanes_there(int k, int n)
 {
@@ -158,17 +174,17 @@ static void add_emission(const struct integrator *it, struct batch *b, int k, un
 static void shade(const struct integrator *it, struct batch *b, int n, int vertex)
 {
     const struct lanes_scene *ls = it->lanes_scene;
-    const bool counts = integrator_counts(it, vertex), last = vertex == it->opt.max_bounces;
+    const bool lights_count = counts(it, vertex), last = vertex == it->opt.max_bounces;
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n);
         vi prim = vi_load_any(b->hit.prim + k);
         unsigned missed = there & bits(vi_eq(prim, vi_set(-1)));
-        if (missed && counts && it->scene->environment != NULL)
+        if (missed && lights_count && it->scene->environment != NULL)
             add_environment(it, b, k, missed);
         there &= ~missed;
         struct surfacev s;
         surfaces(ls, it->scene->num_triangles, b, k, prim, &s);
-        if (counts) {
+        if (lights_count) {
             unsigned lit = there & bits(vi_lt(vi_set(-1), s.light));
             if (lit)
                 add_emission(it, b, k, lit);
@@ -352,7 +368,7 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
     const struct scene *s = it->scene;
     uint32_t purpose = PURPOSE_LIGHT;
     bool only_delta = it->opt.direct == DIRECT_BSDF;
-    if (integrator_chooses_light(it)) {
+    if (chooses_light(it)) {
         for (int k = 0; k < it->opt.light_samples; k++) {
             choose(it, b, n, vertex, purpose++, only_delta);
             connect_light(it, b, n, vertex, purpose++, it->opt.light_samples, true, 0);
@@ -498,7 +514,7 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
         if (vertex == 0 && it->opt.first_hits)
             first_hits_record(it, b, n);
         shade(it, b, n, vertex);
-        if (integrator_counts(it, vertex + 1))
+        if (counts(it, vertex + 1))
             connect(it, b, n, vertex);
         bool only_delta = vertex + 1 == it->opt.max_bounces && !last_ray;
         n = scatter(it, b, n, vertex, only_delta);
@@ -506,4 +522,4 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 }
 
 const struct lanes_kernel FOR_ISA(lanes_kernel) = {.integrate = integrate_lanes,
-                                                    .film_add = film_add_lanes};
+                                                   .film_add = film_add_lanes};
