@@ -68,10 +68,12 @@ static bool add_picture(const struct crew *w, const struct povray_picture *p, co
     struct image im = {0};
     if (!image_read_exr(path, &im, NULL, e))
         return false;
-    bool ok = im.width == k * width && im.height == k * height && im.channels >= 3;
+    const int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
+    bool ok =
+        im.width == k * width && im.height == k * height && at[0] >= 0 && at[1] >= 0 && at[2] >= 0;
     if (!ok)
-        err_set(e, "%s: POV-Ray wrote %d x %d x %d values, not %d x %d x 3", path, im.width,
-                im.height, im.channels, k * width, k * height);
+        err_set(e, "%s: POV-Ray wrote %d x %d x %d values, not %d x %d of R, G and B", path,
+                im.width, im.height, im.channels, k * width, k * height);
     for (int y = 0; ok && y < height; y++)
         for (int x = 0; ok && x < width; x++)
             for (int c = 0; c < 3; c++) {
@@ -81,7 +83,7 @@ static bool add_picture(const struct crew *w, const struct povray_picture *p, co
                         sum += (double)im.data[((size_t)(y * k + j) * (size_t)im.width +
                                                 (size_t)(x * k + i)) *
                                                    (size_t)im.channels +
-                                               (size_t)c];
+                                               (size_t)at[c]];
                 if (!isfinite(sum))
                     ok =
                         err_set(e, "%s: pixel %d,%d is brighter than half floats hold", path, x, y);

@@ -20,7 +20,7 @@ static const double fact_error[NUM_FACTS] = {
 /* What floats, stored and rendered, are good for. */
 static const double rounding = 1e-5;
 /* Of the variance that the correct renderer's predicts: a cell that by luck states less is not believed. */
-static const double least_variance = 0.25;
+static const double least_variance = 0.5;
 /* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
 static const double amplitude_cost = 6;
 static const double least_amplitude = 0.1, largest_amplitude = 4;
@@ -247,7 +247,8 @@ static bool gate_mean(const struct clue *clue, double alpha, int num_tests, bool
 {
     struct moments a, b;
     struct comparison r;
-    if (!sight_moments(&clue->seen, &a, e))
+    struct sight seen = sight_as_noisy_as(&clue->seen, &clue->view->correct);
+    if (!sight_moments(&seen, &a, e))
         return false;
     bool ok = sight_moments(&clue->view->correct, &b, e);
     if (!ok) {

@@ -19,8 +19,8 @@ static bool check(const struct moments *m, int columns, struct err *e)
         return err_set(e, "a picture of unit '%s' does not state its error", m->unit);
     size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t p = 0; p < pixels; p++)
-        if (!(m->n[p] >= 3))
-            return err_set(e, "pixel %zu has %g observations, at least 3 are needed", p, m->n[p]);
+        if (!(m->n[p] >= 2))
+            return err_set(e, "pixel %zu has %g observations, at least 2 are needed", p, m->n[p]);
     return true;
 }
 
@@ -32,7 +32,8 @@ static void add_pixel(const struct moments *m, size_t p, int cell_at, struct sig
         int at = 3 * cell_at + c;
         s->mean[at] += m->mean[i] / pixels;
         s->var[at] += m->m2[i] / (n * (n - 1)) / (pixels * pixels);
-        s->k3[at] += m->m3[i] / (n * (n - 1) * (n - 2)) / (pixels * pixels * pixels);
+        if (n > 2)
+            s->k3[at] += m->m3[i] / (n * (n - 1) * (n - 2)) / (pixels * pixels * pixels);
         s->spread[cell_at] += m->m2[i] / (n - 1) / pixels;
     }
 }
@@ -131,6 +132,19 @@ void sight_set_spread(struct sight *s, const struct sight *correct)
         squares += pow(s->spread[i] - sum / sum_correct * correct->spread[i], 2);
     s->fact[FACT_SPREAD] = log(sum / sum_correct);
     s->fact_sd[FACT_SPREAD] = sqrt(squares) / sum;
+}
+
+struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correct)
+{
+    struct sight out = *s;
+    double ratio = correct->n / s->n;
+    for (int i = 0; i < 3 * s->columns * s->rows; i++) {
+        double var = correct->var[i] * ratio, k3 = correct->k3[i] * ratio * ratio;
+        out.var[i] = fmax(out.var[i], var);
+        if (fabs(k3) > fabs(out.k3[i]))
+            out.k3[i] = k3;
+    }
+    return out;
 }
 
 bool sight_moments(const struct sight *s, struct moments *out, struct err *e)

@@ -33,7 +33,7 @@ struct sight {
 };
 
 /* columns: cells across, at most SIGHT_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
- * cells, on pixels with fewer than 3 observations, and on moments that do not state an error ("stratified",
+ * cells, on pixels with fewer than 2 observations, and on moments that do not state an error ("stratified",
  * "exact"). FACT_SAMPLES is known if `asked` is. */
 bool sight_of(const struct moments *m, int columns, double asked, struct sight *out, struct err *e)
     __attribute__((warn_unused_result));
@@ -52,6 +52,10 @@ void sight_set_consistency(struct sight *s, double pixels, double lo, double hi,
  * from the residuals of the cells (ratio estimator). Unknown where either has no spread, and where pixels are
  * of another size: how much a sample varies depends on how much a pixel covers. */
 void sight_set_spread(struct sight *s, const struct sight *correct);
+
+/* s with at least the variance and the third cumulant that means of the correct renderer have at as many samples: a render
+ * that happens to miss rare bright samples states less of both than is true of it. */
+struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correct);
 
 /* The same as moments over cells, for compare_moments(): n, M2 and M3 such that the variance and the third
  * cumulant of the mean are those of the sight. The caller frees them. */
