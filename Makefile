@@ -58,7 +58,7 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
+check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/libassay.a
 	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).

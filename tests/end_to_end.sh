@@ -525,6 +525,13 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
+# Each part of `make bench` on its smallest case: that it runs, not what it finds. Without the course's files.
+ASSAY_CS184=$tmp/none expect "bench, a tiny run" 0 "samples" "$build/tests/bench" --smoke --build "$build" --out "$tmp/bench"
+expect "bench: what it skips, it says" 0 "SKIPPED: no $tmp/none" cat "$tmp/out"
+expect "bench: its figures" 0 '"mrays_per_cpu_second"' cat "$tmp/bench/results.json"
+expect "bench: its plots" 0 "</svg>" cat "$tmp/bench/error_41_cornell.svg"
+expect "bench: no such part" 3 "usage" "$build/tests/bench" nonsense
+
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"
