@@ -277,6 +277,10 @@ expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]
     "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
 expect "compare: PNG, different" 1 "^DIFFERENT" \
     "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report --github" 0 "^::error title=.*DIFFERENT, expected EQUIVALENT" \
+    env GITHUB_STEP_SUMMARY="$tmp/summary.md" "$san_assay" report --github "$tmp/png/results.json"
+expect "report --github: the summary" 0 "^## Of 1 claims 1 came out wrong" cat "$tmp/summary.md"
+expect "report --github: with another" 3 "no other" "$san_assay" report --github --matrix "$tmp/png/results.json"
 expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
 expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
@@ -290,6 +294,24 @@ expect "compare: samples of a file that says them" 3 "says itself" \
     "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
 
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+mkdir -p "$tmp/history"
+for k in 1 2; do
+    mkdir -p "$tmp/history/$k"
+    sed "s/\"date\": \"2/\"date\": \"$k/" "$tmp/png/results.json" >"$tmp/history/$k/results.json"
+done
+expect "report --history" 0 "^0 of 1 claims moved in the last of 2 runs: .*/history/history.html" \
+    "$san_assay" report --history "$tmp/history/"
+sed -i 's/"difference": -*0/"difference": 9/' "$tmp/history/2/results.json"
+expect "report --history: a move" 1 "^1 of 1 claims moved" "$san_assay" report --history "$tmp/history"
+expect "report --history: nothing there" 3 "no results.json" "$san_assay" report --history "$tmp/runs_a"
+expect "report --history with another option" 3 "alone" "$san_assay" report --history "$tmp/history" --matrix
+expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
+    "$tmp/shallow.png" "$tmp/two.png"
+expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"
+expect "compare --report: only the page is left" 0 "^index.html page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
+    sh -c "ls '$tmp/png' | tr '\\n' ' '"
+expect "compare --report: no directory" 3 "one.exr: not a directory" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
+    "$tmp/one.exr" "$tmp/two.exr"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 
@@ -525,12 +547,94 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
-# Each part of `make bench` on its smallest case: that it runs, not what it finds. Without the course's files.
-ASSAY_CS184=$tmp/none expect "bench, a tiny run" 0 "samples" "$build/tests/bench" --smoke --build "$build" --out "$tmp/bench"
-expect "bench: what it skips, it says" 0 "SKIPPED: no $tmp/none" cat "$tmp/out"
+# Each part of `make bench` on its smallest case: that it runs, not what it finds.
+ASSAY_CS184=$tmp/none expect "bench, a tiny run that says what it skips" 0 "SKIPPED: no $tmp/none" \
+    "$build/tests/bench" --smoke --build "$build" --out "$tmp/bench"
 expect "bench: its figures" 0 '"mrays_per_cpu_second"' cat "$tmp/bench/results.json"
 expect "bench: its plots" 0 "</svg>" cat "$tmp/bench/error_41_cornell.svg"
-expect "bench: no such part" 3 "usage" "$build/tests/bench" nonsense
+expect "bench: no such part" 3 "usage" "$build/tests/bench" --nonsense
+
+# Grading: one right program among hostile ones; each costs its author the check, none of them the run.
+expect "grade: help" 0 "unsafe-no-sandbox" "$san_assay" grade --help
+expect "grade: the rubric of the course" 0 "137 points" "$san_assay" grade --check-rubric tools/rubrics/cs184.rubric
+sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubrics/template.rubric >"$tmp/wrong.rubric"
+expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
+cat >"$tmp/quick.rubric" <<'EOF'
+rubric Quick
+curve srgb
+command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}
+limit wall 10
+limit cpu 10
+limit memory 512
+limit disk 16
+limit processes 16
+total 8
+picture point
+  scene 12_point_plane
+  size 64 64
+  spp 16
+  bounces 1
+  reference truth
+part 1 Light
+check point 8 equal point
+  image 0.01 0.05
+  tile 0.03 0.12
+  hint falls with the square
+EOF
+mkdir -p "$tmp/subs" "$tmp/subs/pictures" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
+sub() { # NAME: a shell script from stdin
+    { echo '#!/bin/sh' && cat; } >"$tmp/subs/$1" && chmod +x "$tmp/subs/$1"
+}
+cp "$pathtracer" "$tmp/subs/right"
+"$pathtracer" -q -s 16 -m 1 -r 64 64 --seed 9 -f "$tmp/subs/pictures/point.png" reference/scenes/12_point_plane.dae >/dev/null
+cp "$pathtracer" "$tmp/subs/source/pathtracer"
+ln -s "$tmp/subs/pictures/point.png" "$tmp/subs/linked/point.png"
+cp "$pathtracer" "$tmp/subs/other_scene.bin"
+sub crash <<<'kill -SEGV $$'
+sub hang <<<'trap "" TERM; while :; do sleep 1; done'
+sub fork_bomb <<<'b() { b | b & }; b; wait; sleep 100'
+sub huge_file <<<'exec head -c 100G /dev/zero >out.png'
+sub link_out <<<"ln -s $tmp/subs/pictures/point.png out.png"
+sub reads_golden <<<"cp $PWD/golden/12_point_plane/* $tmp/subs/pictures/point.png out.png"
+sub made_up <<<'echo "{\"score\": 100}" >results.json; echo "{\"points\": 100}" >grade.json; echo "0 ended" >.report'
+sub noise <<<'head -c 12288 /dev/urandom >out.png'
+sub text <<<'echo "I am a picture" >out.png'
+sub nothing <<<'exit 0'
+{ printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
+mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
+if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
+    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
+    for good in right pictures source; do
+        [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
+    done
+    for bad in crash hang fork_bomb huge_file link_out linked reads_golden made_up noise text nothing bomb empty; do
+        [ "$(points $bad)" = 0.00 ] && ok "grade: $bad has none" || not_ok "grade: $bad has none" "$(points $bad)"
+    done
+    for why in "crash signal 11" "hang no end after 10 s" "huge_file all 16 MiB of its directory are full" "link_out wrote no out.png" \
+        "nothing wrote no out.png" "noise not an OpenEXR" "bomb 65536 x 65536" "empty cannot execute\|No such file\|failed to execute"; do
+        expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
+    done
+    expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"
+    expect "grade: JUnit" 0 'testsuite name="fork_bomb" tests="1" failures="1"' xmllint "$tmp/grades/junit.xml"
+    expect "grade: TAP" 0 "^ok [0-9]* - right point (8.00 of 8)" cat "$tmp/grades/grades.tap"
+    cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
+    expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
+    expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
+elif grep -q "no sandbox" "$tmp/out"; then
+    ok "grade: refuses without a sandbox ($(cat "$tmp/out"))"
+else
+    not_ok "grade: one submission" "$(cat "$tmp/out")"
+fi
+expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
+
+# The page, in a browser.
+tests/browser/run.sh "$build" >"$tmp/browser"
+cat "$tmp/browser"
+failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
