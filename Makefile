@@ -38,7 +38,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 
 # Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
 ISAS     := sse42 avx2 avx512
-BY_ISA   := renderer/wide_kernel renderer/wide_split
+BY_ISA   := renderer/wide_kernel renderer/wide_split renderer/lanes_kernel
 KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
 RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc

@@ -28,7 +28,7 @@ struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa
     if (t == NULL)
         goto fail;
     if (kind == BVH_WIDE) {
-        t->wide = wide_build(s, isa, threads, e);
+        t->wide = wide_build(s, isa == ISA_SCALAR ? ISA_AUTO : isa, threads, e);
         if (t->wide != NULL)
             return t;
         free(t);

@@ -1,6 +1,7 @@
 #include "bvh_wide.h"
 #include "alloc_large.h"
 #include "parallel.h"
+#include "wide_flat.h"
 #include "wide_kernel.h"
 #include "wide_parts.h"
 
@@ -194,6 +195,9 @@ static bool add_tree(struct build *b, const struct wide_range *all)
 
 static bool add_list(struct build *b, struct wide_range *all)
 {
+    if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
+        return false;
+    wide_flat_fill(b->scene, b->w->flat);
     uint32_t triangles = b->scene->num_triangles;
     for (uint32_t i = 0; i < all->count;) {
         uint32_t end = i < triangles ? triangles : all->count;
@@ -261,5 +265,6 @@ void wide_free(struct wide *w)
     if (w == NULL)
         return;
     free(w->arena);
+    free(w->flat);
     free(w);
 }

@@ -35,7 +35,10 @@ struct wide_leaf {
 
 struct wide_kernel;
 
+struct wide_flat;
+
 struct wide {
+    struct wide_flat *flat; /* of a list, else NULL */
     char *arena; /* nodes and leaves; at 0 the root, or the leaves of a list */
     size_t used; /* bytes */
     const struct wide_kernel *kernel;
