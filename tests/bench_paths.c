@@ -56,7 +56,7 @@ struct runs {
 
 static bool load_view(int i, const struct bench_options *o, struct bench_view *v, struct err *e)
 {
-    *v = (struct bench_view){.name = views[i].name, .depth = 5};
+    *v = (struct bench_view){.name = views[i].name, .depth = 5, .isa = o->isa};
     if (views[i].course) {
         struct bench_scene of;
         if (!bench_scene_load(v->name, &of))
