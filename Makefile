@@ -60,7 +60,7 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
 check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer \
-  $(BUILD)/libassay.a $(BUILD)/browser/package-lock.json
+  $(BUILD)/libassay.a $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json
 	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
@@ -217,6 +217,7 @@ $(BUILD)/san/libassay.a: $(call obj,$(BUILD)/san,$(HARNESS) $(RENDERER))
 	$(archive)
 $(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH) tests/mesh.c tests/calibrate_plot.c) $(BUILD)/libassay.a
 	$(link)
+$(call obj,$(BUILD),$(BENCH)): | $(BUILD)/deps-test
 # The peer gets all that this machine has; ours chooses when it starts.
 $(BUILD)/tests/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
 $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(BUILD)/libassay.a

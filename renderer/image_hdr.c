@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { MIN_PACKED = 8, MAX_PACKED = 0x7fff };
 
@@ -69,10 +70,14 @@ bool image_read_hdr(const char *path, struct image *out, struct err *e)
     FILE *f = fopen(path, "rb");
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
-    bool ok = read_header(f, &width, &height) && width > 0 && height > 0 &&
-              width <= IMAGE_MAX_SIDE && height <= IMAGE_MAX_SIDE;
+    struct stat st;
+    bool ok = fstat(fileno(f), &st) == 0 && read_header(f, &width, &height) && width > 0 &&
+              height > 0 && width <= IMAGE_MAX_SIDE && height <= IMAGE_MAX_SIDE;
     if (!ok)
         err_set(e, "%s: cannot read: not a Radiance picture (RGBE, rows from the top)", path);
+    else if (4.0 * width * height > IMAGE_MAX_EXPANSION * (double)st.st_size)
+        ok = err_set(e, "%s: an image of %d x %d cannot be in %lld bytes", path, width, height,
+                     (long long)st.st_size);
     else if (!image_alloc(&im, width, height, 3, names, e))
         ok = err_prefix(e, "%s", path);
     for (int y = 0; ok && y < height; y++) {

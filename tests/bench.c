@@ -32,8 +32,8 @@ bool bench_wanted(const struct bench_options *o, const char *scene)
 static _Noreturn void usage(void)
 {
     fputs(
-        "usage: bench [--build DIR] [--out DIR] [--isa NAME] [--rounds N] [--smoke] [--only SCENE]... "
-        "[PART...]\nparts:",
+        "usage: bench [--build DIR] [--out DIR] [--isa NAME] [--rounds N] [--smoke] [--only SCENE]... [PART...]; "
+        "parts:",
         stderr);
     for (int i = 0; i < NUM_PARTS; i++)
         fprintf(stderr, " %s", parts[i].name);

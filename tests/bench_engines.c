@@ -36,6 +36,7 @@ static bool render_ours(enum bench_engine engine, const struct bench_view *v, in
                        .max_bounces = v->depth,
                        .light_samples = 1,
                        .roulette = ROULETTE_THROUGHPUT,
+                       .isa = v->isa,
                        .sampler = {engine == BENCH_SOBOL ? SAMPLER_SOBOL : SAMPLER_INDEPENDENT,
                                    seed}},
         .width = v->camera.width,

@@ -23,6 +23,7 @@ struct bench_view {
     struct scene scene;
     struct camera camera;
     int depth;
+    enum isa isa;
     struct bvh *bvh;
     struct embree_tracer *embree; /* NULL: cannot */
 };

@@ -123,7 +123,7 @@ static bool normals_job(const struct bench_options *o, int i, json_t *jobs, stru
     bool ok = bvh != NULL && camera_init(&c, &s.scene, width, height, e);
     double wall[BENCH_MAX_ROUNDS], cpu[BENCH_MAX_ROUNDS], factor = NAN;
     for (int k = 0; ok && k < o->rounds; k++) {
-        const struct render_options opt = {.integrator = {.kind = INTEGRATE_NORMALS},
+        const struct render_options opt = {.integrator = {.kind = INTEGRATE_NORMALS, .isa = o->isa},
                                            .width = width,
                                            .height = height,
                                            .num_samples = 1,

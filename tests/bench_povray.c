@@ -1,6 +1,6 @@
 /* One POV-Ray picture: what reference/povray_picture.h calls indirect_i, which by itself has all the light,
- * lamps by jittered spotlights. The recipe of the suite adds pictures to it that take its lamps' noise away
- * and are shared by all replicates. */
+ * with lamps by a small Gauss rule. The recipe of the suite adds pictures to it with finer lamps, which all
+ * replicates share. */
 #include "bench_povray.h"
 
 #include "../reference/povray_picture.h"
@@ -11,6 +11,8 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+
+enum { LAMP_CELLS = 4 };
 
 /* image += the picture, averaged over grid x grid sub-pixels. */
 static bool add_picture(const char *path, const struct povray_picture *p, const struct camera *c,
@@ -51,6 +53,8 @@ bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, co
     for (int pass = 0; pass < plan.num_passes; pass++) {
         struct povray_picture p =
             povray_replicate(&plan, c->width, c->height, grid, i, seed, pass, true);
+        p.variant.rule = POVRAY_GAUSS;
+        p.variant.lamp_cells = LAMP_CELLS;
         snprintf(path, sizeof path, "%s/scene.pov", dir);
         FILE *f = fopen(path, "w");
         if (f == NULL)

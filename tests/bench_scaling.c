@@ -136,6 +136,7 @@ static bool measure_render(const struct bench_options *o, const struct bench_sce
                            .max_bounces = 5,
                            .light_samples = 1,
                            .roulette = ROULETTE_THROUGHPUT,
+                           .isa = o->isa,
                            .sampler = {SAMPLER_INDEPENDENT, (uint64_t)k}},
             .width = side,
             .height = side,
