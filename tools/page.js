@@ -369,5 +369,8 @@ document.addEventListener("keydown", (e) => {
 
 // Everything is on paper, also what has not been scrolled to.
 const loadAll = () => Promise.all(scenes.map((s) => s.load()));
-window.addEventListener("beforeprint", () => scenes.forEach((s) => s.panes.forEach((p) => p.draw(true))));
+window.addEventListener("beforeprint", () => {
+  document.querySelectorAll("details").forEach((d) => { d.open = true; });
+  scenes.forEach((s) => s.panes.forEach((p) => p.draw(true)));
+});
 window.addEventListener("load", () => (window.requestIdleCallback || setTimeout)(loadAll));

@@ -55,9 +55,10 @@ class Pane {
     let b = buffers.get(source.id);
     if (!b) buffers.set(source.id, b = { canvas: make("canvas", { width, height }) });
     if (b.key !== source.key) {
-      const context = b.canvas.getContext("2d"), image = context.createImageData(width, height);
-      source.paint(image.data);
-      context.putImageData(image, 0, 0);
+      const context = b.canvas.getContext("2d");
+      b.image = b.image || context.createImageData(width, height);
+      source.paint(b.image.data);
+      context.putImageData(b.image, 0, 0);
       b.key = source.key;
     }
     return b.canvas;
