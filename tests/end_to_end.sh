@@ -547,6 +547,9 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
+expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
+expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
+
 # The page, in a browser.
 tests/browser/run.sh "$build" >"$tmp/browser"
 cat "$tmp/browser"

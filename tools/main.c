@@ -18,6 +18,7 @@ static const struct {
     {"diagnose", verb_diagnose, "name the known bug that explains how a renderer is wrong"},
     {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
     {"report", verb_report, "make the HTML page of a results.json"},
+    {"watch", verb_watch, "show the latest page of a folder in a browser while runs go on"},
     {"golden", verb_golden, "render, inspect and approve the stored references"},
     {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},

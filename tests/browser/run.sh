@@ -27,3 +27,6 @@ done
 sed -i "s|\"reason\": \".*\"|\"reason\": \"</script><script>alert(2)</script>\", \"notes\": [\"$evil\"]|" "$tmp/evil.json"
 "$build/assay" report -o "$tmp/evil.html" "$tmp/evil.json" >/dev/null
 for page in evil compared; do look names.mjs "$tmp/$page.html"; done
+
+mkdir "$tmp/watched"
+look watch.mjs "$build/san/assay" "$tmp/watched" "$tmp/compared.html" "$tmp/report/index.html"
