@@ -152,8 +152,8 @@ void report_qq(FILE *f, const json_t *claim)
             "</svg><figcaption><b>The same p-values against those that chance gives.</b> If both "
             "have the same mean the points follow the dashed line and stay in the band, each 95 "
             "times of 100. Points above the band at the right are tiles that chance does not "
-            "explain; here %d of %d are above it. ",
-            outside, n);
+            "explain; here %d of %d are above it.%s ",
+            outside, n, -v[0] > a.top ? " What lies on the upper edge is further out." : "");
         write_tile_csv(f, claim);
         fputs("</figcaption></figure>\n", f);
     }
