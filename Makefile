@@ -14,7 +14,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev zlib1g-dev libmicrohttpd-dev
+  nettle-dev zlib1g-dev libmicrohttpd-dev bubblewrap
 DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LIVE := blender povray python3-numpy
@@ -38,7 +38,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 
 # Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
 ISAS     := sse42 avx2 avx512
-BY_ISA   := renderer/wide_kernel renderer/wide_split
+BY_ISA   := renderer/wide_kernel renderer/wide_split renderer/lanes_kernel
 KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
 RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc
@@ -82,7 +82,7 @@ calibrate: $(BUILD)/tests/make_calibration
 	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
 	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
-bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench
+bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
 
 bvh-table: $(BUILD)/pathtracer
@@ -116,7 +116,7 @@ install: all
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
 	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
-	cp -R reference/scenes reference/engines golden $(DESTDIR)$(PREFIX)/share/assay
+	cp -R reference/scenes reference/engines golden tools/rubrics $(DESTDIR)$(PREFIX)/share/assay
 
 format:
 	clang-format -i $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])

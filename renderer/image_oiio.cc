@@ -153,6 +153,9 @@ extern "C" bool image_inspect(const char *path, struct image_info *out, struct e
         if (!in)
             return false;
         const OIIO::ImageSpec spec = in->spec();
+        out->width = spec.width;
+        out->height = spec.height;
+        out->channels = spec.nchannels;
         std::snprintf(out->format, sizeof out->format, "%s", in->format_name());
         size_t smallest = 8;
         bool other = spec.deep;

@@ -23,6 +23,7 @@ struct image_info {
     enum image_type type; /* the smallest of its channels */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;            /* pictures in one file (EXR parts), 1 .. */
+    int width, height, channels;
     bool is_cropped;      /* the file holds another rectangle than the picture shown */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)

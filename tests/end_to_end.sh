@@ -547,6 +547,82 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
+# Grading: one right program among hostile ones; each costs its author the check, none of them the run.
+expect "grade: help" 0 "unsafe-no-sandbox" "$san_assay" grade --help
+expect "grade: the rubric of the course" 0 "137 points" "$san_assay" grade --check-rubric tools/rubrics/cs184.rubric
+sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubrics/template.rubric >"$tmp/wrong.rubric"
+expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
+cat >"$tmp/quick.rubric" <<'EOF'
+rubric Quick
+curve srgb
+command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}
+limit wall 10
+limit cpu 10
+limit memory 512
+limit disk 16
+limit processes 16
+total 8
+picture point
+  scene 12_point_plane
+  size 64 64
+  spp 16
+  bounces 1
+  reference truth
+part 1 Light
+check point 8 equal point
+  image 0.01 0.05
+  tile 0.03 0.12
+  hint falls with the square
+EOF
+mkdir -p "$tmp/subs" "$tmp/subs/pictures" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
+sub() { # NAME: a shell script from stdin
+    { echo '#!/bin/sh' && cat; } >"$tmp/subs/$1" && chmod +x "$tmp/subs/$1"
+}
+cp "$pathtracer" "$tmp/subs/right"
+"$pathtracer" -q -s 16 -m 1 -r 64 64 --seed 9 -f "$tmp/subs/pictures/point.png" reference/scenes/12_point_plane.dae >/dev/null
+cp "$pathtracer" "$tmp/subs/source/pathtracer"
+ln -s "$tmp/subs/pictures/point.png" "$tmp/subs/linked/point.png"
+cp "$pathtracer" "$tmp/subs/other_scene.bin"
+sub crash <<<'kill -SEGV $$'
+sub hang <<<'trap "" TERM; while :; do sleep 1; done'
+sub fork_bomb <<<'b() { b | b & }; b; wait; sleep 100'
+sub huge_file <<<'exec head -c 100G /dev/zero >out.png'
+sub link_out <<<"ln -s $tmp/subs/pictures/point.png out.png"
+sub reads_golden <<<"cp $PWD/golden/12_point_plane/* $tmp/subs/pictures/point.png out.png"
+sub made_up <<<'echo "{\"score\": 100}" >results.json; echo "{\"points\": 100}" >grade.json; echo "0 ended" >.report'
+sub noise <<<'head -c 12288 /dev/urandom >out.png'
+sub text <<<'echo "I am a picture" >out.png'
+sub nothing <<<'exit 0'
+{ printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
+mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
+if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
+    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
+    for good in right pictures source; do
+        [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
+    done
+    for bad in crash hang fork_bomb huge_file link_out linked reads_golden made_up noise text nothing bomb empty; do
+        [ "$(points $bad)" = 0.00 ] && ok "grade: $bad has none" || not_ok "grade: $bad has none" "$(points $bad)"
+    done
+    for why in "crash signal 11" "hang no end after 10 s" "huge_file all 16 MiB of its directory are full" "link_out wrote no out.png" \
+        "nothing wrote no out.png" "noise not an OpenEXR" "bomb 65536 x 65536" "empty cannot execute\|No such file\|failed to execute"; do
+        expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
+    done
+    expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"
+    expect "grade: JUnit" 0 'testsuite name="fork_bomb" tests="1" failures="1"' xmllint "$tmp/grades/junit.xml"
+    expect "grade: TAP" 0 "^ok [0-9]* - right point (8.00 of 8)" cat "$tmp/grades/grades.tap"
+    cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
+    expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
+    expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
+elif grep -q "no sandbox" "$tmp/out"; then
+    ok "grade: refuses without a sandbox ($(cat "$tmp/out"))"
+else
+    not_ok "grade: one submission" "$(cat "$tmp/out")"
+fi
+expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
 expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
 expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 

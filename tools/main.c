@@ -17,6 +17,7 @@ static const struct {
     {"compare", verb_compare, "judge two renders, of any kind of file"},
     {"diagnose", verb_diagnose, "name the known bug that explains how a renderer is wrong"},
     {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
+    {"grade", verb_grade, "grade students' pictures and programs by a rubric"},
     {"report", verb_report, "make the HTML page of a results.json"},
     {"watch", verb_watch, "show the latest page of a folder in a browser while runs go on"},
     {"golden", verb_golden, "render, inspect and approve the stored references"},

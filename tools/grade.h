@@ -1,0 +1,53 @@
+/* `assay grade`: many submissions by one rubric, each into a directory of its own, whatever they do. */
+#ifndef ASSAY_GRADE_H
+#define ASSAY_GRADE_H
+
+#include "grading.h"
+
+#include <jansson.h>
+
+struct grade_job {
+    const struct rubric *rubric;
+    const struct answers *answers;
+    const struct sandbox *sandbox;
+    const char *stage;       /* submission_stage() */
+    const char *out;         /* OUT/ID/grade.json and what else there is of it */
+    const char *const *path; /* of the submissions */
+    int num, jobs, threads;
+    double alpha; /* of one check */
+    uint64_t seed;
+    bool again; /* also those that have been graded already */
+    void (*done)(void *ctx, int num, const char *id,
+                 const json_t *grade); /* one at a time; may be NULL */
+    void *ctx;
+};
+
+/* grade.json:
+ *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, submission, seed, alpha, version: while it
+ *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
+ *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
+ *     "cpu_s": ,
+ *     "parts": [{"number": , "title": , "points": , "of": }],
+ *     "checks": [{"part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,
+ *                 "expected": , "seen": , "hint": , "where": , "visibility": , "accepted": , "flag": , "picture": ,
+ *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null}],
+ *     "pictures": [{"name": , "file": "NAME.png" | null, "why": , "end": "ok", "cpu_s": , "wall_s": ,
+ *                   "width": , "height": , "sha256": | null}] }
+ * Texts of programs are in it: whoever shows them has to escape them. */
+
+/* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
+ * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
+ * the order of path. */
+bool grade_all(const struct grade_job *job, json_t **grades, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Names and titles of the class in every format: OUT/grades.json, grades.csv, junit.xml, grades.tap, and of each
+ * submission OUT/ID/results.json as Gradescope reads it. */
+bool grade_write(const char *out, const json_t *grades, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* OUT/ID/index.html of each and OUT/index.html of all; no other file is needed to read them. */
+bool grade_pages(const char *out, const json_t *grades, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,255 @@
+#include "grade.h"
+
+#include "../reference/json_file.h"
+#include "../renderer/fs.h"
+#include "report_html.h"
+#include "results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MAX_PATH = 4400 };
+
+/* To a hundredth of a point: more would be noise. */
+static double rounded(double points)
+{
+    return round(100 * points) / 100;
+}
+
+static const char *text_of(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text != NULL ? text : "";
+}
+
+static bool is_judged(const json_t *check)
+{
+    return json_is_true(json_object_get(check, "judged"));
+}
+
+static bool is_full(const json_t *check)
+{
+    return member_number(check, "share") >= 1;
+}
+
+/* What a student reads of a check. */
+static void describe(const json_t *c, char *out, size_t size)
+{
+    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.", text_of(c, "expected"),
+                                text_of(c, "seen"));
+    if (text_of(c, "accepted")[0] != '\0' && n < size)
+        n += (size_t)snprintf(
+            out + n, size - n,
+            "\nExplained by what the starter code does (%s): no points lost for that.",
+            text_of(c, "accepted"));
+    if (!is_full(c) && text_of(c, "hint")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", text_of(c, "hint"));
+    if (!is_full(c) && text_of(c, "where")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", text_of(c, "where"));
+    if (!is_judged(c) && n < size)
+        snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
+}
+
+/* Fields as documented at gradescope-autograders.readthedocs.io, "specs": points and texts of every check, no
+ * score of the whole, which Gradescope adds up. */
+static json_t *gradescope(const json_t *grade)
+{
+    json_t *tests = json_array(), *root = json_object();
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        char output[4096], name[400], number[32];
+        describe(c, output, sizeof output);
+        snprintf(name, sizeof name, "Part %s: %s", text_of(c, "part"), text_of(c, "title"));
+        snprintf(number, sizeof number, "%s.%zu", text_of(c, "part"), i + 1);
+        json_array_append_new(tests,
+                              json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
+                                        rounded(member_number(c, "points")), "max_score",
+                                        member_number(c, "of"), "name", name, "number", number,
+                                        "output", output, "visibility", text_of(c, "visibility"),
+                                        "status", is_full(c) ? "passed" : "failed"));
+    }
+    const char *whole =
+        text_of(grade, "trouble")[0] != '\0' ? text_of(grade, "trouble") : text_of(grade, "wrong");
+    json_object_set_new(root, "output", json_string(whole));
+    json_object_set_new(root, "output_format", json_string("text"));
+    json_object_set_new(root, "test_output_format", json_string("text"));
+    json_object_set_new(root, "visibility", json_string("visible"));
+    json_object_set_new(root, "stdout_visibility", json_string("hidden"));
+    if (json_array_size(tests) > 0) {
+        json_object_set_new(root, "tests", tests);
+    } else {
+        json_decref(tests);
+        json_object_set_new(root, "score", json_real(0));
+    }
+    return root;
+}
+
+/* RFC 4180; a leading = + - @ would be a formula to a spreadsheet. */
+static void csv_text(FILE *f, const char *text)
+{
+    fputc('"', f);
+    if (text[0] != '\0' && strchr("=+-@\t", text[0]) != NULL)
+        fputc('\'', f);
+    for (; *text != '\0'; text++) {
+        if (*text == '"')
+            fputc('"', f);
+        fputc(*text == '\n' || *text == '\r' ? ' ' : *text, f);
+    }
+    fputc('"', f);
+}
+
+static void write_csv(FILE *f, const json_t *grades)
+{
+    const json_t *first = NULL;
+    size_t i, k;
+    json_t *g, *c;
+    json_array_foreach(grades, i, g)
+    {
+        if (first == NULL && json_array_size(json_object_get(g, "checks")) > 0)
+            first = g;
+    }
+    fputs("id,points,of,remarks", f);
+    json_array_foreach(json_object_get(first, "checks"), k, c)
+    {
+        fputc(',', f);
+        csv_text(f, text_of(c, "name"));
+    }
+    fputs("\r\n", f);
+    json_array_foreach(grades, i, g)
+    {
+        csv_text(f, text_of(g, "id"));
+        fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
+        csv_text(f, text_of(g, "trouble")[0] != '\0' ? text_of(g, "trouble") : text_of(g, "wrong"));
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            fprintf(f, ",%.2f", member_number(c, "points"));
+        }
+        fputs("\r\n", f);
+    }
+}
+
+/* One point a line: `#` would begin a directive. */
+static void tap_text(FILE *f, const char *text)
+{
+    for (; *text != '\0'; text++)
+        fputc(*text == '#' || *text == '\n' ? ' ' : *text, f);
+}
+
+static void write_tap(FILE *f, const json_t *grades)
+{
+    size_t i, k, num = 0;
+    json_t *g, *c;
+    json_array_foreach(grades, i, g)
+    {
+        size_t checks = json_array_size(json_object_get(g, "checks"));
+        num += checks > 0 ? checks : 1;
+    }
+    fprintf(f, "TAP version 13\n1..%zu\n", num);
+    num = 0;
+    json_array_foreach(grades, i, g)
+    {
+        if (json_array_size(json_object_get(g, "checks")) == 0) {
+            fprintf(f, "not ok %zu - ", ++num);
+            tap_text(f, text_of(g, "id"));
+            fputs(": ", f);
+            tap_text(f, text_of(g, "trouble"));
+            fputc('\n', f);
+        }
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
+            tap_text(f, text_of(g, "id"));
+            fprintf(f, " %s (%.2f of %g): ", text_of(c, "name"), member_number(c, "points"),
+                    member_number(c, "of"));
+            tap_text(f, text_of(c, "seen"));
+            fputc('\n', f);
+        }
+    }
+}
+
+static void xml_pair(FILE *f, const char *name, const char *value)
+{
+    fprintf(f, " %s=\"", name);
+    html_text(f, value);
+    fputc('"', f);
+}
+
+static void write_junit(FILE *f, const json_t *grades)
+{
+    size_t i, k;
+    json_t *g, *c;
+    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
+    json_array_foreach(grades, i, g)
+    {
+        size_t failures = 0, errors = text_of(g, "trouble")[0] != '\0',
+               checks = json_array_size(json_object_get(g, "checks"));
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            failures += is_judged(c) && !is_full(c);
+            errors += !is_judged(c);
+        }
+        fputs("<testsuite", f);
+        xml_pair(f, "name", text_of(g, "id"));
+        fprintf(f, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" time=\"%.2f\">\n",
+                checks + (checks == 0), failures, errors, member_number(g, "cpu_s"));
+        if (checks == 0) {
+            fputs("<testcase name=\"submission\"><error", f);
+            xml_pair(f, "message", text_of(g, "trouble"));
+            fputs("/></testcase>\n", f);
+        }
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            char output[4096];
+            describe(c, output, sizeof output);
+            fputs("<testcase", f);
+            xml_pair(f, "classname", text_of(c, "part"));
+            xml_pair(f, "name", text_of(c, "name"));
+            fputc('>', f);
+            if (!is_full(c)) {
+                fputs(is_judged(c) ? "<failure" : "<error", f);
+                xml_pair(f, "message", text_of(c, "seen"));
+                fputc('>', f);
+                html_text(f, output);
+                fputs(is_judged(c) ? "</failure>" : "</error>", f);
+            }
+            fputs("</testcase>\n", f);
+        }
+        fputs("</testsuite>\n", f);
+    }
+    fputs("</testsuites>\n", f);
+}
+
+static bool write_file(const char *dir, const char *name, const json_t *grades,
+                       void (*write)(FILE *, const json_t *), struct err *e)
+{
+    char path[MAX_PATH];
+    struct out_file o;
+    snprintf(path, sizeof path, "%.4000s/%s", dir, name);
+    if (!out_open(&o, path, e))
+        return false;
+    write(o.f, grades);
+    return out_commit(&o, e);
+}
+
+bool grade_write(const char *out, const json_t *grades, struct err *e)
+{
+    char path[MAX_PATH];
+    size_t i;
+    json_t *g;
+    bool ok = true;
+    json_array_foreach(grades, i, g)
+    {
+        json_t *results = gradescope(g);
+        snprintf(path, sizeof path, "%.4000s/%s/results.json", out, text_of(g, "id"));
+        ok = ok && (results != NULL || err_set(e, "out of memory")) && json_write(path, results, e);
+        json_decref(results);
+    }
+    snprintf(path, sizeof path, "%.4000s/grades.json", out);
+    return ok && json_write(path, grades, e) &&
+           write_file(out, "grades.csv", grades, write_csv, e) &&
+           write_file(out, "junit.xml", grades, write_junit, e) &&
+           write_file(out, "grades.tap", grades, write_tap, e);
+}

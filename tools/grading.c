@@ -1,0 +1,372 @@
+#include "grading.h"
+
+#include "grading_rates.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+double score_share(const struct margin *m, const struct interval *i)
+{
+    double distance = interval_distance(i), half = interval_half(i);
+    double near = fmin(1, fmax(0, (m->none - distance) / (m->none - m->full)));
+    double quiet = fmin(1, fmax(0, 2 - half / m->none));
+    return fmin(near, quiet);
+}
+
+static double beyond(double distance, double sd)
+{
+    return sd > 0 ? 0.5 * erfc(distance / (sd * sqrt(2))) : distance >= 0 ? 0 : 1;
+}
+
+double score_chance(const struct margin *m, const struct interval *i)
+{
+    double share = score_share(m, i), half = interval_half(i), v = fabs(i->value);
+    if (share == 1)
+        return fmin(1, beyond(m->full + half - v, i->sd) + beyond(m->full + half + v, i->sd));
+    if (share == 0 && half < 2 * m->none)
+        return beyond(v - half - m->none, i->sd);
+    return share == 0 ? 0 : 1;
+}
+
+/* One check being made. */
+struct work {
+    const struct rubric *r;
+    const struct rubric_check *check;
+    const struct answers *answers;
+    struct handed_in *h;
+    double alpha;
+};
+
+static const struct rubric_picture *picture(const struct work *w, int k)
+{
+    return &w->r->picture[w->check->picture[k]];
+}
+
+static const struct student *student(const struct work *w, int k)
+{
+    return &w->h->picture[w->check->picture[k]];
+}
+
+/* NULL: the rubric gives none. */
+static const struct moments *reference(const struct work *w, int k)
+{
+    const struct moments *m = &w->answers->picture[w->check->picture[k]].m;
+    return m->width > 0 ? m : NULL;
+}
+
+static const struct moments *expected_noise(const struct work *w, int k)
+{
+    return &w->answers->picture[w->check->picture[k]].noise;
+}
+
+static unsigned char *usable(const struct work *w, struct err *e)
+{
+    size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
+    unsigned char *use = malloc(pixels);
+    bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
+    if (ok)
+        memset(use, 1, pixels);
+    for (int k = 0; ok && k < w->check->num_pictures; k++)
+        ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
+    if (ok)
+        return use;
+    free(use);
+    return NULL;
+}
+
+/* The noise of the reference itself, in a picture that should have noise of its own: a copy. A share of values
+ * that lie in their code's bin around the reference, where only chance would put so many of them. */
+static bool is_copy(const struct student *s, const struct moments *m, double spp,
+                    const unsigned char *use)
+{
+    double same = 0, expected = 0, num = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        double sd = student_expected_sd(m, i, spp), bin = s->tolerance[i] + 1e-6 * m->mean[i];
+        if (!use[i / 3] || s->clipped[i] || !(sd > 0))
+            continue;
+        num++;
+        same += fabs(s->mean[i] - m->mean[i]) <= bin * 1.01;
+        expected += erf(bin / (sd * sqrt(2)));
+    }
+    return num >= 100 && same > 0.98 * num && expected < 0.6 * num;
+}
+
+static void tell(const struct agreement *a, char *text, size_t size)
+{
+    const struct interval *worst = &a->image[0];
+    static const char *const names[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
+    int channel = 0;
+    for (int c = 0; c < NUM_CHANNELS; c++)
+        if (interval_distance(&a->image[c]) >= interval_distance(worst)) {
+            worst = &a->image[c];
+            channel = c;
+        }
+    int n = snprintf(text, size, "mean of the picture (%s) %+.2f %% (%+.2f to %+.2f)",
+                     names[channel], 100 * worst->value, 100 * worst->lo, 100 * worst->hi);
+    if (a->tiles > 0 && n > 0 && (size_t)n < size)
+        snprintf(text + n, size - (size_t)n, "; furthest tile at %d,%d: %+.1f %% (%+.1f to %+.1f)",
+                 a->tile_x, a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
+}
+
+static void score_agreement(const struct rubric_check *c, struct result *out)
+{
+    out->share = 1;
+    out->chance = 0;
+    for (int k = 0; k <= NUM_CHANNELS; k++) {
+        const struct interval *i =
+            k < NUM_CHANNELS ? &out->agreement.image[k] : &out->agreement.tile;
+        const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
+        if (k == NUM_CHANNELS && out->agreement.tiles == 0)
+            continue;
+        double share = score_share(m, i), chance = score_chance(m, i);
+        if (share < out->share)
+            out->chance = chance;
+        else if (share == 1 && out->share == 1)
+            out->chance = fmin(1, out->chance + chance);
+        out->share = fmin(out->share, share);
+    }
+    tell(&out->agreement, out->seen, sizeof out->seen);
+}
+
+/* A against B; what keeps them from being compared is the student's to mend. */
+static void compare(const struct work *w, const struct student *a, const struct student *b,
+                    const unsigned char *use, struct result *out)
+{
+    struct err why;
+    if (agreement_measure(a, b, use, w->alpha, &out->agreement, &why))
+        score_agreement(w->check, out);
+    else
+        snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
+}
+
+static void add_name(char *names, size_t size, const char *name)
+{
+    size_t n = strlen(names);
+    snprintf(names + n, size - n, "%s%s", n > 0 ? ", " : "", name);
+}
+
+static bool check_equal(const struct work *w, struct result *out, struct err *e)
+{
+    const struct rubric_picture *p = picture(w, 0);
+    const struct answer *answer = &w->answers->picture[w->check->picture[0]];
+    unsigned char *use = usable(w, e);
+    bool ok = use != NULL;
+    snprintf(
+        out->expected, sizeof out->expected,
+        "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
+        100 * w->check->image.full, 100 * w->check->tile.full);
+    for (int k = -1; ok && k < p->num_accepted && out->share < 1; k++) {
+        struct result tried = {.judged = true};
+        struct student b;
+        ok = student_from(k < 0 ? &answer->m : &answer->accepted[k], student(w, 0), &b, e);
+        if (!ok)
+            break;
+        compare(w, student(w, 0), &b, use, &tried);
+        student_free(&b);
+        if (k < 0 || tried.share > out->share) {
+            agreement_free(&out->agreement);
+            out->share = tried.share;
+            out->chance = tried.chance;
+            out->agreement = tried.agreement;
+            snprintf(out->seen, sizeof out->seen, "%s", tried.seen);
+            out->accepted[0] = '\0';
+            if (k >= 0)
+                add_name(out->accepted, sizeof out->accepted, p->accept[k].name);
+        } else {
+            agreement_free(&tried.agreement);
+        }
+    }
+    if (ok && is_copy(student(w, 0), &answer->m, p->spp, use)) {
+        out->share = out->chance = 0;
+        snprintf(
+            out->seen, sizeof out->seen,
+            "this is the reference itself, with its noise; a render of %d samples has noise of its own",
+            p->spp);
+        snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
+    }
+    free(use);
+    return ok;
+}
+
+static bool check_agree(const struct work *w, struct result *out, struct err *e)
+{
+    snprintf(out->expected, sizeof out->expected,
+             "%s and %s have the same mean, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
+             picture(w, 0)->name, picture(w, 1)->name, 100 * w->check->image.full,
+             100 * w->check->tile.full);
+    if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
+        snprintf(out->seen, sizeof out->seen,
+                 "the two files are the same: the option that tells them apart has no effect");
+        return true;
+    }
+    unsigned char *use = usable(w, e);
+    if (use == NULL)
+        return false;
+    compare(w, student(w, 0), student(w, 1), use, out);
+    free(use);
+    return true;
+}
+
+static bool check_sum(const struct work *w, struct result *out, struct err *e)
+{
+    struct student sum;
+    unsigned char *use = usable(w, e);
+    bool ok = use != NULL && student_from(NULL, student(w, 0), &sum, e);
+    snprintf(out->expected, sizeof out->expected,
+             "%s is the sum of the other %d pictures, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
+             picture(w, 0)->name, w->check->num_pictures - 1, 100 * w->check->image.full,
+             100 * w->check->tile.full);
+    for (int k = 1; ok && k < w->check->num_pictures; k++)
+        student_add(&sum, student(w, k));
+    if (ok)
+        student_unclipped(&sum, use);
+    if (ok) {
+        compare(w, student(w, 0), &sum, use, out);
+        student_free(&sum);
+    }
+    free(use);
+    return ok;
+}
+
+/* Deterministic shares of pixels. */
+static void score_pixels(const struct work *w, double wrong, double num, struct result *out)
+{
+    double v = num > 0 ? wrong / num : 1;
+    const struct interval i = {v, v, v, 0};
+    out->share = score_share(&w->check->share, &i);
+    out->chance = 0;
+}
+
+/* A picture without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
+ * the reference's own samples, and the rounding to codes. */
+static bool check_exact(const struct work *w, struct result *out, struct err *e)
+{
+    static const double allowed_sd = 6;
+    const struct student *s = student(w, 0);
+    const struct moments *m = reference(w, 0);
+    double wrong = 0, num = 0;
+    int first = -1;
+    (void)e;
+    for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
+        bool off = false, lit = false;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+            double sd = hypot(student_expected_sd(m, i, picture(w, 0)->spp),
+                              student_expected_sd(m, i, m->n[p] * fmax(1, m->spp)));
+            lit |= m->mean[i] > 0;
+            off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
+                   allowed_sd * sd + 2 * s->tolerance[i] + 1e-3;
+        }
+        num += lit;
+        wrong += lit && off;
+        if (lit && off && first < 0)
+            first = (int)p;
+    }
+    score_pixels(w, wrong, num, out);
+    snprintf(out->expected, sizeof out->expected,
+             "all pixels of objects as in the reference, at most %.3g %% of them not",
+             100 * w->check->share.full);
+    int n = snprintf(out->seen, sizeof out->seen, "%.0f of %.0f pixels differ (%.2f %%)", wrong,
+                     num, 100 * wrong / fmax(1, num));
+    if (first >= 0)
+        snprintf(out->seen + n, sizeof out->seen - (size_t)n,
+                 ", the first at %d,%d from the top left", first % s->width, first / s->width);
+    return true;
+}
+
+static bool check_noise(const struct work *w, struct result *out, struct err *e)
+{
+    const struct student *p = student(w, 0), *q = student(w, 1);
+    unsigned char *use = usable(w, e);
+    struct student rp, rq;
+    struct interval i;
+    struct err why;
+    bool ok = use != NULL && student_from(reference(w, 0), p, &rp, e);
+    if (ok && !student_from(reference(w, 1), q, &rq, e)) {
+        student_free(&rp);
+        ok = false;
+    }
+    snprintf(out->expected, sizeof out->expected,
+             "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
+             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
+    if (!ok) {
+        free(use);
+        return false;
+    }
+    if (agreement_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+        snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
+                 exp(i.lo), exp(i.hi));
+        out->share = score_share(&w->check->log_ratio, &i);
+        out->chance = score_chance(&w->check->log_ratio, &i);
+    } else {
+        snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
+    }
+    student_free(&rp);
+    student_free(&rq);
+    free(use);
+    return true;
+}
+
+static bool check_rates(const struct work *w, struct result *out, struct err *e)
+{
+    struct rates rates;
+    struct err why;
+    const struct made *made = &w->h->made[w->check->picture[0]];
+    (void)e;
+    snprintf(
+        out->expected, sizeof out->expected,
+        "every pixel of the rate picture stands for a multiple of %d of at most %d samples, and some stop early",
+        w->check->batch, picture(w, 0)->spp);
+    if (made->rates[0] == '\0') {
+        snprintf(out->seen, sizeof out->seen, "there is no rate picture");
+    } else if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height,
+                           picture(w, 0)->spp, w->check->batch, &rates, &why)) {
+        snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
+    } else if (rates.early == 0) {
+        snprintf(out->seen, sizeof out->seen, "no pixel stopped early");
+    } else {
+        score_pixels(w, rates.odd, rates.pixels, out);
+        snprintf(
+            out->seen, sizeof out->seen,
+            "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early, %.3g samples a pixel on average",
+            rates.odd, rates.pixels, w->check->batch, rates.early, rates.mean);
+    }
+    return true;
+}
+
+/* The noise that a picture should have. */
+static void expect_noise(const struct work *w)
+{
+    for (int k = 0; k < w->check->num_pictures; k++)
+        student_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
+                       picture(w, k)->spp);
+}
+
+bool grading_check(const struct rubric *r, const struct rubric_check *check,
+                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
+                   struct err *e)
+{
+    static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
+                                                struct err *) = {
+        [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
+        [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
+    const struct work w = {r, check, a, h, alpha};
+    *out = (struct result){.judged = true, .picture = check->picture[0]};
+    for (int k = 0; k < check->num_pictures; k++) {
+        int i = check->picture[k];
+        if (h->picture[i].mean != NULL)
+            continue;
+        snprintf(out->expected, sizeof out->expected, "picture '%s'", r->picture[i].name);
+        snprintf(out->seen, sizeof out->seen, "%s", h->why[i]);
+        out->judged = h->made[i].end != SANDBOX_LOST;
+        return true;
+    }
+    expect_noise(&w);
+    return kinds[check->kind](&w, out, e);
+}
+
+void result_free(struct result *r)
+{
+    agreement_free(&r->agreement);
+}

@@ -1,0 +1,65 @@
+/* From pictures to points: the checks of a rubric on one submission. */
+#ifndef ASSAY_GRADING_H
+#define ASSAY_GRADING_H
+
+#include "agreement.h"
+#include "submission.h"
+
+/* What the pictures of a rubric should be; made once for all submissions. */
+struct answer {
+    struct moments m; /* of the reference; width 0: none */
+    struct moments
+        noise; /* of a render by ours: how its samples vary; m itself where that is ours */
+    struct moments accepted[RUBRIC_ACCEPTED];
+};
+struct answers {
+    struct answer picture[RUBRIC_PICTURES];
+};
+
+struct answer_options {
+    const char *golden_dir, *pathtracer;
+    const char *cache; /* directory for our own renders, kept while their key is the same */
+    int threads;
+    double timeout_s;
+};
+bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
+                  struct err *e) __attribute__((warn_unused_result));
+void answers_free(struct answers *a);
+
+/* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
+ * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
+ * half its width is judged too: 1 up to margin.none, 0 from twice that; the smaller of the two counts. */
+double score_share(const struct margin *m, const struct interval *i);
+
+/* The chance that a fresh run of the same program, with the estimate as its truth, gets another share; 1 where the
+ * share lies between 0 and 1. For a program that is within margin.full the chance of less than all is at most alpha
+ * by the interval itself, whatever its noise. */
+double score_chance(const struct margin *m, const struct interval *i);
+
+struct result {
+    double share;  /* 0 .. 1 of the points */
+    double chance; /* score_chance() of what decided */
+    bool
+        judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
+    char expected[256], seen[400];
+    char accepted[RUBRIC_ACCEPTED * 64]; /* names of accepted deviations that were found, or "" */
+    char flag[256];                      /* for staff only */
+    int picture;                         /* that shows it best: index in the rubric */
+    struct agreement agreement;          /* of equal, agree and sum; tiles 0: none */
+};
+
+/* One student's pictures, read. */
+struct handed_in {
+    struct made made[RUBRIC_PICTURES];
+    struct student picture[RUBRIC_PICTURES]; /* mean NULL: not there, or not readable */
+    char why[RUBRIC_PICTURES][400];          /* why not */
+};
+
+/* alpha: of one check: the chance that a program which is right loses points in it. Fails only for our own
+ * trouble. The caller frees with result_free(). */
+bool grading_check(const struct rubric *r, const struct rubric_check *check,
+                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
+                   struct err *e) __attribute__((warn_unused_result));
+void result_free(struct result *r);
+
+#endif

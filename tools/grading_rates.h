@@ -1,0 +1,17 @@
+/* The assignment's picture of sampling rates: blue (none) through green (half) to red (all samples), 8 bits. */
+#ifndef ASSAY_GRADING_RATES_H
+#define ASSAY_GRADING_RATES_H
+
+#include "../renderer/err.h"
+
+struct rates {
+    double pixels, odd; /* odd: of a colour that no multiple of the batch has, to 2 codes */
+    double early;       /* that did not take all samples */
+    double mean;        /* samples a pixel */
+};
+
+/* Fails on what is no picture of that size, and where batches are too small against `most` to tell apart. */
+bool rates_read(const char *path, int width, int height, int most, int batch, struct rates *out,
+                struct err *e) __attribute__((warn_unused_result));
+
+#endif

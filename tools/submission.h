@@ -1,0 +1,62 @@
+/* What a student handed in, and the pictures it makes. */
+#ifndef ASSAY_SUBMISSION_H
+#define ASSAY_SUBMISSION_H
+
+#include "rubric.h"
+
+#include <stdint.h>
+
+enum submission_kind {
+    SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some picture of the rubric */
+    SUBMISSION_PROGRAM, /* a file, or a directory that needs no building */
+    SUBMISSION_SOURCE   /* a directory, and the rubric has a `build` command */
+};
+extern const char *const submission_kind_name[]; /* "images", "program", "source" */
+
+struct submission {
+    enum submission_kind kind;
+    char id[128]; /* the last part of its path */
+    char path[4096];
+    char tree[512];    /* of programs: a tar, of the built tree where there is something to build */
+    char program[160]; /* as {program} is replaced */
+    char sha256[65];   /* of the tar of what was handed in */
+    char why[600];     /* what is wrong with all of it: "" if nothing */
+};
+
+/* One picture as it came out. */
+struct made {
+    char path[4400], rates[4400]; /* "": there is none; rates of adaptive sampling: NAME_rate.png */
+    char why[600];                /* why there is none */
+    enum sandbox_end end;
+    double cpu_s, wall_s;
+};
+
+/* Directory of what all runs need, made once: scenes and environments of the rubric's pictures, by their last
+ * names, which have to differ. */
+bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Looks what it is and packs it. work: a directory of its own below the sandbox's. What is wrong with the
+ * submission is in out->why; false only if we cannot go on. */
+bool submission_open(const struct rubric *r, const char *path, const char *work,
+                     struct submission *out, struct err *e) __attribute__((warn_unused_result));
+
+/* Builds it in the sandbox, if it is to be built; the output goes to `log`. */
+bool submission_build(const struct rubric *r, const struct sandbox *s, const char *work,
+                      const char *log, struct submission *sub, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* The picture with that index: found, or made in the sandbox and then moved to out_dir, where its log goes too. A
+ * picture that is not there is no error: made->why says so. */
+bool submission_picture(const struct rubric *r, const struct sandbox *s,
+                        const struct submission *sub, int picture, const char *stage,
+                        const char *work, const char *out_dir, uint64_t seed, int threads,
+                        struct made *made, struct err *e) __attribute__((warn_unused_result));
+
+/* The command of a picture in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
+ * output by its name in the rubric. False if it is too long. */
+bool submission_command(const struct rubric *r, const struct rubric_picture *p, const char *program,
+                        uint64_t seed, int threads, char *text, size_t size, const char **argv,
+                        int most);
+
+#endif
