@@ -1,4 +1,4 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS: the page of one scene of four pictures, in Debian's chromium.
+// node page.mjs MODULES PAGE RESULTS SHOTS [--values-only]: the page of one scene of four pictures, in Debian's chromium.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
@@ -75,6 +75,11 @@ for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 
   });
 }
 check("values, errors, n, differences and t are those of the files", wrong.length === 0, wrong.slice(0, 5).join("; "));
+
+if (process.argv.includes("--values-only")) {
+  await browser.close();
+  process.exit();
+}
 
 // What is painted: the buffer that the stage shows (its second picture, if over), pixel by pixel.
 const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
