@@ -630,6 +630,8 @@ else
     not_ok "grade: one submission" "$(cat "$tmp/out")"
 fi
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
+expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
+expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 
 # The page, in a browser.
 tests/browser/run.sh "$build" >"$tmp/browser"

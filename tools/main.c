@@ -19,6 +19,7 @@ static const struct {
     {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
     {"grade", verb_grade, "grade students' pictures and programs by a rubric"},
     {"report", verb_report, "make the HTML page of a results.json"},
+    {"watch", verb_watch, "show the latest page of a folder in a browser while runs go on"},
     {"golden", verb_golden, "render, inspect and approve the stored references"},
     {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},

@@ -16,6 +16,8 @@ class Scene {
       claim.name = article.dataset.name;
       claim.p = JSON.parse(article.dataset.tileP || "[]");
       claim.t = JSON.parse(article.dataset.tileT || "[]");
+      const worst = article.querySelector("button[data-x]");
+      claim.worst = worst ? { x: +worst.dataset.x, y: +worst.dataset.y, side: claim.tile } : null;
       return claim;
     });
     Object.assign(this, { panes: new Set(), view: { zoom: 1, x: 0, y: 0 }, stops: 0, curve: "sRGB", shown: 0,
@@ -99,8 +101,8 @@ class Scene {
     });
     this.kindButtons = Object.entries(mapKinds).map(([kind, k]) =>
       Object.assign(button(k.key, k.name, () => this.show(this.shown, kind)), { kind }));
-    const select = (label, names, index, action) => {
-      const s = make("select", {}, ...names.map((n, i) => make("option", { value: String(i), selected: i === index }, n)));
+    const select = (label, name, names, index, action) => {
+      const s = make("select", { "aria-label": name }, ...names.map((n, i) => make("option", { value: String(i), selected: i === index }, n)));
       s.addEventListener("change", () => action(+s.value));
       return [make("label", {}, label, s), s];
     };
@@ -117,12 +119,12 @@ class Scene {
     const stopsText = (v) => (v > 0 ? "+" : "") + digits(v) + " stops";
     let exposure, curve, pair, against;
     [exposure, this.stopsInput, this.stopsOutput] = slider("Exposure", "-8", "8", "0.25", 0, stopsText, (v) => this.expose(v));
-    [curve] = select("Curve", Object.keys(curves), 0, (i) => { this.curve = Object.keys(curves)[i]; this.redraw(); });
-    [pair, this.pairSelect] = select("of", this.claims.map((c) => c.name), 0, (i) => {
+    [curve] = select("Curve", "Curve", Object.keys(curves), 0, (i) => { this.curve = Object.keys(curves)[i]; this.redraw(); });
+    [pair, this.pairSelect] = select("of", "Pictures of the map", this.claims.map((c) => c.name), 0, (i) => {
       this.claim = this.claims[i];
       this.show(this.shown, this.kind);
     });
-    [against, this.againstSelect] = select("over", this.shots.map((s) => s.name), this.against, (i) => {
+    [against, this.againstSelect] = select("over", "Picture that is wiped in", this.shots.map((s) => s.name), this.against, (i) => {
       this.against = i;
       this.show(this.shown, null);
     });
@@ -167,6 +169,7 @@ class Scene {
         const source = this.mapSource(kind, claim);
         return source && Object.assign(source, { prepare: () => this.captionMap(claim, kind, figure) });
       });
+      pane.tile = claim.worst;
       const figure = make("figure", { className: "map", "data-kind": kind }, pane.frame);
       return figure;
     });
@@ -369,5 +372,8 @@ document.addEventListener("keydown", (e) => {
 
 // Everything is on paper, also what has not been scrolled to.
 const loadAll = () => Promise.all(scenes.map((s) => s.load()));
-window.addEventListener("beforeprint", () => scenes.forEach((s) => s.panes.forEach((p) => p.draw(true))));
+window.addEventListener("beforeprint", () => {
+  document.querySelectorAll("details").forEach((d) => { d.open = true; });
+  scenes.forEach((s) => s.panes.forEach((p) => p.draw(true)));
+});
 window.addEventListener("load", () => (window.requestIdleCallback || setTimeout)(loadAll));

@@ -38,6 +38,7 @@ class Pane {
     this.scene = scene;
     this.source = source;
     this.visible = false;
+    this.tile = null; // outlined while the scene has none marked
     this.canvas = make("canvas", { role: "img" });
     this.frame = make("div", { className: "frame", tabIndex: 0 }, this.canvas);
     this.frame.style.aspectRatio = scene.width + " / " + scene.height;
@@ -55,9 +56,10 @@ class Pane {
     let b = buffers.get(source.id);
     if (!b) buffers.set(source.id, b = { canvas: make("canvas", { width, height }) });
     if (b.key !== source.key) {
-      const context = b.canvas.getContext("2d"), image = context.createImageData(width, height);
-      source.paint(image.data);
-      context.putImageData(image, 0, 0);
+      const context = b.canvas.getContext("2d");
+      b.image = b.image || context.createImageData(width, height);
+      source.paint(b.image.data);
+      context.putImageData(b.image, 0, 0);
       b.key = source.key;
     }
     return b.canvas;
@@ -109,7 +111,8 @@ class Pane {
       c.strokeStyle = "rgba(128,128,128,.75)";
       c.stroke();
     }
-    if (s.tile) box(s.tile.x, s.tile.y, s.tile.side, s.tile.side, false);
+    const tile = s.tile || this.tile;
+    if (tile) box(tile.x, tile.y, tile.side, tile.side, false);
     if (s.pixel) box(s.pixel.x, s.pixel.y, 1, 1, true);
   }
 

@@ -230,6 +230,23 @@ static size_t gather_scene(struct claim_ref *claim, size_t num)
     return front;
 }
 
+static void write_keys(FILE *f)
+{
+    fputs(
+        "<section>\n<h2>How to look</h2>\n<p class=\"caption\">Each scene below has its pictures "
+        "(keys <kbd>1</kbd> to <kbd>9</kbd>; <kbd>0</kbd> side by side), maps of two of them "
+        "(<kbd>d</kbd> difference, <kbd>t</kbd> difference over its noise, <kbd>e</kbd> error without "
+        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples), a wipe (<kbd>w</kbd>), tiles "
+        "(<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
+        "<kbd>-</kbd>, <kbd>f</kbd> the whole picture, double click, Ctrl and the wheel, two "
+        "fingers); drag to pan. All frames of a scene move together. Point at a pixel, or focus a "
+        "picture and use the arrow keys, to read its values. A key goes to the scene in the middle "
+        "of the window.</p>\n<noscript><p class=\"error-line\">Pictures and maps are drawn by this "
+        "page's own script, which is switched off. Verdicts, numbers and plots are all "
+        "here.</p></noscript>\n</section>\n",
+        f);
+}
+
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
                        struct err *e)
 {
@@ -246,6 +263,8 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     write_header(f, root, claim, num);
     if (num > 0)
         write_table(f, claim, num);
+    if (num > 0)
+        write_keys(f);
     for (size_t done = 0; done < num;) {
         size_t of_scene = gather_scene(claim + done, num - done);
         if (!report_scene(p, claim + done, of_scene, e))

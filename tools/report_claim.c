@@ -332,7 +332,9 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     report_power(f, json);
     fputs("</div>\n", f);
     report_tiles(f, json);
-    fputs("<h4>Everything needed to doubt it</h4>\n<dl class=\"facts\">\n", f);
+    fprintf(f,
+            "<details%s>\n<summary>Everything needed to doubt it</summary>\n<dl class=\"facts\">\n",
+            claim->outcome == OUTCOME_AS_EXPECTED ? "" : " open");
     write_numbers(f, json);
     write_regions(f, json);
     write_provenance(f, json);
@@ -340,5 +342,5 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     report_statistics(f, json);
     write_command(f, "To run this claim again:", member_text(json, "rerun"));
     write_approval(f, json);
-    fputs("</article>\n", f);
+    fputs("</details>\n</article>\n", f);
 }

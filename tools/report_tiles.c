@@ -48,10 +48,12 @@ void report_tiles(FILE *f, const json_t *claim)
                     pow(10, fmin(k->log10_p, 0)),
                     plain_number(json_number_value(json_array_get(t, k->index))).s);
         }
-        fputs("</div>\n<p class=\"caption tile-reading\" aria-live=\"polite\">Each is x, y of its "
-              "corner; p asks if the tile's means are equal, without a margin. Press one to mark "
-              "and enlarge it, or a tile in any picture to mark it.</p></div>\n",
-              f);
+        fputs(
+            "</div>\n<p class=\"caption tile-reading\" aria-live=\"polite\">Each is x, y of its "
+            "corner; p asks if the tile's means are equal, without a margin. The first is outlined "
+            "in the maps. Press one to mark and enlarge it, or a tile in any picture to mark "
+            "it.</p></div>\n",
+            f);
     }
     free(tile);
 }

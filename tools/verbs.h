@@ -14,6 +14,7 @@ int verb_export(int argc, char **argv, struct err *e);
 int verb_import_check(int argc, char **argv, struct err *e);
 int verb_merge(int argc, char **argv, struct err *e);
 int verb_diagnose(int argc, char **argv, struct err *e);
+int verb_watch(int argc, char **argv, struct err *e);
 int verb_grade(int argc, char **argv, struct err *e);
 int verb_report(int argc, char **argv, struct err *e);
 

@@ -20,4 +20,7 @@ const pixels = await page.evaluate("scenes[0].ready && scenes[0].shots.length ==
 const good = made === 0 && shown && pixels && events.length === 0;
 console.log(good ? "ok page: names cannot inject markup" :
   "not ok page: names cannot inject markup: " + [made, shown, pixels, ...events].join("; "));
+await page.setViewportSize({ width: 390, height: 844 });
+const wide = await page.evaluate("document.scrollingElement.scrollWidth - window.innerWidth");
+console.log(wide <= 0 ? "ok page: long names fit on a phone" : "not ok page: long names fit on a phone: " + wide + " px");
 await browser.close();

@@ -1,4 +1,4 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS: the page of one scene of four pictures, in Debian's chromium.
+// node page.mjs MODULES PAGE RESULTS SHOTS [--values-only]: the page of one scene of four pictures, in Debian's chromium.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
@@ -76,6 +76,11 @@ for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 
 }
 check("values, errors, n, differences and t are those of the files", wrong.length === 0, wrong.slice(0, 5).join("; "));
 
+if (process.argv.includes("--values-only")) {
+  await browser.close();
+  process.exit();
+}
+
 // What is painted: the buffer that the stage shows (its second picture, if over), pixel by pixel.
 const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
   const pane = scenes[0].stagePane, source = pane.source();
@@ -108,7 +113,19 @@ await frames(page);
 const white = +(await page.getAttribute("section.scene", "data-white"));
 const linear = await painted(0, 31, 31), wanted = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * v / white));
 check("the linear curve is linear", linear.every((v, k) => Math.abs(v - wanted[k]) <= 1), linear + " not " + wanted);
+await page.getByLabel("Curve").selectOption({ label: "gamma 2.2" });
+await frames(page);
+const gamma = await painted(0, 31, 31), bent = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (v / white) ** (1 / 2.2)));
+check("gamma 2.2 is that", gamma.every((v, k) => Math.abs(v - bent[k]) <= 1), gamma + " not " + bent);
+await page.getByLabel("Curve").selectOption({ label: "log, 4 decades" });
+await frames(page);
+const logarithmic = await painted(0, 31, 31), decades = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (1 + Math.log10(v / white) / 4)));
+check("the logarithmic curve is that", logarithmic.every((v, k) => Math.abs(v - decades[k]) <= 1), logarithmic + " not " + decades);
 await page.getByLabel("Curve").selectOption({ label: "sRGB" });
+await page.getByLabel("Exposure").fill("-2");
+await frames(page);
+check("the slider exposes too", (await paintsRadiance(names[3], 0, 0.25, points)).length === 0);
+await page.getByLabel("Exposure").fill("0");
 
 // Wipe: the shown picture left of the line, another one right of it; the line follows a drag.
 await page.keyboard.press("1");
@@ -122,7 +139,7 @@ await page.mouse.down();
 await page.mouse.move(box.x + box.width / 4, box.y + 60, { steps: 3 });
 await page.mouse.up();
 check("the wipe is dragged", Math.abs(await page.evaluate("scenes[0].wipe") - 0.25) < 0.01);
-await page.locator(".tools select").last().selectOption({ label: names[3] });
+await page.getByLabel("Picture that is wiped in").selectOption({ label: names[3] });
 check("the wiped picture is chosen", await page.evaluate("scenes[0].shots[scenes[0].against].name") === names[3]);
 await page.keyboard.press("w");
 
@@ -143,6 +160,11 @@ for (let y = 0; y < size.height; y += 7)
     if (z > 1 && !(c[0] > c[2]) || z < -1 && !(c[2] > c[0])) red.push(x + "," + y + ": z " + z + " is " + c);
   }
 check("the t map is red above and blue below", red.length === 0, red.join("; "));
+
+await page.getByLabel("Pictures of the map").selectOption({ index: 1 });
+await frames(page);
+check("the pair of a map is chosen", (await page.textContent(".stage figcaption")).startsWith("t map, " + claims[1].a + " against " + claims[1].b));
+await page.getByLabel("Pictures of the map").selectOption({ index: 0 });
 
 // Zoom to single pixels and pan, linked between all frames; then the whole picture.
 await page.keyboard.press("0");
@@ -189,6 +211,14 @@ await page.keyboard.press("g");
 check("all tiles are outlined", await page.evaluate("scenes[0].grid") === side);
 await page.keyboard.press("g");
 
+// Figures' numbers as files.
+const [download] = await Promise.all([page.waitForEvent("download"), article.locator("a.csv").first().click()]);
+const csv = readFileSync(await download.path(), "utf8").split("\r\n");
+check("a figure's numbers are saved as CSV", download.suggestedFilename() === "tiles.csv" && csv[0] === "x,y,t,log10_p" &&
+  csv.length === tiles.length + 2 && Math.abs(csv[1].split(",")[3] - tiles[0]) < 1e-5, csv.slice(0, 2).join(" | "));
+await article.locator("summary").click();
+check("the facts unfold", await article.locator("dl.facts").isVisible());
+
 // Widths, colours, paper.
 for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
   for (const scheme of ["light", "dark"]) {
@@ -214,5 +244,5 @@ const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg,
   e.offsetParent !== null && !e.closest("[hidden]") && !(e.getAttribute("aria-label") || e.textContent.trim() || e.labels && e.labels.length)).length`);
 check("every picture and control has a name", unnamed === 0, unnamed + " have none");
 check("no console message", complaints.length === 0, complaints.join("; "));
-check("nothing is loaded from outside", requests.every((u) => u.startsWith("file://") && u.endsWith(".html") || u.startsWith("blob:")), requests.join(" "));
+check("nothing is loaded from outside", requests.every((u) => u.startsWith("data:text/csv") || u.startsWith("file://") && u.endsWith(".html") || u.startsWith("blob:")), requests.join(" "));
 await browser.close();

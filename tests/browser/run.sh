@@ -17,6 +17,12 @@ look() {
 "$build/assay" validate -q --out "$tmp/report" --only 31_spot_plane >/dev/null
 look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots"
 
+# Control: with two pictures exchanged nothing but the values is wrong, and that is found.
+sed 's/id="layer-0"/id="layer-x"/; s/id="layer-1"/id="layer-0"/; s/id="layer-x"/id="layer-1"/' "$tmp/report/index.html" >"$tmp/exchanged.html"
+if node "$here/page.mjs" "$build/browser" "$tmp/exchanged.html" "$tmp/report/results.json" "$tmp" --values-only 2>&1 |
+    grep -q '^not ok page: values, errors'; then echo "ok page: exchanged pictures are found"; else
+    echo "not ok page: exchanged pictures are found: no"; fi
+
 # File names as an attacker would choose them, and all the texts of results.json too.
 evil='<img src=x onerror=alert(1)>'
 for seed in 1 2; do
@@ -27,3 +33,6 @@ done
 sed -i "s|\"reason\": \".*\"|\"reason\": \"</script><script>alert(2)</script>\", \"notes\": [\"$evil\"]|" "$tmp/evil.json"
 "$build/assay" report -o "$tmp/evil.html" "$tmp/evil.json" >/dev/null
 for page in evil compared; do look names.mjs "$tmp/$page.html"; done
+
+mkdir "$tmp/watched"
+look watch.mjs "$build/san/assay" "$tmp/watched" "$tmp/compared.html" "$tmp/report/index.html"
