@@ -109,11 +109,11 @@ static const struct cli_option options[] = {
     [OPT_SAMPLER] = {0, "sampler", 1, "NAME",
                      "independent or sobol: less noise, but unknown error (independent)"},
     [OPT_INTEGRATOR] = {0, "integrator", 1, "NAME", "path or normals (path)"},
-    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid, sah or wide (sah)"},
+    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid, sah or wide (wide)"},
     [OPT_ISA] = {0, "isa", 1, "NAME",
                  "vector instructions: auto, sse4.2, avx2, avx512, or scalar\n"
-                 "paths; all give the same picture (auto with --accel wide,\n"
-                 "else scalar)"},
+                 "paths; all give the same picture (auto; scalar with another\n"
+                 "--accel than wide)"},
     [OPT_DIALECT] = {0, "dialect", 1, "NAME",
                      "auto, collada or cgl: whose rules for camera and lights;\n"
                      "auto: cgl if the file has CGL extras (auto)"},
@@ -311,7 +311,7 @@ bool options_parse(int argc, char **argv, struct options *s, struct err *e)
 {
     *s = (struct options){.width = 800,
                           .height = 600,
-                          .accel = BVH_SAH,
+                          .accel = BVH_WIDE,
                           .isa = -1,
                           .direct = DIRECT_MIS,
                           .light_samples = 1,

@@ -40,14 +40,15 @@ static bool make_pictures(const struct grade_job *job, const struct submission *
     const struct rubric *r = job->rubric;
     for (int i = 0; i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
-        struct err why;
+        struct err why = {""};
         if (!submission_picture(r, job->sandbox, s, i, job->stage, work, out,
                                 picture_seed(job->seed, i), job->threads, &h->made[i], e))
             return false;
-        snprintf(h->why[i], sizeof h->why[i], "%.390s", h->made[i].why);
-        if (h->made[i].path[0] != '\0' &&
-            !student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
-            snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
+        if (h->made[i].path[0] == '\0')
+            err_set(&why, "%s", h->made[i].why);
+        else if (student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
+            why.msg[0] = '\0';
+        snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
     }
     return true;
 }
