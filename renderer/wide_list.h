@@ -257,7 +257,8 @@ static void list_closest(const struct wide *w, const struct rays *r, const uint1
         struct list_hits best;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_init(r, eight, &q);
+        bool in_row = octet_load(r, eight, &q);
+        octet_shear(&q);
         if (!f->quick || bits(list_closest_quick(f, &q, &best)) != 255)
             list_closest_exact(f, &q, &best);
         stats->primitive_tests += w->num_leaves;
@@ -285,13 +286,15 @@ static void list_occluded(const struct wide *w, const struct rays *r, const uint
         struct octet q;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_init(r, eight, &q);
+        bool in_row = octet_load(r, eight, &q);
         octet_ignore(r, eight, &q);
         vi known = vi_set(0), met = known;
         if (f->quick)
             met = list_occluded_quick(f, &q, &known);
-        if (bits(known) != 255)
+        if (bits(known) != 255) {
+            octet_shear(&q);
             met = list_occluded_exact(f, &q);
+        }
         stats->primitive_tests += w->num_leaves;
         const uint64_t flags = bytes_of(bits(met));
         if (in_row)

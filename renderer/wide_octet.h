@@ -42,8 +42,8 @@ INLINE void octet_shear(struct octet *q)
     q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
 }
 
-/* True if the lanes follow each other. */
-INLINE bool octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+/* Origins, directions and ends; true if the lanes follow each other. */
+INLINE bool octet_load(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
 {
     bool in_row = true;
     for (int i = 1; i < LANES; i++)
@@ -56,11 +56,16 @@ INLINE bool octet_init(const struct rays *r, const uint16_t lane[LANES], struct 
     q->d[2] = gather(r->d.z, lane, in_row);
     q->tmin = gather(r->tmin, lane, in_row);
     q->tmax = gather(r->tmax, lane, in_row);
+    return in_row;
+}
+
+INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    octet_load(r, lane, q);
     vi tmax = (vi)q->tmax;
     vi zero = vf_eq((vf)tmax, vf_set(0));
     q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
     octet_shear(q);
-    return in_row;
 }
 
 /* Lanes k .. k+7 of a list of n; behind its end the last again. */

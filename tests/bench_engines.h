@@ -23,7 +23,7 @@ struct bench_view {
     struct scene scene;
     struct camera camera;
     int depth;
-    enum isa isa;
+    enum isa isa; /* of the rays and of the paths */
     struct bvh *bvh;
     struct embree_tracer *embree; /* NULL: cannot */
 };

@@ -82,6 +82,7 @@ static bool load_view(int i, const struct bench_options *o, struct bench_view *v
         v->camera.width = v->camera.height = 16;
     struct err why = {""};
     v->embree = embree_tracer_new(&v->scene, &why);
+    v->isa = o->isa;
     v->bvh = bvh_build_for(&v->scene, BVH_WIDE, o->isa, e);
     return v->bvh != NULL;
 }
