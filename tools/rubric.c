@@ -285,6 +285,8 @@ static bool read_in_check(struct statement *s, const char *word)
         take_margin(s, word, &c->image);
     else if (strcmp(word, "tile") == 0)
         take_margin(s, word, &c->tile);
+    else if (strcmp(word, "count") == 0)
+        take_margin(s, word, &c->count);
     else if (strcmp(word, "share") == 0)
         take_margin(s, word, &c->share);
     else if (strcmp(word, "ratio") == 0) {

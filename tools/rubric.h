@@ -37,6 +37,7 @@
  *     share D0 D1                       of pixels that are wrong (exact, rates)
  *     ratio D0 D1                       on the natural logarithm (noise)
  *     batch N                           samples (rates)
+ *     count D0 D1                       relative difference of the mean number of samples from ours (rates)
  *     title TEXT, hint TEXT, where TEXT (the place in the assignment)
  *     visibility hidden | after_due_date | after_published | visible (default) */
 #ifndef ASSAY_RUBRIC_H
@@ -103,7 +104,7 @@ struct rubric_check {
     double points;
     enum check_kind kind;
     int picture[CHECK_PICTURES], num_pictures; /* indices */
-    struct margin image, tile, share, log_ratio;
+    struct margin image, tile, share, log_ratio, count;
     int batch;
     char title[160], hint[512], where[160], visibility[24];
 };

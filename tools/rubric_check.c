@@ -152,7 +152,8 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
                       {"tile", c->tile.given, kinds[c->kind].image},
                       {"share", c->share.given, kinds[c->kind].share},
                       {"ratio", c->log_ratio.given, kinds[c->kind].ratio},
-                      {"batch", c->batch > 0, kinds[c->kind].batch}};
+                      {"batch", c->batch > 0, kinds[c->kind].batch},
+                      {"count", c->count.given, kinds[c->kind].batch}};
     for (size_t i = 0; i < sizeof statements / sizeof *statements; i++) {
         if (statements[i].given && !statements[i].wanted)
             mistake(m, c->line, "check '%s': '%s' is not for '%s'", c->name, statements[i].name,
