@@ -11,6 +11,8 @@
  *   output NAME                         the file that {out} names: its ending is the kind of picture (out.png)
  *   program NAME                        the program inside a submitted directory (pathtracer)
  *   build WORDS                         run first in a submitted source tree; without it trees are as they are
+ *   diagnose WORDS                      a command as above that writes our moments (.exr) to {out}, from plain COLLADA:
+ *                                       programs that lose points are then diagnosed, and the bug is named
  *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
  *   total POINTS                        what all checks have to add up to
  *
@@ -116,7 +118,7 @@ struct rubric_part {
 
 struct rubric {
     char path[4096], dir[4096]; /* of the file; of what lies beside it */
-    char title[160], curve[32], command[1024], output[64], program[128], build[512];
+    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512];
     struct sandbox_limits limit;
     double build_s, total;
     struct rubric_part part[RUBRIC_PARTS];
