@@ -191,7 +191,7 @@ static int run_batch(const struct settings *s, const struct rubric *r, const str
         job.diagnosis = &diagnosis;
     }
     ok = ok && grade_all(&job, &grades, e);
-    if (ok && grade_write(s->out, grades, e))
+    if (ok && grade_write(s->out, grades, e) && grade_pages(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
     diagnosis_close(&diagnosis);
