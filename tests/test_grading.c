@@ -154,7 +154,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
     struct err e;
     assert_true(h != NULL && a != NULL);
     for (int i = 0; i < num; i++) {
-        char path[128], name[8];
+        char path[128], name[16];
         snprintf(name, sizeof name, "p%d", i);
         write_picture(name, bug[i], spp[i], path);
         h->picture[i] = read_back(path);
