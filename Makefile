@@ -14,13 +14,14 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev bubblewrap
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools
+  nettle-dev zlib1g-dev bubblewrap
+DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+  $(if $(shell command -v npm),,nodejs npm)
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle
+PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle zlib
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
@@ -37,7 +38,7 @@ cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
 
 # Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
 ISAS     := sse42 avx2 avx512
-BY_ISA   := renderer/wide_kernel renderer/wide_split
+BY_ISA   := renderer/wide_kernel renderer/wide_split renderer/lanes_kernel
 KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
 RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
 HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc
@@ -58,7 +59,8 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer $(BUILD)/libassay.a
+check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer \
+  $(BUILD)/libassay.a $(BUILD)/browser/package-lock.json
 	tests/run.sh $(BUILD) $(CHECKED)
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
@@ -80,7 +82,7 @@ calibrate: $(BUILD)/tests/make_calibration
 	$(BUILD)/tests/make_calibration --threads $(shell nproc) \
 	  $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/calibration)
 
-bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench
+bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
 
 bvh-table: $(BUILD)/pathtracer
@@ -231,6 +233,11 @@ $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anch
 	$(link)
 $(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
+# playwright-core, by which the page is tested in Debian's chromium.
+$(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
+	$(call say,NPM,$@)
+	$(Q)mkdir -p $(@D) && cp tests/browser/package.json $(@D) && cp $< $(@D)/lock.json && cd $(@D) && \
+	  mv lock.json package-lock.json && npm ci --silent --ignore-scripts --no-audit --no-fund
 $(BUILD)/tests/student_tracer: $(BUILD)/tests/student_tracer.c.o
 	$(link)
 # Readers of files under libFuzzer: one program for each tests/fuzz/fuzz_NAME.c.
@@ -251,7 +258,7 @@ programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERE
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css tools/page.js
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css $(wildcard tools/page*.js)
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): $(BUILD)/commit
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): \
   CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'

@@ -7,37 +7,39 @@
 
 #include <stdint.h>
 
-enum { BATCH_LANES = 256 };
+/* Rows are longer than a batch: vectors may read and write a little behind its end, and rows of 1024
+ * bytes would all fall into the same few sets of the first cache. */
+enum { BATCH_LANES = 256, BATCH_ROOM = BATCH_LANES + 16 };
 
 #define NO_HIT UINT32_MAX
 
 struct vec3s {
-    float x[BATCH_LANES], y[BATCH_LANES], z[BATCH_LANES];
+    float x[BATCH_ROOM], y[BATCH_ROOM], z[BATCH_ROOM];
 };
 
 struct rgbs {
-    float r[BATCH_LANES], g[BATCH_LANES], b[BATCH_LANES];
+    float r[BATCH_ROOM], g[BATCH_ROOM], b[BATCH_ROOM];
 };
 
 struct rays {
     struct vec3s o, d;
-    float tmin[BATCH_LANES], tmax[BATCH_LANES];
+    float tmin[BATCH_ROOM], tmax[BATCH_ROOM];
     /* Occlusion only: a sphere (primitive number) that does not count, or NO_HIT. A shadow ray that
      * ends at the rim of a spherical light cannot tell by distance that it has arrived. */
-    uint32_t ignore[BATCH_LANES];
+    uint32_t ignore[BATCH_ROOM];
 };
 
 struct hits {
-    float t[BATCH_LANES], u[BATCH_LANES], v[BATCH_LANES];
-    uint32_t prim[BATCH_LANES];
+    float t[BATCH_ROOM], u[BATCH_ROOM], v[BATCH_ROOM];
+    uint32_t prim[BATCH_ROOM];
 };
 
 /* What camera rays met, for the layers beside the picture (first_hit.h). */
 struct first_hits {
-    float depth[BATCH_LANES];     /* from the plane through the eye, along the viewing axis */
-    struct vec3s normal;          /* shading normal as the scene has it, world space */
-    struct rgbs albedo;           /* see first_hits_record() */
-    uint32_t object[BATCH_LANES]; /* object number; NO_HIT: nothing met, the rest is not set */
+    float depth[BATCH_ROOM];     /* from the plane through the eye, along the viewing axis */
+    struct vec3s normal;         /* shading normal as the scene has it, world space */
+    struct rgbs albedo;          /* see first_hits_record() */
+    uint32_t object[BATCH_ROOM]; /* object number; NO_HIT: nothing met, the rest is not set */
 };
 
 static inline vec3 vec3s_get(const struct vec3s *a, int i)

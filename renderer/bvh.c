@@ -18,11 +18,17 @@ struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
 
 struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
 {
+    return bvh_build_on(s, kind, isa, 1, e);
+}
+
+struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa, int threads,
+                         struct err *e)
+{
     struct bvh *t = calloc(1, sizeof *t);
     if (t == NULL)
         goto fail;
     if (kind == BVH_WIDE) {
-        t->wide = wide_build(s, isa, e);
+        t->wide = wide_build(s, isa == ISA_SCALAR ? ISA_AUTO : isa, threads, e);
         if (t->wide != NULL)
             return t;
         free(t);

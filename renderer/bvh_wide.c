@@ -1,18 +1,28 @@
 #include "bvh_wide.h"
 #include "alloc_large.h"
+#include "parallel.h"
+#include "wide_flat.h"
 #include "wide_kernel.h"
 #include "wide_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+/* A leaf that has its place and is not filled yet. */
+struct empty_leaf {
+    uint32_t place, first, count;
+};
+
 struct build {
     struct wide *w;
+    int threads;
     struct wide_parts parts;
     const struct wide_splitter *splitter;
     const struct scene *scene;
     struct wide_item *item;
     size_t capacity; /* bytes of the arena */
+    struct empty_leaf *leaf;
+    size_t leaf_room;
     double root_area;
 };
 
@@ -50,6 +60,13 @@ static void set_item(const struct scene *s, uint32_t prim, struct wide_item *it)
     }
     *it = (struct wide_item){
         .min = {low.x, low.y, low.z}, .prim = prim, .minus_max = {-high.x, -high.y, -high.z}};
+}
+
+static void set_items(void *ctx, size_t first, size_t last)
+{
+    const struct build *b = ctx;
+    for (size_t i = first; i < last; i++)
+        set_item(b->scene, (uint32_t)i, &b->item[i]);
 }
 
 static bool is_sphere(const struct build *b, uint32_t item)
@@ -92,18 +109,34 @@ static void fill_leaf(const struct build *b, struct wide_item *item, uint32_t co
     }
 }
 
-/* Appends; the reference, or WIDE_PLACE if out of memory. */
+static void fill_leaves(void *ctx, size_t first, size_t last)
+{
+    const struct build *b = ctx;
+    for (size_t i = first; i < last; i++) {
+        const struct empty_leaf *l = &b->leaf[i];
+        fill_leaf(b, b->item + l->first, l->count, (struct wide_leaf *)(b->w->arena + l->place));
+    }
+}
+
+/* Appends one to be filled later; the reference, or WIDE_PLACE if out of memory. */
 static uint32_t add_leaf(struct build *b, const struct wide_range *r)
 {
+    struct wide *w = b->w;
+    if (w->num_leaves == b->leaf_room) {
+        size_t room = b->leaf_room + b->leaf_room / 2 + 64;
+        struct empty_leaf *larger = realloc(b->leaf, room * sizeof *larger);
+        if (larger == NULL)
+            return WIDE_PLACE;
+        b->leaf = larger;
+        b->leaf_room = room;
+    }
     if (!reserve(b, sizeof(struct wide_leaf)))
         return WIDE_PLACE;
-    struct wide *w = b->w;
     uint32_t ref = (uint32_t)w->used | WIDE_LEAF;
     if (is_sphere(b, r->first))
         ref |= WIDE_SPHERES;
-    fill_leaf(b, b->item + r->first, r->count, (struct wide_leaf *)(w->arena + w->used));
+    b->leaf[w->num_leaves++] = (struct empty_leaf){(uint32_t)w->used, r->first, r->count};
     w->used += sizeof(struct wide_leaf);
-    w->num_leaves++;
     return ref;
 }
 
@@ -155,12 +188,16 @@ static bool add_node(struct build *b, uint32_t i, int depth)
 
 static bool add_tree(struct build *b, const struct wide_range *all)
 {
-    return wide_parts_build(b->splitter, b->item, b->scene->num_triangles, all, &b->parts) &&
+    return wide_parts_build(b->splitter, b->item, b->scene->num_triangles, all, b->threads,
+                            &b->parts) &&
            add_node(b, 0, 0);
 }
 
 static bool add_list(struct build *b, struct wide_range *all)
 {
+    if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
+        return false;
+    wide_flat_fill(b->scene, b->w->flat);
     uint32_t triangles = b->scene->num_triangles;
     for (uint32_t i = 0; i < all->count;) {
         uint32_t end = i < triangles ? triangles : all->count;
@@ -174,7 +211,7 @@ static bool add_list(struct build *b, struct wide_range *all)
     return true;
 }
 
-struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
+struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
 {
     static const struct {
         const struct wide_kernel *kernel;
@@ -186,7 +223,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
     };
     if (!isa_choose(&isa, e))
         return NULL;
-    struct build b = {.scene = s, .splitter = code[isa].splitter};
+    struct build b = {.scene = s, .splitter = code[isa].splitter, .threads = threads};
     struct wide_range all = {.count = scene_num_primitives(s)};
     struct wide *w = b.w = calloc(1, sizeof *w);
     if (w == NULL)
@@ -198,8 +235,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
     b.item = alloc_large(all.count * sizeof *b.item);
     if (w->arena == NULL || b.item == NULL)
         goto fail;
-    for (uint32_t i = 0; i < all.count; i++)
-        set_item(s, i, &b.item[i]);
+    parallel_for(threads, all.count, set_items, &b);
     b.splitter->bounds(b.item, all.count, &all.box, &all.centres);
     b.root_area = (double)wide_half_area(&all.box);
     for (int a = 0; a < 3; a++) {
@@ -208,13 +244,16 @@ struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
     }
     if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : add_tree(&b, &all)))
         goto fail;
+    parallel_for(threads, w->num_leaves, fill_leaves, &b);
     float extent = maxf(maxf(w->max[0] - w->min[0], w->max[1] - w->min[1]), w->max[2] - w->min[2]);
     w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);
     free(b.item);
+    free(b.leaf);
     wide_parts_free(&b.parts);
     return w;
 fail:
     free(b.item);
+    free(b.leaf);
     wide_parts_free(&b.parts);
     wide_free(w);
     err_set(e, "out of memory for the acceleration structure of %u primitives", all.count);
@@ -226,5 +265,6 @@ void wide_free(struct wide *w)
     if (w == NULL)
         return;
     free(w->arena);
+    free(w->flat);
     free(w);
 }

@@ -35,7 +35,10 @@ struct wide_leaf {
 
 struct wide_kernel;
 
+struct wide_flat;
+
 struct wide {
+    struct wide_flat *flat; /* of a list, else NULL */
     char *arena; /* nodes and leaves; at 0 the root, or the leaves of a list */
     size_t used; /* bytes */
     const struct wide_kernel *kernel;
@@ -50,8 +53,9 @@ struct wide {
     double cost; /* expected tests of a node or leaf for a random ray */
 };
 
-/* ISA_AUTO: the widest. NULL on failure (out of memory; no such instructions). */
-struct wide *wide_build(const struct scene *s, enum isa isa, struct err *e)
+/* ISA_AUTO: the widest. The same bits on any number of threads. NULL on failure (out of memory; no such
+ * instructions). */
+struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
     __attribute__((warn_unused_result));
 void wide_free(struct wide *w);
 

@@ -269,15 +269,11 @@ static bool read_scene(struct loader *ld)
     return true;
 }
 
-bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
-                   struct scene *out, struct err *e)
+static bool load(struct text_input *in, const char *path, enum dialect dialect, struct scene *out,
+                 struct err *e)
 {
     struct loader ld = {.path = path, .err = e, .dialect = dialect, .unit = 1};
-    bool ok = false;
-    if (size > MAX_FILE_BYTES)
-        err_set(e, "%s: larger than %d bytes", path, MAX_FILE_BYTES);
-    else
-        ok = xml_open(&ld, text, size) && read_scene(&ld);
+    bool ok = xml_open(&ld, in) && read_scene(&ld);
     if (ok)
         *out = ld.scene;
     else
@@ -292,48 +288,19 @@ bool collada_parse(const char *text, size_t size, const char *path, enum dialect
     return ok;
 }
 
-/* The whole file, *size bytes; the caller frees. */
-static char *read_file(const char *path, size_t *size, struct err *e)
+bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
+                   struct scene *out, struct err *e)
 {
-    char *text = NULL;
-    size_t capacity = 0, count = 0;
-    FILE *f = fopen(path, "rb");
-    if (f == NULL) {
-        err_set(e, "%s: cannot read: %s", path, strerror(errno));
-        return NULL;
-    }
-    while (!feof(f) && count <= MAX_FILE_BYTES) {
-        if (count == capacity) {
-            capacity = capacity == 0 ? 65536 : 2 * capacity;
-            char *p = realloc(text, capacity);
-            if (p == NULL) {
-                err_set(e, "%s: out of memory", path);
-                goto fail;
-            }
-            text = p;
-        }
-        count += fread(text + count, 1, capacity - count, f);
-        if (ferror(f)) {
-            err_set(e, "%s: cannot read: %s", path, strerror(errno));
-            goto fail;
-        }
-    }
-    fclose(f);
-    *size = count;
-    return text;
-fail:
-    fclose(f);
-    free(text);
-    return NULL;
+    struct text_input in = {.text = text, .size = size};
+    return load(&in, path, dialect, out, e);
 }
 
 bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
 {
-    size_t size;
-    char *text = read_file(path, &size, e);
-    if (text == NULL)
-        return false;
-    bool ok = collada_parse(text, size, path, dialect, out, e);
-    free(text);
+    struct text_input in = {.file = fopen(path, "rb")};
+    if (in.file == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    bool ok = load(&in, path, dialect, out, e);
+    fclose(in.file);
     return ok;
 }

@@ -9,6 +9,7 @@
 #include "mat4.h"
 
 #include <libxml/tree.h>
+#include <stdio.h>
 
 /* Limits that only a broken or hostile file reaches. */
 enum {
@@ -91,9 +92,16 @@ struct loader {
 
 /* collada_xml.c */
 
+/* Where the text comes from: a file or memory, whatever is left to read. */
+struct text_input {
+    FILE *file; /* NULL: memory */
+    const char *text;
+    size_t size, taken;
+    bool failed; /* the error is set */
+};
 /* Parses the text into ld->doc, refuses document types, foreign structure and other versions,
  * indexes the ids and resolves DIALECT_AUTO. */
-bool xml_open(struct loader *ld, const char *text, size_t size);
+bool xml_open(struct loader *ld, struct text_input *in);
 
 /* collada_element.c */
 

@@ -62,6 +62,10 @@ static bool read_source(struct loader *ld, const xmlNode *node, struct source *o
         fail_at(ld, accessor, "<accessor> reaches beyond the end of its <float_array>");
         goto done;
     }
+    if (offset == 0 && stride == 3 && param[0] == 0 && param[1] == 1 && param[2] == 2) {
+        *out = (struct source){node, d.data, (uint32_t)count};
+        return true;
+    }
     *out = (struct source){node, malloc((3 * count + 1) * sizeof *out->xyz), (uint32_t)count};
     if (out->xyz == NULL) {
         fail_memory(ld);

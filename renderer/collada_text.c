@@ -1,14 +1,23 @@
 /* The text of elements as numbers and words. */
 #include "collada_priv.h"
+#include "number.h"
 
 #include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* The document's own bytes where an element has one text and nothing else, as meshes do; else a copy. */
 struct text {
     char *data;
     size_t size;
+    bool is_borrowed;
 };
+
+static void text_free(struct text *t)
+{
+    if (!t->is_borrowed)
+        free(t->data);
+}
 
 static bool append(struct loader *ld, struct text *t, const char *s, size_t size)
 {
@@ -23,10 +32,16 @@ static bool append(struct loader *ld, struct text *t, const char *s, size_t size
 }
 
 /* All character data of the element. Comments leave their line ends, so that a place in the text
- * can be told by its line. The caller frees t->data, also after failure. */
+ * can be told by its line. The caller calls text_free(), also after failure. */
 static bool collect(struct loader *ld, const xmlNode *n, struct text *t)
 {
-    *t = (struct text){NULL, 0};
+    const xmlNode *only = n->children;
+    if (only != NULL && only->next == NULL && only->type == XML_TEXT_NODE &&
+        only->content != NULL) {
+        *t = (struct text){(char *)only->content, strlen((char *)only->content), true};
+        return true;
+    }
+    *t = (struct text){NULL, 0, false};
     if (!append(ld, t, "", 0))
         return false;
     for (const xmlNode *c = n->children; c != NULL; c = c->next) {
@@ -71,19 +86,6 @@ static int token_length(const char *s)
     return n;
 }
 
-/* A finite decimal number that ends at a blank. strtod() alone would take hexadecimal, "nan" and
- * "inf" too. */
-static bool parse_double(const char *s, const char **end, double *out)
-{
-    size_t length = strspn(s, "0123456789+-.eE");
-    if (length == 0 || (s[length] != '\0' && !is_space(s[length])))
-        return false;
-    char *stop;
-    *out = strtod(s, &stop);
-    *end = stop;
-    return stop == s + length && isfinite(*out);
-}
-
 bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
 {
     struct text t;
@@ -97,14 +99,14 @@ bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
             break;
         out->data = grown;
         const char *end = s;
-        if (!parse_double(s, &end, &v))
+        if (!number_parse(s, &end, &v))
             ok = fail_line(ld, line, "<%.60s>: '%.*s' is not a finite number",
                            (const char *)n->name, token_length(s), s);
         else
             out->data[out->count++] = v;
         s = end;
     }
-    free(t.data);
+    text_free(&t);
     return ok;
 }
 
@@ -130,7 +132,7 @@ bool read_uints(struct loader *ld, const xmlNode *n, struct uints *out)
         else
             out->data[out->count++] = (uint32_t)v;
     }
-    free(t.data);
+    text_free(&t);
     return ok;
 }
 
@@ -182,16 +184,17 @@ bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha)
 char *read_word(struct loader *ld, const xmlNode *n)
 {
     struct text t;
-    if (!collect(ld, n, &t)) {
-        free(t.data);
-        return NULL;
+    char *word = NULL;
+    if (collect(ld, n, &t)) {
+        const char *start = t.data, *end = t.data + t.size;
+        while (start < end && is_space(*start))
+            start++;
+        while (end > start && is_space(end[-1]))
+            end--;
+        word = strndup(start, (size_t)(end - start));
+        if (word == NULL)
+            fail_memory(ld);
     }
-    size_t start = 0, end = t.size;
-    while (start < end && is_space(t.data[start]))
-        start++;
-    while (end > start && is_space(t.data[end - 1]))
-        end--;
-    memmove(t.data, t.data + start, end - start);
-    t.data[end - start] = '\0';
-    return t.data;
+    text_free(&t);
+    return word;
 }

@@ -1,6 +1,7 @@
 /* From text to a document that is safe to read. */
 #include "collada_priv.h"
 
+#include <errno.h>
 #include <libxml/SAX2.h>
 #include <libxml/parser.h>
 #include <libxml/parserInternals.h>
@@ -58,8 +59,35 @@ static void document_type(void *ctx, const xmlChar *name, const xmlChar *externa
     xmlStopParser(ctxt);
 }
 
-static bool parse(struct loader *ld, const char *text, size_t size)
+struct reading {
+    struct loader *ld;
+    struct text_input *in;
+};
+
+/* libxml2 asks for a few thousand bytes at a time, so the text is never in memory as a whole. */
+static int read_some(void *context, char *buffer, int size)
 {
+    const struct reading *r = context;
+    struct text_input *in = r->in;
+    size_t n = (size_t)size;
+    if (in->file != NULL) {
+        n = fread(buffer, 1, n, in->file);
+        if (ferror(in->file))
+            in->failed = !err_set(r->ld->err, "%s: cannot read: %s", r->ld->path, strerror(errno));
+    } else {
+        n = n < in->size - in->taken ? n : in->size - in->taken;
+        memcpy(buffer, in->text + in->taken, n);
+    }
+    in->taken += n;
+    if (in->taken > MAX_FILE_BYTES)
+        in->failed = !err_set(r->ld->err, "%s: larger than %d bytes", r->ld->path, MAX_FILE_BYTES);
+    r->ld->parse_failed |= in->failed; /* what the parser says of it is of no interest */
+    return in->failed ? -1 : (int)n;
+}
+
+static bool parse(struct loader *ld, struct text_input *in)
+{
+    struct reading reading = {ld, in};
     xmlParserCtxt *ctxt = xmlNewParserCtxt();
     if (ctxt == NULL)
         return fail_memory(ld);
@@ -69,8 +97,8 @@ static bool parse(struct loader *ld, const char *text, size_t size)
     ctxt->sax->serror = parse_error;
     /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
      * (depth, entities) is checked here. */
-    ld->doc =
-        xmlCtxtReadMemory(ctxt, text, (int)size, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
+    ld->doc = xmlCtxtReadIO(ctxt, read_some, NULL, &reading, NULL, NULL,
+                            XML_PARSE_NONET | XML_PARSE_HUGE);
     bool failed = ld->parse_failed;
     xmlFreeParserCtxt(ctxt);
     if (failed)
@@ -190,10 +218,10 @@ static bool check_root(struct loader *ld)
     return true;
 }
 
-bool xml_open(struct loader *ld, const char *text, size_t size)
+bool xml_open(struct loader *ld, struct text_input *in)
 {
     bool has_cgl = false;
-    if (!parse(ld, text, size) || !check_root(ld) || !survey(ld, &has_cgl))
+    if (!parse(ld, in) || !check_root(ld) || !survey(ld, &has_cgl))
         return false;
     if (ld->dialect == DIALECT_AUTO)
         ld->dialect = has_cgl ? DIALECT_CGL : DIALECT_COLLADA;

@@ -42,7 +42,8 @@ static inline float fresnel_conductor(float cos_i, float eta, float k)
     float cos2 = cos_i * cos_i, sin2 = 1 - cos2;
     /* eta^2 - k^2 - sin^2, in a form that keeps its digits for eta near 1 and at grazing angles. */
     float t0 = (eta - 1) * (eta + 1) - k * k + cos2;
-    float a2b2 = hypotf(t0, 2 * eta * k);
+    double ek2 = 2 * eta * k;
+    float a2b2 = (float)sqrt((double)t0 * (double)t0 + ek2 * ek2);
     /* a + i b = sqrt(t0 + 2 i eta k): the larger by its root, the other by a b = eta k. */
     float large = sqrtf(0.5f * (a2b2 + fabsf(t0)));
     float a = t0 >= 0 ? large : eta * k / large;

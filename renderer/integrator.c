@@ -1,8 +1,10 @@
 #include "integrator.h"
 
-#include "bsdf.h"
 #include "environment.h"
 #include "first_hit.h"
+#include "integrator_lane.h"
+#include "lanes_kernel.h"
+#include "lanes_scene.h"
 #include "warp.h"
 
 const char *const integrator_kind_names[] = {"path", "normals", NULL};
@@ -98,17 +100,26 @@ static float emission_weight(const struct integrator *it, const struct batch *b,
     return power_heuristic(b->pdf_w[i], (float)it->opt.light_samples * pdf_light);
 }
 
-/* The ray of lane i has left the scene. */
-static void add_environment(const struct integrator *it, struct batch *b, int i)
+rgb lane_environment(const struct integrator *it, const struct batch *b, int i)
 {
     const struct scene *s = it->scene;
     if (s->environment == NULL || (b->pdf_w[i] == 0 && environment_is_hidden(s->environment)))
-        return;
+        return grey(0);
     rgb le = environment_radiance(s->environment, vec3s_get(&b->ray.d, i));
     if (rgb_is_zero(le))
-        return;
+        return grey(0);
     float w = emission_weight(it, b, i, (uint32_t)s->environment_light, NULL);
-    rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
+    return rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w);
+}
+
+rgb lane_emission(const struct integrator *it, const struct batch *b, int i, uint32_t light,
+                  const struct material *m, const struct surface *s)
+{
+    rgb le = emitted_radiance(m, s->ng, neg(vec3s_get(&b->ray.d, i)));
+    if (rgb_is_zero(le))
+        return grey(0);
+    float w = emission_weight(it, b, i, light, s);
+    return rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w);
 }
 
 /* Adds emission, sets up the surfaces, drops lanes whose path has ended. */
@@ -120,7 +131,7 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
         uint32_t prim = b->hit.prim[i];
         if (prim == NO_HIT) {
             if (counts(it, vertex))
-                add_environment(it, b, i);
+                rgbs_add(&b->radiance, i, lane_environment(it, b, i));
             continue;
         }
         ray r = rays_get(&b->ray, i);
@@ -129,13 +140,8 @@ static int shade_hits(const struct integrator *it, struct batch *b, int num_acti
         b->material[i] = material_of(it->scene, prim);
         const struct material *m = &it->scene->materials[b->material[i]];
         int32_t light = light_of(it->scene, prim);
-        if (light >= 0 && counts(it, vertex)) {
-            rgb le = emitted_radiance(m, s.ng, wo);
-            if (!rgb_is_zero(le)) {
-                float w = emission_weight(it, b, i, (uint32_t)light, &s);
-                rgbs_add(&b->radiance, i, rgb_scale(rgb_mul(rgbs_get(&b->throughput, i), le), w));
-            }
-        }
+        if (light >= 0 && counts(it, vertex))
+            rgbs_add(&b->radiance, i, lane_emission(it, b, i, (uint32_t)light, m, &s));
         if (vertex == it->opt.max_bounces || bsdf_is_black(m))
             continue;
         b->front[i] = dot(s.ng, wo) > 0;
@@ -161,10 +167,8 @@ static vec3 to_local(const frame *f, vec3 w)
     return v3(dot(w, f->s), dot(w, f->t), dot(w, f->n));
 }
 
-/* f(wo, wi) cos(theta_i) and, if pdf_w is not NULL, the BSDF's own density of wi; 0 unless wi
- * leaves on wo's side of the true surface. */
-static rgb scatter_towards(const struct integrator *it, const struct batch *b, int i, vec3 wi,
-                           float *pdf_w)
+rgb lane_scatter_towards(const struct integrator *it, const struct batch *b, int i, vec3 wi,
+                         float *pdf_w)
 {
     vec3 ns = vec3s_get(&b->ns, i);
     float cos_i = dot(ns, wi);
@@ -204,7 +208,7 @@ static void connect_light(const struct integrator *it, struct batch *b, int num_
             continue;
         ls.pdf_w *= b->choice[i].probability;
         float pdf_bsdf;
-        rgb f = scatter_towards(it, b, i, ls.wi, &pdf_bsdf);
+        rgb f = lane_scatter_towards(it, b, i, ls.wi, &pdf_bsdf);
         if (rgb_is_zero(f))
             continue;
         float w = 1;
@@ -237,7 +241,7 @@ static void connect_hemisphere(const struct integrator *it, struct batch *b, int
         vec3 local = warp_uniform_hemisphere(u.u[0], u.u[1]);
         frame f = frame_from_normal(vec3s_get(&b->ns, i));
         vec3 wi = frame_to_world(&f, local);
-        rgb scattered = scatter_towards(it, b, i, wi, NULL);
+        rgb scattered = lane_scatter_towards(it, b, i, wi, NULL);
         if (rgb_is_zero(scattered))
             continue;
         float pdf_w = warp_uniform_hemisphere_pdf_w(local);
@@ -369,8 +373,37 @@ static void integrate_normals(const struct integrator *it, struct batch *b, int 
     }
 }
 
+bool integrator_prepare(struct integrator *it, struct err *e)
+{
+    static const struct lanes_kernel *const kernel[] = {[ISA_SSE42] = &lanes_kernel_sse42,
+                                                        [ISA_AVX2] = &lanes_kernel_avx2,
+                                                        [ISA_AVX512] = &lanes_kernel_avx512};
+    enum isa isa = it->opt.isa;
+    it->lanes = NULL;
+    it->lanes_scene = NULL;
+    /* One ray per sample and no light sampling: not worth the records. */
+    if (isa == ISA_SCALAR || it->opt.kind == INTEGRATE_NORMALS ||
+        it->opt.direct == DIRECT_HEMISPHERE)
+        return true;
+    if (!isa_choose(&isa, e) || (it->lanes_scene = lanes_scene_build(it->scene, e)) == NULL)
+        return false;
+    it->lanes = kernel[isa];
+    return true;
+}
+
+void integrator_free(struct integrator *it)
+{
+    lanes_scene_free((struct lanes_scene *)it->lanes_scene);
+    it->lanes_scene = NULL;
+    it->lanes = NULL;
+}
+
 void integrate(const struct integrator *it, struct batch *b, int num_lanes)
 {
+    if (it->lanes != NULL) {
+        it->lanes->integrate(it, b, num_lanes);
+        return;
+    }
     int active = generate(it, b, num_lanes);
     if (it->opt.kind == INTEGRATE_NORMALS) {
         integrate_normals(it, b, active);

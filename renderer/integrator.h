@@ -7,6 +7,7 @@
 #include "batch.h"
 #include "bvh.h"
 #include "camera.h"
+#include "isa.h"
 #include "light.h"
 #include "sampler.h"
 
@@ -52,6 +53,7 @@ struct integrator_options {
     float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
     struct sampler sampler;
     bool first_hits; /* fill the batch's `first`; changes nothing else */
+    enum isa isa;    /* of the stages; ISA_SCALAR: none. Every choice gives the same bits */
 };
 
 struct integrator {
@@ -60,33 +62,50 @@ struct integrator {
     const struct camera *camera;
     const struct bvh *bvh;
     const struct light_table *lights;
+    /* The stages on eight paths at a time, and the scene for them; both NULL: one by one. */
+    const struct lanes_kernel *lanes;
+    const struct lanes_scene *lanes_scene;
 };
 
 /* The working memory of one thread. In: lanes 0 .. num_lanes-1 of pixel (number in the full
  * picture, row 0 at the top) and sample. Out: radiance and, if asked for, first. */
 struct batch {
-    uint32_t pixel[BATCH_LANES], sample[BATCH_LANES];
+    uint32_t pixel[BATCH_ROOM], sample[BATCH_ROOM];
     struct rgbs radiance;
     struct first_hits first;
     struct rgbs throughput;
-    float pdf_w[BATCH_LANES]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
+    float pdf_w[BATCH_ROOM]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
                                  whose emitters nothing else finds */
-    float eta2[BATCH_LANES];  /* what the throughput is divided by for being inside glass */
+    float eta2[BATCH_ROOM];  /* what the throughput is divided by for being inside glass */
     struct rays ray, shadow;
     struct hits hit, shadow_hit;
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
-    bool occluded[BATCH_LANES];
+    bool occluded[BATCH_ROOM];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
-    float eps[BATCH_LANES];
-    bool front[BATCH_LANES];
-    uint32_t material[BATCH_LANES];
-    uint16_t active[BATCH_LANES], shadow_lane[BATCH_LANES];
-    struct light_choice choice[BATCH_LANES];
-    uint16_t diffuse[BATCH_LANES]; /* those of active that light sampling serves */
+    float eps[BATCH_ROOM];
+    bool front[BATCH_ROOM];
+    uint32_t material[BATCH_ROOM];
+    uint16_t active[BATCH_ROOM], shadow_lane[BATCH_ROOM];
+    struct light_choice choice[BATCH_ROOM];
+    float choice_probability[BATCH_ROOM];
+    uint16_t diffuse[BATCH_ROOM]; /* those of active that light sampling serves */
+    /* Of the stages on eight paths, which keep the paths that go on side by side: whose path a lane
+     * is, and what it has gathered. */
+    uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
+    struct rgbs gathered, reflectance;
+    int32_t bits[BATCH_ROOM];        /* of the material's record */
+    uint8_t goes_on[BATCH_ROOM / 8]; /* by eight lanes, a bit each */
+    uint8_t shadow_bits[BATCH_ROOM / 8];
+    uint16_t shadow_first[BATCH_ROOM / 8];
     struct bvh_stats stats;
 };
 
 void integrate(const struct integrator *it, struct batch *b, int num_lanes);
+
+/* Fills it->lanes and it->lanes_scene as it->opt.isa asks, for the scene in *it; false if out of
+ * memory or if the machine lacks the instructions. integrator_free() afterwards, in either case. */
+bool integrator_prepare(struct integrator *it, struct err *e) __attribute__((warn_unused_result));
+void integrator_free(struct integrator *it);
 
 extern const char *const integrator_kind_names[]; /* end with NULL */
 extern const char *const direct_kind_names[];

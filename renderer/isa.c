@@ -2,11 +2,12 @@
 
 #include <stddef.h>
 
-const char *const isa_names[] = {"auto", "sse4.2", "avx2", "avx512", NULL};
+const char *const isa_names[] = {"scalar", "auto", "sse4.2", "avx2", "avx512", NULL};
 
 static bool machine_has(enum isa isa)
 {
     switch (isa) {
+    case ISA_SCALAR: return true;
     case ISA_AUTO: break;
     case ISA_SSE42: return __builtin_cpu_supports("sse4.2");
     case ISA_AVX2: return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");

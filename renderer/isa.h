@@ -8,7 +8,8 @@
 #include <stdbool.h>
 
 enum isa {
-    ISA_AUTO, /* as an option only: the widest that the machine has */
+    ISA_SCALAR, /* none: the oracle of the others */
+    ISA_AUTO,   /* as an option only: the widest that the machine has */
     ISA_SSE42,
     ISA_AVX2,  /* with FMA */
     ISA_AVX512 /* F, VL, BW, DQ */

@@ -118,6 +118,11 @@ float light_choice_probability(const struct light_table *t, uint32_t l)
     return t->all != NULL ? discrete_probability(t->all, l) : 0;
 }
 
+const float *light_table_areas(const struct light_table *t)
+{
+    return t->cdf;
+}
+
 uint32_t light_count_areas(const struct light_table *t)
 {
     return t->num_areas;

@@ -103,7 +103,8 @@ static struct render_options render_options_of(const struct options *o)
                                                   .light_samples = o->light_samples,
                                                   .roulette = o->roulette,
                                                   .survival = (float)o->survival,
-                                                  .sampler = sampler},
+                                                  .sampler = sampler,
+                                                  .isa = (enum isa)o->isa},
                                    .x = o->cell[0],
                                    .y = o->height - o->cell[1] - o->cell[3],
                                    .width = o->cell[2],
@@ -160,7 +161,8 @@ static bool run(struct session *s, struct err *e)
         !identity_make(o, &id, e))
         goto done;
     double start = now_seconds();
-    if ((bvh = bvh_build_for(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, e)) == NULL)
+    bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
+    if (bvh == NULL)
         goto done;
     snprintf(s->out.accel, sizeof s->out.accel,
              "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],

@@ -109,10 +109,11 @@ static const struct cli_option options[] = {
     [OPT_SAMPLER] = {0, "sampler", 1, "NAME",
                      "independent or sobol: less noise, but unknown error (independent)"},
     [OPT_INTEGRATOR] = {0, "integrator", 1, "NAME", "path or normals (path)"},
-    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid, sah or wide (sah)"},
+    [OPT_ACCEL] = {0, "accel", 1, "NAME", "bruteforce, centroid, sah or wide (wide)"},
     [OPT_ISA] = {0, "isa", 1, "NAME",
-                 "vector instructions of --accel wide: auto, sse4.2, avx2 or\n"
-                 "avx512; all give the same picture (auto)"},
+                 "vector instructions: auto, sse4.2, avx2, avx512, or scalar\n"
+                 "paths; all give the same picture (auto; scalar with another\n"
+                 "--accel than wide)"},
     [OPT_DIALECT] = {0, "dialect", 1, "NAME",
                      "auto, collada or cgl: whose rules for camera and lights;\n"
                      "auto: cgl if the file has CGL extras (auto)"},
@@ -287,8 +288,6 @@ static bool complete(struct options *s, int accumulate, struct err *e)
                        "--adaptive and --error estimate the error from samples that have to be "
                        "independent: not with --sampler %s",
                        sampler_kind_names[s->sampler]);
-    if (s->isa != ISA_AUTO && s->accel != BVH_WIDE)
-        return err_set(e, "--isa: only --accel wide has vector instructions to choose");
     if (s->adaptive_batch > 0 && s->pilot_tolerance >= 0)
         return err_set(e, "--adaptive and --adaptive-unbiased exclude each other");
     if (s->pilot_tolerance >= 0 && s->last > 0 && s->spp == 0)
@@ -301,6 +300,8 @@ static bool complete(struct options *s, int accumulate, struct err *e)
         s->last = s->spp;
     if (s->last > s->spp)
         return err_set(e, "--samples: %d:%d goes past the %d of --spp", s->first, s->last, s->spp);
+    if (s->isa < 0)
+        s->isa = s->accel == BVH_WIDE ? ISA_AUTO : ISA_SCALAR;
     if (s->threads == 0)
         s->threads = cli_processors();
     return true;
@@ -310,7 +311,8 @@ bool options_parse(int argc, char **argv, struct options *s, struct err *e)
 {
     *s = (struct options){.width = 800,
                           .height = 600,
-                          .accel = BVH_SAH,
+                          .accel = BVH_WIDE,
+                          .isa = -1,
                           .direct = DIRECT_MIS,
                           .light_samples = 1,
                           .max_bounces = 5,

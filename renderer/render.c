@@ -1,5 +1,7 @@
 #include "render.h"
 
+#include "lanes_kernel.h"
+
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -71,9 +73,15 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         }
         integrate(j->it, b, n);
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
+        const bool plain = j->it->lanes != NULL && f->first == NULL;
+        if (plain)
+            j->it->lanes->film_add(f, at, n, b);
+        if (plain && f->target == NULL && o->adaptive_batch == 0)
+            continue;
         int kept = 0;
         for (int i = 0; i < n; i++) {
-            film_add(f, at[i], b, i);
+            if (!plain)
+                film_add(f, at[i], b, i);
             at[kept] = at[i];
             pixel[kept] = pixel[i];
             kept += !has_stopped(o, f, at[i], k + 1);
@@ -292,6 +300,11 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     it.opt.first_hits = film->first != NULL;
     if (opt->integrator.sampler.kind != SAMPLER_INDEPENDENT)
         strcpy(film->m.unit, "stratified");
+    if (!integrator_prepare(&it, e)) {
+        integrator_free(&it);
+        light_table_free(lights);
+        return false;
+    }
     struct job j = {.it = &it, .opt = opt, .film = film};
     double wall = now_seconds(), cpu = cpu_seconds();
     double pixels = (double)opt->width * opt->height;
@@ -321,6 +334,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     stats->samples += (double)atomic_load(&j.samples_done);
     stats->wall_seconds = now_seconds() - wall;
     stats->cpu_seconds = cpu_seconds() - cpu;
+    integrator_free(&it);
     light_table_free(lights);
     return ok;
 }

@@ -1,21 +1,20 @@
 #include "warp.h"
 
+#include "trig.h"
+
 void warp_disk(float u, float v, float *x, float *y)
 {
-    float a = 2 * u - 1, b = 2 * v - 1, r, phi;
+    float a = 2 * u - 1, b = 2 * v - 1, s, c;
     if (a == 0 && b == 0) {
         *x = *y = 0;
         return;
     }
-    if (fabsf(a) > fabsf(b)) {
-        r = a;
-        phi = 0.25f * PI_F * (b / a);
-    } else {
-        r = b;
-        phi = 0.5f * PI_F - 0.25f * PI_F * (a / b);
-    }
-    *x = r * cosf(phi);
-    *y = r * sinf(phi);
+    /* Within an eighth of a turn from the nearer axis. */
+    bool near_x = fabsf(a) > fabsf(b);
+    float r = near_x ? a : b;
+    trig_small(0.25f * PI_F * (near_x ? b / a : a / b), &s, &c);
+    *x = r * (near_x ? c : s);
+    *y = r * (near_x ? s : c);
 }
 
 vec3 warp_cosine_hemisphere(float u, float v)
@@ -27,8 +26,9 @@ vec3 warp_cosine_hemisphere(float u, float v)
 
 static vec3 from_height(float z, float v)
 {
-    float r = sqrtf(maxf(0, 1 - z * z)), phi = 2 * PI_F * v;
-    return v3(r * cosf(phi), r * sinf(phi), z);
+    float r = sqrtf(maxf(0, 1 - z * z)), sine, cosine;
+    trig_turn(v, &sine, &cosine);
+    return v3(r * cosine, r * sine, z);
 }
 
 vec3 warp_uniform_hemisphere(float u, float v)
@@ -45,8 +45,9 @@ vec3 warp_uniform_cone(float u, float v, float one_minus_cos)
 {
     /* 1 - z is formed first: a narrow cone would lose all its digits in z. */
     float h = u * one_minus_cos;
-    float r = sqrtf(maxf(0, h * (2 - h))), phi = 2 * PI_F * v;
-    return v3(r * cosf(phi), r * sinf(phi), 1 - h);
+    float r = sqrtf(maxf(0, h * (2 - h))), sine, cosine;
+    trig_turn(v, &sine, &cosine);
+    return v3(r * cosine, r * sine, 1 - h);
 }
 
 void warp_triangle(float u, float v, float *b1, float *b2)

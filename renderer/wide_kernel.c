@@ -5,16 +5,6 @@
 #include "wide_packet.h"
 #include "wide_single.h"
 
-/* Lanes k .. k+7 of a list of n; behind its end the last again. */
-static const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
-{
-    if (n - k >= LANES)
-        return lane + k;
-    for (int i = 0; i < LANES; i++)
-        filled[i] = lane[k + i < n ? k + i : n - 1];
-    return filled;
-}
-
 /* One batch: rays that are alike go in packets, the others one by one. h is NULL: occlusion. */
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                   bool any, struct hits *h, bool *occluded, struct bvh_stats *stats)

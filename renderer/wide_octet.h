@@ -11,7 +11,7 @@
 enum { NOTHING = INT32_MAX /* no primitive yet: more than any */ };
 
 struct octet {
-    vf o[3], d[3], sx, sy, sz, tmin;
+    vf o[3], d[3], sx, sy, sz, tmin, tmax;
     vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
                  distance counts only if its number is smaller */
     vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
@@ -42,7 +42,8 @@ INLINE void octet_shear(struct octet *q)
     q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
 }
 
-INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+/* True if the lanes follow each other. */
+INLINE bool octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
 {
     bool in_row = true;
     for (int i = 1; i < LANES; i++)
@@ -54,10 +55,22 @@ INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct 
     q->d[1] = gather(r->d.y, lane, in_row);
     q->d[2] = gather(r->d.z, lane, in_row);
     q->tmin = gather(r->tmin, lane, in_row);
-    vi tmax = (vi)gather(r->tmax, lane, in_row);
+    q->tmax = gather(r->tmax, lane, in_row);
+    vi tmax = (vi)q->tmax;
     vi zero = vf_eq((vf)tmax, vf_set(0));
     q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
     octet_shear(q);
+    return in_row;
+}
+
+/* Lanes k .. k+7 of a list of n; behind its end the last again. */
+static inline const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
+{
+    if (n - k >= LANES)
+        return lane + k;
+    for (int i = 0; i < LANES; i++)
+        filled[i] = lane[k + i < n ? k + i : n - 1];
+    return filled;
 }
 
 INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct octet *q)

@@ -1,8 +1,10 @@
 #include "wide_parts.h"
 #include "alloc_large.h"
+#include "parallel.h"
 
 #include <assert.h>
 #include <float.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,12 +70,12 @@ static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
     *r = l;
 }
 
-/* Room for two more. */
-static bool reserve(struct wide_parts *p)
+/* Room for so many more. */
+static bool reserve(struct wide_parts *p, size_t more)
 {
-    if (p->num + 2 <= p->room)
+    if (p->num + more <= p->room)
         return true;
-    size_t room = p->room + p->room / 2 + 64;
+    size_t room = p->room + p->room / 2 + more + 64;
     struct wide_part *larger = alloc_large(room * sizeof *larger);
     if (larger == NULL)
         return false;
@@ -121,7 +123,7 @@ static bool add_part(struct build *b, uint32_t i, struct wide_range *r)
             b->parts->part[i].cost[k] = wide_half_area(&r->box);
         return true;
     }
-    if (!reserve(b->parts))
+    if (!reserve(b->parts, 2))
         return false;
     uint32_t left = (uint32_t)b->parts->num;
     b->parts->num += 2;
@@ -148,14 +150,138 @@ static int gather_children(const struct wide_parts *p, uint32_t i, int slots, ui
     return gather_children(p, c->left + 1, slots - left, child, n);
 }
 
-bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
-                      const struct wide_range *all, struct wide_parts *p)
+/* One thread's own part of the tree, which hangs on part `at` of the whole. */
+struct branch {
+    uint32_t at;
+    struct wide_parts parts;
+};
+
+/* Several threads: large ranges are cut one by one, smaller ones become branches. */
+struct grove {
+    struct build *b;
+    pthread_mutex_t lock; /* of b->parts and of what follows */
+    uint32_t most;        /* items of a branch */
+    struct branch *branch;
+    size_t num, room;
+};
+
+struct grove_task {
+    uint32_t at;
+    struct wide_range range;
+};
+static_assert(sizeof(struct grove_task) <= PARALLEL_TASK, "a task is stored by value");
+
+static struct parallel_task grove_task(uint32_t at, const struct wide_range *r)
 {
+    struct parallel_task t = {.size = r->count};
+    memcpy(t.what, &(struct grove_task){at, *r}, sizeof(struct grove_task));
+    return t;
+}
+
+static bool add_branch(struct grove *g, struct branch *n)
+{
+    if (g->num == g->room) {
+        size_t room = 2 * g->room + 64;
+        struct branch *larger = realloc(g->branch, room * sizeof *larger);
+        if (larger == NULL)
+            return false;
+        g->branch = larger;
+        g->room = room;
+    }
+    g->branch[g->num++] = *n;
+    return true;
+}
+
+static int grow_range(void *ctx, const struct parallel_task *task, struct parallel_task more[2])
+{
+    struct grove *g = ctx;
+    struct grove_task t;
+    memcpy(&t, task->what, sizeof t);
+    if (t.range.count <= g->most) {
+        struct branch n = {.at = t.at};
+        struct build b = *g->b;
+        b.parts = &n.parts;
+        bool ok = reserve(&n.parts, 2);
+        n.parts.num = 1;
+        ok = ok && add_part(&b, 0, &t.range);
+        pthread_mutex_lock(&g->lock);
+        ok = ok && add_branch(g, &n);
+        pthread_mutex_unlock(&g->lock);
+        if (!ok)
+            wide_parts_free(&n.parts);
+        return ok ? 0 : -1;
+    }
+    struct wide_range left = t.range, right;
+    cut(g->b, &left, &right);
+    pthread_mutex_lock(&g->lock);
+    struct wide_parts *p = g->b->parts;
+    bool ok = reserve(p, 2);
+    uint32_t i = (uint32_t)p->num;
+    if (ok) {
+        p->part[t.at] = (struct wide_part){
+            .box = t.range.box, .first = t.range.first, .count = t.range.count, .left = i};
+        p->num += 2;
+    }
+    pthread_mutex_unlock(&g->lock);
+    more[0] = grove_task(i, &left);
+    more[1] = grove_task(i + 1, &right);
+    return ok ? 2 : -1;
+}
+
+/* The branches' parts behind those there are. */
+static bool join_branches(struct grove *g)
+{
+    struct wide_parts *p = g->b->parts;
+    size_t more = 0;
+    for (size_t k = 0; k < g->num; k++)
+        more += g->branch[k].parts.num;
+    if (!reserve(p, more))
+        return false;
+    for (size_t k = 0; k < g->num; k++) {
+        const struct wide_parts *from = &g->branch[k].parts;
+        uint32_t shift = (uint32_t)p->num - 1;
+        for (size_t i = 0; i < from->num; i++) {
+            struct wide_part *to = &p->part[i == 0 ? g->branch[k].at : i + shift];
+            *to = from->part[i];
+            to->left += to->left != 0 ? shift : 0;
+        }
+        p->num += from->num - 1;
+        wide_parts_free(&g->branch[k].parts);
+    }
+    return true;
+}
+
+static bool grow_on_threads(struct build *b, const struct wide_range *all, int threads)
+{
+    struct grove g = {.b = b, .most = all->count / (16 * (uint32_t)threads)};
+    pthread_mutex_init(&g.lock, NULL);
+    const struct parallel_task first = grove_task(0, all);
+    bool ok = parallel_divide(threads, &first, grow_range, &g);
+    pthread_mutex_destroy(&g.lock);
+    size_t num_cut = b->parts->num;
+    if (ok)
+        ok = join_branches(&g);
+    else
+        for (size_t k = 0; k < g.num; k++)
+            wide_parts_free(&g.branch[k].parts);
+    free(g.branch);
+    for (size_t i = num_cut; ok && i-- > 0;)
+        if (b->parts->part[i].left != 0 && b->parts->part[i].left < num_cut)
+            best_slots(b, (uint32_t)i);
+    return ok;
+}
+
+bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
+                      const struct wide_range *all, int threads, struct wide_parts *p)
+{
+    enum { LEAST_FOR_THREADS = 1 << 14 };
     struct build b = {.splitter = s, .item = item, .num_triangles = num_triangles, .parts = p};
     struct wide_range r = *all;
-    if (!reserve(p))
+    if (!reserve(p, 2))
         return false;
     p->num = 1;
+    if (threads > 1 && all->count >= LEAST_FOR_THREADS)
+        return grow_on_threads(&b, all, threads);
     return add_part(&b, 0, &r);
 }
 

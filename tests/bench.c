@@ -1,6 +1,6 @@
 /* bench [--build DIR] [--out DIR] [--isa NAME] [--rounds N] [--smoke] [--only SCENE]... [PART...]
  *
- * Measures the parts named, or all: rays paths. Tables on standard output; OUT/results.json and plots as SVG.
+ * Measures the parts named, or all: rays, paths, jobs, scaling. Tables on standard output; OUT/results.json and plots as SVG.
  * Exits with 1 where results differ, with 3 where it could not measure. */
 #include "bench.h"
 
@@ -16,6 +16,8 @@ static const struct {
 } parts[] = {
     {"rays", bench_rays},
     {"paths", bench_paths},
+    {"jobs", bench_jobs},
+    {"scaling", bench_scaling},
 };
 enum { NUM_PARTS = sizeof parts / sizeof parts[0], MAX_ONLY = 16 };
 

@@ -26,5 +26,7 @@ bool bench_wanted(const struct bench_options *o, const char *scene);
  * said; nothing is then timed. A failure to measure is a line in *e and NULL. */
 json_t *bench_rays(const struct bench_options *o, bool *wrong, struct err *e);
 json_t *bench_paths(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_jobs(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_scaling(const struct bench_options *o, bool *wrong, struct err *e);
 
 #endif

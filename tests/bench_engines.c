@@ -1,4 +1,5 @@
 #include "bench_engines.h"
+#include "bench_povray.h"
 
 #include "../reference/job.h"
 #include "../renderer/fs.h"
@@ -64,14 +65,13 @@ static void take_replicate(void *ctx, int k, const float *pixels_rgb)
     memcpy(s->images + (size_t)k * s->size, pixels_rgb, s->size * sizeof *pixels_rgb);
 }
 
-static bool render_reference(bool is_cycles, const struct bench_view *v, int spp, int count,
-                             uint32_t seed, const char *work_dir, float *images, struct err *e)
+static bool render_cycles(const struct bench_view *v, int spp, int count, uint32_t seed,
+                          const char *work_dir, float *images, struct err *e)
 {
     char dir[4096];
     struct suite_scene suite = {
         .width = v->camera.width, .height = v->camera.height, .depth = v->depth};
-    struct suite_reference ref = {
-        .replicates = count, .spp = spp, .subgrid = (int)lround(sqrt(spp))};
+    struct suite_reference ref = {.replicates = count, .spp = spp};
     struct sink sink = {images, 3 * (size_t)suite.width * (size_t)suite.height};
     const struct reference_options opt = {.seed = seed,
                                           .threads = 1,
@@ -85,9 +85,7 @@ static bool render_reference(bool is_cycles, const struct bench_view *v, int spp
     const struct reference_job job = {&suite, &ref, &opt, &v->scene, &v->camera, dir};
     struct moments m;
     json_t *manifest = json_object();
-    bool ok =
-        remove_tree(dir, e) && make_dirs(dir, e) &&
-        (is_cycles ? cycles_render(&job, &m, manifest, e) : povray_render(&job, &m, manifest, e));
+    bool ok = remove_tree(dir, e) && make_dirs(dir, e) && cycles_render(&job, &m, manifest, e);
     json_decref(manifest);
     if (!ok)
         return false;
@@ -114,9 +112,11 @@ bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, i
             embree_tracer_render(v->embree, &v->camera, v->depth, spp, replicate_seed(seed, k),
                                  images + (size_t)k * size);
         break;
-    case BENCH_CYCLES:
+    case BENCH_CYCLES: ok = render_cycles(v, spp, count, seed, work_dir, images, e); break;
     case BENCH_POVRAY:
-        ok = render_reference(engine == BENCH_CYCLES, v, spp, count, seed, work_dir, images, e);
+        for (int k = 0; ok && k < count; k++)
+            ok = bench_povray(v, (int)lround(sqrt(spp)), k, replicate_seed(seed, k), work_dir,
+                              images + (size_t)k * size, e);
         break;
     case BENCH_NUM_ENGINES: break;
     }

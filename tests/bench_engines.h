@@ -13,7 +13,7 @@ enum bench_engine {
     BENCH_SOBOL,  /* the same with --sampler sobol */
     BENCH_EMBREE, /* embree_tracer.h */
     BENCH_CYCLES,
-    BENCH_POVRAY, /* by the recipe of reference/MATCH_POVRAY.md; spp is a square */
+    BENCH_POVRAY, /* bench_povray.c; spp is a square */
     BENCH_NUM_ENGINES
 };
 extern const char *const bench_engine_names[BENCH_NUM_ENGINES];

@@ -277,6 +277,10 @@ expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]
     "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
 expect "compare: PNG, different" 1 "^DIFFERENT" \
     "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report --github" 0 "^::error title=.*DIFFERENT, expected EQUIVALENT" \
+    env GITHUB_STEP_SUMMARY="$tmp/summary.md" "$san_assay" report --github "$tmp/png/results.json"
+expect "report --github: the summary" 0 "^## Of 1 claims 1 came out wrong" cat "$tmp/summary.md"
+expect "report --github: with another" 3 "no other" "$san_assay" report --github --matrix "$tmp/png/results.json"
 expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
 expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
@@ -290,6 +294,24 @@ expect "compare: samples of a file that says them" 3 "says itself" \
     "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
 
 expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+mkdir -p "$tmp/history"
+for k in 1 2; do
+    mkdir -p "$tmp/history/$k"
+    sed "s/\"date\": \"2/\"date\": \"$k/" "$tmp/png/results.json" >"$tmp/history/$k/results.json"
+done
+expect "report --history" 0 "^0 of 1 claims moved in the last of 2 runs: .*/history/history.html" \
+    "$san_assay" report --history "$tmp/history/"
+sed -i 's/"difference": -*0/"difference": 9/' "$tmp/history/2/results.json"
+expect "report --history: a move" 1 "^1 of 1 claims moved" "$san_assay" report --history "$tmp/history"
+expect "report --history: nothing there" 3 "no results.json" "$san_assay" report --history "$tmp/runs_a"
+expect "report --history with another option" 3 "alone" "$san_assay" report --history "$tmp/history" --matrix
+expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
+    "$tmp/shallow.png" "$tmp/two.png"
+expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"
+expect "compare --report: only the page is left" 0 "^index.html page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
+    sh -c "ls '$tmp/png' | tr '\\n' ' '"
+expect "compare --report: no directory" 3 "one.exr: not a directory" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
+    "$tmp/one.exr" "$tmp/two.exr"
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 
@@ -594,6 +616,21 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
     expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
+    mkdir -p "$tmp/wrong" && cp "$build/mutants/point_light_linear/pathtracer" "$tmp/wrong/student" && cp "$pathtracer" "$tmp/wrong/right"
+    sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
+        $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
+        sed 's/^total 8/total 10/' >"$tmp/named.rubric"
+    expect "grade: with diagnosis" 0 "student  *0.00 of 10" "$assay" grade -j 2 -o "$tmp/named" "$tmp/named.rubric" "$tmp/wrong"/*
+    expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
+    expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
+    expect "grade: on the page" 0 "This looks like a known bug" cat "$tmp/named/student/index.html"
+    expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
+    expect "grade: staff see who has it" 0 'student/index.html.*point_light_linear' bash -c "tr -d '\n' <'$tmp/named/index.html'"
+    if grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
+        not_ok "grade: the page has no hidden check and needs no other file" "it does"
+    else
+        ok "grade: the page has no hidden check and needs no other file"
+    fi
     expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
 elif grep -q "no sandbox" "$tmp/out"; then
     ok "grade: refuses without a sandbox ($(cat "$tmp/out"))"
@@ -601,6 +638,11 @@ else
     not_ok "grade: one submission" "$(cat "$tmp/out")"
 fi
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
+
+# The page, in a browser.
+tests/browser/run.sh "$build" >"$tmp/browser"
+cat "$tmp/browser"
+failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

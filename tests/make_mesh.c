@@ -23,8 +23,9 @@ static void geometry_open(FILE *f, const char *id, size_t vertices)
             id, id, id, 3 * vertices);
 }
 
-/* Polygons of `corners` consecutive vertices. */
-static void geometry_close(FILE *f, const char *id, size_t vertices, size_t corners)
+/* Polygons of `corners` corners each, `num` of them: vertex index[i], or i where it is NULL. */
+static void geometry_close(FILE *f, const char *id, size_t vertices, const uint32_t *index,
+                           size_t num, size_t corners)
 {
     fprintf(f,
             "</float_array><technique_common><accessor source=\"#%s-a\" count=\"%zu\" stride=\"3\">"
@@ -33,12 +34,12 @@ static void geometry_close(FILE *f, const char *id, size_t vertices, size_t corn
             "<vertices id=\"%s-v\"><input semantic=\"POSITION\" source=\"#%s-p\"/></vertices>"
             "<polylist material=\"m\" count=\"%zu\"><input semantic=\"VERTEX\" source=\"#%s-v\" "
             "offset=\"0\"/><vcount>",
-            id, vertices, id, id, vertices / corners, id);
-    for (size_t i = 0; i < vertices / corners; i++)
+            id, vertices, id, id, num, id);
+    for (size_t i = 0; i < num; i++)
         fprintf(f, "%zu ", corners);
     fputs("</vcount><p>", f);
-    for (size_t i = 0; i < vertices; i++)
-        fprintf(f, "%zu ", i);
+    for (size_t i = 0; i < corners * num; i++)
+        fprintf(f, "%zu ", index != NULL ? (size_t)index[i] : i);
     fputs("</p></polylist></mesh></geometry>\n", f);
 }
 
@@ -90,16 +91,19 @@ static void write_scene(FILE *f, const struct scene *s, bool box)
         fprintf(f, "<material id=\"%s\"><instance_effect url=\"#%s-effect\"/></material>\n",
                 materials[i][0], materials[i][0]);
     fputs("</library_materials><library_geometries>\n", f);
-    size_t vertices = 3 * (size_t)s->num_triangles;
+    vec3 *vertex;
+    uint32_t *index, vertices = mesh_share(s, &vertex, &index);
     geometry_open(f, "ball", vertices);
-    for (size_t i = 0; i < vertices; i++)
-        fprintf(f, "%.9g %.9g %.9g\n", (double)s->position[i].x, (double)s->position[i].y,
-                (double)s->position[i].z);
-    geometry_close(f, "ball", vertices, 3);
+    for (uint32_t i = 0; i < vertices; i++)
+        fprintf(f, "%.9g %.9g %.9g\n", (double)vertex[i].x, (double)vertex[i].y,
+                (double)vertex[i].z);
+    geometry_close(f, "ball", vertices, index, s->num_triangles, 3);
+    free(vertex);
+    free(index);
     for (int i = 0; box && i < NUM_WALLS; i++) {
         geometry_open(f, walls[i].id, 4);
         fputs(walls[i].corners, f);
-        geometry_close(f, walls[i].id, 4, 4);
+        geometry_close(f, walls[i].id, 4, NULL, 1, 4);
     }
     fputs("</library_geometries><library_visual_scenes><visual_scene id=\"s\">\n"
           "<node id=\"Lamp\"><matrix>",

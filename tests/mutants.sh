@@ -4,7 +4,7 @@
 # Builds each bug of tests/mutants (or those named) into a renderer of its own,
 # BUILD/mutants/NAME/pathtracer, and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
-# as there are processors. "none" is the renderer as it is, of which nothing may differ.
+# as there are processors. Mutants run their scalar code; "none" is the renderer as it is, of which nothing may differ.
 #   --build-only   builds, and that is all
 #   --quick        three bugs of different kinds and "none", on two scenes: for `make check`
 #   --table FILE   writes the results as Markdown
@@ -68,7 +68,10 @@ build_mutant() {
         $compile $flags -c -o "$dir/$(basename "$file").o" "$dir/${source:-$file}" || return 1
         objects+=("$dir/$(basename "$file").o")
     done
-    g++ -o "$dir/pathtracer" "${objects[@]}" "$build/libassay.a" $libs
+    g++ -o "$dir/mutant" "${objects[@]}" "$build/libassay.a" $libs || return 1
+    # The bugs are in the scalar code, which is what a student writes; vectors of paths would go round it.
+    printf '#!/bin/sh\nexec "${0%%/*}/mutant" --accel sah --isa scalar "$@"\n' >"$dir/pathtracer"
+    chmod +x "$dir/pathtracer"
 }
 
 # The first claim that differs where it should not, "scene|against|why", from the results. They are

@@ -2,7 +2,7 @@
  * the same primitive or another at the same distance with a larger number, whatever the rays, the
  * scale and the instructions; and for a ray alone, in a batch or in a packet the same bits of
  * everything. */
-#include "../renderer/bvh.h"
+#include "../renderer/bvh_wide.h"
 #include "../renderer/sampler.h"
 #include "../renderer/warp.h"
 #include "build_scene.h"
@@ -299,12 +299,40 @@ static void small_enough(void **state)
     scene_free(&s);
 }
 
+/* The same nodes and leaves, bit for bit, however many threads build them; also where half of the triangles
+ * lie in one place and splits are lopsided. */
+static void same_on_any_threads(void **state)
+{
+    (void)state;
+    struct scene scenes[] = {mesh_ball(180, 180, 0.5f), mesh_soup(40000), mesh_twins(100)};
+    for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; i++) {
+        struct scene *s = &scenes[i];
+        for (uint32_t k = 0; i == 1 && k < 3 * s->num_triangles / 2; k++)
+            s->position[k] = scale(s->position[k], 1e-6f);
+        struct err e = {0};
+        struct wide *one = wide_build(s, ISA_AUTO, 1, &e);
+        assert_non_null(one);
+        static const int threads[] = {2, 3, 16};
+        for (int k = 0; k < 3; k++) {
+            struct wide *w = wide_build(s, ISA_AUTO, threads[k], &e);
+            assert_non_null(w);
+            assert_true(w->used == one->used && w->num_leaves == one->num_leaves);
+            assert_true(w->cost == one->cost && w->depth == one->depth);
+            assert_memory_equal(w->arena, one->arena, one->used);
+            wide_free(w);
+        }
+        wide_free(one);
+        scene_free(s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(generated_meshes),     cmocka_unit_test(huge_and_tiny),
         cmocka_unit_test(degenerate_triangles), cmocka_unit_test(spheres_and_triangles),
         cmocka_unit_test(ignored_sphere),       cmocka_unit_test(small_enough),
+        cmocka_unit_test(same_on_any_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -157,8 +157,8 @@ static void png_round_trip(void **state)
 {
     (void)state;
     char path[256], copy[256];
-    uint8_t pixel[WIDTH * HEIGHT * 3], *bytes;
-    size_t size;
+    uint8_t pixel[WIDTH * HEIGHT * 3], *bytes = NULL;
+    size_t size = 0;
     struct image got;
     struct err e = {""};
     for (size_t i = 0; i < sizeof pixel; i++)

@@ -40,14 +40,15 @@ static bool make_pictures(const struct grade_job *job, const struct submission *
     const struct rubric *r = job->rubric;
     for (int i = 0; i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
-        struct err why;
+        struct err why = {""};
         if (!submission_picture(r, job->sandbox, s, i, job->stage, work, out,
                                 picture_seed(job->seed, i), job->threads, &h->made[i], e))
             return false;
-        memcpy(h->why[i], h->made[i].why, sizeof h->why[i] - 1); /* all zero before */
-        if (h->made[i].path[0] != '\0' &&
-            !student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
-            snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
+        if (h->made[i].path[0] == '\0')
+            err_set(&why, "%s", h->made[i].why);
+        else if (student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
+            why.msg[0] = '\0';
+        snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
     }
     return true;
 }
@@ -139,14 +140,6 @@ static bool grade_made(const struct grade_job *job, const struct submission *s, 
     struct handed_in *h = calloc(1, sizeof *h);
     bool ok = h != NULL || err_set(e, "out of memory");
     ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, e);
-    bool lost =
-        ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
-    json_object_set_new(grade, "diagnosis",
-                        lost && job->diagnosis != NULL && s->kind != SUBMISSION_IMAGES &&
-                                s->why[0] == '\0'
-                            ? diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed,
-                                           job->threads, job->alpha)
-                            : json_null());
     for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
         student_free(&h->picture[i]);
     free(h);

@@ -4,34 +4,15 @@
 #include "report_consistency.h"
 #include "report_cost.h"
 #include "report_converge.h"
+#include "report_csv.h"
 #include "report_html.h"
 #include "report_page.h"
 #include "report_parts.h"
 #include "report_plot.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The page stays below 5 MB: what is left after the pictures goes to the numbers behind them. */
-enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
-
-bool page_add_layer(struct page *p, int width, int height, int channels, const double *value,
-                    size_t *index, struct err *e)
-{
-    size_t n = (size_t)width * (size_t)height * (size_t)channels;
-    struct layer *grown = realloc(p->layer, (p->num_layers + 1) * sizeof *grown);
-    if (grown == NULL)
-        return err_set(e, "out of memory for the report");
-    p->layer = grown;
-    uint16_t *half = malloc(n * sizeof *half);
-    if (half == NULL)
-        return err_set(e, "out of memory for the report");
-    for (size_t i = 0; i < n; i++)
-        half[i] = half_from_double(value[i]);
-    *index = p->num_layers++;
-    p->layer[*index] = (struct layer){width, height, channels, half};
-    return true;
-}
 
 /* Worst outcome first, the file's order within. */
 static int compare_claims(const void *a, const void *b)
@@ -146,15 +127,14 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 static void write_row(FILE *f, const struct claim_ref *claim)
 {
     const json_t *c = claim->json;
-    fprintf(f, "<tr%s><th scope=\"row\"><a href=\"#claim-%zu\">",
-            claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"", claim->index);
-    html_text(f, member_text(c, "scene"));
-    fputs("</a></th><td>", f);
-    html_text(f, member_text(c, "a"));
-    fputs("</td><td>", f);
-    report_reference(f, claim);
-    fputs("</td><td>", f);
+    fprintf(f, "<tr%s><td>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
     report_badge(f, claim);
+    fprintf(f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
+    html_text(f, member_text(c, "scene"));
+    fputs("</a></th><td class=\"name\">", f);
+    html_text(f, member_text(c, "a"));
+    fputs("</td><td class=\"name\">", f);
+    report_reference(f, claim);
     fputs("</td><td>", f);
     html_text(f, member_text(c, "expected"));
     if (claim->outcome == OUTCOME_NOT_JUDGED) {
@@ -180,24 +160,46 @@ static void write_row(FILE *f, const struct claim_ref *claim)
     fputs("</td></tr>\n", f);
 }
 
+static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    static const char *const text[] = {"scene", "a", "b", "verdict", "expected", "error"};
+    static const char *const number[] = {"difference", "mdb_global", "margin_global", "alpha",
+                                         "seconds_a"};
+    struct csv csv = csv_open(f, "claims.csv",
+                              "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
+                              "alpha,seconds,low,high");
+    for (size_t i = 0; i < num; i++) {
+        const json_t *c = claim[i].json, *ci = json_object_get(c, "ci");
+        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
+            csv_text(&csv, member_text(c, text[k]));
+        for (size_t k = 0; k < sizeof number / sizeof *number; k++)
+            csv_number(&csv, json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
+        for (size_t k = 0; k < 2; k++)
+            csv_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+}
+
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
-    fputs("<section>\n"
-          "<h2>The claims</h2>\n"
-          "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
-          "<table id=\"claims\"><thead><tr><th scope=\"col\">Scene</th><th "
-          "scope=\"col\">Tested</th><th scope=\"col\">Against</th><th "
-          "scope=\"col\">Verdict</th><th scope=\"col\">Expected</th><th scope=\"col\">In "
-          "margin</th><th scope=\"col\" class=\"num\">Difference %</th><th scope=\"col\" "
-          "class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
-          "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" "
-          "class=\"num\">Time</th></tr></thead>\n"
-          "<tbody>\n",
-          f);
+    fputs(
+        "<section>\n"
+        "<h2>The claims</h2>\n"
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
+        "<table id=\"claims\"><thead><tr><th scope=\"col\">Verdict</th><th scope=\"col\">Scene</th>"
+        "<th scope=\"col\">Tested</th><th scope=\"col\">Against</th><th scope=\"col\">Expected</th>"
+        "<th scope=\"col\">In margin</th><th scope=\"col\" class=\"num\">Difference %</th><th "
+        "scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
+        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" class=\"num\">Time</th></tr>"
+        "</thead>\n"
+        "<tbody>\n",
+        f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
-    fputs("</tbody></table>\n"
-          "</div>\n"
+    fputs("</tbody></table>\n</div>\n<p class=\"caption\">The table as a file: ", f);
+    write_csv(f, claim, num);
+    fputs("</p>\n"
           "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
           "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
           "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
@@ -228,53 +230,17 @@ static size_t gather_scene(struct claim_ref *claim, size_t num)
     return front;
 }
 
-/* Little-endian halves, base64, in elements that no browser runs. */
-static void write_layers(struct page *p)
-{
-    bool all = true;
-    for (size_t i = 0; i < p->num_layers; i++) {
-        const struct layer *l = &p->layer[i];
-        size_t n = (size_t)l->width * (size_t)l->height * (size_t)l->channels;
-        long here = ftell(p->f);
-        if (here < 0 || (size_t)here + 2 * n * 4 / 3 + PAGE_RESERVE > PAGE_LIMIT) {
-            all = false;
-            continue;
-        }
-        uint8_t *bytes = malloc(2 * n);
-        if (bytes == NULL) {
-            all = false;
-            continue;
-        }
-        for (size_t k = 0; k < n; k++) {
-            bytes[2 * k] = (uint8_t)(l->half[k] & 0xff);
-            bytes[2 * k + 1] = (uint8_t)(l->half[k] >> 8);
-        }
-        fprintf(p->f,
-                "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" data-height=\"%d\" "
-                "data-channels=\"%d\">",
-                i, l->width, l->height, l->channels);
-        html_base64(p->f, bytes, 2 * n);
-        fputs("</script>\n", p->f);
-        free(bytes);
-    }
-    if (!all)
-        fputs("<p class=\"caption\">To stay below 5 MB this page leaves out the numbers behind "
-              "some of its pictures; exposure and pixel values are not offered there.</p>\n",
-              p->f);
-}
-
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
                        struct err *e)
 {
     FILE *f = p->f;
-    fprintf(
-        f,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-        "style-src 'unsafe-inline'; script-src '%s'\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay report, ",
-        script_hash(page_js).s);
+    fprintf(f,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+            "style-src 'unsafe-inline'; script-src '%s'\">\n"
+            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+            "<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay report, ",
+            script_hash(page_js).s);
     html_text(f, member_text(root, "date"));
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
     write_header(f, root, claim, num);
@@ -285,12 +251,13 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
         if (!report_scene(p, claim + done, of_scene, e))
             return false;
         done += of_scene;
+        p->num_scenes++;
     }
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
     fputs("</main>\n", f);
-    write_layers(p);
+    page_write_layers(p);
     fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
     return true;
 }
@@ -357,9 +324,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     else
         out_abandon(&out);
 done:
-    for (size_t i = 0; i < page.num_layers; i++)
-        free(page.layer[i].half);
-    free(page.layer);
+    page_free_layers(&page);
     free(claim);
     json_decref(root);
     return ok;

@@ -1,15 +1,14 @@
 #include "report_parts.h"
 
-#include "report_colour.h"
 #include "report_html.h"
 #include "report_plot.h"
+#include "report_power.h"
 #include "report_statistics.h"
+#include "report_tiles.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { Z_RANGE = 4 };
 
 static double interval_end(const json_t *object, size_t end)
 {
@@ -63,122 +62,6 @@ void report_claim_error(struct page *p, const struct claim_ref *claim)
         fputs("</code></pre>\n", f);
     }
     fputs("</article>\n", f);
-}
-
-static bool write_legend(FILE *f, const char *low, const char *middle, const char *high,
-                         struct err *e)
-{
-    enum { STEPS = 129 };
-    uint8_t ramp[3 * STEPS];
-    for (int i = 0; i < STEPS; i++)
-        diverging_rgb8(2.0 * i / (STEPS - 1) - 1, &ramp[3 * i]);
-    fputs("<div class=\"legend\"><img width=\"129\" height=\"1\" alt=\"colour scale from blue over "
-          "white to red\" src=\"",
-          f);
-    if (!html_png(f, STEPS, 1, ramp, e))
-        return false;
-    fprintf(f, "\"><span>%s</span><span>%s</span><span>%s</span></div>", low, middle, high);
-    return true;
-}
-
-/* Outline of the reporting tile whose interval reaches furthest out. */
-static void write_tile_mark(FILE *f, const json_t *claim, const struct image *map)
-{
-    const json_t *worst = json_object_get(claim, "worst_tile");
-    double tile = member_number(claim, "tile"), x = member_number(worst, "x"),
-           y = member_number(worst, "y");
-    if (tile <= 0 || x + tile > map->width || y + tile > map->height)
-        return;
-    fprintf(
-        f,
-        "<span class=\"tile\" style=\"left:%.3f%%;top:%.3f%%;width:%.3f%%;height:%.3f%%\"></span>",
-        100 * x / map->width, 100 * y / map->height, 100 * tile / map->width,
-        100 * tile / map->height);
-}
-
-static bool write_map(struct page *p, const struct claim_ref *claim, const struct image *map,
-                      const char *what, double range, const char *const legend[3], struct err *e)
-{
-    size_t pixels = (size_t)map->width * (size_t)map->height, layer;
-    uint8_t *rgb8 = malloc(3 * pixels);
-    double *value = malloc(pixels * sizeof *value);
-    bool ok = rgb8 != NULL && value != NULL;
-    if (!ok)
-        err_set(e, "out of memory for the report");
-    for (size_t i = 0; ok && i < pixels; i++) {
-        value[i] = map->data[i];
-        diverging_rgb8(value[i] / range, &rgb8[3 * i]);
-    }
-    ok = ok && page_add_layer(p, map->width, map->height, 1, value, &layer, e);
-    if (ok) {
-        const char *b = member_text(claim->json, "b");
-        fputs("<figure class=\"map\"", p->f);
-        report_scale(p->f, map->width);
-        fprintf(p->f, "><div class=\"frame\" data-layer=\"%zu\">", layer);
-        fprintf(p->f, "<img width=\"%d\" height=\"%d\" alt=\"Map of the %s, ", map->width,
-                map->height, what);
-        html_text(p->f, member_text(claim->json, "a"));
-        fputs(" against ", p->f);
-        html_text(p->f, b);
-        fprintf(p->f, ", from %s to %s\" src=\"", legend[0], legend[2]);
-        ok = html_png(p->f, map->width, map->height, rgb8, e);
-        fputs("\">", p->f);
-        write_tile_mark(p->f, claim->json, map);
-        fputs("</div>", p->f);
-        ok = ok && write_legend(p->f, legend[0], legend[1], legend[2], e);
-    }
-    free(rgb8);
-    free(value);
-    return ok;
-}
-
-static bool write_relative(struct page *p, const struct claim_ref *claim, const struct image *map,
-                           double range, struct err *e)
-{
-    struct number_text low = percent_prose(-range), high = percent_prose(range);
-    const char *const legend[3] = {low.s, "equal", high.s};
-    if (!write_map(p, claim, map, "relative difference", range, legend, e))
-        return false;
-    const json_t *worst = json_object_get(claim->json, "worst_tile");
-    const char *a = member_text(claim->json, "a");
-    fputs("<figcaption><b>Relative difference, pixel by pixel.</b> Red: ", p->f);
-    html_text(p->f, a);
-    fputs(" is brighter than ", p->f);
-    html_text(p->f, member_text(claim->json, "b"));
-    fprintf(
-        p->f,
-        ". Blue: darker. White: equal. In per cent of the reference, or, where it is darker than "
-        "that, of 5 %% of its mean. Single pixels are noisy; only a patch of one colour matters. "
-        "The outlined tile, at x %.0f, y %.0f, reaches furthest from equal: %s, "
-        "interval %s to %s.</figcaption></figure>\n",
-        member_number(worst, "x"), member_number(worst, "y"),
-        percent_prose(member_number(worst, "difference")).s,
-        percent_prose(interval_end(worst, 0)).s, percent_prose(interval_end(worst, 1)).s);
-    return true;
-}
-
-static bool write_z(struct page *p, const struct claim_ref *claim, const struct image *map,
-                    struct err *e)
-{
-    static const char *const legend[3] = {"−4", "0", "+4"};
-    if (!write_map(p, claim, map, "z value", Z_RANGE, legend, e))
-        return false;
-    size_t pixels = (size_t)map->width * (size_t)map->height, noisy = 0, beyond = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        double z = fabs((double)map->data[i]);
-        noisy += z > 0;
-        beyond += z > 2;
-    }
-    fputs("<figcaption><b>The same difference in units of its noise (z map).</b> One unit is one "
-          "standard error: the size a difference has by chance alone. If the engines agree, this "
-          "is an even mix of pale red and blue, and about 5 of 100 pixels lie beyond ±2",
-          p->f);
-    if (noisy > 0)
-        fprintf(p->f, " (here %.1f)", 100 * (double)beyond / (double)noisy);
-    fputs(
-        ". A shape or an edge that you can recognise is a real difference.</figcaption></figure>\n",
-        p->f);
-    return true;
 }
 
 static void write_histogram(FILE *f, const json_t *claim)
@@ -353,12 +236,78 @@ static void write_provenance(FILE *f, const json_t *claim)
     }
 }
 
-bool report_claim(struct page *p, const struct claim_ref *claim, const struct image *relative,
-                  const struct image *z, double range, struct err *e)
+/* An attribute with a claim's list of numbers, three digits, null where there is none. */
+static void write_list(FILE *f, const char *attribute, const json_t *list)
+{
+    fprintf(f, " %s=\"[", attribute);
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const json_t *v = json_array_get(list, i);
+        fputs(i > 0 ? "," : "", f);
+        if (json_is_number(v))
+            fprintf(f, "%.3g", json_number_value(v));
+        else
+            fputs("null", f);
+    }
+    fputs("]\"", f);
+}
+
+/* What had to be assumed about the inputs. */
+static void write_notes(FILE *f, const json_t *claim)
+{
+    const json_t *notes = json_object_get(claim, "notes");
+    if (json_array_size(notes) == 0)
+        return;
+    fputs("<ul class=\"notes\">\n", f);
+    for (size_t i = 0; i < json_array_size(notes); i++) {
+        fputs("<li>", f);
+        html_text(f, json_string_value(json_array_get(notes, i)));
+        fputs("</li>\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+static void write_command(FILE *f, const char *what, const char *command)
+{
+    if (command == NULL)
+        return;
+    fprintf(f, "<p class=\"caption\">%s</p>\n<pre tabindex=\"0\"><code>", what);
+    html_text(f, command);
+    fputs("</code></pre>\n", f);
+}
+
+/* Of a stored reference (it has seeds): how to replace it. */
+static void write_approval(FILE *f, const json_t *claim)
+{
+    if (json_object_get(claim, "seeds_b") == NULL)
+        return;
+    fputs(
+        "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
+        "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
+        "tabindex=\"0\"><code>assay golden render --fresh --engine ",
+        f);
+    html_text(f, member_text(claim, "b"));
+    fputs(" --only ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("\nassay golden approve ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("/", f);
+    html_text(f, member_text(claim, "b"));
+    fputs("</code></pre>\n", f);
+}
+
+void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b)
 {
     FILE *f = p->f;
     const json_t *json = claim->json;
-    fprintf(f, "<article class=\"claim\" id=\"claim-%zu\" data-name=\"against ", claim->index);
+    fprintf(f,
+            "<article class=\"claim\" id=\"claim-%zu\" data-a=\"%zu\" data-b=\"%zu\" "
+            "data-tile=\"%.0f\"",
+            claim->index, layer_a, layer_b, member_number(json, "tile"));
+    write_list(f, "data-tile-p", json_object_get(json, "tile_log10_p"));
+    write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
+    fputs(" data-name=\"", f);
+    html_text(f, member_text(json, "a"));
+    fputs(" against ", f);
     report_reference(f, claim);
     fputs("\">\n<h3>", f);
     html_text(f, member_text(json, "a"));
@@ -375,22 +324,21 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct im
     }
     fputs("</h3>\n<p class=\"reason\">", f);
     html_text(f, member_text(json, "reason"));
-    fputs("</p>\n<div class=\"maps\">\n", f);
-    if (!write_relative(p, claim, relative, range, e) || !write_z(p, claim, z, e))
-        return false;
+    fputs("</p>\n", f);
+    write_notes(f, json);
+    fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
-    fputs("</div>\n<h4>Everything needed to doubt it</h4>\n<dl class=\"facts\">\n", f);
+    report_qq(f, json);
+    report_power(f, json);
+    fputs("</div>\n", f);
+    report_tiles(f, json);
+    fputs("<h4>Everything needed to doubt it</h4>\n<dl class=\"facts\">\n", f);
     write_numbers(f, json);
     write_regions(f, json);
     write_provenance(f, json);
     fputs("</dl>\n", f);
     report_statistics(f, json);
-    const char *rerun = member_text(json, "rerun");
-    if (rerun != NULL) {
-        fputs("<p class=\"caption\">To run this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
-        html_text(f, rerun);
-        fputs("</code></pre>\n", f);
-    }
+    write_command(f, "To run this claim again:", member_text(json, "rerun"));
+    write_approval(f, json);
     fputs("</article>\n", f);
-    return true;
 }

@@ -1,5 +1,5 @@
 /* How the report turns numbers into colours: how radiance is exposed (the curve is that of
- * renderer/tone.h) and one diverging map for signed quantities. */
+ * renderer/tone.h) and two maps, for signed quantities and for others. */
 #ifndef ASSAY_REPORT_COLOUR_H
 #define ASSAY_REPORT_COLOUR_H
 
@@ -25,5 +25,9 @@ double display_white(double *luminances, size_t n, bool *capped);
  * equal steps look equal, and blue against red so that the colour blind can tell the signs apart.
  */
 void diverging_rgb8(double t, uint8_t rgb[3]);
+
+/* Dark violet - green - yellow for t in [0, 1] (clamped); grey where t is not a number. L* rises all the
+ * way, so that it can be read without colours, and equal steps are equally far apart in L*a*b*. */
+void sequential_rgb8(double t, uint8_t rgb[3]);
 
 #endif

@@ -1,6 +1,7 @@
 #include "report_converge.h"
 
 #include "convergence.h"
+#include "report_csv.h"
 #include "report_html.h"
 #include "report_parts.h"
 
@@ -218,6 +219,30 @@ static void write_number(FILE *f, const json_t *object, const char *name, double
     fputs("</td>", f);
 }
 
+static void write_csv(FILE *f, const json_t *engines)
+{
+    static const char *const number[] = {"spp", "rmse", "variance", "bias", "cpu_s", "efficiency"};
+    struct csv csv =
+        csv_open(f, "convergence.csv",
+                 "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
+    for (size_t k = 0; k < json_array_size(engines); k++) {
+        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
+        for (size_t i = 0; i < json_array_size(rungs); i++) {
+            const json_t *g = json_array_get(rungs, i);
+            bool has_ci = json_array_size(json_object_get(g, "rmse_ci")) == 2;
+            csv_text(&csv, member_text(j, "engine"));
+            for (size_t n = 0; n < sizeof number / sizeof *number; n++)
+                csv_number(&csv, json_is_number(json_object_get(g, number[n]))
+                                     ? member_number(g, number[n])
+                                     : NAN);
+            for (size_t n = 0; n < 2; n++)
+                csv_number(&csv, has_ci ? end(g, "rmse_ci", n) : NAN);
+            csv_line(&csv);
+        }
+    }
+    csv_close(&csv);
+}
+
 static void write_rungs(FILE *f, const json_t *scene)
 {
     fputs("<h4>The rungs</h4>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
@@ -248,8 +273,10 @@ static void write_rungs(FILE *f, const json_t *scene)
         "the pixels. <b>RMS bias</b>: what is left of the "
         "error when noise is taken out; negative where the noise, by chance, was more. "
         "<b>CPU s</b>: of one picture, its share of the engine's start included. "
-        "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out.</p>\n",
+        "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out. ",
         f);
+    write_csv(f, engines);
+    fputs("</p>\n", f);
 }
 
 static void write_scene(FILE *f, const json_t *scene)

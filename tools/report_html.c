@@ -1,7 +1,5 @@
 #include "report_html.h"
 
-#include "../renderer/image.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -93,34 +91,6 @@ void html_base64(FILE *f, const void *bytes, size_t size)
         p += n;
         size -= n;
     }
-}
-
-bool html_png(FILE *f, int width, int height, const uint8_t *rgb8, struct err *e)
-{
-    uint8_t *bytes = NULL;
-    size_t size = 0;
-    if (!image_encode_png(width, height, rgb8, &bytes, &size, e))
-        return false;
-    fputs("data:image/png;base64,", f);
-    html_base64(f, bytes, size);
-    free(bytes);
-    return true;
-}
-
-uint16_t half_from_double(double v)
-{
-    if (isnan(v))
-        return 0x7e00;
-    unsigned sign = signbit(v) ? 0x8000 : 0;
-    v = fmin(fabs(v), 65504);
-    int exponent;
-    (void)frexp(v, &exponent); /* v = m 2^exponent, 1/2 <= m < 1 */
-    if (v == 0 || exponent < -13)
-        exponent = -13; /* zero and subnormal halves share the scale of the smallest normal ones */
-    /* In units of the last place, a whole number up to 2048; the addition lets a mantissa that
-     * rounds up to 2^11 carry into the exponent. */
-    unsigned units = (unsigned)nearbyint(ldexp(v, 11 - exponent));
-    return (uint16_t)(sign | (((unsigned)(exponent + 13) << 10) + units));
 }
 
 struct number_text script_hash(const char *script)

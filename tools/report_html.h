@@ -1,4 +1,4 @@
-/* The report's pieces of HTML: escaped text, numbers, embedded pictures and float layers. What
+/* The report's pieces of HTML: escaped text, numbers, base64. What
  * cannot be written shows in ferror() of the stream, which out_commit() asks. */
 #ifndef ASSAY_REPORT_HTML_H
 #define ASSAY_REPORT_HTML_H
@@ -30,14 +30,6 @@ struct number_text plain_number(double v);
 struct number_text duration_text(double seconds);
 
 void html_base64(FILE *f, const void *bytes, size_t size);
-
-/* data:image/png;base64,... of 8-bit RGB. */
-bool html_png(FILE *f, int width, int height, const uint8_t *rgb8, struct err *e)
-    __attribute__((warn_unused_result));
-
-/* IEEE 754 binary16 nearest to v (ties to even); beyond its range the largest finite half. NaN
- * stays NaN. */
-uint16_t half_from_double(double v);
 
 /* "sha256-<base64>" of a script's text, as a Content-Security-Policy wants it. */
 struct number_text script_hash(const char *script);

@@ -1,4 +1,4 @@
-/* The page's style sheet and script, as they stand in page.css and page.js, inside the program. */
+/* The page's style sheet and script, as they stand in page.css and page*.js, inside the program. */
 #ifndef ASSAY_REPORT_PAGE_H
 #define ASSAY_REPORT_PAGE_H
 

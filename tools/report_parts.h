@@ -2,30 +2,36 @@
 #ifndef ASSAY_REPORT_PARTS_H
 #define ASSAY_REPORT_PARTS_H
 
-#include "../renderer/image.h"
 #include "../renderer/moments.h"
 #include "results.h"
 
 #include <stdint.h>
 #include <stdio.h>
 
-/* Numbers behind a picture, for the exposure slider and the pixel readout; written at the page's
- * end as long as there is room. */
-struct layer {
-    int width, height, channels;
-    uint16_t *half; /* IEEE binary16, interleaved */
+/* Numbers behind a picture (layer.h), written at the page's end as long as there is room. */
+struct page_layer {
+    char *path;
+    int width, height;
+    double n; /* of every pixel; 0 where they differ and the bytes tell */
+    char unit[16];
+    double spp;
+    uint8_t *bytes;
+    size_t size;
 };
 
 struct page {
     FILE *f;
     char dir[4096]; /* of results.json, with a final slash, or "" */
-    struct layer *layer;
-    size_t num_layers;
+    struct page_layer *layer;
+    size_t num_layers, num_scenes;
 };
 
-/* Appends a layer of `channels` values a pixel; *index is its number on the page. */
-bool page_add_layer(struct page *p, int width, int height, int channels, const double *value,
-                    size_t *index, struct err *e) __attribute__((warn_unused_result));
+/* The number on the page of the layer of m, which was read from path; the same path has one. */
+bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
+                    struct err *e) __attribute__((warn_unused_result));
+/* All layers, and the colours of maps, as base64 in elements that no browser runs. */
+void page_write_layers(struct page *p);
+void page_free_layers(struct page *p);
 
 /* One claim where it stands in the page. */
 struct claim_ref {
@@ -39,11 +45,9 @@ struct claim_ref {
 bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, struct err *e)
     __attribute__((warn_unused_result));
 
-/* <article> of one judged claim: the maps on the colour range +-range, the histogram, and all that
- * is needed to doubt the verdict. The maps are one channel each. */
-bool report_claim(struct page *p, const struct claim_ref *claim, const struct image *relative,
-                  const struct image *z, double range, struct err *e)
-    __attribute__((warn_unused_result));
+/* <article> of one judged claim: where the page's script puts its maps, the histogram, and all that is
+ * needed to doubt the verdict. layer_a and layer_b are the numbers of its sides. */
+void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b);
 
 /* <article> of a claim that could not be judged. */
 void report_claim_error(struct page *p, const struct claim_ref *claim);
@@ -53,9 +57,5 @@ void report_badge(FILE *f, const struct claim_ref *claim);
 
 /* The reference's name, and the quantity where it is not the mean. */
 void report_reference(FILE *f, const struct claim_ref *claim);
-
-/* The style attribute of a picture's figure: its width in pixels, and the whole factors by which it
- * is drawn side by side and alone. */
-void report_scale(FILE *f, int width);
 
 #endif

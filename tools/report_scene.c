@@ -1,6 +1,5 @@
 #include "report_parts.h"
 
-#include "../renderer/tone.h"
 #include "report_colour.h"
 #include "report_html.h"
 
@@ -12,14 +11,12 @@
 struct shot {
     const char *engine, *file; /* borrowed from the claim */
     struct moments m;
+    size_t layer; /* its number on the page */
 };
 
 struct scene {
     struct shot *shot;
     size_t num_shots;
-    struct image *relative, *z; /* one per claim; empty for claims that could not be judged */
-    size_t num_claims;
-    double range;       /* of the relative maps: +-range */
     double white;       /* radiance that is shown as white */
     const char *anchor; /* the engine whose image white was taken from; NULL without images */
     bool white_capped;
@@ -31,7 +28,7 @@ static bool full_path(const struct page *p, const char *file, char path[8192], s
     return n > 0 && n < 8192 ? true : err_set(e, "%.64s...: path too long", file);
 }
 
-static bool load_shot(const struct page *p, struct scene *s, const json_t *claim, const char *side,
+static bool load_shot(struct page *p, struct scene *s, const json_t *claim, const char *side,
                       struct err *e)
 {
     const char *file = member_text(json_object_get(claim, "files"), side);
@@ -48,52 +45,42 @@ static bool load_shot(const struct page *p, struct scene *s, const json_t *claim
     if (shot->m.width != s->shot[0].m.width || shot->m.height != s->shot[0].m.height)
         return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path, shot->m.width,
                        shot->m.height, s->shot[0].file, s->shot[0].m.width, s->shot[0].m.height);
-    return true;
+    return page_add_layer(p, path, &shot->m, &shot->layer, e);
 }
 
-static bool load_map(const struct page *p, const struct scene *s, const json_t *claim,
-                     const char *which, struct image *out, struct err *e)
+/* Ours first, then the references in the order that the keys 1 to 4 have in every scene, then others. */
+static int rank_of(const struct shot *s)
 {
-    char path[8192];
-    if (!full_path(p, member_text(json_object_get(claim, "files"), which), path, e) ||
-        !image_read_exr(path, out, NULL, e))
-        return false;
-    const struct moments *m = &s->shot[0].m;
-    if (out->channels != 1 || out->width != m->width || out->height != m->height)
-        return err_set(e, "%s: %d x %d pixels of %d channels, not %d x %d of 1", path, out->width,
-                       out->height, out->channels, m->width, m->height);
-    return true;
+    static const char *const order[] = {"pathtracer", "cycles", "povray", "truth"};
+    int rank = 0;
+    while (rank < 4 && strcmp(s->engine, order[rank]) != 0)
+        rank++;
+    return rank;
 }
 
-/* The 98th percentile of all |relative difference|, rounded up to 1, 2 or 5 times a power of ten:
- * the noise of single pixels fills the map's range without clipping much of it. From 0.1 % to 100
- * %. */
-static bool choose_range(struct scene *s, struct err *e)
+static void order_shots(struct scene *s)
 {
-    size_t num = 0, pixels = (size_t)s->shot[0].m.width * (size_t)s->shot[0].m.height;
-    double *v = malloc(s->num_claims * pixels * sizeof *v);
-    if (v == NULL)
-        return err_set(e, "out of memory for the report");
-    for (size_t c = 0; c < s->num_claims; c++)
-        for (size_t i = 0; s->relative[c].data != NULL && i < pixels; i++)
-            if (isfinite(s->relative[c].data[i]))
-                v[num++] = fabs((double)s->relative[c].data[i]);
-    double p98 = num > 0 ? percentile(v, num, 0.98) : 0;
-    free(v);
-    static const double ladder[] = {0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
-    s->range = 1;
-    for (size_t i = sizeof ladder / sizeof *ladder; i-- > 0;)
-        if (p98 <= ladder[i])
-            s->range = ladder[i];
-    return true;
+    for (size_t i = 1; i < s->num_shots; i++)
+        for (size_t k = i; k > 0 && rank_of(&s->shot[k]) < rank_of(&s->shot[k - 1]); k--) {
+            struct shot swap = s->shot[k];
+            s->shot[k] = s->shot[k - 1];
+            s->shot[k - 1] = swap;
+        }
+}
+
+/* The loaded image of one side of a claim. */
+static const struct shot *shot_of(const struct scene *s, const json_t *claim, const char *side)
+{
+    const char *file = member_text(json_object_get(claim, "files"), side);
+    const struct shot *shot = s->shot;
+    while (strcmp(shot->file, file) != 0)
+        shot++;
+    return shot;
 }
 
 static bool choose_white(struct scene *s, const json_t *claim, struct err *e)
 {
-    const char *file = member_text(json_object_get(claim, "files"), "b");
-    const struct shot *shot = s->shot;
-    while (strcmp(shot->file, file) != 0)
-        shot++;
+    const struct shot *shot = shot_of(s, claim, "b");
     size_t pixels = (size_t)shot->m.width * (size_t)shot->m.height;
     double *v = malloc(pixels * sizeof *v);
     if (v == NULL)
@@ -110,52 +97,28 @@ static void scene_free(struct scene *s)
 {
     for (size_t i = 0; i < s->num_shots; i++)
         moments_free(&s->shot[i].m);
-    for (size_t i = 0; i < s->num_claims; i++) {
-        if (s->relative != NULL)
-            image_free(&s->relative[i]);
-        if (s->z != NULL)
-            image_free(&s->z[i]);
-    }
     free(s->shot);
-    free(s->relative);
-    free(s->z);
 }
 
-static bool scene_load(const struct page *p, struct scene *s, const struct claim_ref *claim,
-                       size_t num, struct err *e)
+static bool scene_load(struct page *p, struct scene *s, const struct claim_ref *claim, size_t num,
+                       struct err *e)
 {
-    *s = (struct scene){.num_claims = num};
+    *s = (struct scene){0};
     s->shot = calloc(2 * num, sizeof *s->shot);
-    s->relative = calloc(num, sizeof *s->relative);
-    s->z = calloc(num, sizeof *s->z);
-    if (s->shot == NULL || s->relative == NULL || s->z == NULL) {
-        err_set(e, "out of memory for the report");
-        goto fail;
-    }
-    for (size_t i = 0; i < num; i++) {
+    bool ok = s->shot != NULL || err_set(e, "out of memory for the report");
+    for (size_t i = 0; ok && i < num; i++) {
         const json_t *json = claim[i].json;
         if (claim[i].outcome == OUTCOME_NOT_JUDGED)
             continue;
-        if (!load_shot(p, s, json, "a", e) || !load_shot(p, s, json, "b", e) ||
-            !load_map(p, s, json, "relative", &s->relative[i], e) ||
-            !load_map(p, s, json, "z", &s->z[i], e))
-            goto fail;
-        if (s->anchor == NULL && !choose_white(s, json, e))
-            goto fail;
+        ok = load_shot(p, s, json, "a", e) && load_shot(p, s, json, "b", e);
+        if (ok && s->anchor == NULL)
+            ok = choose_white(s, json, e);
     }
-    if (s->num_shots > 0 && !choose_range(s, e))
-        goto fail;
-    return true;
-fail:
-    scene_free(s);
-    return false;
-}
-
-void report_scale(FILE *f, int width)
-{
-    int aside = 264 / width, alone = 560 / width;
-    fprintf(f, " style=\"--w:%d;--k:%d;--z:%d\"", width, aside > 1 ? aside : 1,
-            alone > 1 ? alone : 1);
+    if (ok)
+        order_shots(s);
+    else
+        scene_free(s);
+    return ok;
 }
 
 /* "2048 samples per pixel", "16 replicates of 256 samples per pixel", "without noise". */
@@ -176,59 +139,35 @@ static void print_observations(FILE *f, const struct moments *m)
         fprintf(f, "%.0f replicates", n);
 }
 
-static bool write_shot(struct page *p, const struct scene *s, const struct shot *shot,
-                       const char *scene_name, struct err *e)
+/* What the page's script makes a viewer of. */
+static void write_images(struct page *p, const struct scene *s)
 {
-    const struct moments *m = &shot->m;
-    size_t pixels = (size_t)m->width * (size_t)m->height, layer;
-    uint8_t *rgb8 = malloc(3 * pixels);
-    if (rgb8 == NULL)
-        return err_set(e, "out of memory for the report");
-    for (size_t i = 0; i < 3 * pixels; i++)
-        rgb8[i] = tone_map(TONE_SRGB, m->mean[i] / s->white);
-    bool ok = page_add_layer(p, m->width, m->height, 3, m->mean, &layer, e);
-    if (ok) {
-        fputs("<figure class=\"shot\" data-name=\"", p->f);
-        html_text(p->f, shot->engine);
-        fputs("\"", p->f);
-        report_scale(p->f, m->width);
-        fprintf(p->f, "><div class=\"frame\" data-layer=\"%zu\">", layer);
-        fprintf(p->f, "<img width=\"%d\" height=\"%d\" alt=\"", m->width, m->height);
-        html_text(p->f, scene_name);
-        fputs(" as rendered by ", p->f);
-        html_text(p->f, shot->engine);
-        fputs("\" src=\"", p->f);
-        ok = html_png(p->f, m->width, m->height, rgb8, e);
-        fputs("\"></div><figcaption><b>", p->f);
-        html_text(p->f, shot->engine);
-        fputs("</b> ", p->f);
-        print_observations(p->f, m);
-        fputs("</figcaption></figure>\n", p->f);
-    }
-    free(rgb8);
-    return ok;
-}
-
-static bool write_images(struct page *p, const struct scene *s, const char *scene_name,
-                         struct err *e)
-{
-    fputs("<h3>The images</h3>\n<div class=\"shots\">\n", p->f);
-    for (size_t i = 0; i < s->num_shots; i++)
-        if (!write_shot(p, s, &s->shot[i], scene_name, e))
-            return false;
+    const struct moments *m = &s->shot[0].m;
     fprintf(p->f,
-            "</div>\n<p class=\"caption\">All at the same exposure, so that what looks brighter is "
-            "brighter: radiance %s and above is white",
+            "<h3>The images</h3>\n<div class=\"viewer\" data-width=\"%d\" "
+            "data-height=\"%d\">\n<ul class=\"shots\">\n",
+            m->width, m->height);
+    for (size_t i = 0; i < s->num_shots; i++) {
+        fprintf(p->f, "<li data-layer=\"%zu\" data-name=\"", s->shot[i].layer);
+        html_text(p->f, s->shot[i].engine);
+        fputs("\"><b>", p->f);
+        html_text(p->f, s->shot[i].engine);
+        fputs("</b> <span>", p->f);
+        print_observations(p->f, &s->shot[i].m);
+        fputs("</span></li>\n", p->f);
+    }
+    fprintf(p->f,
+            "</ul>\n</div>\n<p class=\"caption\">All at the same exposure, so that what looks "
+            "brighter is brighter: at 0 stops radiance %s and above is white",
             plain_number(s->white).s);
     fputs(s->white_capped ? " (7.5 times the median of " : " (the 99th percentile of ", p->f);
     html_text(p->f, s->anchor);
     fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the picture)"
                           : " is shown at 80 % of white)",
           p->f);
-    fputs(", then the usual sRGB curve. Each square is one pixel. If the engines agree you should "
-          "see no difference but the grain.</p>\n",
+    fputs(", then the sRGB curve. Each square is one pixel. Values are exact to 1/16 of their own "
+          "standard error or a millionth of themselves.</p>\n",
           p->f);
-    return true;
 }
 
 static void write_purpose(FILE *f, const json_t *claim)
@@ -263,23 +202,25 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
         if (member_text(purpose, "detects") == NULL)
             purpose = claim[i].json;
     }
-    fprintf(p->f, "<section class=\"scene\" data-white=\"%.9g\">\n<h2>", s.white);
+    fprintf(p->f, "<section class=\"scene\" data-white=\"%.9g\" data-scene=\"", s.white);
+    html_text(p->f, name);
+    fputs("\">\n<h2>", p->f);
     html_text(p->f, title != NULL ? title : name);
     fputs(" <code>", p->f);
     html_text(p->f, name);
     fputs("</code></h2>\n", p->f);
     write_purpose(p->f, purpose);
 
-    bool ok = true;
     for (size_t i = 0; i < num; i++)
         if (claim[i].outcome == OUTCOME_NOT_JUDGED)
             report_claim_error(p, &claim[i]);
     if (s.num_shots > 0)
-        ok = write_images(p, &s, name, e);
-    for (size_t i = 0; ok && i < num; i++)
+        write_images(p, &s);
+    for (size_t i = 0; i < num; i++)
         if (claim[i].outcome != OUTCOME_NOT_JUDGED)
-            ok = report_claim(p, &claim[i], &s.relative[i], &s.z[i], s.range, e);
+            report_claim(p, &claim[i], shot_of(&s, claim[i].json, "a")->layer,
+                         shot_of(&s, claim[i].json, "b")->layer);
     fputs("</section>\n", p->f);
     scene_free(&s);
-    return ok;
+    return true;
 }

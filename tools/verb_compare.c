@@ -1,10 +1,14 @@
 #include "../renderer/cli.h"
+#include "../renderer/fs.h"
 #include "comparing.h"
 #include "region.h"
+#include "report.h"
 #include "results.h"
 #include "verbs.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum option {
@@ -21,6 +25,7 @@ enum option {
     OPT_SPP_B,
     OPT_EXPECT,
     OPT_JSON,
+    OPT_REPORT,
     OPT_QUIET,
     OPT_HELP
 };
@@ -52,6 +57,7 @@ static const struct cli_option options[] = {
     [OPT_SPP_B] = {0, "spp-b", 1, "N", "the same for B"},
     [OPT_EXPECT] = {0, "expect", 1, "VERDICT", "what exit code 0 stands for (EQUIVALENT)"},
     [OPT_JSON] = {0, "json", 1, "FILE", "write the claim as results.json"},
+    [OPT_REPORT] = {'r', "report", 1, "FILE", "write the claim as one HTML page with its pictures"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "print nothing; the exit code says it"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -69,7 +75,7 @@ static const char help_head[] =
 struct settings {
     struct compare_job job;
     int num_paths;
-    const char *json;
+    const char *json, *report;
     enum verdict expect;
     bool quiet, done;
 };
@@ -134,6 +140,7 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
                                v);
             break;
         case OPT_JSON: s->json = v; break;
+        case OPT_REPORT: s->report = v; break;
         case OPT_QUIET: s->quiet = true; break;
         case OPT_HELP:
             puts(help_head);
@@ -177,6 +184,20 @@ static void print_result(const struct compared *c, bool exchangeable)
         printf("note: %s\n", c->notes.line[i]);
 }
 
+/* The page is made from a results.json, as every page is; this one goes with its directory. */
+static bool write_report(const struct settings *s, const struct compared *c, int argc, char **argv,
+                         struct err *e)
+{
+    char dir[] = "/tmp/assay_compare_XXXXXX", results[64];
+    if (mkdtemp(dir) == NULL)
+        return err_set(e, "%s: cannot make a temporary directory", dir);
+    snprintf(results, sizeof results, "%s/results.json", dir);
+    bool ok = compared_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
+              report_write(results, s->report, e);
+    struct err ignored = {0};
+    return remove_tree(dir, ok ? e : &ignored) && ok;
+}
+
 int verb_compare(int argc, char **argv, struct err *e)
 {
     struct settings s = {.job.opt.alpha = 1e-3, .expect = VERDICT_EQUIVALENT};
@@ -195,6 +216,8 @@ int verb_compare(int argc, char **argv, struct err *e)
     if (!s.quiet)
         print_result(&c, s.job.exchangeable);
     if (s.json != NULL && !compared_write_json(&s.job, &c, s.expect, s.json, argc, argv, e))
+        code = EXIT_NOT_JUDGED;
+    if (s.report != NULL && !write_report(&s, &c, argc, argv, e))
         code = EXIT_NOT_JUDGED;
     compared_free(&c);
     return code;

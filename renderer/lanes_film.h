@@ -1,0 +1,51 @@
+/* Samples into the sums of a film, as plain loops that the compiler turns into vectors. Part of
+ * lanes_kernel.c. */
+#ifndef ASSAY_LANES_FILM_H
+#define ASSAY_LANES_FILM_H
+
+#include "film.h"
+
+/* Pixels of the film that follow each other, from the first one of the pointers on. */
+enum { FILM_RUN = 16 };
+
+/* moments_add() and the sums of film_add() for `count` pixels, all of which have had the same number of
+ * samples. */
+static void add_run(double *restrict n, double *restrict mean, double *restrict m2,
+                    double *restrict m3, double *restrict s1, double *restrict s2,
+                    const struct rgbs *radiance, int lane, int count)
+{
+    double x[3 * FILM_RUN];
+    const double samples = n[0] + 1;
+    for (int i = 0; i < count; i++) {
+        double r = radiance->r[lane + i], g = radiance->g[lane + i], b = radiance->b[lane + i];
+        double illuminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        x[3 * i] = r;
+        x[3 * i + 1] = g;
+        x[3 * i + 2] = b;
+        n[i] = samples;
+        s1[i] += illuminance;
+        s2[i] += illuminance * illuminance;
+    }
+    for (int i = 0; i < 3 * count; i++) {
+        double d = x[i] - mean[i], dn = d / samples, term = d * dn * (samples - 1);
+        mean[i] += dn;
+        m3[i] += term * dn * (samples - 2) - 3 * dn * m2[i];
+        m2[i] += term;
+    }
+}
+
+static void film_add_lanes(struct film *f, const size_t *pixel, int num_lanes,
+                           const struct batch *b)
+{
+    for (int i = 0, end; i < num_lanes; i = end) {
+        const size_t p = pixel[i];
+        const double n = f->m.n[p];
+        for (end = i + 1; end < num_lanes && end - i < FILM_RUN &&
+                          pixel[end] == p + (size_t)(end - i) && f->m.n[pixel[end]] == n;)
+            end++;
+        add_run(f->m.n + p, f->m.mean + 3 * p, f->m.m2 + 3 * p, f->m.m3 + 3 * p, f->s1 + p,
+                f->s2 + p, &b->radiance, i, end - i);
+    }
+}
+
+#endif

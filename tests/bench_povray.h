@@ -1,0 +1,11 @@
+/* POV-Ray as one of bench_engines.h. */
+#ifndef ASSAY_BENCH_POVRAY_H
+#define ASSAY_BENCH_POVRAY_H
+
+#include "bench_engines.h"
+
+/* Picture i of grid x grid points a pixel. */
+bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, const char *work_dir,
+                  float *image, struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,218 @@
+// node page.mjs MODULES PAGE RESULTS SHOTS: the page of one scene of four pictures, in Debian's chromium.
+// Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
+import { createRequire } from "node:module";
+import { readFileSync } from "node:fs";
+import { dirname, resolve } from "node:path";
+import { readExr, pixelOf, grey, srgb } from "./files.mjs";
+
+const [modules, pagePath, resultsPath, shots] = process.argv.slice(2);
+const { chromium } = createRequire(resolve(modules) + "/")("playwright-core");
+const results = JSON.parse(readFileSync(resultsPath, "utf8"));
+const directory = dirname(resultsPath) + "/", claims = results.claims.filter((c) => c.files);
+const fileOf = {};
+for (const c of claims) Object.assign(fileOf, { [c.a]: c.files.a, [c.b]: c.files.b });
+const pictures = Object.fromEntries(Object.entries(fileOf).map(([name, f]) => [name, readExr(directory + f)]));
+const size = pictures[claims[0].a];
+
+function check(name, good, why = "") {
+  console.log(good ? "ok page: " + name : "not ok page: " + name + ": " + why);
+}
+
+const browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox"] });
+const complaints = [], requests = [];
+async function open(path, width, height, options = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, ...options });
+  const page = await context.newPage();
+  // This test itself reads canvases back.
+  page.on("console", (m) => ["error", "warning"].includes(m.type()) && !/willReadFrequently/.test(m.text()) && complaints.push(m.text()));
+  page.on("pageerror", (e) => complaints.push(e.message));
+  page.on("dialog", (d) => { complaints.push("dialog " + d.message()); d.dismiss(); });
+  page.on("request", (r) => requests.push(r.url()));
+  await page.goto("file://" + resolve(path));
+  await page.evaluate("loadAll()");
+  return page;
+}
+const frames = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+const page = await open(pagePath, 1280, 900);
+check("its pictures are all there", await page.evaluate("scenes.length === 1 && scenes[0].ready"));
+const names = await page.evaluate("scenes[0].shots.map((s) => s.name)");
+check("keys 1 to 4 are ours, Cycles, POV-Ray, truth", names.slice(0, 4).join() === "pathtracer,cycles,povray,truth", names.join());
+
+// The table of the pixel under the pointer against the files: every number is right to its last digit but one
+// unit, which is how exact the page says it is (1/16 of the error, two digits of which are shown).
+const rows = () => page.evaluate(`[...document.querySelectorAll(".probe tbody tr")].map((r) => [...r.cells].map((c) => c.textContent))`);
+const number = (text) => +text.replace(/\u2212/g, "-").replace("%", "");
+function agrees(text, value, error, unitOfError = 1) {
+  const [v, e] = text.split("\u00b1").map(number);
+  if (e === undefined) return !(error > 0) && Math.abs(v - value) <= Math.abs(value) * 5.1e-4 + 1e-12;
+  return Math.abs(v - value) <= (error / 16 * 1.03 + 0.05 * error) * unitOfError && Math.abs(e / error - 1) < 0.09;
+}
+const map = (name) => claims.map((c) => readExr(directory + c.files[name]));
+const zMaps = map("z"), relativeMaps = map("relative");
+let wrong = [];
+for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 9], [size.width >> 1, 1]]) {
+  await page.evaluate(`scenes[0].show(1, null)`);
+  await frames(page);
+  const frame = page.locator(".stage .frame"), pixel = (await frame.boundingBox()).width / size.width;
+  await frame.hover({ position: { x: (x + 0.5) * pixel, y: (y + 0.5) * pixel } });
+  await frames(page);
+  const table = await rows();
+  for (const row of table.filter((r) => r.length === 5)) {
+    const p = pixelOf(pictures[row[0]], x, y), exact = results.claims.some((c) => c.b === row[0] && c.unit_b === "exact");
+    for (let k = 0; k < 3; k++)
+      if (!agrees(row[k + 1], p.value[k], exact ? 0 : p.error[k])) wrong.push(row[0] + " " + x + "," + y + ": " + row[k + 1] + " is " + p.value[k] + " ± " + p.error[k]);
+    if (row[4] !== "exact" && number(row[4]) !== p.n) wrong.push(row[0] + ": n " + row[4] + " is " + p.n);
+  }
+  table.filter((r) => r.length === 3).forEach((row, i) => {
+    const [d] = row[1].split("\u00b1").map(number), z = zMaps[i].at("z", x, y), relative = relativeMaps[i].at("rel", x, y);
+    const a = pixelOf(pictures[claims[i].a], x, y), b = pixelOf(pictures[claims[i].b], x, y);
+    const unit = (grey(a.value) - grey(b.value)) / relative, noise = Math.hypot(grey(a.error), grey(b.error)) / unit;
+    // Both sides are off by 1/16 of their error or 2^-20 of themselves.
+    const off = 0.2 * noise + 2 * 2 ** -20 * grey(b.value) / unit + 5e-4 * Math.abs(relative);
+    if (Number.isFinite(unit) && Math.abs(d / 100 - relative) > off) wrong.push(row[0] + ": difference " + row[1] + " is " + 100 * relative);
+    if (noise > 1e-3 && Math.abs(number(row[2]) - z) > off / noise + 0.01) wrong.push(row[0] + ": t " + row[2] + " is " + z);
+  });
+}
+check("values, errors, n, differences and t are those of the files", wrong.length === 0, wrong.slice(0, 5).join("; "));
+
+// What is painted: the buffer that the stage shows (its second picture, if over), pixel by pixel.
+const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
+  const pane = scenes[0].stagePane, source = pane.source();
+  return [...pane.buffer(o ? source.over : source).getContext("2d").getImageData(px, py, 1, 1).data.slice(0, 3)];
+}, [over, x, y]);
+async function paintsRadiance(name, over, gain, points) {
+  const bad = [], white = +(await page.getAttribute("section.scene", "data-white"));
+  for (const [x, y] of points) {
+    const p = pixelOf(pictures[name], x, y), c = await painted(over, x, y);
+    for (let k = 0; k < 3; k++) {
+      const lowest = srgb((p.value[k] - p.error[k] / 8) * gain / white) - 1, highest = srgb((p.value[k] + p.error[k] / 8) * gain / white) + 1;
+      if (c[k] < lowest || c[k] > highest) bad.push(x + "," + y + ": " + c[k] + " not " + lowest + ".." + highest);
+    }
+  }
+  return bad;
+}
+const points = [[3, 5], [31, 31], [50, 20], [10, 60]];
+for (let i = 0; i < 4; i++) {
+  await page.keyboard.press(String(i + 1));
+  await frames(page);
+  const bad = await paintsRadiance(names[i], 0, 1, points);
+  check("key " + (i + 1) + " shows " + names[i] + " as the sRGB curve has it", bad.length === 0, bad.join("; "));
+}
+for (let i = 0; i < 4; i++) await page.keyboard.press("]");
+await frames(page);
+check("exposure of one stop doubles radiance", (await paintsRadiance(names[3], 0, 2, points)).length === 0);
+for (let i = 0; i < 4; i++) await page.keyboard.press("[");
+await page.getByLabel("Curve").selectOption({ label: "linear" });
+await frames(page);
+const white = +(await page.getAttribute("section.scene", "data-white"));
+const linear = await painted(0, 31, 31), wanted = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * v / white));
+check("the linear curve is linear", linear.every((v, k) => Math.abs(v - wanted[k]) <= 1), linear + " not " + wanted);
+await page.getByLabel("Curve").selectOption({ label: "sRGB" });
+
+// Wipe: the shown picture left of the line, another one right of it; the line follows a drag.
+await page.keyboard.press("1");
+await page.keyboard.press("w");
+await frames(page);
+check("wipe shows two pictures", (await paintsRadiance(names[0], 0, 1, points)).length === 0 && (await paintsRadiance(names[1], 1, 1, points)).length === 0);
+await page.locator(".stage .frame").scrollIntoViewIfNeeded();
+let box = await page.locator(".stage .frame").boundingBox();
+await page.mouse.move(box.x + box.width / 2, box.y + 40);
+await page.mouse.down();
+await page.mouse.move(box.x + box.width / 4, box.y + 60, { steps: 3 });
+await page.mouse.up();
+check("the wipe is dragged", Math.abs(await page.evaluate("scenes[0].wipe") - 0.25) < 0.01);
+await page.locator(".tools select").last().selectOption({ label: names[3] });
+check("the wiped picture is chosen", await page.evaluate("scenes[0].shots[scenes[0].against].name") === names[3]);
+await page.keyboard.press("w");
+
+// Maps, each with its sentence, legend and colours.
+const maps = { d: "Difference", t: "t map", e: "Error", v: "Variance ratio", n: "Samples" };
+for (const [key, name] of Object.entries(maps)) {
+  await page.keyboard.press(key);
+  await frames(page);
+  const caption = await page.textContent(".stage figcaption"), legend = await page.textContent(".stage .legend");
+  check("key " + key + " shows: " + name, caption.startsWith(name) && caption.length > name.length + 60 && /\d/.test(legend), caption);
+}
+await page.keyboard.press("t");
+await frames(page);
+const red = [];
+for (let y = 0; y < size.height; y += 7)
+  for (let x = 0; x < size.width; x += 5) {
+    const z = zMaps[0].at("z", x, y), c = await painted(0, x, y);
+    if (z > 1 && !(c[0] > c[2]) || z < -1 && !(c[2] > c[0])) red.push(x + "," + y + ": z " + z + " is " + c);
+  }
+check("the t map is red above and blue below", red.length === 0, red.join("; "));
+
+// Zoom to single pixels and pan, linked between all frames; then the whole picture.
+await page.keyboard.press("0");
+for (let i = 0; i < 8; i++) await page.keyboard.press("+");
+check("zoom ends at 4 pixels", await page.evaluate("scenes[0].width / scenes[0].view.zoom") === 4);
+await page.locator(".side .frame").first().scrollIntoViewIfNeeded();
+box = await page.locator(".side .frame").first().boundingBox();
+const before = await page.evaluate("scenes[0].view.x");
+await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+await page.mouse.down();
+await page.mouse.move(box.x + box.width / 4, box.y + box.height / 2, { steps: 4 });
+await page.mouse.up();
+check("a drag pans by what it is long", Math.abs(await page.evaluate("scenes[0].view.x") - before - 1) < 0.05);
+await frames(page);
+const middles = await page.evaluate(`[...document.querySelectorAll(".side .frame canvas")].map((c) =>
+  [...c.getContext("2d").getImageData(c.width / 8, c.height / 8, 1, 1).data.slice(0, 3)])`);
+const corner = await page.evaluate("[Math.floor(scenes[0].view.x + 0.5), Math.floor(scenes[0].view.y + 0.5)]");
+check("all frames show the same pixels", middles.length === names.length && middles.every((c, i) =>
+  srgb(pixelOf(pictures[names[i]], ...corner).value[1] / white) - c[1] <= 2 && c[1] - srgb(pixelOf(pictures[names[i]], ...corner).value[1] / white) <= 2), JSON.stringify(middles));
+await page.keyboard.press("f");
+await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+await page.mouse.dblclick(box.x + box.width / 2, box.y + box.height / 2);
+check("a double click zooms", await page.evaluate("scenes[0].view.zoom") === 2);
+await page.getByRole("button", { name: "Fit" }).click();
+await page.getByTitle("Zoom in").click();
+await page.getByTitle("Zoom out").click();
+check("the zoom's buttons", await page.evaluate("scenes[0].view.zoom") === 1);
+await page.locator(".side .frame").first().focus();
+await page.keyboard.press("ArrowRight");
+const at = await page.evaluate("({...scenes[0].pixel})");
+await page.keyboard.press("Shift+ArrowDown");
+const after = await page.evaluate("({...scenes[0].pixel})");
+check("arrow keys move the pixel", after.x === at.x && after.y === Math.min(at.y + 8, size.height - 1));
+
+// Tiles: sorted by p, one press marks and reads.
+const article = page.locator("article.claim").first(), tiles = claims[0].tile_log10_p;
+const first = tiles.indexOf(Math.min(...tiles.filter((p) => p !== null))), columns = claims[0].tiles_x, side = claims[0].tile;
+await article.locator(".tiles button").first().click();
+const tile = await page.evaluate("({...scenes[0].tile})"), reading = await article.locator(".tile-reading").textContent();
+check("the tile of smallest p is first and is marked", tile.x === first % columns * side && tile.y === Math.floor(first / columns) * side, JSON.stringify(tile));
+check("its p is read", Math.abs(number(/p ([^ ]+)\.$/.exec(reading)[1]) / 10 ** tiles[first] - 1) < 0.01, reading);
+await page.keyboard.press("f");
+await page.keyboard.press("g");
+check("all tiles are outlined", await page.evaluate("scenes[0].grid") === side);
+await page.keyboard.press("g");
+
+// Widths, colours, paper.
+for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
+  for (const scheme of ["light", "dark"]) {
+    const other = await open(pagePath, width, height, { colorScheme: scheme, hasTouch: width < 500 });
+    await frames(other);
+    const wide = await other.evaluate("document.scrollingElement.scrollWidth - window.innerWidth");
+    check(scheme + ", " + width + " px: nothing sticks out", wide <= 0, wide + " px");
+    await other.screenshot({ path: shots + "/" + width + "-" + scheme + "-top.png" });
+    await other.evaluate(`document.querySelector("section.scene").scrollIntoView()`);
+    await frames(other);
+    await other.screenshot({ path: shots + "/" + width + "-" + scheme + "-scene.png" });
+    if (width < 500 && scheme === "light") {
+      const frame = other.locator(".side .frame").first();
+      await frame.tap({ position: { x: 3, y: 3 } });
+      check("a tap reads a pixel", await other.evaluate("scenes[0].pixel.x === 0 && scenes[0].pixel.y === 0"));
+    }
+    await other.context().close();
+  }
+}
+const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true });
+check("it prints", pdf.length > 20000, pdf.length + " bytes");
+const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>
+  e.offsetParent !== null && !e.closest("[hidden]") && !(e.getAttribute("aria-label") || e.textContent.trim() || e.labels && e.labels.length)).length`);
+check("every picture and control has a name", unnamed === 0, unnamed + " have none");
+check("no console message", complaints.length === 0, complaints.join("; "));
+check("nothing is loaded from outside", requests.every((u) => u.startsWith("file://") && u.endsWith(".html") || u.startsWith("blob:")), requests.join(" "));
+await browser.close();

@@ -1,0 +1,188 @@
+// What is made of two pictures, pixel by pixel, and how numbers become colours.
+
+const lutElement = document.getElementById("colours");
+// Red, green, blue of 257 steps of the diverging map, then of 256 of the sequential one.
+const LUT = lutElement ? bytesOf(lutElement.textContent) : new Uint8Array(1539);
+const SEQUENTIAL = 3 * 257;
+
+const LUMINANCE = [0.2126, 0.7152, 0.0722];
+const luminance = (three, i) =>
+  LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
+
+// The picture's luminance, its standard error for channels that err together, and its mean.
+function greyOf(layer) {
+  if (!layer.grey) {
+    const pixels = layer.width * layer.height, value = new Float64Array(pixels), error = new Float64Array(pixels);
+    let sum = 0;
+    for (let i = 0; i < pixels; i++) {
+      sum += value[i] = luminance(layer.value, i);
+      error[i] = luminance(layer.error, i);
+    }
+    layer.grey = { value, error, mean: sum / pixels };
+  }
+  return layer.grey;
+}
+
+const studentT = (d, error) => (d === 0 ? 0 : Math.min(1e4, Math.max(-1e4, d / error)));
+
+const countAt = (layer, i) => (typeof layer.n === "number" ? layer.n : layer.n[i]);
+
+// The sum over the square of side 2 r + 1 around each pixel, and how many pixels that has.
+function boxSum(value, width, height, r) {
+  const rows = new Float64Array(value.length), out = new Float64Array(value.length);
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++) {
+      let s = 0;
+      for (let k = Math.max(0, x - r); k <= Math.min(width - 1, x + r); k++) s += value[y * width + k];
+      rows[y * width + x] = s;
+    }
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++) {
+      let s = 0;
+      for (let k = Math.max(0, y - r); k <= Math.min(height - 1, y + r); k++) s += rows[k * width + x];
+      out[y * width + x] = s;
+    }
+  return out;
+}
+
+// Differences are in units of B, or of 5 % of its mean where it is darker than that.
+const makeMap = {
+  difference(a, b) {
+    const p = greyOf(a), q = greyOf(b), floor = 0.05 * q.mean;
+    return p.value.map((v, i) => (v - q.value[i]) / Math.max(q.value[i], floor));
+  },
+  t(a, b) {
+    const p = greyOf(a), q = greyOf(b);
+    return p.value.map((v, i) => studentT(v - q.value[i], Math.hypot(p.error[i], q.error[i])));
+  },
+  // Root of the mean square difference around a pixel less the square that noise alone would leave.
+  error(a, b) {
+    const p = greyOf(a), q = greyOf(b), floor = 0.05 * q.mean;
+    const left = p.value.map((v, i) => (v - q.value[i]) ** 2 - p.error[i] ** 2 - q.error[i] ** 2);
+    const sum = boxSum(left, a.width, a.height, 2), unit = boxSum(q.value, a.width, a.height, 2);
+    const count = boxSum(new Float64Array(left.length).fill(1), a.width, a.height, 2);
+    return sum.map((s, i) => Math.sqrt(Math.max(0, s / count[i])) / Math.max(unit[i] / count[i], floor));
+  },
+  // log2 of the variance of one path of A over that of B, over squares of 8 x 8 pixels.
+  variance(a, b) {
+    const p = greyOf(a), q = greyOf(b), width = a.width, out = new Float64Array(p.value.length).fill(NaN);
+    const paths = (layer, i) => countAt(layer, i) * (layer.spp > 0 ? layer.spp : 1);
+    for (let y0 = 0; y0 < a.height; y0 += 8)
+      for (let x0 = 0; x0 < width; x0 += 8) {
+        let va = 0, vb = 0;
+        const inside = [];
+        for (let y = y0; y < Math.min(y0 + 8, a.height); y++)
+          for (let x = x0; x < Math.min(x0 + 8, width); x++) inside.push(y * width + x);
+        for (const i of inside) {
+          va += p.error[i] ** 2 * paths(a, i);
+          vb += q.error[i] ** 2 * paths(b, i);
+        }
+        if (va > 0 && vb > 0) for (const i of inside) out[i] = Math.log2(va / vb);
+      }
+    return out;
+  },
+  samples(a) {
+    return Float64Array.from({ length: a.width * a.height }, (_, i) => countAt(a, i));
+  },
+};
+
+const percent = (v) => digits(100 * v) + "\u00a0%";
+
+// How each map is shown and read. range(values): [low, high]; a diverging map is symmetric.
+const mapKinds = {
+  difference: {
+    key: "d", name: "Difference", diverging: true, range: (v) => symmetric(v, 0.001, 1),
+    label: (v) => (v > 0 ? "+" : "") + percent(v),
+    says: (a, b) => "Red: " + a + " is brighter than " + b + "; blue: darker; white: equal. In per cent of " + b +
+      ", or of 5 % of its mean where it is darker. Single pixels are noisy: only a patch of one colour matters.",
+  },
+  t: {
+    key: "t", name: "t map", diverging: true, range: () => [-4, 4], label: (v) => (v > 0 ? "+" : "") + digits(v),
+    says: (a, b, v) => "The same difference in units of its noise: one unit is what chance alone does. If both agree " +
+      "this is an even mix of pale red and blue, and about 5 of 100 pixels are beyond \u00b12" + beyondTwo(v) +
+      ". A shape that you recognise is a real difference.",
+  },
+  error: {
+    key: "e", name: "Error", diverging: false, range: (v) => [0, symmetric(v, 0.001, 1)[1]], label: percent,
+    says: () => "How far off the picture is around each pixel (5 \u00d7 5) once the error that noise alone " +
+      "explains is taken out. Noise leaves scattered blotches on about half of a right picture; what follows " +
+      "the shapes of the scene is error.",
+  },
+  variance: {
+    key: "v", name: "Variance ratio", diverging: true, range: () => [-3, 3],
+    label: (v) => (v < 0 ? "1/" + digits(2 ** -v) : digits(2 ** v)) + "\u00a0\u00d7",
+    says: (a, b) => "How noisy one path of " + a + " is against one of " + b + ", in squares of 8 \u00d7 8 pixels. Red: " +
+      a + " is the noisier one; grey: one of them has no noise. It need not be equal, but should be smooth.",
+  },
+  samples: {
+    key: "n", name: "Samples", diverging: false, range: (v) => [0, v.reduce((m, x) => Math.max(m, x), 1)],
+    label: (v) => digits(v, 6),
+    says: (a, b, v) => "How often each pixel of " + a + " was observed" +
+      (v.every((x) => x === v[0]) ? ": " + v[0] + " times, all of them." : "; adaptive sampling spends more where noise is."),
+  },
+};
+
+// The 98th percentile of |v|, rounded up to 1, 2 or 5 times a power of ten, from least to most.
+function symmetric(values, least, most) {
+  const sorted = Float64Array.from(values, Math.abs).filter(Number.isFinite).sort();
+  const p98 = sorted.length ? sorted[Math.ceil(0.98 * sorted.length) - 1] : 0;
+  let r = least;
+  for (let i = 1; r < p98 && r < most; i++) r = least * [1, 2, 5][i % 3] * 10 ** Math.floor(i / 3);
+  return [-r, r];
+}
+
+function beyondTwo(t) {
+  const noisy = t.filter((v) => v !== 0);
+  return noisy.length ? " (here " + (100 * noisy.filter((v) => Math.abs(v) > 2).length / noisy.length).toFixed(1) + ")" : "";
+}
+
+function digits(v, n = 3) {
+  return Number.isFinite(v) ? String(+v.toPrecision(n)).replace("-", "\u2212") : "none";
+}
+
+// "0.2513 \u00b1 0.0021": as many decimals as two digits of the error need; without an error, 4 digits.
+function withError(v, error) {
+  if (!(error > 0)) return digits(v, 4);
+  const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 12);
+  return (v.toFixed(decimals) + " \u00b1 " + error.toFixed(decimals)).replace(/-/g, "\u2212");
+}
+
+// Fills RGBA bytes with a map's colours; grey where there is no number.
+function paintMap(rgba, values, range, diverging) {
+  const base = diverging ? 0 : SEQUENTIAL, last = diverging ? 256 : 255;
+  for (let i = 0; i < values.length; i++) {
+    const u = (values[i] - range[0]) / (range[1] - range[0]);
+    const at = base + 3 * Math.round(last * Math.min(Math.max(u, 0), 1)), known = u === u;
+    rgba[4 * i] = known ? LUT[at] : 128;
+    rgba[4 * i + 1] = known ? LUT[at + 1] : 128;
+    rgba[4 * i + 2] = known ? LUT[at + 2] : 128;
+    rgba[4 * i + 3] = 255;
+  }
+}
+
+const curves = {
+  sRGB: (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055),
+  linear: (v) => v,
+  "gamma 2.2": (v) => v ** (1 / 2.2),
+  "log, 4 decades": (v) => (v > 0 ? 1 + Math.log10(v) / 4 : 0),
+};
+const CURVE_STEPS = 16384;
+const curveTables = {};
+function curveTable(name) {
+  if (!curveTables[name])
+    curveTables[name] = Uint8Array.from({ length: CURVE_STEPS + 1 },
+      (_, i) => Math.round(255 * Math.min(1, Math.max(0, curves[name](i / CURVE_STEPS)))));
+  return curveTables[name];
+}
+
+// Fills RGBA bytes with radiance times gain through a curve.
+function paintPicture(rgba, layer, gain, curve) {
+  const table = curveTable(curve), [r, g, b] = layer.value, scale = gain * CURVE_STEPS;
+  const code = (v) => table[v <= 0 ? 0 : v >= CURVE_STEPS ? CURVE_STEPS : (v + 0.5) | 0];
+  for (let i = 0; i < r.length; i++) {
+    rgba[4 * i] = code(r[i] * scale);
+    rgba[4 * i + 1] = code(g[i] * scale);
+    rgba[4 * i + 2] = code(b[i] * scale);
+    rgba[4 * i + 3] = 255;
+  }
+}

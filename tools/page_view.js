@@ -1,0 +1,192 @@
+// One frame of the page: a canvas that shows a picture or a map through its scene's zoom, with the marked
+// tile and pixel, and hands pointer and keys to the scene.
+
+function make(tag, properties, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, v] of Object.entries(properties || {}))
+    if (name.includes("-") || name === "role") element.setAttribute(name, v);
+    else element[name] = v;
+  element.append(...children);
+  return element;
+}
+
+const waiting = new Set();
+function redraw(pane) {
+  if (waiting.size === 0) requestAnimationFrame(() => {
+    const now = [...waiting];
+    waiting.clear();
+    now.forEach((p) => p.draw());
+  });
+  waiting.add(pane);
+}
+
+const seen = new IntersectionObserver((entries) => {
+  for (const entry of entries) {
+    const pane = entry.target.pane;
+    pane.visible = entry.isIntersecting;
+    if (pane.visible) {
+      pane.scene.load();
+      redraw(pane);
+    }
+  }
+}, { rootMargin: "300px" });
+const resized = new ResizeObserver((entries) => entries.forEach((entry) => redraw(entry.target.pane)));
+
+class Pane {
+  // source() says what to show: {id, key, paint(rgba), label}, {.., over} with the wiped-in one, or null.
+  constructor(scene, source) {
+    this.scene = scene;
+    this.source = source;
+    this.visible = false;
+    this.canvas = make("canvas", { role: "img" });
+    this.frame = make("div", { className: "frame", tabIndex: 0 }, this.canvas);
+    this.frame.style.aspectRatio = scene.width + " / " + scene.height;
+    this.frame.pane = this;
+    this.pointers = new Map();
+    this.listen();
+    scene.panes.add(this);
+    seen.observe(this.frame);
+    resized.observe(this.frame);
+  }
+
+  // A picture at one pixel a pixel, for all frames; painted again only when its key has changed.
+  buffer(source) {
+    const { width, height, buffers } = this.scene;
+    let b = buffers.get(source.id);
+    if (!b) buffers.set(source.id, b = { canvas: make("canvas", { width, height }) });
+    if (b.key !== source.key) {
+      const context = b.canvas.getContext("2d"), image = context.createImageData(width, height);
+      source.paint(image.data);
+      context.putImageData(image, 0, 0);
+      b.key = source.key;
+    }
+    return b.canvas;
+  }
+
+  draw(force) {
+    const source = (this.visible || force) && this.scene.ready && this.frame.clientWidth > 0 ? this.source() : null;
+    if (!source) return;
+    const s = this.scene, v = s.view, ratio = window.devicePixelRatio || 1;
+    const width = Math.round(this.frame.clientWidth * ratio), height = Math.round(width * s.height / s.width);
+    if (this.canvas.width !== width || this.canvas.height !== height)
+      Object.assign(this.canvas, { width, height });
+    if (source.prepare) source.prepare();
+    this.canvas.setAttribute("aria-label", source.label);
+    const c = this.canvas.getContext("2d"), scale = width / s.width * v.zoom;
+    c.imageSmoothingEnabled = scale < 1;
+    const put = (what, x0, x1) => {
+      c.save();
+      c.beginPath();
+      c.rect(x0, 0, x1 - x0, height);
+      c.clip();
+      c.setTransform(scale, 0, 0, scale, -v.x * scale, -v.y * scale);
+      c.drawImage(this.buffer(what), 0, 0);
+      c.restore();
+    };
+    const split = source.over ? Math.round(width * s.wipe) : width;
+    if (source.over) put(source.over, split, width);
+    put(source, 0, split);
+    const box = (x, y, w, h, inner) => {
+      const r = [(x - v.x) * scale, (y - v.y) * scale, w * scale, h * scale];
+      c.lineWidth = 3 * ratio;
+      c.strokeStyle = inner ? "#000" : "#fff";
+      c.strokeRect(...r);
+      c.lineWidth = 1.2 * ratio;
+      c.strokeStyle = inner ? "#fff" : "#000";
+      c.strokeRect(...r);
+    };
+    if (source.over) {
+      c.fillStyle = "#fff";
+      c.fillRect(split - 1.5 * ratio, 0, 3 * ratio, height);
+      c.fillStyle = "#000";
+      c.fillRect(split - 0.5 * ratio, 0, ratio, height);
+    }
+    if (s.grid) {
+      c.beginPath();
+      for (let x = s.grid; x < s.width; x += s.grid) c.rect((x - v.x) * scale, 0, 0, height);
+      for (let y = s.grid; y < s.height; y += s.grid) c.rect(0, (y - v.y) * scale, width, 0);
+      c.lineWidth = ratio;
+      c.strokeStyle = "rgba(128,128,128,.75)";
+      c.stroke();
+    }
+    if (s.tile) box(s.tile.x, s.tile.y, s.tile.side, s.tile.side, false);
+    if (s.pixel) box(s.pixel.x, s.pixel.y, 1, 1, true);
+  }
+
+  // Where in the picture a pointer event is, in pixels and parts of them.
+  place(e) {
+    const r = this.frame.getBoundingClientRect(), s = this.scene, scale = r.width / s.width * s.view.zoom;
+    return { x: s.view.x + (e.clientX - r.left) / scale, y: s.view.y + (e.clientY - r.top) / scale,
+             share: (e.clientX - r.left) / r.width, scale };
+  }
+
+  listen() {
+    const f = this.frame, s = this.scene;
+    f.addEventListener("pointerdown", (e) => {
+      this.pointers.set(e.pointerId, e);
+      this.moved = false;
+      this.wiping = s.wiping && this === s.stagePane && Math.abs(this.place(e).share - s.wipe) < 0.06;
+      if (this.wiping || s.view.zoom > 1) f.setPointerCapture(e.pointerId);
+    });
+    f.addEventListener("pointermove", (e) => {
+      const last = this.pointers.get(e.pointerId), at = this.place(e);
+      if (last && this.wiping) {
+        s.setWipe(at.share);
+        this.moved = true;
+      } else if (last && this.pointers.size === 2) {
+        const other = [...this.pointers.values()].find((p) => p.pointerId !== e.pointerId);
+        const before = Math.hypot(last.clientX - other.clientX, last.clientY - other.clientY);
+        const now = Math.hypot(e.clientX - other.clientX, e.clientY - other.clientY);
+        s.zoom(s.view.zoom * now / Math.max(before, 1), at.x, at.y);
+        this.moved = true;
+      } else if (last && s.view.zoom > 1) {
+        const dx = e.clientX - last.clientX, dy = e.clientY - last.clientY;
+        this.moved = this.moved || Math.hypot(dx, dy) > 2;
+        s.pan(-dx / at.scale, -dy / at.scale);
+      }
+      if (last) this.pointers.set(e.pointerId, e);
+      else s.point(Math.floor(at.x), Math.floor(at.y));
+    });
+    const end = (e) => {
+      if (e.type === "pointerup" && this.pointers.has(e.pointerId) && !this.moved) {
+        const at = this.place(e);
+        s.point(Math.floor(at.x), Math.floor(at.y));
+        s.pickTile(Math.floor(at.x), Math.floor(at.y));
+      }
+      this.pointers.delete(e.pointerId);
+    };
+    f.addEventListener("pointerup", end);
+    f.addEventListener("pointercancel", end);
+    f.addEventListener("pointerleave", (e) => { if (!f.hasPointerCapture(e.pointerId)) this.pointers.delete(e.pointerId); });
+    f.addEventListener("dblclick", (e) => {
+      const at = this.place(e);
+      s.zoom(s.view.zoom * (e.shiftKey ? 0.5 : 2), at.x, at.y);
+    });
+    f.addEventListener("wheel", (e) => {
+      if (!e.ctrlKey && !e.metaKey) return; // the page still scrolls
+      e.preventDefault();
+      const at = this.place(e);
+      s.zoom(s.view.zoom * 2 ** (-e.deltaY / 100), at.x, at.y);
+    }, { passive: false });
+    f.addEventListener("keydown", (e) => {
+      const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
+      if (e.key === "Enter" && s.pixel) s.pickTile(s.pixel.x, s.pixel.y);
+      if (!step || e.ctrlKey || e.metaKey || e.altKey) return;
+      e.preventDefault();
+      const far = e.shiftKey ? 8 : 1, from = s.pixel || { x: 0, y: 0 };
+      s.point(from.x + far * step[0], from.y + far * step[1]);
+      s.follow();
+    });
+  }
+}
+
+function legend(range, kind) {
+  const canvas = make("canvas", { width: 257, height: 1, role: "img", "aria-label": "colour scale" });
+  const context = canvas.getContext("2d"), image = context.createImageData(257, 1);
+  paintMap(image.data, Float64Array.from({ length: 257 }, (_, i) => range[0] + (range[1] - range[0]) * i / 256),
+           range, kind.diverging);
+  context.putImageData(image, 0, 0);
+  const middle = (range[0] + range[1]) / 2;
+  return make("div", { className: "legend" }, canvas, ...[range[0], middle, range[1]].map((v) =>
+    make("span", {}, kind.label(v))));
+}

@@ -1,0 +1,230 @@
+#include "report_power.h"
+
+#include "report_csv.h"
+#include "report_html.h"
+#include "results.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_cdf.h>
+
+enum { LEFT = 44, TOP = 8, WIDTH = 300, HEIGHT = 200, BOTTOM = TOP + HEIGHT };
+
+static void write_frame(FILE *f, const char *label, const char *x, const char *y)
+{
+    fprintf(f,
+            "<figure class=\"map\"><svg class=\"plot\" viewBox=\"0 0 %d %d\" role=\"img\" "
+            "aria-label=\"%s\"><text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>"
+            "<text transform=\"translate(11 %d) rotate(-90)\" text-anchor=\"middle\">%s</text>",
+            LEFT + WIDTH + 14, BOTTOM + 40, label, LEFT + WIDTH / 2, BOTTOM + 34, x,
+            TOP + HEIGHT / 2, y);
+}
+
+static void write_axes(FILE *f)
+{
+    fprintf(f, "<path class=\"axis\" d=\"M%d %dV%dH%d\"/>", LEFT, TOP, BOTTOM, LEFT + WIDTH);
+}
+
+void qq_band(int i, int n, double *low, double *high)
+{
+    *low = gsl_cdf_beta_Pinv(0.025, i, n + 1 - i);
+    *high = gsl_cdf_beta_Pinv(0.975, i, n + 1 - i);
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Ends of the axes of a QQ plot of n tiles, in -log10 p. */
+struct qq_axes {
+    int n;
+    double right, top;
+};
+
+/* Of the i-th smallest p, where uniform ones would have it. */
+static double qq_x(const struct qq_axes *a, int i)
+{
+    return LEFT + WIDTH * -log10(i / (a->n + 1.0)) / a->right;
+}
+
+static double qq_y(const struct qq_axes *a, double v)
+{
+    return BOTTOM - HEIGHT * fmin(v, a->top) / a->top;
+}
+
+/* Every tile while there are few, then ever fewer of those with large p, which lie on each other. */
+static int next_shown(int i, int n)
+{
+    return i + 1 + (n > 100 ? i / 50 : 0);
+}
+
+static void write_band(FILE *f, const struct qq_axes *a)
+{
+    double low, high;
+    fputs("<path class=\"band\" d=\"", f);
+    for (int i = 1; i <= a->n; i = next_shown(i, a->n)) {
+        qq_band(i, a->n, &low, &high);
+        fprintf(f, "%s%.1f %.1f", i == 1 ? "M" : "L", qq_x(a, i), qq_y(a, -log10(low)));
+    }
+    for (int i = a->n; i >= 1; i -= next_shown(i, a->n) - i) {
+        qq_band(i, a->n, &low, &high);
+        fprintf(f, "L%.1f %.1f", qq_x(a, i), qq_y(a, -log10(high)));
+    }
+    fputs("Z\"/>", f);
+}
+
+/* Distance of ticks: 1, 2 or 5 times a power of ten, at most five of them. */
+static double tick(double top)
+{
+    double power = pow(10, floor(log10(top / 5))), share = top / 5 / power;
+    return power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
+}
+
+static void write_tile_csv(FILE *f, const json_t *claim)
+{
+    const json_t *p = json_object_get(claim, "tile_log10_p"), *t = json_object_get(claim, "tile_t");
+    size_t columns = (size_t)member_number(claim, "tiles_x");
+    double side = member_number(claim, "tile");
+    struct csv csv = csv_open(f, "tiles.csv", "x,y,t,log10_p");
+    for (size_t i = 0; columns > 0 && i < json_array_size(p); i++) {
+        const json_t *one = json_array_get(p, i);
+        csv_number(&csv, side * (double)(i % columns));
+        csv_number(&csv, side * (double)(i / columns));
+        csv_number(&csv, json_is_number(one) ? json_number_value(json_array_get(t, i)) : NAN);
+        csv_number(&csv, json_is_number(one) ? json_number_value(one) : NAN);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+}
+
+void report_qq(FILE *f, const json_t *claim)
+{
+    const json_t *list = json_object_get(claim, "tile_log10_p");
+    double *v = calloc(json_array_size(list) + 1, sizeof *v);
+    int n = 0, outside = 0;
+    for (size_t i = 0; v != NULL && i < json_array_size(list); i++)
+        if (json_is_number(json_array_get(list, i)))
+            v[n++] = fmin(json_number_value(json_array_get(list, i)), 0);
+    if (n >= 4) {
+        qsort(v, (size_t)n, sizeof *v, compare_doubles);
+        /* What is far out must not flatten the rest. */
+        double chance = -log10(1 / (n + 1.0));
+        struct qq_axes a = {n, 1.05 * chance, fmin(fmax(-v[0], 1.6 * chance), 2.5 * chance)};
+        write_frame(f, "Observed against expected p-values of the tiles, as minus log10",
+                    "expected −log₁₀ p", "observed −log₁₀ p");
+        write_band(f, &a);
+        fprintf(f, "<path class=\"expected\" d=\"M%d %dL%d %.1f\"/>", LEFT, BOTTOM, LEFT + WIDTH,
+                qq_y(&a, a.right));
+        fputs("<path class=\"points\" d=\"", f);
+        for (int i = 1; i <= n; i = next_shown(i, n))
+            fprintf(f, "M%.1f %.1fh0", qq_x(&a, i), qq_y(&a, -v[i - 1]));
+        fputs("\"/>", f);
+        for (int i = 1; i <= n; i++) {
+            double low, high;
+            qq_band(i, n, &low, &high);
+            outside += pow(10, v[i - 1]) < low;
+        }
+        write_axes(f);
+        for (double x = 0, step = tick(a.right); x <= a.right; x += step)
+            fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>",
+                    LEFT + WIDTH * x / a.right, BOTTOM + 16, x);
+        for (double y = 0, step = tick(a.top); y <= a.top; y += step)
+            fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%g</text>", LEFT - 6,
+                    qq_y(&a, y) + 4, y);
+        fprintf(
+            f,
+            "</svg><figcaption><b>The same p-values against those that chance gives.</b> If both "
+            "have the same mean the points follow the dashed line and stay in the band, each 95 "
+            "times of 100. Points above the band at the right are tiles that chance does not "
+            "explain; here %d of %d are above it. ",
+            outside, n);
+        write_tile_csv(f, claim);
+        fputs("</figcaption></figure>\n", f);
+    }
+    free(v);
+}
+
+struct power power_of(const json_t *claim)
+{
+    const json_t *statistics = json_object_get(claim, "statistics");
+    struct power p = {.margin = member_number(claim, "margin_global")};
+    double mdb = member_number(claim, "mdb_global");
+    for (size_t i = 0; i < json_array_size(statistics); i++) {
+        const json_t *s = json_array_get(statistics, i);
+        double tests = member_number(s, "num_tests");
+        double level = member_number(claim, "alpha") * member_number(s, "share") / tests;
+        if (strcmp(member_text(s, "name"), "image") == 0 && tests > 0 && level > 0)
+            p.critical = gsl_cdf_ugaussian_Qinv(level / 2);
+    }
+    /* Beyond 10 no test covers the image (1e6). */
+    if (p.critical > 0 && mdb > p.margin && mdb < 10)
+        p.error = (mdb - p.margin) / (p.critical + gsl_cdf_ugaussian_Qinv(0.05));
+    return p;
+}
+
+double power_at(const struct power *p, double bias)
+{
+    return gsl_cdf_ugaussian_P((fabs(bias) - p->margin) / p->error - p->critical);
+}
+
+static double power_y(double share)
+{
+    return BOTTOM - HEIGHT * share;
+}
+
+static void write_mark(FILE *f, double x, double top, bool left, const char *text, double y)
+{
+    double at = LEFT + WIDTH * x / top;
+    fprintf(f,
+            "<path class=\"expected\" d=\"M%.1f %dV%d\"/><text x=\"%.1f\" y=\"%.1f\" "
+            "text-anchor=\"%s\">%s</text>",
+            at, TOP, BOTTOM, left ? at - 5 : at + 5, y, left ? "end" : "start", text);
+}
+
+void report_power(FILE *f, const json_t *claim)
+{
+    enum { STEPS = 60 };
+    struct power p = power_of(claim);
+    double mdb = member_number(claim, "mdb_global"), top = 1.3 * mdb;
+    if (!(p.error > 0))
+        return;
+    write_frame(f, "Chance to find a bias of the image, against its size",
+                "true bias of the image, %", "chance of DIFFERENT, %");
+    if (p.margin > 0)
+        fprintf(f, "<rect class=\"band\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>", LEFT,
+                TOP, WIDTH * p.margin / top, HEIGHT);
+    fputs("<path class=\"curve\" d=\"", f);
+    for (int i = 0; i <= STEPS; i++)
+        fprintf(f, "%s%.1f %.1f", i == 0 ? "M" : "L", LEFT + (double)WIDTH * i / STEPS,
+                power_y(power_at(&p, top * i / STEPS)));
+    fputs("\"/>", f);
+    write_mark(f, mdb, top, false, "MDB", power_y(0.45));
+    if (p.margin > 0)
+        write_mark(f, p.margin, top, true, "margin", power_y(0.8));
+    write_axes(f);
+    for (int i = 0; i <= 4; i++)
+        fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%d</text>", LEFT - 6,
+                power_y(i / 4.0) + 4, 25 * i);
+    for (double x = 0, step = tick(100 * top); x <= 100 * top; x += step)
+        fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>",
+                LEFT + WIDTH * x / (100 * top), BOTTOM + 16, plain_number(x).s);
+    fprintf(
+        f,
+        "</svg><figcaption><b>What this claim could have found.</b> If the image were too bright "
+        "or too dark by what is on the axis, this is the chance that its mean alone made the claim "
+        "DIFFERENT. Inside the margin (shaded) that would be wrong and is rare; at the MDB, %s, it "
+        "is 95\u00a0%%. ",
+        percent_plain(mdb).s);
+    struct csv csv = csv_open(f, "power.csv", "bias,power");
+    for (int i = 0; i <= STEPS; i += 3) {
+        csv_number(&csv, top * i / STEPS);
+        csv_number(&csv, power_at(&p, top * i / STEPS));
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+    fputs("</figcaption></figure>\n", f);
+}
