@@ -53,6 +53,18 @@ static uint8_t *codes(const struct picture *pic)
     return rgb8;
 }
 
+static bool write_png(FILE *f, int width, int height, const uint8_t *rgb8, struct err *e)
+{
+    uint8_t *bytes;
+    size_t size;
+    if (!image_encode_png(width, height, rgb8, &bytes, &size, e))
+        return false;
+    fputs("data:image/png;base64,", f);
+    html_base64(f, bytes, size);
+    free(bytes);
+    return true;
+}
+
 static bool show_picture(FILE *f, const char *path, const char *name, struct err *e)
 {
     struct picture pic;
@@ -62,7 +74,7 @@ static bool show_picture(FILE *f, const char *path, const char *name, struct err
     uint8_t *rgb8 = codes(&pic);
     bool ok = rgb8 != NULL || err_set(e, "out of memory");
     fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", SHOWN);
-    ok = ok && html_png(f, pic.width, pic.height, rgb8, e);
+    ok = ok && write_png(f, pic.width, pic.height, rgb8, e);
     fputs("\"><figcaption>", f);
     html_text(f, name);
     fputs(", yours</figcaption></figure>\n", f);
