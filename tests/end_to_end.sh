@@ -616,7 +616,7 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
     expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
-    mkdir -p "$tmp/wrong" && cp "$build/mutants/point_light_linear/pathtracer" "$tmp/wrong/student" && cp "$pathtracer" "$tmp/wrong/right"
+    mkdir -p "$tmp/wrong" && cp -r "$build/mutants/point_light_linear" "$tmp/wrong/student" && cp "$pathtracer" "$tmp/wrong/right"
     sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
         $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
         sed 's/^total 8/total 10/' >"$tmp/named.rubric"
