@@ -385,17 +385,25 @@ static void rates_are_whole_batches_or_not(void **state)
     char path[128];
     struct rates r;
     struct err e;
+    static double ours[PIXELS];
     snprintf(path, sizeof path, "%s/rate.png", dir);
     for (size_t p = 0; p < PIXELS; p++) {
         const uint8_t quarter[3] = {0, 127, 127}, all[3] = {255, 0, 0}, odd[3] = {0, 60, 195};
+        ours[p] = p < 1024 ? 16 : 64;
         memcpy(rgb8 + 3 * p, p < 1024 ? quarter : p < 3000 ? all : odd, 3);
     }
     assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
-    assert_true(rates_read(path, WIDTH, HEIGHT, 64, 16, &r, &e));
+    assert_true(rates_read(path, WIDTH, HEIGHT, 64, 16, ours, &r, &e));
     assert_true(r.odd == PIXELS - 3000);
     assert_true(r.early == 1024 + PIXELS - 3000);
-    assert_false(rates_read(path, 32, 32, 64, 16, &r, &e));
-    assert_false(rates_read(path, WIDTH, HEIGHT, 64000, 16, &r, &e));
+    /* The odd ones (rate .118 of 64 is 7.5) are nearest to 16: 72 pixels have 48 too few. */
+    double mean = (1024.0 * 16 + 1976.0 * 64 + 72.0 * 16) / PIXELS,
+           right = (1024.0 * 16 + 2048.0 * 64) / PIXELS;
+    assert_true(fabs(r.mean - mean) < 1e-9 && fabs(r.more - (mean / right - 1)) < 1e-9);
+    assert_true(fabs(r.sd * right - 48 * sqrt(72.0 / PIXELS * (1 - 72.0 / PIXELS) / PIXELS)) <
+                1e-9);
+    assert_false(rates_read(path, 32, 32, 64, 16, ours, &r, &e));
+    assert_false(rates_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
 }
 
 /* Files that are no pictures, and one that says it is large: the header alone is read. */

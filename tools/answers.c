@@ -128,6 +128,19 @@ static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
     return render_ours(r, &ours, opt, out, e);
 }
 
+/* With the student's options and samples: how many of them each pixel takes. */
+static bool as_asked(const struct rubric *r, int picture, const struct answer_options *opt,
+                     struct moments *out, struct err *e)
+{
+    struct rubric_picture ours = r->picture[picture];
+    bool needed = false;
+    for (int i = 0; i < r->num_checks; i++)
+        needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
+    ours.reference_spp = ours.spp;
+    ours.reference_options[0] = '\0';
+    return !needed || render_ours(r, &ours, opt, out, e);
+}
+
 bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
                   struct err *e)
 {
@@ -139,7 +152,7 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
         const struct rubric_picture *p = &r->picture[i];
         struct answer *a = &out->picture[i];
         ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
-        ok = ok && noise_of(r, p, opt, &a->noise, e);
+        ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, opt, &a->as_asked, e);
         for (int k = 0; ok && k < p->num_accepted; k++) {
             snprintf(path, sizeof path, "%s/%s", r->dir, p->accept[k].file);
             ok = moments_read(path, &a->accepted[k], NULL, e);
@@ -159,6 +172,7 @@ void answers_free(struct answers *a)
     for (int i = 0; i < RUBRIC_PICTURES; i++) {
         moments_free(&a->picture[i].m);
         moments_free(&a->picture[i].noise);
+        moments_free(&a->picture[i].as_asked);
         for (int k = 0; k < RUBRIC_ACCEPTED; k++)
             moments_free(&a->picture[i].accepted[k]);
     }

@@ -140,6 +140,14 @@ static bool grade_made(const struct grade_job *job, const struct submission *s, 
     struct handed_in *h = calloc(1, sizeof *h);
     bool ok = h != NULL || err_set(e, "out of memory");
     ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, e);
+    bool lost =
+        ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
+    json_object_set_new(grade, "diagnosis",
+                        lost && job->diagnosis != NULL && s->kind != SUBMISSION_IMAGES &&
+                                s->why[0] == '\0'
+                            ? diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed,
+                                           job->threads, job->alpha)
+                            : json_null());
     for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
         student_free(&h->picture[i]);
     free(h);

@@ -2,6 +2,7 @@
 #ifndef ASSAY_GRADE_H
 #define ASSAY_GRADE_H
 
+#include "grade_diagnose.h"
 #include "grading.h"
 
 #include <jansson.h>
@@ -14,7 +15,8 @@ struct grade_job {
     const char *out;         /* OUT/ID/grade.json and what else there is of it */
     const char *const *path; /* of the submissions */
     int num, jobs, threads;
-    double alpha; /* of one check */
+    double alpha;                            /* of one check */
+    const struct grade_diagnosis *diagnosis; /* NULL: bugs are not named */
     uint64_t seed;
     bool again; /* also those that have been graded already */
     void (*done)(void *ctx, int num, const char *id,
@@ -33,6 +35,7 @@ struct grade_job {
  *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null}],
  *     "pictures": [{"name": , "file": "NAME.png" | null, "why": , "end": "ok", "cpu_s": , "wall_s": ,
  *                   "width": , "height": , "sha256": | null}] }
+ *   "diagnosis": null | grade_diagnose.h
  * Texts of programs are in it: whoever shows them has to escape them. */
 
 /* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go

@@ -2,6 +2,7 @@
 
 #include "../reference/json_file.h"
 #include "../renderer/fs.h"
+#include "grade_page.h"
 #include "report_html.h"
 #include "results.h"
 
@@ -17,12 +18,6 @@ static double rounded(double points)
     return round(100 * points) / 100;
 }
 
-static const char *text_of(const json_t *object, const char *key)
-{
-    const char *text = json_string_value(json_object_get(object, key));
-    return text != NULL ? text : "";
-}
-
 static bool is_judged(const json_t *check)
 {
     return json_is_true(json_object_get(check, "judged"));
@@ -36,19 +31,40 @@ static bool is_full(const json_t *check)
 /* What a student reads of a check. */
 static void describe(const json_t *c, char *out, size_t size)
 {
-    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.", text_of(c, "expected"),
-                                text_of(c, "seen"));
-    if (text_of(c, "accepted")[0] != '\0' && n < size)
+    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.", grade_text(c, "expected"),
+                                grade_text(c, "seen"));
+    if (grade_text(c, "accepted")[0] != '\0' && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "\nExplained by what the starter code does (%s): no points lost for that.",
-            text_of(c, "accepted"));
-    if (!is_full(c) && text_of(c, "hint")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", text_of(c, "hint"));
-    if (!is_full(c) && text_of(c, "where")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", text_of(c, "where"));
+            grade_text(c, "accepted"));
+    if (!is_full(c) && grade_text(c, "hint")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", grade_text(c, "hint"));
+    if (!is_full(c) && grade_text(c, "where")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", grade_text(c, "where"));
     if (!is_judged(c) && n < size)
         snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
+}
+
+/* What is said of the submission as a whole, the bug's name with its place above all. */
+static void describe_whole(const json_t *grade, char *out, size_t size)
+{
+    const json_t *diagnosis = json_object_get(grade, "diagnosis");
+    size_t n = (size_t)snprintf(out, size, "%s%s", grade_text(grade, "trouble"),
+                                grade_text(grade, "wrong")),
+           i;
+    json_t *b;
+    if (strcmp(grade_text(diagnosis, "finding"), "unknown") == 0 && n < size)
+        n += (size_t)snprintf(
+            out + n, size - n,
+            "Different from the right pictures in a way that no known bug explains.");
+    json_array_foreach(json_object_get(diagnosis, "named"), i, b)
+    {
+        if (n < size)
+            n += (size_t)snprintf(out + n, size - n, "%s%s (%s)",
+                                  i == 0 ? "This looks like: " : "\nor: ", grade_text(b, "bug"),
+                                  grade_text(b, "where"));
+    }
 }
 
 /* Fields as documented at gradescope-autograders.readthedocs.io, "specs": points and texts of every check, no
@@ -62,17 +78,17 @@ static json_t *gradescope(const json_t *grade)
     {
         char output[4096], name[400], number[32];
         describe(c, output, sizeof output);
-        snprintf(name, sizeof name, "Part %s: %s", text_of(c, "part"), text_of(c, "title"));
-        snprintf(number, sizeof number, "%s.%zu", text_of(c, "part"), i + 1);
+        snprintf(name, sizeof name, "Part %s: %s", grade_text(c, "part"), grade_text(c, "title"));
+        snprintf(number, sizeof number, "%s.%zu", grade_text(c, "part"), i + 1);
         json_array_append_new(tests,
                               json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
                                         rounded(member_number(c, "points")), "max_score",
                                         member_number(c, "of"), "name", name, "number", number,
-                                        "output", output, "visibility", text_of(c, "visibility"),
+                                        "output", output, "visibility", grade_text(c, "visibility"),
                                         "status", is_full(c) ? "passed" : "failed"));
     }
-    const char *whole =
-        text_of(grade, "trouble")[0] != '\0' ? text_of(grade, "trouble") : text_of(grade, "wrong");
+    char whole[2048];
+    describe_whole(grade, whole, sizeof whole);
     json_object_set_new(root, "output", json_string(whole));
     json_object_set_new(root, "output_format", json_string("text"));
     json_object_set_new(root, "test_output_format", json_string("text"));
@@ -115,14 +131,15 @@ static void write_csv(FILE *f, const json_t *grades)
     json_array_foreach(json_object_get(first, "checks"), k, c)
     {
         fputc(',', f);
-        csv_text(f, text_of(c, "name"));
+        csv_text(f, grade_text(c, "name"));
     }
     fputs("\r\n", f);
     json_array_foreach(grades, i, g)
     {
-        csv_text(f, text_of(g, "id"));
+        csv_text(f, grade_text(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_text(f, text_of(g, "trouble")[0] != '\0' ? text_of(g, "trouble") : text_of(g, "wrong"));
+        csv_text(f, grade_text(g, "trouble")[0] != '\0' ? grade_text(g, "trouble")
+                                                        : grade_text(g, "wrong"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, ",%.2f", member_number(c, "points"));
@@ -153,18 +170,18 @@ static void write_tap(FILE *f, const json_t *grades)
     {
         if (json_array_size(json_object_get(g, "checks")) == 0) {
             fprintf(f, "not ok %zu - ", ++num);
-            tap_text(f, text_of(g, "id"));
+            tap_text(f, grade_text(g, "id"));
             fputs(": ", f);
-            tap_text(f, text_of(g, "trouble"));
+            tap_text(f, grade_text(g, "trouble"));
             fputc('\n', f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
-            tap_text(f, text_of(g, "id"));
-            fprintf(f, " %s (%.2f of %g): ", text_of(c, "name"), member_number(c, "points"),
+            tap_text(f, grade_text(g, "id"));
+            fprintf(f, " %s (%.2f of %g): ", grade_text(c, "name"), member_number(c, "points"),
                     member_number(c, "of"));
-            tap_text(f, text_of(c, "seen"));
+            tap_text(f, grade_text(c, "seen"));
             fputc('\n', f);
         }
     }
@@ -184,7 +201,7 @@ static void write_junit(FILE *f, const json_t *grades)
     fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
     json_array_foreach(grades, i, g)
     {
-        size_t failures = 0, errors = text_of(g, "trouble")[0] != '\0',
+        size_t failures = 0, errors = grade_text(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
@@ -192,12 +209,12 @@ static void write_junit(FILE *f, const json_t *grades)
             errors += !is_judged(c);
         }
         fputs("<testsuite", f);
-        xml_pair(f, "name", text_of(g, "id"));
+        xml_pair(f, "name", grade_text(g, "id"));
         fprintf(f, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" time=\"%.2f\">\n",
                 checks + (checks == 0), failures, errors, member_number(g, "cpu_s"));
         if (checks == 0) {
             fputs("<testcase name=\"submission\"><error", f);
-            xml_pair(f, "message", text_of(g, "trouble"));
+            xml_pair(f, "message", grade_text(g, "trouble"));
             fputs("/></testcase>\n", f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
@@ -205,12 +222,12 @@ static void write_junit(FILE *f, const json_t *grades)
             char output[4096];
             describe(c, output, sizeof output);
             fputs("<testcase", f);
-            xml_pair(f, "classname", text_of(c, "part"));
-            xml_pair(f, "name", text_of(c, "name"));
+            xml_pair(f, "classname", grade_text(c, "part"));
+            xml_pair(f, "name", grade_text(c, "name"));
             fputc('>', f);
             if (!is_full(c)) {
                 fputs(is_judged(c) ? "<failure" : "<error", f);
-                xml_pair(f, "message", text_of(c, "seen"));
+                xml_pair(f, "message", grade_text(c, "seen"));
                 fputc('>', f);
                 html_text(f, output);
                 fputs(is_judged(c) ? "</failure>" : "</error>", f);
@@ -243,7 +260,7 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
     json_array_foreach(grades, i, g)
     {
         json_t *results = gradescope(g);
-        snprintf(path, sizeof path, "%.4000s/%s/results.json", out, text_of(g, "id"));
+        snprintf(path, sizeof path, "%.4000s/%s/results.json", out, grade_text(g, "id"));
         ok = ok && (results != NULL || err_set(e, "out of memory")) && json_write(path, results, e);
         json_decref(results);
     }
@@ -252,4 +269,25 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
            write_file(out, "grades.csv", grades, write_csv, e) &&
            write_file(out, "junit.xml", grades, write_junit, e) &&
            write_file(out, "grades.tap", grades, write_tap, e);
+}
+
+bool grade_pages(const char *out, const json_t *grades, struct err *e)
+{
+    char path[MAX_PATH];
+    struct out_file o;
+    size_t i;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        snprintf(path, sizeof path, "%.4000s/%s/index.html", out, grade_text(g, "id"));
+        if (!make_parent_dirs(path, e) || !out_open(&o, path, e))
+            return false;
+        if (!grade_page(o.f, out, g, e)) {
+            out_abandon(&o);
+            return false;
+        }
+        if (!out_commit(&o, e))
+            return false;
+    }
+    return write_file(out, "index.html", grades, grade_overview, e);
 }

@@ -1,6 +1,7 @@
 #include "grading.h"
 
 #include "grading_rates.h"
+#include "stats.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -310,28 +311,36 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
 
 static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
+    const struct rubric_check *c = w->check;
+    const struct made *made = &w->h->made[c->picture[0]];
+    const struct moments *ours = &w->answers->picture[c->picture[0]].as_asked;
     struct rates rates;
     struct err why;
-    const struct made *made = &w->h->made[w->check->picture[0]];
     (void)e;
     snprintf(
         out->expected, sizeof out->expected,
-        "every pixel of the rate picture stands for a multiple of %d of at most %d samples, and some stop early",
-        w->check->batch, picture(w, 0)->spp);
+        "every pixel of the rate picture stands for a multiple of %d samples, and on average for as many as in our render, within %.3g %%",
+        c->batch, 100 * c->count.full);
     if (made->rates[0] == '\0') {
         snprintf(out->seen, sizeof out->seen, "there is no rate picture");
-    } else if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height,
-                           picture(w, 0)->spp, w->check->batch, &rates, &why)) {
-        snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
-    } else if (rates.early == 0) {
-        snprintf(out->seen, sizeof out->seen, "no pixel stopped early");
-    } else {
-        score_pixels(w, rates.odd, rates.pixels, out);
-        snprintf(
-            out->seen, sizeof out->seen,
-            "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early, %.3g samples a pixel on average",
-            rates.odd, rates.pixels, w->check->batch, rates.early, rates.mean);
+        return true;
     }
+    if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height, picture(w, 0)->spp,
+                    c->batch, ours->n, &rates, &why)) {
+        snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
+        return true;
+    }
+    double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
+    const struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    score_pixels(w, rates.odd, rates.pixels, out);
+    double share = score_share(&c->count, &count);
+    out->chance = share < 1 || out->share == 1 ? score_chance(&c->count, &count) : 0;
+    out->share = fmin(out->share, share);
+    snprintf(
+        out->seen, sizeof out->seen,
+        "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",
+        rates.odd, rates.pixels, c->batch, rates.early, rates.mean, 100 * count.value,
+        100 * count.lo, 100 * count.hi);
     return true;
 }
 

@@ -10,6 +10,8 @@ struct answer {
     struct moments m; /* of the reference; width 0: none */
     struct moments
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
+    struct moments
+        as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
     struct moments accepted[RUBRIC_ACCEPTED];
 };
 struct answers {

@@ -17,11 +17,12 @@ static double distance(const float *px, const uint8_t code[3])
     return d;
 }
 
-bool rates_read(const char *path, int width, int height, int most, int batch, struct rates *out,
-                struct err *e)
+bool rates_read(const char *path, int width, int height, int most, int batch,
+                const double *expected, struct rates *out, struct err *e)
 {
     struct picture pic;
     struct image_info info;
+    double ours = 0, squares = 0;
     *out = (struct rates){0};
     if (most / batch > MOST_BATCHES)
         return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
@@ -49,7 +50,13 @@ bool rates_read(const char *path, int width, int height, int most, int batch, st
         out->odd += least > ALLOWED;
         out->early += nearest < most;
         out->mean += nearest;
+        ours += expected[p];
+        squares += pow(nearest - expected[p], 2);
     }
+    out->more = out->mean / ours - 1;
+    double difference = (out->mean - ours) / out->pixels;
+    out->sd = sqrt(fmax(0, squares / out->pixels - difference * difference) / out->pixels) *
+              out->pixels / ours;
     out->mean /= out->pixels;
     picture_free(&pic);
     return true;

@@ -285,6 +285,8 @@ static bool read_in_check(struct statement *s, const char *word)
         take_margin(s, word, &c->image);
     else if (strcmp(word, "tile") == 0)
         take_margin(s, word, &c->tile);
+    else if (strcmp(word, "count") == 0)
+        take_margin(s, word, &c->count);
     else if (strcmp(word, "share") == 0)
         take_margin(s, word, &c->share);
     else if (strcmp(word, "ratio") == 0) {
@@ -314,6 +316,8 @@ static void read_statement(struct statement *s)
         take_text(s, word, r->curve, sizeof r->curve);
     else if (strcmp(word, "command") == 0)
         take_text(s, word, r->command, sizeof r->command);
+    else if (strcmp(word, "diagnose") == 0)
+        take_text(s, word, r->diagnose, sizeof r->diagnose);
     else if (strcmp(word, "output") == 0)
         take_text(s, word, r->output, sizeof r->output);
     else if (strcmp(word, "program") == 0)

@@ -11,6 +11,8 @@
  *   output NAME                         the file that {out} names: its ending is the kind of picture (out.png)
  *   program NAME                        the program inside a submitted directory (pathtracer)
  *   build WORDS                         run first in a submitted source tree; without it trees are as they are
+ *   diagnose WORDS                      a command as above that writes our moments (.exr) to {out}, from plain COLLADA:
+ *                                       programs that lose points are then diagnosed, and the bug is named
  *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
  *   total POINTS                        what all checks have to add up to
  *
@@ -37,6 +39,7 @@
  *     share D0 D1                       of pixels that are wrong (exact, rates)
  *     ratio D0 D1                       on the natural logarithm (noise)
  *     batch N                           samples (rates)
+ *     count D0 D1                       relative difference of the mean number of samples from ours (rates)
  *     title TEXT, hint TEXT, where TEXT (the place in the assignment)
  *     visibility hidden | after_due_date | after_published | visible (default) */
 #ifndef ASSAY_RUBRIC_H
@@ -103,7 +106,7 @@ struct rubric_check {
     double points;
     enum check_kind kind;
     int picture[CHECK_PICTURES], num_pictures; /* indices */
-    struct margin image, tile, share, log_ratio;
+    struct margin image, tile, share, log_ratio, count;
     int batch;
     char title[160], hint[512], where[160], visibility[24];
 };
@@ -115,7 +118,7 @@ struct rubric_part {
 
 struct rubric {
     char path[4096], dir[4096]; /* of the file; of what lies beside it */
-    char title[160], curve[32], command[1024], output[64], program[128], build[512];
+    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512];
     struct sandbox_limits limit;
     double build_s, total;
     struct rubric_part part[RUBRIC_PARTS];

@@ -25,22 +25,19 @@ static void set_default(char *text, size_t size, const char *value)
         snprintf(text, size, "%s", value);
 }
 
-static void check_command(struct rubric *r, struct rubric_mistakes *m)
+static void check_command(const char *what, const char *command, struct rubric_mistakes *m)
 {
     static const char *const known[] = {"program", "scene",   "out",     "width",   "height", "spp",
                                         "lights",  "bounces", "threads", "options", "seed",   NULL};
-    set_default(
-        r->command, sizeof r->command,
-        "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} {options} -f {out} {scene}");
-    for (const char *c = strchr(r->command, '{'); c != NULL; c = strchr(c + 1, '{')) {
+    for (const char *c = strchr(command, '{'); c != NULL; c = strchr(c + 1, '{')) {
         char name[32];
-        snprintf(name, sizeof name, "%.*s",
-                 (int)(strcspn(c + 1, "} ") < 31 ? strcspn(c + 1, "} ") : 31), c + 1);
+        size_t n = strcspn(c + 1, "} ");
+        snprintf(name, sizeof name, "%.*s", (int)(n < 31 ? n : 31), c + 1);
         if (!is_word(name, known))
-            mistake(m, LINE_WHOLE, "command: {%s} is nothing that is replaced", name);
+            mistake(m, LINE_WHOLE, "%s: {%s} is nothing that is replaced", what, name);
     }
-    if (strstr(r->command, "{out}") == NULL)
-        mistake(m, LINE_WHOLE, "command: without {out} there is no picture");
+    if (strstr(command, "{out}") == NULL)
+        mistake(m, LINE_WHOLE, "%s: without {out} there is no picture", what);
 }
 
 static void check_head(struct rubric *r, struct rubric_mistakes *m)
@@ -64,7 +61,12 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
                 r->output);
     if (r->program[0] == '/' || strstr(r->program, "..") != NULL)
         mistake(m, LINE_WHOLE, "program '%s' is not inside the submission", r->program);
-    check_command(r, m);
+    set_default(r->command, sizeof r->command,
+                "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} "
+                "{options} -f {out} {scene}");
+    check_command("command", r->command, m);
+    if (r->diagnose[0] != '\0')
+        check_command("diagnose", r->diagnose, m);
 }
 
 static bool is_beside(const struct rubric *r, const char *file)
@@ -152,7 +154,8 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
                       {"tile", c->tile.given, kinds[c->kind].image},
                       {"share", c->share.given, kinds[c->kind].share},
                       {"ratio", c->log_ratio.given, kinds[c->kind].ratio},
-                      {"batch", c->batch > 0, kinds[c->kind].batch}};
+                      {"batch", c->batch > 0, kinds[c->kind].batch},
+                      {"count", c->count.given, kinds[c->kind].batch}};
     for (size_t i = 0; i < sizeof statements / sizeof *statements; i++) {
         if (statements[i].given && !statements[i].wanted)
             mistake(m, c->line, "check '%s': '%s' is not for '%s'", c->name, statements[i].name,

@@ -302,13 +302,40 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     return ok;
 }
 
+/* Copies a picture of a directory to where those of programs are; `to` "" and the reason where there is none. */
+static bool take_image(const struct rubric *r, const struct submission *s, const char *name,
+                       const char *ending, const char *out_dir, char *to, char *why, size_t size,
+                       struct err *e)
+{
+    char from[MAX_PATH];
+    struct stat st;
+    to[0] = '\0';
+    if (!find_image(s, name, ending, from, sizeof from)) {
+        snprintf(why, size, "there is no %s.png, .exr, .pfm or .hdr", name);
+        return true;
+    }
+    if (stat(from, &st) != 0 || (size_t)st.st_size > r->limit.file) {
+        snprintf(why, size, "%s is larger than %zu MiB", last_part(from), r->limit.file >> 20);
+        return true;
+    }
+    snprintf(to, MAX_PATH, "%.4000s/%.300s", out_dir, last_part(from));
+    return copy_file(from, to, e);
+}
+
+static bool take_rates(const struct rubric *r, const struct submission *s, const char *name,
+                       const char *out_dir, char *to, struct err *e)
+{
+    char rates[80], why[400];
+    snprintf(rates, sizeof rates, "%s_rate", name);
+    return take_image(r, s, rates, ".png", out_dir, to, why, sizeof why, e);
+}
+
 bool submission_picture(const struct rubric *r, const struct sandbox *s,
                         const struct submission *sub, int picture, const char *stage,
                         const char *work, const char *out_dir, uint64_t seed, int threads,
                         struct made *made, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
-    char rates[80];
     *made = (struct made){.end = SANDBOX_OK};
     if (sub->why[0] != '\0') {
         snprintf(made->why, sizeof made->why, "%.590s", sub->why);
@@ -316,9 +343,6 @@ bool submission_picture(const struct rubric *r, const struct sandbox *s,
     }
     if (sub->kind != SUBMISSION_IMAGES)
         return run_program(r, s, sub, p, stage, work, out_dir, seed, threads, made, e);
-    if (!find_image(sub, p->name, NULL, made->path, sizeof made->path))
-        snprintf(made->why, sizeof made->why, "there is no %s.png, .exr, .pfm or .hdr", p->name);
-    snprintf(rates, sizeof rates, "%s_rate", p->name);
-    find_image(sub, rates, ".png", made->rates, sizeof made->rates);
-    return true;
+    return take_image(r, sub, p->name, NULL, out_dir, made->path, made->why, sizeof made->why, e) &&
+           take_rates(r, sub, p->name, out_dir, made->rates, e);
 }

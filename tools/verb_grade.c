@@ -22,6 +22,7 @@ enum option {
     OPT_PATHTRACER,
     OPT_GOLDEN,
     OPT_SUITE,
+    OPT_CATALOGUE,
     OPT_QUIET,
     OPT_HELP
 };
@@ -43,12 +44,13 @@ static const struct cli_option options[] = {
                         "our renderer, for references (the one beside this program)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
     [OPT_SUITE] = {0, "suite", 1, "DIR", "scenes (reference/scenes)"},
+    [OPT_CATALOGUE] = {0, "catalogue", 1, "DIR", "the stored effects of bugs (golden/diagnose)"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no lines on submissions"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
 struct settings {
-    const char *rubric, *out, *pathtracer, *golden, *suite;
+    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue;
     const char **submission;
     int num, jobs, threads;
     uint64_t seed;
@@ -83,6 +85,7 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         case OPT_PATHTRACER: s->pathtracer = v; break;
         case OPT_GOLDEN: s->golden = v; break;
         case OPT_SUITE: s->suite = v; break;
+        case OPT_CATALOGUE: s->catalogue = v; break;
         case OPT_QUIET: s->quiet = true; break;
         case OPT_HELP: s->help = true; break;
         }
@@ -158,11 +161,12 @@ static bool needs_staff(const json_t *grades)
     return false;
 }
 
-static int run_batch(const struct settings *s, const struct rubric *r,
+static int run_batch(const struct settings *s, const struct rubric *r, const struct suite *suite,
                      const struct answers *answers, const struct sandbox *box, struct err *e)
 {
-    char stage[512];
+    char stage[512], views[512];
     struct progress p = {s->num, s->quiet};
+    struct grade_diagnosis diagnosis = {0};
     struct grade_job job = {.rubric = r,
                             .answers = answers,
                             .sandbox = box,
@@ -178,17 +182,24 @@ static int run_batch(const struct settings *s, const struct rubric *r,
                             .done = tell,
                             .ctx = &p};
     json_t *grades = NULL;
+    int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%.400s/stage", box->dir);
-    if (!submission_stage(r, stage, e) || !grade_all(&job, &grades, e))
-        return EXIT_NOT_JUDGED;
-    int code = !grade_write(s->out, grades, e) ? EXIT_NOT_JUDGED
-               : needs_staff(grades)           ? EXIT_INCONCLUSIVE
-                                               : EXIT_EQUIVALENT;
+    snprintf(views, sizeof views, "%.400s/views", box->dir);
+    bool ok = submission_stage(r, stage, e);
+    if (ok && r->diagnose[0] != '\0') {
+        ok = diagnosis_open(r, s->catalogue, suite, views, &diagnosis, e);
+        job.diagnosis = &diagnosis;
+    }
+    ok = ok && grade_all(&job, &grades, e);
+    if (ok && grade_write(s->out, grades, e) && grade_pages(s->out, grades, e))
+        code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
+    diagnosis_close(&diagnosis);
     return code;
 }
 
-static int grade(const struct settings *s, const struct rubric *r, struct err *e)
+static int grade(const struct settings *s, const struct rubric *r, const struct suite *suite,
+                 struct err *e)
 {
     char cache[4400], pathtracer[PATH_MAX];
     struct answers *answers = calloc(1, sizeof *answers);
@@ -209,7 +220,7 @@ static int grade(const struct settings *s, const struct rubric *r, struct err *e
     if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL}, &box,
                      e)) {
         if (make_dirs(cache, e) && answers_make(r, &opt, answers, e))
-            code = run_batch(s, r, answers, &box, e);
+            code = run_batch(s, r, suite, answers, &box, e);
         sandbox_close(&box);
     } else if (!s->unsafe) {
         err_prefix(e, "programs are not run (--unsafe-no-sandbox)");
@@ -221,7 +232,7 @@ static int grade(const struct settings *s, const struct rubric *r, struct err *e
 
 int verb_grade(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite_dir[4096], golden[4096];
+    char pathtracer[4096], suite_dir[4096], golden[4096], catalogue[4096];
     beside_program(pathtracer, sizeof pathtracer, "pathtracer");
     struct settings s = {
         .out = "grades",
@@ -232,6 +243,8 @@ int verb_grade(int argc, char **argv, struct err *e)
         .alpha = 1e-5,
         .suite = find_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes"),
         .golden = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
+        .catalogue = find_dir(catalogue, sizeof catalogue, "golden/diagnose",
+                              "../share/assay/golden/diagnose"),
         .submission = calloc((size_t)argc + 1, sizeof *s.submission)};
     struct suite suite = {0};
     struct rubric *r = calloc(1, sizeof *r);
@@ -248,7 +261,7 @@ int verb_grade(int argc, char **argv, struct err *e)
             if (s.only_check)
                 printf("%s: %d checks in %d parts, %g points\n", r->path, r->num_checks,
                        r->num_parts, rubric_points(r));
-            code = s.only_check ? 0 : grade(&s, r, e);
+            code = s.only_check ? 0 : grade(&s, r, &suite, e);
         }
     }
     suite_free(&suite);

@@ -1,0 +1,27 @@
+/* Pages of grades: pieces that the student's and the class's page share. */
+#ifndef ASSAY_GRADE_PAGE_H
+#define ASSAY_GRADE_PAGE_H
+
+#include "../renderer/err.h"
+
+#include <jansson.h>
+#include <stdio.h>
+
+enum { GRADE_TILE = 8 };
+
+extern const char grade_page_head[]; /* up to the title */
+
+/* "" where there is none. */
+const char *grade_text(const json_t *object, const char *key);
+
+/* The named bug, or that there is no name. */
+void grade_show_bug(FILE *f, const json_t *diagnosis);
+
+/* Of one grade.json (grade.h); its pictures are in dir/ID. */
+bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Of the whole class, for staff. */
+void grade_overview(FILE *f, const json_t *grades);
+
+#endif
