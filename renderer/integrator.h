@@ -35,8 +35,8 @@ enum many_lights {
 /* How paths end before max_bounces, without changing a mean [Arvo90]. */
 enum roulette_kind {
     ROULETTE_OFF,
-    ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the root of the largest component
-                            of the throughput, 1 at most */
+    ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the largest component of the
+                            throughput, 1 at most */
     ROULETTE_FIXED       /* from the second vertex on: survive with the same probability each time,
                             as in the assignment */
 };

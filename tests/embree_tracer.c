@@ -140,7 +140,7 @@ static rgb path(const struct embree_tracer *t, ray r, int depth, struct pcg *g)
         if (!(dot(d, ng) > 0))
             return sum;
         if (vertex >= 2) {
-            float go_on = sqrtf(rgb_max(beta));
+            float go_on = rgb_max(beta);
             if (go_on < 1 && uniform(g) >= go_on)
                 return sum;
             beta = go_on < 1 ? rgb_scale(beta, 1 / go_on) : beta;
