@@ -122,14 +122,20 @@ static void add_view(const struct clue *clue, const struct effect *e, double amp
     add_facts(clue, e, amplitude, t);
 }
 
-/* The largest over the views at hand: only some of them show how pixels depend on each other. */
-static double inflation_of(const struct catalogue *c, int bug, const struct sight *seen)
+/* The largest over the views at hand: only some of them show how pixels depend on each other. Where a bug makes all renders
+ * the same, their average is no surer than one of them. */
+static double inflation_of(const struct catalogue *c, int bug, const struct clue *clue)
 {
-    double factor = 1;
-    for (int v = 0; v < c->num_views; v++)
-        if (c->view[v].effect[bug] != NULL)
-            factor = fmax(factor, inflation(c->view[v].effect[bug], seen));
-    return factor;
+    double factor = 1, repeats = 1;
+    for (int v = 0; v < c->num_views; v++) {
+        const struct effect *e = c->view[v].effect[bug];
+        if (e == NULL)
+            continue;
+        factor = fmax(factor, inflation(e, &clue->seen));
+        if (e->fact[FACT_PIXELS] <= SIGHT_SAME)
+            repeats = clue->view->renders;
+    }
+    return factor * repeats;
 }
 
 struct hypotheses {
@@ -154,7 +160,7 @@ static struct tally total(const struct hypotheses *h, int bug, double amplitude)
     struct tally sum = {0};
     for (int k = 0; k < h->num_clues; k++) {
         const struct effect *e = h->clue[k].view->effect[bug];
-        double factor = inflation_of(h->c, bug, &h->clue[k].seen);
+        double factor = inflation_of(h->c, bug, &h->clue[k]);
         struct tally t = {0};
         if (e == NULL && factor == 1)
             t = h->correct[k];
@@ -481,7 +487,7 @@ struct evidence diagnose_evidence(const struct catalogue *c, const struct clue *
     struct evidence out = {.explained = NAN};
     struct tally t = {0}, none = {0};
     add_view(clue, NULL, 0, 1, &none);
-    add_view(clue, e, candidate->amplitude, inflation_of(c, candidate->bug, a), &t);
+    add_view(clue, e, candidate->amplitude, inflation_of(c, candidate->bug, clue), &t);
     out.log_lead = t.log_likelihood - none.log_likelihood;
     if (none.chi2 > none.chi2_mean + largest_excess * sqrt(2 * none.cells))
         out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;

@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 
+/* Of the logarithm of the variance of a sample: how much it may change with what a pixel covers. */
+static const double other_size = 0.35;
+
 static bool check(const struct moments *m, int columns, struct err *e)
 {
     int cell = m->width / columns;
@@ -124,14 +127,14 @@ void sight_set_spread(struct sight *s, const struct sight *correct)
         sum += s->spread[i];
         sum_correct += correct->spread[i];
     }
-    if (!(sum > 0 && sum_correct > 0 && s->cell == correct->cell)) {
+    if (!(sum > 0 && sum_correct > 0)) {
         s->fact[FACT_SPREAD] = s->fact_sd[FACT_SPREAD] = NAN;
         return;
     }
     for (int i = 0; i < cells; i++)
         squares += pow(s->spread[i] - sum / sum_correct * correct->spread[i], 2);
     s->fact[FACT_SPREAD] = log(sum / sum_correct);
-    s->fact_sd[FACT_SPREAD] = sqrt(squares) / sum;
+    s->fact_sd[FACT_SPREAD] = hypot(sqrt(squares) / sum, s->cell == correct->cell ? 0 : other_size);
 }
 
 struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correct)

@@ -49,8 +49,8 @@ void sight_set_consistency(struct sight *s, double pixels, double lo, double hi,
                            int renders, double alpha);
 
 /* FACT_SPREAD of s against the correct renderer's: log ratio of the sums of `spread`, its standard deviation
- * from the residuals of the cells (ratio estimator). Unknown where either has no spread, and where pixels are
- * of another size: how much a sample varies depends on how much a pixel covers. */
+ * from the residuals of the cells (ratio estimator). Unknown where either has no spread. Where pixels are of another
+ * size it is known to a third only: how much a sample varies depends on how much a pixel covers. */
 void sight_set_spread(struct sight *s, const struct sight *correct);
 
 /* s with at least the variance and the third cumulant that means of the correct renderer have at as many samples: a render
