@@ -19,8 +19,6 @@ static const double fact_error[NUM_FACTS] = {
     [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
 /* What floats, stored and rendered, are good for. */
 static const double rounding = 1e-5;
-/* Of the variance that the correct renderer's predicts: a cell that by luck states less is not believed. */
-static const double least_variance = 0.5;
 /* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
 static const double amplitude_cost = 6;
 static const double least_amplitude = 0.1, largest_amplitude = 4;
@@ -31,6 +29,14 @@ static const double least_explained = 0.95;
 static const double tie = 20;
 /* A number of samples has to be off by so many standard deviations. */
 static const double samples_z = 7;
+
+/* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
+ * than the correct renderer has at as many samples is not believed. */
+static double variance_of(const struct clue *clue, int i, double factor)
+{
+    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    return fmax(factor * a->var[i], c->var[i] * c->n / a->n) + c->var[i];
+}
 
 static double mean_of(const struct sight *s)
 {
@@ -69,8 +75,8 @@ static void add_cell(const struct clue *clue, const struct effect *e, double amp
     double log_likelihood = 0, chi2 = 0, chi2_mean = 0;
     for (int i = 3 * cell; i < 3 * cell + 3; i++) {
         double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
-        double noise = factor * fmax(a->var[i], least_variance * c->var[i] * c->n / a->n) +
-                       c->var[i] + (e != NULL ? amplitude * amplitude * (double)e->var[i] : 0);
+        double noise = variance_of(clue, i, factor) +
+                       (e != NULL ? amplitude * amplitude * (double)e->var[i] : 0);
         double fuzz = pow(rounding * (a->mean[i] + c->mean[i] + scale), 2);
         double var = noise + fuzz + pow(model_error * effect, 2);
         double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
@@ -187,8 +193,8 @@ static double first_amplitude(const struct hypotheses *h, int bug)
         double tiny = rounding * mean_of(c);
         for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
             double effect = (double)e->mean[i];
-            double var = fmax(a->var[i], least_variance * c->var[i] * c->n / a->n) + c->var[i] +
-                         (double)e->var[i] + tiny * tiny + pow(model_error * effect, 2);
+            double var = variance_of(&h->clue[k], i, 1) + (double)e->var[i] + tiny * tiny +
+                         pow(model_error * effect, 2);
             along += effect * (a->mean[i] - c->mean[i]) / var;
             norm += effect * effect / var;
         }
