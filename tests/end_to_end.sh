@@ -623,17 +623,18 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
     expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
-    mkdir -p "$tmp/wrong" && cp -r "$build/mutants/point_light_linear" "$tmp/wrong/student" && cp "$pathtracer" "$tmp/wrong/right"
+    mkdir "$tmp/two" && cp -r "$build/mutants/point_light_linear" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
     sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
         $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
         sed 's/^total 8/total 10/' >"$tmp/named.rubric"
-    expect "grade: with diagnosis" 0 "student  *0.00 of 10" "$assay" grade -j 2 -o "$tmp/named" "$tmp/named.rubric" "$tmp/wrong"/*
+    expect "grade: with diagnosis" 0 "student  *0.00 of 10" "$assay" grade -j 2 -o "$tmp/named" "$tmp/named.rubric" "$tmp/two"/*
     expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
     expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
     expect "grade: on the page" 0 "This looks like a known bug" cat "$tmp/named/student/index.html"
     expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
     expect "grade: staff see who has it" 0 'student/index.html.*point_light_linear' bash -c "tr -d '\n' <'$tmp/named/index.html'"
-    if grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
+    if ! grep -q "<html" "$tmp/named/student/index.html" ||
+        grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
         not_ok "grade: the page has no hidden check and needs no other file" "it does"
     else
         ok "grade: the page has no hidden check and needs no other file"
