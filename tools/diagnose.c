@@ -271,8 +271,11 @@ static bool gate_mean(const struct clue *clue, double alpha, int num_tests, bool
         .alpha = alpha / num_tests, .tile = greatest_divisor(clue->seen.columns, clue->seen.rows)};
     ok = compare_moments(&a, &b, &opt, &r, e) || err_prefix(e, "%s", clue->view->name);
     if (ok) {
+        /* No test at all: everything is too skewed. */
         double log10_p =
-            fmin(0, r.worst.log10_p + log10((double)r.num_tests) + log10((double)num_tests));
+            r.num_tests == 0
+                ? 0
+                : fmin(0, r.worst.log10_p + log10((double)r.num_tests) + log10((double)num_tests));
         *differs = r.verdict == VERDICT_DIFFERENT;
         if (log10_p < out->log10_p || (*differs && out->gate[0] == '\0')) {
             out->log10_p = log10_p;
