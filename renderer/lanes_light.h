@@ -35,16 +35,6 @@ INLINE void finish_area_samplev(struct light_samplev *s, rgb radiance, bool both
     s->pdf_w = vf_select(lit, pdf_a * d2 / cos_l, zero);
 }
 
-INLINE void sample_parallelogramv(const struct scene *s, const struct light *light,
-                                  const struct parallelogram *q, vec3v p, const vf u[4],
-                                  struct light_samplev *out)
-{
-    const struct material *m = &s->materials[s->tri_material[light->first]];
-    vec3v to = madv(madv(v3_all(q->p), u[0], v3_all(q->eu)), u[1], v3_all(q->ev));
-    finish_area_samplev(out, m->radiance, m->radiance_both_sides, p, to, v3_all(q->n),
-                        1 / light->area);
-}
-
 INLINE void sample_trianglesv(const struct scene *s, const struct lanes_scene *ls, const float *cdf,
                               const struct light *light, vec3v p, const vf u[4],
                               struct light_samplev *out)
@@ -148,10 +138,6 @@ INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
     vi done = vi_set(0);
     switch (light->kind) {
     case LIGHT_TRIANGLES:
-        if (light_parallelogram(t, l) != NULL) {
-            sample_parallelogramv(s, light, light_parallelogram(t, l), p, u, out);
-            return;
-        }
         if (light->count > FEW_TRIANGLES)
             break;
         sample_trianglesv(s, ls, light_table_areas(t), light, p, u, out);

@@ -5,7 +5,6 @@
 #include "warp.h"
 
 #include <assert.h>
-#include <float.h>
 #include <stdlib.h>
 
 struct light_table {
@@ -14,7 +13,6 @@ struct light_table {
     /* Choices among all lights and among the delta lights; NULL where there is nothing to choose. */
     uint32_t *all, *delta;
     uint32_t num_areas;
-    struct parallelogram *quad; /* by light; where it is none, eu is 0 */
 };
 
 static void sum_areas(const struct scene *s, float *cdf)
@@ -30,39 +28,6 @@ static void sum_areas(const struct scene *s, float *cdf)
             cdf[i] = (float)sum;
         }
     }
-}
-
-static bool same_point(vec3 a, vec3 b)
-{
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-}
-
-static float largest(vec3 a)
-{
-    return maxf(fabsf(a.x), maxf(fabsf(a.y), fabsf(a.z)));
-}
-
-/* Two triangles with an edge in common, whose fourth corner is where the other three want it up to the
- * rounding of the loader's transformations. */
-static struct parallelogram find_parallelogram(const struct scene *s, const struct light *light)
-{
-    struct parallelogram none = {.eu = {0, 0, 0}};
-    if (light->kind != LIGHT_TRIANGLES || light->count != 2)
-        return none;
-    const vec3 *a = s->position + 3 * (size_t)light->first, *b = a + 3;
-    for (int i = 0; i < 3; i++) {
-        const vec3 o = a[i], u = a[(i + 1) % 3], v = a[(i + 2) % 3];
-        for (int j = 0; j < 3; j++) {
-            vec3 x = b[(j + 1) % 3], y = b[(j + 2) % 3];
-            if (!(same_point(x, u) && same_point(y, v)) && !(same_point(x, v) && same_point(y, u)))
-                continue;
-            float size = maxf(maxf(largest(o), largest(u)), maxf(largest(v), largest(b[j])));
-            if (largest(sub(b[j], sub(add(u, v), o))) <= 8 * FLT_EPSILON * size)
-                return (struct parallelogram){o, sub(u, o), sub(v, o),
-                                              normalize(cross(sub(a[1], a[0]), sub(a[2], a[0])))};
-        }
-    }
-    return none;
 }
 
 static double light_power(const struct scene *s, const struct light *l)
@@ -111,8 +76,7 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
     if (ok) {
         t->scene = s;
         t->cdf = calloc((size_t)s->num_triangles + 1, sizeof *t->cdf);
-        t->quad = calloc((size_t)s->num_lights + 1, sizeof *t->quad);
-        ok = t->cdf != NULL && t->quad != NULL;
+        ok = t->cdf != NULL;
     }
     if (ok)
         t->all = build_choice(s, false, power, &ok);
@@ -126,8 +90,6 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
     }
     sum_areas(s, t->cdf);
     for (uint32_t l = 0; l < s->num_lights; l++)
-        t->quad[l] = find_parallelogram(s, &s->lights[l]);
-    for (uint32_t l = 0; l < s->num_lights; l++)
         t->num_areas += !light_is_delta(&s->lights[l]);
     return t;
 }
@@ -137,7 +99,6 @@ void light_table_free(struct light_table *t)
     if (t == NULL)
         return;
     free(t->cdf);
-    free(t->quad);
     free(t->all);
     free(t->delta);
     free(t);
@@ -155,12 +116,6 @@ struct light_choice light_choose(const struct light_table *t, bool only_delta, f
 float light_choice_probability(const struct light_table *t, uint32_t l)
 {
     return t->all != NULL ? discrete_probability(t->all, l) : 0;
-}
-
-const struct parallelogram *light_parallelogram(const struct light_table *t, uint32_t l)
-{
-    const struct parallelogram *q = &t->quad[l];
-    return q->eu.x == 0 && q->eu.y == 0 && q->eu.z == 0 ? NULL : q;
 }
 
 const float *light_table_areas(const struct light_table *t)
@@ -209,17 +164,6 @@ static struct light_sample sample_triangles(const struct light_table *t, const s
     struct light_sample out = {.sphere = NO_HIT};
     finish_area_sample(&out, &s->materials[s->tri_material[lo]], p, mad(mad(q[0], b1, e1), b2, e2),
                        normalize(cross(e1, e2)), 1 / light->area);
-    return out;
-}
-
-static struct light_sample sample_parallelogram(const struct light_table *t,
-                                                const struct light *light,
-                                                const struct parallelogram *q, vec3 p,
-                                                const float u[2])
-{
-    struct light_sample out = {.sphere = NO_HIT};
-    finish_area_sample(&out, &t->scene->materials[t->scene->tri_material[light->first]], p,
-                       mad(mad(q->p, u[0], q->eu), u[1], q->ev), q->n, 1 / light->area);
     return out;
 }
 
@@ -303,12 +247,7 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
                                     .pdf_w = 1,
                                     .delta = true};
         break;
-    case LIGHT_TRIANGLES: {
-        const struct parallelogram *q = light_parallelogram(t, l);
-        out =
-            q != NULL ? sample_parallelogram(t, light, q, p, u) : sample_triangles(t, light, p, u);
-        break;
-    }
+    case LIGHT_TRIANGLES: out = sample_triangles(t, light, p, u); break;
     case LIGHT_SPHERE: out = sample_sphere(t, light, p, u); break;
     case LIGHT_ENVIRONMENT: {
         struct environment_sample s = environment_sample_direction(t->scene->environment, u);

@@ -35,14 +35,6 @@ struct light_choice {
 struct light_choice light_choose(const struct light_table *t, bool only_delta, float u);
 /* The probability that light_choose(t, false, ..) has for light l. */
 float light_choice_probability(const struct light_table *t, uint32_t l);
-/* p + u eu + v ev for u and v from 0 to 1, with unit normal n. */
-struct parallelogram {
-    vec3 p, eu, ev, n;
-};
-
-/* Light l, if it is two triangles that make a parallelogram: its points are then those of two numbers,
- * evenly spread ones where these are. Else NULL. */
-const struct parallelogram *light_parallelogram(const struct light_table *t, uint32_t l);
 /* By triangle: the area of its light up to and including it. */
 const float *light_table_areas(const struct light_table *t);
 /* How many are no delta lights. */
