@@ -71,17 +71,6 @@ static uint32_t material_of(const struct scene *s, uint32_t prim)
                                    : s->sphere_material[prim - s->num_triangles];
 }
 
-/* One light, chosen by power, is sampled at a vertex and not each of them. */
-static bool chooses_light(const struct integrator *it)
-{
-    switch (it->opt.many_lights) {
-    case LIGHTS_AUTO: break;
-    case LIGHTS_ALL: return false;
-    case LIGHTS_ONE: return true;
-    }
-    return it->scene->num_lights > MANY_LIGHTS;
-}
-
 /* Weight of emission of light l that the path ran into on surface s, or in the environment (s is
  * NULL). */
 static float emission_weight(const struct integrator *it, const struct batch *b, int i, uint32_t l,

@@ -102,6 +102,17 @@ struct batch {
 
 void integrate(const struct integrator *it, struct batch *b, int num_lanes);
 
+/* One light, chosen by power, is sampled at a vertex and not each of them. */
+static inline bool chooses_light(const struct integrator *it)
+{
+    switch (it->opt.many_lights) {
+    case LIGHTS_AUTO: break;
+    case LIGHTS_ALL: return false;
+    case LIGHTS_ONE: return true;
+    }
+    return it->scene->num_lights > MANY_LIGHTS;
+}
+
 /* Fills it->lanes and it->lanes_scene as it->opt.isa asks, for the scene in *it; false if out of
  * memory or if the machine lacks the instructions. integrator_free() afterwards, in either case. */
 bool integrator_prepare(struct integrator *it, struct err *e) __attribute__((warn_unused_result));

@@ -17,17 +17,6 @@ static bool counts(const struct integrator *it, int bounces)
     return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
 }
 
-/* One light, chosen by power, is sampled at a vertex and not each of them. */
-static bool chooses_light(const struct integrator *it)
-{
-    switch (it->opt.many_lights) {
-    case LIGHTS_AUTO: break;
-    case LIGHTS_ALL: return false;
-    case LIGHTS_ONE: return true;
-    }
-    return it->scene->num_lights > MANY_LIGHTS;
-}
-
 /* Bits of the lanes of eight paths from k that a batch of n has. */
 INLINE unsigned lanes_there(int k, int n)
 {

@@ -131,6 +131,23 @@ INLINE void single_root(const struct wide *w, struct single *s)
     s->hit = single_node((const struct wide_node *)w->arena, &b, vf_set(s->limit), &s->enter);
 }
 
+/* From *ref down to a leaf, always to the nearest child; what is left goes onto the stack. False: the ray meets no child
+ * of a node. */
+INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit, uint32_t *ref,
+                           stacked **top, uint64_t *nodes)
+{
+    while (!(*ref & WIDE_LEAF)) {
+        const struct wide_node *n = (const struct wide_node *)(w->arena + *ref);
+        vf enter;
+        ++*nodes;
+        unsigned hit = single_node(n, b, limit, &enter);
+        if (hit == 0)
+            return false;
+        *ref = next_of(w, n, hit, enter, top);
+    }
+    return true;
+}
+
 static void single_closest(const struct wide *w, struct single *s, struct bvh_stats *stats)
 {
     stats->box_tests++;
@@ -142,14 +159,8 @@ static void single_closest(const struct wide *w, struct single *s, struct bvh_st
     vf limit = vf_set(s->limit), t, u, v;
     uint64_t nodes = 0, leaves = 0;
     for (;;) {
-        while (!(ref & WIDE_LEAF)) {
-            const struct wide_node *n = (const struct wide_node *)(w->arena + ref);
-            nodes++;
-            unsigned hit = single_node(n, &b, limit, &t);
-            if (hit == 0)
-                goto pop;
-            ref = next_of(w, n, hit, t, &top);
-        }
+        if (!single_descend(w, &b, limit, &ref, &top, &nodes))
+            goto pop;
         const struct wide_leaf *l = at(w, ref);
         leaves++;
         unsigned hit = bits(single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v));
@@ -183,14 +194,8 @@ static bool single_occluded(const struct wide *w, const struct single *s, struct
     uint64_t nodes = 0, leaves = 0;
     bool met_something = false;
     for (;;) {
-        while (!(ref & WIDE_LEAF)) {
-            const struct wide_node *n = (const struct wide_node *)(w->arena + ref);
-            nodes++;
-            unsigned hit = single_node(n, &b, limit, &t);
-            if (hit == 0)
-                goto pop;
-            ref = next_of(w, n, hit, t, &top);
-        }
+        if (!single_descend(w, &b, limit, &ref, &top, &nodes))
+            goto pop;
         const struct wide_leaf *l = at(w, ref);
         leaves++;
         vi met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);

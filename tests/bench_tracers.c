@@ -1,5 +1,6 @@
 #include "bench_tracers.h"
 #include "bench_timing.h"
+#include "embree_mesh.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -76,25 +77,11 @@ struct tracer tracer_embree(const char *name, const struct scene *s, enum RTCSce
     t.device = rtcNewDevice("threads=1,set_affinity=0");
     t.scene = rtcNewScene(t.device);
     rtcSetSceneFlags(t.scene, flags);
-    RTCGeometry g = rtcNewGeometry(t.device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    size_t n = s->num_triangles;
-    float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                       3 * sizeof(float), 3 * n);
-    unsigned *index = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              3 * sizeof(unsigned), n);
-    for (size_t i = 0; i < 3 * n; i++) {
-        v[3 * i] = s->position[i].x;
-        v[3 * i + 1] = s->position[i].y;
-        v[3 * i + 2] = s->position[i].z;
-        index[i] = (unsigned)i;
-    }
-    rtcCommitGeometry(g);
-    rtcAttachGeometryByID(t.scene, g, 0);
-    rtcReleaseGeometry(g);
+    embree_attach_triangles(t.device, t.scene, s);
     if (s->num_spheres > 0) {
-        g = rtcNewGeometry(t.device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
-        v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
-                                    4 * sizeof(float), s->num_spheres);
+        RTCGeometry g = rtcNewGeometry(t.device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
+        float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
+                                           4 * sizeof(float), s->num_spheres);
         for (uint32_t i = 0; i < s->num_spheres; i++) {
             v[4 * i] = s->spheres[i].centre.x;
             v[4 * i + 1] = s->spheres[i].centre.y;

@@ -653,6 +653,7 @@ expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 tests/browser/run.sh "$build" >"$tmp/browser"
 cat "$tmp/browser"
 failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
+grep -q '^ok ' "$tmp/browser" || not_ok "the page in a browser" "nothing was looked at"
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

@@ -17,6 +17,7 @@
 #include "../renderer/sampler.h"
 #include "../renderer/shape.h"
 #include "../renderer/warp.h"
+#include "embree_mesh.h"
 #include "mesh.h"
 
 #include <embree3/rtcore.h>
@@ -108,23 +109,7 @@ static RTCScene embree_scene(RTCDevice device, const struct scene *s)
 {
     RTCScene scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-    RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    size_t n = s->num_triangles;
-    float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                       3 * sizeof(float), 3 * n);
-    unsigned *index = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              3 * sizeof(unsigned), n);
-    assert_non_null(v);
-    assert_non_null(index);
-    for (size_t i = 0; i < 3 * n; i++) {
-        v[3 * i] = s->position[i].x;
-        v[3 * i + 1] = s->position[i].y;
-        v[3 * i + 2] = s->position[i].z;
-        index[i] = (unsigned)i;
-    }
-    rtcCommitGeometry(g);
-    rtcAttachGeometry(scene, g);
-    rtcReleaseGeometry(g);
+    embree_attach_triangles(device, scene, s);
     rtcCommitScene(scene);
     assert_true(rtcGetDeviceError(device) == RTC_ERROR_NONE);
     return scene;

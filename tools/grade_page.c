@@ -159,7 +159,8 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
     return ok;
 }
 
-void grade_show_bug(FILE *f, const json_t *diagnosis)
+/* The named bug, or that there is no name. */
+static void show_bug(FILE *f, const json_t *diagnosis)
 {
     const json_t *named = json_object_get(diagnosis, "named");
     size_t i;
@@ -200,7 +201,7 @@ bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     fputs("</p>\n", f);
     paragraph(f, "Could not be graded:", grade_text(grade, "trouble"), "lost");
     paragraph(f, "All of it:", grade_text(grade, "wrong"), "lost");
-    grade_show_bug(f, json_object_get(grade, "diagnosis"));
+    show_bug(f, json_object_get(grade, "diagnosis"));
     fputs("<table>\n", f);
     json_array_foreach(json_object_get(grade, "parts"), i, p)
     {

@@ -14,9 +14,6 @@ extern const char grade_page_head[]; /* up to the title */
 /* "" where there is none. */
 const char *grade_text(const json_t *object, const char *key);
 
-/* The named bug, or that there is no name. */
-void grade_show_bug(FILE *f, const json_t *diagnosis);
-
 /* Of one grade.json (grade.h); its pictures are in dir/ID. */
 bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     __attribute__((warn_unused_result));
