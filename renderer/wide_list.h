@@ -117,6 +117,7 @@ static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *
 /* Rays to the quick form: bounds of its errors, per |normal.d|, and lanes that it serves. */
 struct quick {
     vf error, slack; /* FLAT_ERROR m^2, FLAT_SLACK m */
+    vf end;          /* where the ray ends, or has left the scene */
     vi fit;
 };
 
@@ -124,7 +125,8 @@ INLINE struct quick quick_init(const struct wide_flat *f, const struct octet *q)
 {
     vf m = vf_max(vf_max(vf_abs(q->o[0]), vf_abs(q->o[1])), vf_abs(q->o[2]));
     m = vf_max(vf_set(f->reach), m);
-    return (struct quick){FLAT_ERROR * m * m, FLAT_SLACK * m, vf_lt(m, vf_set(1e5f))};
+    return (struct quick){FLAT_ERROR * m * m, FLAT_SLACK * m, vf_min(4 * m, q->tmax),
+                          vf_lt(m, vf_set(1e5f))};
 }
 
 /* Where a ray meets a face. `inside`: how far from the rim, in u or v; off by no more than `error`. t
@@ -133,13 +135,34 @@ struct quick_hit {
     vf inside, error, low, high, sum;
 };
 
-INLINE struct quick_hit quick_face(const struct flat_face *face, const struct octet *q,
-                                   const struct quick *k)
+/* normal.d, and how far the plane is from the origin along the normal. */
+struct quick_plane {
+    vf nd, no;
+};
+
+INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct octet *q)
 {
-    const float *n = face->normal, *ur = face->u_row, *vr = face->v_row;
+    const float *n = face->normal;
     const vf *o = q->o, *d = q->d;
     vf nd = mul_add(vf_set(n[0]), d[0], mul_add(vf_set(n[1]), d[1], n[2] * d[2]));
     vf no = face->offset - mul_add(vf_set(n[0]), o[0], mul_add(vf_set(n[1]), o[1], n[2] * o[2]));
+    return (struct quick_plane){nd, no};
+}
+
+/* Lanes that begin and end on the same side of the plane, farther from it than rounding matters; at the
+ * end that is twice as far, since k->end can be four times m. */
+INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
+{
+    vf end = mul_add(-k->end, p->nd, p->no);
+    return vf_lt(k->slack, vf_min(p->no, end - k->slack)) |
+           vf_lt(vf_max(p->no, end + k->slack), -k->slack);
+}
+
+INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
+                                   const struct octet *q, const struct quick *k)
+{
+    const float *ur = face->u_row, *vr = face->v_row;
+    const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
     /* Along the plane t is huge, and so is its error, but both are numbers. */
     vf inv = 1 / (nd + 1e-20f), t = no * inv;
     vf x = mul_add(t, d[0], o[0]), y = mul_add(t, d[1], o[1]), z = mul_add(t, d[2], o[2]);
@@ -167,7 +190,8 @@ INLINE vi list_closest_quick(const struct wide_flat *f, const struct octet *q,
     vi prim = vi_set(-1);
     for (int i = 0; i < f->num_faces; i++) {
         const struct flat_face *face = &f->face[i];
-        struct quick_hit h = quick_face(face, q, &k);
+        const struct quick_plane p = quick_plane(face, q);
+        struct quick_hit h = quick_face(face, &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin);
         vf begin = vf_select(out, far, h.low), surely = h.inside - h.error;
         vi number = vi_set(face->prim[0]);
@@ -234,7 +258,10 @@ INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, 
     vf worst = zero;
     vi met = vi_set(0), maybe = vi_set(0);
     for (int i = 0; i < f->num_faces; i++) {
-        struct quick_hit h = quick_face(&f->face[i], q, &k);
+        const struct quick_plane p = quick_plane(&f->face[i], q);
+        if (bits(quick_clear(&p, &k)) == 255)
+            continue;
+        struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
         met |= vf_lt(h.error, h.inside) & vf_lt(q->tmin, h.low) & vf_lt(h.high, q->tmax);
         maybe |= ~out;
