@@ -10,6 +10,9 @@
 #include "lanes_light.h"
 #include "lanes_sampler.h"
 
+/* Samples of a light at a vertex whose rays go to the kernel together. */
+enum { TOGETHER = 4 };
+
 static const vi lane_number = {0, 1, 2, 3, 4, 5, 6, 7};
 
 static bool counts(const struct integrator *it, int bounces)
@@ -205,9 +208,32 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
     }
 }
 
+/* Eight vertices as samples of lights want them. */
+struct vertexv {
+    vec3v p, ng, ns, wo, off; /* off: where rays leave on the side of ng */
+    rgbv throughput, diffuse; /* diffuse: reflectance / pi */
+    vf eps;
+    vi bits;
+};
+
+INLINE void load_vertex(const struct batch *b, int k, struct vertexv *v)
+{
+    v->p = v3_load(&b->p, k);
+    v->ng = v3_load(&b->ng, k);
+    v->ns = v3_load(&b->ns, k);
+    v->wo = v3_load(&b->wo, k);
+    v->eps = vf_load_any(b->eps + k);
+    v->off = madv(v->p, v->eps, v->ng);
+    v->throughput = rgb_load(&b->throughput, k);
+    v->diffuse = rgb_scalev(rgb_load(&b->reflectance, k), vf_set(INV_PI_F));
+    v->bits = vi_load_any(b->bits + k);
+}
+
 /* Beckmann, lane by lane. */
-static void scatter_towards_each(const struct integrator *it, const struct batch *b, int k,
-                                 unsigned mask, const vec3v *wi, rgbv *f, vf *pdf_w)
+static __attribute__((noinline)) void scatter_towards_each(const struct integrator *it,
+                                                           const struct batch *b, int k,
+                                                           unsigned mask, const vec3v *wi, rgbv *f,
+                                                           vf *pdf_w)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -222,33 +248,38 @@ static void scatter_towards_each(const struct integrator *it, const struct batch
 
 /* lane_scatter_towards() for the lanes of the mask; which of them scatter some. */
 INLINE unsigned scatter_towards(const struct integrator *it, const struct batch *b, int k,
-                                unsigned mask, vec3v wi, rgbv *f, vf *pdf_w)
+                                const struct vertexv *v, unsigned mask, vec3v wi, rgbv *f,
+                                vf *pdf_w)
 {
     const vf zero = vf_set(0);
-    vec3v ns = v3_load(&b->ns, k), wo = v3_load(&b->wo, k);
-    vf cos_i = dotv(ns, wi);
-    mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v3_load(&b->ng, k), wi)));
+    vf cos_i = dotv(v->ns, wi);
+    mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v->ng, wi)));
     if (!mask)
         return 0;
-    *f = rgb_scalev(rgb_scalev(rgb_load(&b->reflectance, k), vf_set(INV_PI_F)), cos_i);
+    *f = rgb_scalev(v->diffuse, cos_i);
     *pdf_w = cos_i * INV_PI_F;
-    vi about = vi_load_any(b->bits + k), diffuse = has_bits(about, 1 << MATERIAL_DIFFUSE);
+    vi diffuse = has_bits(v->bits, 1 << MATERIAL_DIFFUSE);
     unsigned rough = mask & ~bits(diffuse);
-    unsigned black = bits(diffuse & ~vf_lt(zero, dotv(wo, ns)));
+    unsigned black = bits(diffuse & ~vf_lt(zero, dotv(v->wo, v->ns)));
     if (rough) {
-        unsigned beckmann = rough & bits(has_bits(about, MATERIAL_IS_BECKMANN));
+        unsigned beckmann = rough & bits(has_bits(v->bits, MATERIAL_IS_BECKMANN));
         if (rough & ~beckmann) {
             struct materialv m;
             materials_gather(it->lanes_scene, (const int32_t *)b->material + k, &m);
-            framev local = frame_from_normalv(ns);
+            framev local = frame_from_normalv(v->ns);
             vf pdf_ggx;
             rgbv ggx =
-                eval_ggx(&m, frame_to_localv(&local, wo), frame_to_localv(&local, wi), &pdf_ggx);
+                eval_ggx(&m, frame_to_localv(&local, v->wo), frame_to_localv(&local, wi), &pdf_ggx);
             *f = rgb_select(diffuse, *f, rgb_scalev(ggx, cos_i));
             *pdf_w = vf_select(diffuse, *pdf_w, pdf_ggx);
         }
-        if (beckmann)
-            scatter_towards_each(it, b, k, beckmann, &wi, f, pdf_w);
+        if (beckmann) {
+            rgbv each = *f;
+            vf pdf_each = *pdf_w;
+            scatter_towards_each(it, b, k, beckmann, &wi, &each, &pdf_each);
+            *f = each;
+            *pdf_w = pdf_each;
+        }
     }
     return mask & ~black & ~bits(rgb_is_zerov(*f));
 }
@@ -268,72 +299,96 @@ INLINE vf power_heuristicv(vf a, vf b)
     return vf_select(vf_lt(vf_set(0), a), 1 / (1 + r * r), vf_set(0));
 }
 
-/* Adds what shadow rays let through. */
-static void add_visible(struct batch *b, int n)
+/* Samples of a light that one call for each vertex takes. */
+struct light_samples {
+    uint32_t purpose; /* of the first; the next has the next */
+    int num, count;   /* this call's, and what a vertex takes in all */
+    bool chosen;      /* of the light in b->choice, else of `light` */
+    uint32_t light;
+};
+
+/* Sample number `which` for the lanes of the mask, from vertices k ..: shadow rays behind the `rays` that
+ * there are, and what they bring into row j; the lanes that cast one. */
+INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
+                             const struct vertexv *v, unsigned mask, int vertex,
+                             const struct light_samples *what, int which, int j, int rays)
 {
-    const rgbv black = {vf_set(0), vf_set(0), vf_set(0)};
-    for (int k = 0; k < n; k += LANES) {
-        unsigned cast = b->shadow_bits[k / LANES];
-        unsigned seen = cast & ~spread_flags(b->occluded + b->shadow_first[k / LANES], cast);
-        rgbv l = rgb_select(lanes_of(seen), rgb_load(&b->shadow_light, k), black);
-        rgbv g = rgb_load(&b->gathered, k);
-        rgb_store(&b->gathered, k, (rgbv){g.r + l.r, g.g + l.g, g.b + l.b});
+    vf u[4], pdf_bsdf;
+    drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k), (vu)vi_load_any(b->slot_sample + k),
+          (uint32_t)vertex + 1, what->purpose + (uint32_t)which, u);
+    struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
+    if (what->chosen) {
+        uint32_t light[LANES];
+        for (int i = 0; i < LANES; i++)
+            light[i] = b->choice[k + i].light;
+        vf probability = vf_load_any(b->choice_probability + k);
+        mask &= bits(vf_lt(vf_set(0), probability));
+        sample_each(it->lights, light, v->p, u, mask, &ls);
+        ls.pdf_w *= probability;
+    } else {
+        sample_lightv(it->scene, it->lanes_scene, it->lights, what->light, v->p, u, mask, &ls);
     }
+    mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
+    rgbv f;
+    mask = scatter_towards(it, b, k, v, mask, ls.wi, &f, &pdf_bsdf);
+    if (!mask)
+        return 0;
+    vf per = (float)what->count * ls.pdf_w, w = vf_set(1);
+    if (it->opt.direct == DIRECT_MIS)
+        w = vf_select(ls.delta, w, power_heuristicv(per, pdf_bsdf));
+    rgbv light = rgb_mulv(rgb_mulv(v->throughput, f), ls.radiance);
+    rgb_store(&b->shadow_light, LANES * j, rgb_scalev(light, w / per));
+    vi order = front_order(mask);
+    pick_v3(&b->shadow.o, rays, v->off, order);
+    pick_v3(&b->shadow.d, rays, ls.wi, order);
+    vf end = ls.distance * (1 - 1e-4f) - 2 * v->eps;
+    vf_store_any(b->shadow.tmax + rays, pick(end, order));
+    vf_store_any(b->shadow.tmin + rays, vf_set(0));
+    vf_store_any(b->shadow.ignore + rays, pick((vf)ls.sphere, order));
+    return mask;
 }
 
-/* One sample of a light from every lane that is not mirror-like, as one of `count` per lane; of light l,
- * or if `chosen` of the one in b->choice. */
-static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
-                          uint32_t purpose, int count, bool chosen, uint32_t l)
+/* Adds what the shadow rays of vertices k .. let through, from row j on. */
+INLINE void add_visible(struct batch *b, int k, int j, int num)
 {
-    const struct scene *s = it->scene;
-    const bool mis = it->opt.direct == DIRECT_MIS;
-    int rays = 0;
-    for (int k = 0; k < n; k += LANES) {
-        unsigned mask = b->goes_on[k / LANES];
-        mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
-        b->shadow_bits[k / LANES] = 0;
-        b->shadow_first[k / LANES] = (uint16_t)rays;
-        if (!mask)
-            continue;
-        vf u[4], pdf_bsdf;
-        drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k),
-              (vu)vi_load_any(b->slot_sample + k), (uint32_t)vertex + 1, purpose, u);
-        struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
-        vec3v p = v3_load(&b->p, k);
-        if (chosen) {
-            uint32_t light[LANES];
-            for (int i = 0; i < LANES; i++)
-                light[i] = b->choice[k + i].light;
-            vf probability = vf_load_any(b->choice_probability + k);
-            mask &= bits(vf_lt(vf_set(0), probability));
-            sample_each(it->lights, light, &p, u, mask, &ls);
-            ls.pdf_w *= probability;
-        } else {
-            sample_lightv(s, it->lanes_scene, it->lights, l, p, u, mask, &ls);
-        }
-        mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
-        rgbv f;
-        mask = scatter_towards(it, b, k, mask, ls.wi, &f, &pdf_bsdf);
-        if (!mask)
-            continue;
-        vf per = (float)count * ls.pdf_w, w = vf_set(1);
-        if (mis)
-            w = vf_select(ls.delta, w, power_heuristicv(per, pdf_bsdf));
-        rgbv light = rgb_mulv(rgb_mulv(rgb_load(&b->throughput, k), f), ls.radiance);
-        rgb_store(&b->shadow_light, k, rgb_scalev(light, w / per));
-        vi order = front_order(mask);
-        pick_v3(&b->shadow.o, rays, leaving(b, k, ls.wi), order);
-        pick_v3(&b->shadow.d, rays, ls.wi, order);
-        vf end = ls.distance * (1 - 1e-4f) - 2 * vf_load_any(b->eps + k);
-        vf_store_any(b->shadow.tmax + rays, pick(end, order));
-        vf_store_any(b->shadow.tmin + rays, vf_set(0));
-        vf_store_any(b->shadow.ignore + rays, pick((vf)ls.sphere, order));
-        b->shadow_bits[k / LANES] = (uint8_t)mask;
-        rays += (int)count_bits(mask);
+    const rgbv black = {vf_set(0), vf_set(0), vf_set(0)};
+    rgbv g = rgb_load(&b->gathered, k);
+    for (int end = j + num; j < end; j++) {
+        unsigned cast = b->shadow_bits[j];
+        unsigned seen = cast & ~spread_flags(b->occluded + b->shadow_first[j], cast);
+        rgbv l = rgb_select(lanes_of(seen), rgb_load(&b->shadow_light, LANES * j), black);
+        g = (rgbv){g.r + l.r, g.g + l.g, g.b + l.b};
     }
-    bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
-    add_visible(b, n);
+    rgb_store(&b->gathered, k, g);
+}
+
+/* Samples a light from every lane that is not mirror-like, for as many lanes at a time as all these shadow
+ * rays have room for. */
+static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
+                          struct light_samples what)
+{
+    const int most = BATCH_LANES / LANES / what.num * LANES;
+    for (int first = 0; first < n; first += most) {
+        const int end = n - first < most ? n : first + most;
+        int rays = 0, j = 0;
+        for (int k = first; k < end; k += LANES) {
+            unsigned mask = b->goes_on[k / LANES];
+            mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
+            struct vertexv v;
+            load_vertex(b, k, &v);
+            for (int i = 0; i < what.num; i++, j++) {
+                unsigned cast =
+                    mask ? connect_once(it, b, k, &v, mask, vertex, &what, i, j, rays) : 0;
+                b->shadow_bits[j] = (uint8_t)cast;
+                b->shadow_first[j] = (uint16_t)rays;
+                rays += (int)count_bits(cast);
+            }
+        }
+        bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
+        j = 0;
+        for (int k = first; k < end; k += LANES, j += what.num)
+            add_visible(b, k, j, what.num);
+    }
 }
 
 /* Every lane chooses a light. */
@@ -360,7 +415,11 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
     if (chooses_light(it)) {
         for (int k = 0; k < it->opt.light_samples; k++) {
             choose(it, b, n, vertex, purpose++, only_delta);
-            connect_light(it, b, n, vertex, purpose++, it->opt.light_samples, true, 0);
+            connect_light(it, b, n, vertex,
+                          (struct light_samples){.purpose = purpose++,
+                                                 .num = 1,
+                                                 .count = it->opt.light_samples,
+                                                 .chosen = true});
         }
         return;
     }
@@ -369,14 +428,21 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
         if (!delta && only_delta)
             continue;
         int count = delta ? 1 : it->opt.light_samples;
-        for (int k = 0; k < count; k++)
-            connect_light(it, b, n, vertex, purpose++, count, false, l);
+        for (int k = 0; k < count; k += TOGETHER) {
+            const int num = count - k < TOGETHER ? count - k : TOGETHER;
+            connect_light(
+                it, b, n, vertex,
+                (struct light_samples){.purpose = purpose, .num = num, .count = count, .light = l});
+            purpose += (uint32_t)num;
+        }
     }
 }
 
 /* bsdf_sample_direction() of Beckmann, lane by lane. */
-static void sample_each_bsdf(const struct integrator *it, const struct batch *b, int k,
-                             unsigned mask, const vec3v *wo, const vf u[4], struct bsdf_samplev *s)
+static __attribute__((noinline)) void sample_each_bsdf(const struct integrator *it,
+                                                       const struct batch *b, int k, unsigned mask,
+                                                       const vec3v *wo, const vf u[4],
+                                                       struct bsdf_samplev *s)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -423,8 +489,12 @@ INLINE void sample_bsdf(const struct integrator *it, const struct batch *b, int 
     vi beckmann = rough & has_bits(about, MATERIAL_IS_BECKMANN);
     if (bits(rough & ~beckmann))
         sample_ggxv(&m, rough & ~beckmann, wo, u[0], u[1], s);
-    if (bits(beckmann))
-        sample_each_bsdf(it, b, k, bits(beckmann), &wo, u, s);
+    if (bits(beckmann)) {
+        const vf numbers[4] = {u[0], u[1], u[2], u[3]};
+        struct bsdf_samplev each = *s;
+        sample_each_bsdf(it, b, k, bits(beckmann), &wo, numbers, &each);
+        *s = each;
+    }
 }
 
 /* Chance to go on, as survival(). */

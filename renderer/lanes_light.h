@@ -107,8 +107,9 @@ INLINE void sample_directionalv(const struct light *light, struct light_samplev 
 }
 
 /* Lanes of the mask one by one, each of light number l[lane]. */
-static void sample_each(const struct light_table *t, const uint32_t *l, const vec3v *p,
-                        const vf u[4], unsigned mask, struct light_samplev *out)
+static __attribute__((noinline)) void sample_each_at(const struct light_table *t, const uint32_t *l,
+                                                     const vec3v *p, const vf u[4], unsigned mask,
+                                                     struct light_samplev *out)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -128,13 +129,22 @@ static void sample_each(const struct light_table *t, const uint32_t *l, const ve
     }
 }
 
+/* By way of copies: what an address is taken of lives in memory for all its life. */
+INLINE void sample_each(const struct light_table *t, const uint32_t *l, vec3v p, const vf u[4],
+                        unsigned mask, struct light_samplev *out)
+{
+    const vf numbers[4] = {u[0], u[1], u[2], u[3]};
+    struct light_samplev each = *out;
+    sample_each_at(t, l, &p, numbers, mask, &each);
+    *out = each;
+}
+
 /* The lanes of the mask sample light l. */
 INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
                           const struct light_table *t, uint32_t l, vec3v p, const vf u[4],
                           unsigned mask, struct light_samplev *out)
 {
     const struct light *light = &s->lights[l];
-    const uint32_t same[LANES] = {l, l, l, l, l, l, l, l};
     vi done = vi_set(0);
     switch (light->kind) {
     case LIGHT_TRIANGLES:
@@ -149,8 +159,9 @@ INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
     case LIGHT_ENVIRONMENT: break;
     }
     mask &= ~bits(done);
+    const uint32_t same[LANES] = {l, l, l, l, l, l, l, l};
     if (mask)
-        sample_each(t, same, &p, u, mask, out);
+        sample_each(t, same, p, u, mask, out);
 }
 
 #endif
