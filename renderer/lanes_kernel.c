@@ -51,16 +51,56 @@ INLINE void split_pixel(vi pixel, int width, vf *x, vf *y)
     *y = vf_of_int(row);
 }
 
+INLINE void draw_rows(struct batch *b, enum sampler_kind kind, const struct philox_keys *keys,
+                      int first, int end, int vertex, uint32_t purpose, int num)
+{
+    for (int k = first, j = 0; k < end; k += LANES) {
+        vu pixel = (vu)vi_load_any(b->slot_pixel + k), sample = (vu)vi_load_any(b->slot_sample + k);
+        for (int i = 0; i < num; i++, j += LANES) {
+            vf u[4];
+            drawv(kind, keys, pixel, sample, (uint32_t)vertex, purpose + (uint32_t)i, u);
+            for (int d = 0; d < 4; d++)
+                vf_store_any(b->numbers[d] + j, u[d]);
+        }
+    }
+}
+
+/* The numbers of `num` purposes for the lanes first .. end, eight lanes after eight, into rows of
+ * b->numbers. A loop of its own, short enough that the machine works on several rounds of it at once. */
+static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
+                                                   int first, int end, int vertex, uint32_t purpose,
+                                                   int num)
+{
+    const struct philox_keys keys = philox_keys(it->opt.sampler.seed);
+    switch (it->opt.sampler.kind) {
+    case SAMPLER_INDEPENDENT:
+        draw_rows(b, SAMPLER_INDEPENDENT, &keys, first, end, vertex, purpose, num);
+        break;
+    case SAMPLER_SOBOL: draw_rows(b, SAMPLER_SOBOL, &keys, first, end, vertex, purpose, num); break;
+    }
+}
+
+INLINE void load_numbers(const struct batch *b, int row, vf u[4])
+{
+    for (int d = 0; d < 4; d++)
+        u[d] = vf_load_any(b->numbers[d] + LANES * row);
+}
+
 /* Camera rays for all lanes, as camera_ray(). */
 static void generate(const struct integrator *it, struct batch *b, int n)
 {
     const struct camera *c = it->camera;
     const vf zero = vf_set(0), one = vf_set(1);
     for (int k = 0; k < n; k += LANES) {
-        vi pixel = vi_load_any(b->pixel + k), sample = vi_load_any(b->sample + k);
+        vf_store_any(b->slot + k, (vf)(lane_number + k));
+        vf_store_any(b->slot_pixel + k, vf_load_any(b->pixel + k));
+        vf_store_any(b->slot_sample + k, vf_load_any(b->sample + k));
+    }
+    draw_numbers(it, b, 0, n, 0, PURPOSE_CAMERA, 1);
+    for (int k = 0; k < n; k += LANES) {
         vf u[4], px, py;
-        drawv(&it->opt.sampler, (vu)pixel, (vu)sample, 0, PURPOSE_CAMERA, u);
-        split_pixel(pixel, c->width, &px, &py);
+        load_numbers(b, k / LANES, u);
+        split_pixel(vi_load_any(b->pixel + k), c->width, &px, &py);
         vf x = px + u[0], y = py + u[1];
         vf sx = (2 * x / (float)c->width - 1) * c->tan_h;
         vf sy = (1 - 2 * y / (float)c->height) * c->tan_v;
@@ -82,9 +122,6 @@ static void generate(const struct integrator *it, struct batch *b, int n)
         rgb_store(&b->gathered, k, (rgbv){zero, zero, zero});
         vf_store_any(b->pdf_w + k, zero);
         vf_store_any(b->eta2 + k, one);
-        vf_store_any(b->slot + k, (vf)(lane_number + k));
-        vf_store_any(b->slot_pixel + k, (vf)pixel);
-        vf_store_any(b->slot_sample + k, (vf)sample);
     }
 }
 
@@ -307,15 +344,14 @@ struct light_samples {
     uint32_t light;
 };
 
-/* Sample number `which` for the lanes of the mask, from vertices k ..: shadow rays behind the `rays` that
- * there are, and what they bring into row j; the lanes that cast one. */
+/* A sample, by the numbers of row j, for the lanes of the mask of vertices k ..: shadow rays behind the
+ * `rays` that there are, and what they bring into row j; the lanes that cast one. */
 INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
-                             const struct vertexv *v, unsigned mask, int vertex,
-                             const struct light_samples *what, int which, int j, int rays)
+                             const struct vertexv *v, unsigned mask,
+                             const struct light_samples *what, int j, int rays)
 {
     vf u[4], pdf_bsdf;
-    drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k), (vu)vi_load_any(b->slot_sample + k),
-          (uint32_t)vertex + 1, what->purpose + (uint32_t)which, u);
+    load_numbers(b, j, u);
     struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
     if (what->chosen) {
         uint32_t light[LANES];
@@ -371,14 +407,14 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
     for (int first = 0; first < n; first += most) {
         const int end = n - first < most ? n : first + most;
         int rays = 0, j = 0;
+        draw_numbers(it, b, first, end, vertex + 1, what.purpose, what.num);
         for (int k = first; k < end; k += LANES) {
             unsigned mask = b->goes_on[k / LANES];
             mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
             struct vertexv v;
             load_vertex(b, k, &v);
             for (int i = 0; i < what.num; i++, j++) {
-                unsigned cast =
-                    mask ? connect_once(it, b, k, &v, mask, vertex, &what, i, j, rays) : 0;
+                unsigned cast = mask ? connect_once(it, b, k, &v, mask, &what, j, rays) : 0;
                 b->shadow_bits[j] = (uint8_t)cast;
                 b->shadow_first[j] = (uint16_t)rays;
                 rays += (int)count_bits(cast);
@@ -395,16 +431,13 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
 static void choose(const struct integrator *it, struct batch *b, int n, int vertex,
                    uint32_t purpose, bool only_delta)
 {
-    for (int k = 0; k < n; k += LANES) {
-        vf u[4];
-        drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k),
-              (vu)vi_load_any(b->slot_sample + k), (uint32_t)vertex + 1, purpose, u);
+    draw_numbers(it, b, 0, n, vertex + 1, purpose, 1);
+    for (int k = 0; k < n; k += LANES)
         for (unsigned mask = b->goes_on[k / LANES]; mask; mask &= mask - 1) {
-            int i = __builtin_ctz(mask);
-            b->choice[k + i] = light_choose(it->lights, only_delta, u[0][i]);
-            b->choice_probability[k + i] = b->choice[k + i].probability;
+            int i = k + __builtin_ctz(mask);
+            b->choice[i] = light_choose(it->lights, only_delta, b->numbers[0][i]);
+            b->choice_probability[i] = b->choice[i].probability;
         }
-    }
 }
 
 static void connect(const struct integrator *it, struct batch *b, int n, int vertex)
@@ -519,6 +552,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
 {
     const vf zero = vf_set(0);
     int kept = 0;
+    draw_numbers(it, b, 0, n, vertex + 1, PURPOSE_BSDF, 1);
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n), mask = b->goes_on[k / LANES];
         if (!mask) {
@@ -526,8 +560,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
             continue;
         }
         vf u[4];
-        vi pixel = vi_load_any(b->slot_pixel + k), sample = vi_load_any(b->slot_sample + k);
-        drawv(&it->opt.sampler, (vu)pixel, (vu)sample, (uint32_t)vertex + 1, PURPOSE_BSDF, u);
+        load_numbers(b, k / LANES, u);
         framev f = frame_from_normalv(v3_load(&b->ns, k));
         vec3v wo = frame_to_localv(&f, v3_load(&b->wo, k));
         struct bsdf_samplev s;
@@ -554,8 +587,8 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         vf_store_any(b->ray.tmax + kept, vf_set(INFINITY));
         vf_store_any(b->pdf_w + kept, pick(vf_select(s.delta, zero, s.pdf_w), order));
         vf_store_any(b->eta2 + kept, pick(eta2, order));
-        vf_store_any(b->slot_pixel + kept, pick((vf)pixel, order));
-        vf_store_any(b->slot_sample + kept, pick((vf)sample, order));
+        vf_store_any(b->slot_pixel + kept, pick(vf_load_any(b->slot_pixel + k), order));
+        vf_store_any(b->slot_sample + kept, pick(vf_load_any(b->slot_sample + k), order));
         vf_store_any(b->slot + kept, pick(vf_load_any(b->slot + k), order));
         kept += (int)count_bits(mask);
     }
