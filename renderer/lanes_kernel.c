@@ -285,19 +285,21 @@ static __attribute__((noinline)) void scatter_towards_each(const struct integrat
 
 /* lane_scatter_towards() for the lanes of the mask; which of them scatter some. */
 INLINE unsigned scatter_towards(const struct integrator *it, const struct batch *b, int k,
-                                const struct vertexv *v, unsigned mask, vec3v wi, rgbv *f,
-                                vf *pdf_w)
+                                const struct vertexv *v, unsigned mask, vec3v wi, bool only_diffuse,
+                                rgbv *f, vf *pdf_w)
 {
     const vf zero = vf_set(0);
     vf cos_i = dotv(v->ns, wi);
     mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v->ng, wi)));
-    if (!mask)
-        return 0;
     *f = rgb_scalev(v->diffuse, cos_i);
     *pdf_w = cos_i * INV_PI_F;
+    vi below = ~vf_lt(zero, dotv(v->wo, v->ns));
+    if (only_diffuse)
+        return mask & ~bits(below | rgb_is_zerov(*f));
+    if (!mask)
+        return 0;
     vi diffuse = has_bits(v->bits, 1 << MATERIAL_DIFFUSE);
-    unsigned rough = mask & ~bits(diffuse);
-    unsigned black = bits(diffuse & ~vf_lt(zero, dotv(v->wo, v->ns)));
+    unsigned rough = mask & ~bits(diffuse), black = bits(diffuse & below);
     if (rough) {
         unsigned beckmann = rough & bits(has_bits(v->bits, MATERIAL_IS_BECKMANN));
         if (rough & ~beckmann) {
@@ -342,18 +344,21 @@ struct light_samples {
     int num, count;   /* this call's, and what a vertex takes in all */
     bool chosen;      /* of the light in b->choice, else of `light` */
     uint32_t light;
+    struct lamp lamp; /* the light, if it is one, where only diffuse things scatter */
 };
 
 /* A sample, by the numbers of row j, for the lanes of the mask of vertices k ..: shadow rays behind the
  * `rays` that there are, and what they bring into row j; the lanes that cast one. */
 INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
-                             const struct light_samples *what, int j, int rays)
+                             const struct light_samples *what, bool simple, int j, int rays)
 {
     vf u[4], pdf_bsdf;
     load_numbers(b, j, u);
     struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
-    if (what->chosen) {
+    if (simple) {
+        sample_lampv(&what->lamp, v->p, u, &ls);
+    } else if (what->chosen) {
         uint32_t light[LANES];
         for (int i = 0; i < LANES; i++)
             light[i] = b->choice[k + i].light;
@@ -366,8 +371,9 @@ INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k
     }
     mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
     rgbv f;
-    mask = scatter_towards(it, b, k, v, mask, ls.wi, &f, &pdf_bsdf);
-    if (!mask)
+    mask = scatter_towards(it, b, k, v, mask, ls.wi, simple, &f, &pdf_bsdf);
+    /* Without a branch where there is little to save. */
+    if (!simple && !mask)
         return 0;
     vf per = (float)what->count * ls.pdf_w, w = vf_set(1);
     if (it->opt.direct == DIRECT_MIS)
@@ -398,31 +404,43 @@ INLINE void add_visible(struct batch *b, int k, int j, int num)
     rgb_store(&b->gathered, k, g);
 }
 
+/* Shadow rays from lanes first .. end; how many. */
+INLINE int connect_rows(const struct integrator *it, struct batch *b, int first, int end,
+                        const struct light_samples *what, bool simple)
+{
+    int rays = 0, j = 0;
+    for (int k = first; k < end; k += LANES) {
+        unsigned mask = b->goes_on[k / LANES];
+        mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
+        struct vertexv v;
+        load_vertex(b, k, &v);
+        for (int i = 0; i < what->num; i++, j++) {
+            unsigned cast = mask ? connect_once(it, b, k, &v, mask, what, simple, j, rays) : 0;
+            b->shadow_bits[j] = (uint8_t)cast;
+            b->shadow_first[j] = (uint16_t)rays;
+            rays += (int)count_bits(cast);
+        }
+    }
+    return rays;
+}
+
 /* Samples a light from every lane that is not mirror-like, for as many lanes at a time as all these shadow
  * rays have room for. */
 static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
                           struct light_samples what)
 {
+    const struct light *light = &it->scene->lights[what.light];
+    const bool simple = !what.chosen && is_lamp(light) && it->lanes_scene->only_diffuse;
+    if (simple)
+        what.lamp = lamp_of(it->scene, it->lanes_scene, it->lights, light);
     const int most = BATCH_LANES / LANES / what.num * LANES;
     for (int first = 0; first < n; first += most) {
         const int end = n - first < most ? n : first + most;
-        int rays = 0, j = 0;
         draw_numbers(it, b, first, end, vertex + 1, what.purpose, what.num);
-        for (int k = first; k < end; k += LANES) {
-            unsigned mask = b->goes_on[k / LANES];
-            mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
-            struct vertexv v;
-            load_vertex(b, k, &v);
-            for (int i = 0; i < what.num; i++, j++) {
-                unsigned cast = mask ? connect_once(it, b, k, &v, mask, &what, j, rays) : 0;
-                b->shadow_bits[j] = (uint8_t)cast;
-                b->shadow_first[j] = (uint16_t)rays;
-                rays += (int)count_bits(cast);
-            }
-        }
+        int rays = simple ? connect_rows(it, b, first, end, &what, true)
+                          : connect_rows(it, b, first, end, &what, false);
         bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
-        j = 0;
-        for (int k = first; k < end; k += LANES, j += what.num)
+        for (int k = first, j = 0; k < end; k += LANES, j += what.num)
             add_visible(b, k, j, what.num);
     }
 }
