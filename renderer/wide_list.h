@@ -1,4 +1,4 @@
-/* A scene without a tree: eight rays at a time against every primitive, each ray sheared along its own
+/* A list without a tree: eight rays at a time against every primitive, each ray sheared along its own
  * largest axis. Part of wide_kernel.c. */
 #ifndef ASSAY_WIDE_LIST_H
 #define ASSAY_WIDE_LIST_H
@@ -71,7 +71,7 @@ INLINE vi list_sphere(const struct wide_flat *f, int i, const struct octet *q, v
                       vf_set(s[3]), q->tmin, below(limit), t);
 }
 
-/* What eight rays meet first. */
+/* What eight rays meet first. prim: place in the list, -1: nothing. */
 struct list_hits {
     vf t, u, v;
     vi prim;
@@ -100,6 +100,11 @@ list_closest_exact(const struct wide_flat *f, const struct octet *q, struct list
     }
 }
 
+INLINE vi does_not_ignore(const struct wide_flat *f, int i, const struct octet *q)
+{
+    return ~vi_eq(q->ignore, vi_set(f->number[i]));
+}
+
 static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *f,
                                                         const struct octet *q)
 {
@@ -108,9 +113,9 @@ static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *
     vi met = vi_set(0);
     list_init(f, q, &l);
     for (int i = 0; i < f->num_triangles; i++)
-        met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & ~vi_eq(q->ignore, vi_set(i));
+        met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & does_not_ignore(f, i, q);
     for (int i = 0; i < f->num_spheres; i++)
-        met |= list_sphere(f, i, q, q->tmax, &t) & ~vi_eq(q->ignore, vi_set(f->num_triangles + i));
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
     return met;
 }
 
@@ -269,66 +274,61 @@ INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, 
     }
     for (int i = 0; i < f->num_spheres; i++) {
         vf t;
-        met |= list_sphere(f, i, q, q->tmax, &t) & ~vi_eq(q->ignore, vi_set(f->num_triangles + i));
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
     }
     *known = k.fit & vf_lt(worst, vf_set(INFINITY)) & (met | ~maybe);
     return met;
 }
 
+/* Sheared rays. */
+INLINE void list_closest_eight(const struct wide_flat *f, const struct octet *q,
+                               struct list_hits *best)
+{
+    if (!f->quick || bits(list_closest_quick(f, q, best)) != 255)
+        list_closest_exact(f, q, best);
+}
+
+/* Lanes that meet something. is_sheared: the rays are; else they will be if need be. */
+INLINE vi list_occluded_eight(const struct wide_flat *f, struct octet *q, bool is_sheared)
+{
+    vi known = vi_set(0), met = known;
+    if (f->quick)
+        met = list_occluded_quick(f, q, &known);
+    if (bits(known) == 255)
+        return met;
+    if (!is_sheared)
+        octet_shear(q);
+    return list_occluded_exact(f, q);
+}
+
 static void list_closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
                          struct hits *h, struct bvh_stats *stats)
 {
-    const struct wide_flat *f = w->flat;
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
         struct list_hits best;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_load(r, eight, &q);
+        octet_load(r, eight, &q);
         octet_shear(&q);
-        if (!f->quick || bits(list_closest_quick(f, &q, &best)) != 255)
-            list_closest_exact(f, &q, &best);
+        list_closest_eight(w->flat, &q, &best);
         stats->primitive_tests += w->num_leaves;
-        if (in_row) {
-            vf_store_any(h->t + eight[0], best.t);
-            vf_store_any(h->u + eight[0], best.u);
-            vf_store_any(h->v + eight[0], best.v);
-            vf_store_any(h->prim + eight[0], (vf)best.prim);
-            continue;
-        }
-        for (int i = 0; i < LANES; i++) {
-            h->t[eight[i]] = best.t[i];
-            h->u[eight[i]] = best.u[i];
-            h->v[eight[i]] = best.v[i];
-            h->prim[eight[i]] = (uint32_t)best.prim[i];
-        }
+        octet_store(&q, eight, best.t, best.u, best.v, best.prim, h);
     }
 }
 
 static void list_occluded(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
                           bool *occluded, struct bvh_stats *stats)
 {
-    const struct wide_flat *f = w->flat;
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_load(r, eight, &q);
+        octet_load(r, eight, &q);
         octet_ignore(r, eight, &q);
-        vi known = vi_set(0), met = known;
-        if (f->quick)
-            met = list_occluded_quick(f, &q, &known);
-        if (bits(known) != 255) {
-            octet_shear(&q);
-            met = list_occluded_exact(f, &q);
-        }
+        vi met = list_occluded_eight(w->flat, &q, false);
         stats->primitive_tests += w->num_leaves;
-        const uint64_t flags = bytes_of(bits(met));
-        if (in_row)
-            memcpy(occluded + eight[0], &flags, sizeof flags);
-        else
-            for (int i = 0; i < LANES; i++)
-                occluded[eight[i]] = flags >> 8 * i & 1;
+        octet_store_flags(&q, eight, bits(met), occluded);
     }
 }
 
