@@ -62,7 +62,7 @@ struct integrator {
     const struct camera *camera;
     const struct bvh *bvh;
     const struct light_table *lights;
-    /* The stages on eight paths at a time, and the scene for them; both NULL: one by one. */
+    /* The stages on eight paths at a time, NULL: one by one; and the scene for them, NULL: not needed. */
     const struct lanes_kernel *lanes;
     const struct lanes_scene *lanes_scene;
 };

@@ -132,6 +132,15 @@ struct surfacev {
     vi material, light;
 };
 
+/* Shading normals, on the side of ng. */
+INLINE vec3v interpolate_normals(vec3v n0, vec3v n1, vec3v n2, vec3v ng, vf u, vf v)
+{
+    vec3v ns = madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2);
+    vf l = vf_sqrt(dotv(ns, ns));
+    ns = v3_select(vf_lt(vf_set(0), l), scalev(ns, 1 / l), ng);
+    return v3_negate_if(vf_lt(dotv(ns, ng), vf_set(0)), ns);
+}
+
 /* surface_at() of eight hits; lanes that hit nothing get anything. */
 INLINE void surfaces(const struct lanes_scene *ls, uint32_t num_triangles, const struct batch *b,
                      int k, vi prim, struct surfacev *s)
@@ -148,10 +157,7 @@ INLINE void surfaces(const struct lanes_scene *ls, uint32_t num_triangles, const
     vec3v n2 = v3v(w[2][2], w[2][3], w[2][4]);
     s->p = madv(madv(v3v(w[0][0], w[0][1], w[0][2]), u, e1), v, e2);
     s->ng = v3v(w[1][1], w[1][2], w[1][3]);
-    vec3v ns = madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2);
-    vf l = vf_sqrt(dotv(ns, ns));
-    ns = v3_select(vf_lt(vf_set(0), l), scalev(ns, 1 / l), s->ng);
-    s->ns = v3_negate_if(vf_lt(dotv(ns, s->ng), vf_set(0)), ns);
+    s->ns = interpolate_normals(n0, n1, n2, s->ng, u, v);
     s->eps = w[2][RECORD_EPS - 2 * LANES];
     s->material = (vi)w[2][RECORD_MATERIAL - 2 * LANES];
     s->light = (vi)w[2][RECORD_LIGHT - 2 * LANES];
@@ -613,12 +619,65 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
     return kept;
 }
 
+/* Shading normals of hits on triangles, from the scene itself: for one ray a pixel records do not pay. */
+INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int k, vi prim)
+{
+    enum { WORDS = 9 };
+    const float *const from[2] = {&s->position[0].x, &s->normal[0].x};
+    int32_t row[LANES];
+    vf_store_any(row, (vf)prim);
+    vf w[2][LANES], last[2][LANES];
+    for (int i = 0; i < 2; i++) {
+        gather_columns(from[i], WORDS, row, w[i]);
+        gather_columns(from[i] + 1, WORDS, row, last[i]);
+    }
+    vec3v p = v3v(w[0][0], w[0][1], w[0][2]);
+    vec3v e1 = subv(v3v(w[0][3], w[0][4], w[0][5]), p);
+    vec3v e2 = subv(v3v(w[0][6], w[0][7], last[0][7]), p);
+    return interpolate_normals(v3v(w[1][0], w[1][1], w[1][2]), v3v(w[1][3], w[1][4], w[1][5]),
+                               v3v(w[1][6], w[1][7], last[1][7]), normalizev(crossv(e1, e2)),
+                               vf_load_any(b->hit.u + k), vf_load_any(b->hit.v + k));
+}
+
+/* integrate_normals() of integrator.c, behind the rays. */
+static void show_normals(const struct integrator *it, struct batch *b, int n)
+{
+    const struct scene *s = it->scene;
+    const vf zero = vf_set(0);
+    for (int k = 0; k < n; k += LANES) {
+        vi prim = vi_load_any(b->hit.prim + k);
+        vi flat = vi_lt(vi_set(-1), prim) & vi_lt(prim, vi_set((int32_t)s->num_triangles));
+        rgbv c = {zero, zero, zero};
+        if (bits(flat)) {
+            vec3v ns = triangle_normals(s, b, k, prim & flat);
+            c = rgb_select(flat, (rgbv){0.5f + 0.5f * ns.x, 0.5f + 0.5f * ns.y, 0.5f + 0.5f * ns.z},
+                           c);
+        }
+        rgb_store(&b->radiance, k, c);
+        unsigned round = lanes_there(k, n) & ~bits(flat | vi_eq(prim, vi_set(-1)));
+        for (; round; round &= round - 1) {
+            int i = k + __builtin_ctz(round);
+            ray r = rays_get(&b->ray, i);
+            vec3 ns = surface_at(s, b->hit.prim[i], &r, b->hit.t[i], 0, 0).ns;
+            rgbs_set(&b->radiance, i,
+                     (rgb){0.5f + 0.5f * ns.x, 0.5f + 0.5f * ns.y, 0.5f + 0.5f * ns.z});
+        }
+    }
+}
+
 static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 {
     const bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     generate(it, b, n);
     for (int i = 0; i < n; i++)
         b->active[i] = (uint16_t)i;
+    if (it->opt.kind == INTEGRATE_NORMALS) {
+        bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
+        if (it->opt.first_hits)
+            first_hits_record(it, b, n);
+        show_normals(it, b, n);
+        return;
+    }
     for (int vertex = 0; n > 0; vertex++) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
         if (vertex == 0 && it->opt.first_hits)
