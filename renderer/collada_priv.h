@@ -21,9 +21,6 @@ enum {
     MAX_POLYGON_CORNERS = 1 << 14
 };
 
-/* Coordinates beyond this would overflow float32 when squared. */
-#define FARTHEST 1e18
-
 struct id_entry {
     const char *id;
     xmlNode *node;

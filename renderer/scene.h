@@ -20,6 +20,9 @@ enum dialect {
     DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
 };
 
+/* Coordinates beyond this, which would overflow float32 when squared, are refused in every file. */
+#define FARTHEST 1e18
+
 /* Relative index of refraction: 1/MAX_IOR to MAX_IOR. */
 #define MAX_IOR 100.0f
 

@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and ten seconds of each fuzzer, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and a fixed run of each fuzzer, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
 build=${1:?usage: tests/run.sh BUILD PROGRAM...}
@@ -21,7 +21,7 @@ run_job() {
     local log=$1 name start=$SECONDS
     name=$(basename "$2" .sh)
     case $2 in
-    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" 10 ;;
+    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" fixed ;;
     *.sh) "$2" "$3" ;;
     *) "$2" ;;
     esac >"$log/$name.out" 2>&1
