@@ -195,9 +195,12 @@ static bool add_tree(struct build *b, const struct wide_range *all)
 
 static bool add_list(struct build *b, struct wide_range *all)
 {
+    uint32_t prim[WIDE_FLAT];
+    for (uint32_t i = 0; i < all->count; i++)
+        prim[i] = i;
     if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
         return false;
-    wide_flat_fill(b->scene, b->w->flat);
+    wide_flat_fill(b->scene, prim, (int)all->count, b->w->flat);
     uint32_t triangles = b->scene->num_triangles;
     for (uint32_t i = 0; i < all->count;) {
         uint32_t end = i < triangles ? triangles : all->count;
@@ -208,6 +211,52 @@ static bool add_list(struct build *b, struct wide_range *all)
         i += r.count;
     }
     b->w->cost = b->w->num_leaves;
+    return true;
+}
+
+/* The walls of a room would be in every ray's way down the tree. Takes them out of `all`: primitives that
+ * a random ray through the scene meets the box of by more than LARGE_PART, if there are few. The rest
+ * follow, in their order. False if out of memory. */
+enum { MOST_LARGE = 16 };
+#define LARGE_PART (1.0 / 32)
+
+static bool is_large(const struct build *b, const struct wide_item *it)
+{
+    float x = -it->minus_max[0] - it->min[0], y = -it->minus_max[1] - it->min[1];
+    float z = -it->minus_max[2] - it->min[2];
+    return x * y + y * z + z * x > LARGE_PART * b->root_area;
+}
+
+static bool take_large(struct build *b, struct wide_range *all)
+{
+    struct wide *w = b->w;
+    uint32_t prim[MOST_LARGE], num = 0;
+    for (uint32_t i = 0; i < all->count; i++) {
+        if (!is_large(b, &b->item[i]))
+            continue;
+        if (num == MOST_LARGE)
+            return true;
+        prim[num++] = i;
+    }
+    if (num == 0)
+        return true;
+    if ((w->flat = malloc(sizeof *w->flat)) == NULL)
+        return false;
+    wide_flat_fill(b->scene, prim, (int)num, w->flat);
+    if (!w->flat->quick) {
+        free(w->flat);
+        w->flat = NULL;
+        return true;
+    }
+    uint32_t to = all->count;
+    for (uint32_t i = all->count; i-- > 0;)
+        if (!is_large(b, &b->item[i]))
+            b->item[--to] = b->item[i];
+    w->num_list_leaves = (num + WIDTH - 1) / WIDTH;
+    w->cost += w->num_list_leaves;
+    all->first = num;
+    all->count -= num;
+    b->splitter->bounds(b->item + num, all->count, &all->box, &all->centres);
     return true;
 }
 
@@ -242,8 +291,12 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
         w->min[a] = all.box.v[a];
         w->max[a] = -all.box.v[4 + a];
     }
-    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : add_tree(&b, &all)))
+    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : take_large(&b, &all) && add_tree(&b, &all)))
         goto fail;
+    for (int a = 0; a < 3; a++) {
+        w->tree_min[a] = all.box.v[a];
+        w->tree_max[a] = -all.box.v[4 + a];
+    }
     parallel_for(threads, w->num_leaves, fill_leaves, &b);
     float extent = maxf(maxf(w->max[0] - w->min[0], w->max[1] - w->min[1]), w->max[2] - w->min[2]);
     w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);

@@ -1,6 +1,6 @@
 /* A hierarchy of nodes with eight children and leaves of eight primitives, for the kernels of
- * wide_kernel.h. Behind bvh.h: BVH_WIDE. A scene of up to WIDE_FLAT primitives is a list of leaves and
- * has no tree.
+ * wide_kernel.h. Behind bvh.h: BVH_WIDE. A scene of up to WIDE_FLAT primitives is a list and has no tree;
+ * the few largest primitives of others, walls say, are a list beside the tree.
  *
  * Which primitive a ray meets does not depend on the way through the tree: the smallest distance
  * wins, and of primitives at the very same distance the smallest number. So a ray finds the same
@@ -38,11 +38,13 @@ struct wide_kernel;
 struct wide_flat;
 
 struct wide {
-    struct wide_flat *flat; /* of a list, else NULL */
-    char *arena; /* nodes and leaves; at 0 the root, or the leaves of a list */
-    size_t used; /* bytes */
+    struct wide_flat *flat; /* the list; NULL: there is none */
+    char *arena;            /* nodes and leaves; at 0 the root, or the leaves of a list */
+    size_t used;            /* bytes */
     const struct wide_kernel *kernel;
     float min[3], max[3];           /* of the scene */
+    float tree_min[3], tree_max[3]; /* of what is in the tree */
+    uint32_t num_list_leaves;       /* what the list counts as in tests */
     uint32_t num_nodes, num_leaves; /* num_nodes 0: a list */
     uint32_t num_sphere_leaves;     /* of a list: the last ones */
     uint32_t num_triangles;         /* of the scene: sphere i is primitive num_triangles + i */

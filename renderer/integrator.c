@@ -370,14 +370,13 @@ bool integrator_prepare(struct integrator *it, struct err *e)
     enum isa isa = it->opt.isa;
     it->lanes = NULL;
     it->lanes_scene = NULL;
-    /* One ray per sample and no light sampling: not worth the records. */
-    if (isa == ISA_SCALAR || it->opt.kind == INTEGRATE_NORMALS ||
-        it->opt.direct == DIRECT_HEMISPHERE)
+    const bool normals = it->opt.kind == INTEGRATE_NORMALS;
+    if (isa == ISA_SCALAR || (it->opt.direct == DIRECT_HEMISPHERE && !normals))
         return true;
-    if (!isa_choose(&isa, e) || (it->lanes_scene = lanes_scene_build(it->scene, e)) == NULL)
+    if (!isa_choose(&isa, e))
         return false;
     it->lanes = kernel[isa];
-    return true;
+    return normals || (it->lanes_scene = lanes_scene_build(it->scene, e)) != NULL;
 }
 
 void integrator_free(struct integrator *it)

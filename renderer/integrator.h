@@ -62,7 +62,7 @@ struct integrator {
     const struct camera *camera;
     const struct bvh *bvh;
     const struct light_table *lights;
-    /* The stages on eight paths at a time, and the scene for them; both NULL: one by one. */
+    /* The stages on eight paths at a time, NULL: one by one; and the scene for them, NULL: not needed. */
     const struct lanes_kernel *lanes;
     const struct lanes_scene *lanes_scene;
 };
@@ -92,6 +92,7 @@ struct batch {
     /* Of the stages on eight paths, which keep the paths that go on side by side: whose path a lane
      * is, and what it has gathered. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
+    float numbers[4][BATCH_ROOM]; /* random ones, eight paths and one purpose a row */
     struct rgbs gathered, reflectance;
     int32_t bits[BATCH_ROOM];        /* of the material's record */
     uint8_t goes_on[BATCH_ROOM / 8]; /* by eight lanes, a bit each */

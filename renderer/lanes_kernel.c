@@ -10,6 +10,9 @@
 #include "lanes_light.h"
 #include "lanes_sampler.h"
 
+/* Samples of a light at a vertex whose rays go to the kernel together. */
+enum { TOGETHER = 4 };
+
 static const vi lane_number = {0, 1, 2, 3, 4, 5, 6, 7};
 
 static bool counts(const struct integrator *it, int bounces)
@@ -48,16 +51,56 @@ INLINE void split_pixel(vi pixel, int width, vf *x, vf *y)
     *y = vf_of_int(row);
 }
 
+INLINE void draw_rows(struct batch *b, enum sampler_kind kind, const struct philox_keys *keys,
+                      int first, int end, int vertex, uint32_t purpose, int num)
+{
+    for (int k = first, j = 0; k < end; k += LANES) {
+        vu pixel = (vu)vi_load_any(b->slot_pixel + k), sample = (vu)vi_load_any(b->slot_sample + k);
+        for (int i = 0; i < num; i++, j += LANES) {
+            vf u[4];
+            drawv(kind, keys, pixel, sample, (uint32_t)vertex, purpose + (uint32_t)i, u);
+            for (int d = 0; d < 4; d++)
+                vf_store_any(b->numbers[d] + j, u[d]);
+        }
+    }
+}
+
+/* The numbers of `num` purposes for the lanes first .. end, eight lanes after eight, into rows of
+ * b->numbers. A loop of its own, short enough that the machine works on several rounds of it at once. */
+static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
+                                                   int first, int end, int vertex, uint32_t purpose,
+                                                   int num)
+{
+    const struct philox_keys keys = philox_keys(it->opt.sampler.seed);
+    switch (it->opt.sampler.kind) {
+    case SAMPLER_INDEPENDENT:
+        draw_rows(b, SAMPLER_INDEPENDENT, &keys, first, end, vertex, purpose, num);
+        break;
+    case SAMPLER_SOBOL: draw_rows(b, SAMPLER_SOBOL, &keys, first, end, vertex, purpose, num); break;
+    }
+}
+
+INLINE void load_numbers(const struct batch *b, int row, vf u[4])
+{
+    for (int d = 0; d < 4; d++)
+        u[d] = vf_load_any(b->numbers[d] + LANES * row);
+}
+
 /* Camera rays for all lanes, as camera_ray(). */
 static void generate(const struct integrator *it, struct batch *b, int n)
 {
     const struct camera *c = it->camera;
     const vf zero = vf_set(0), one = vf_set(1);
     for (int k = 0; k < n; k += LANES) {
-        vi pixel = vi_load_any(b->pixel + k), sample = vi_load_any(b->sample + k);
+        vf_store_any(b->slot + k, (vf)(lane_number + k));
+        vf_store_any(b->slot_pixel + k, vf_load_any(b->pixel + k));
+        vf_store_any(b->slot_sample + k, vf_load_any(b->sample + k));
+    }
+    draw_numbers(it, b, 0, n, 0, PURPOSE_CAMERA, 1);
+    for (int k = 0; k < n; k += LANES) {
         vf u[4], px, py;
-        drawv(&it->opt.sampler, (vu)pixel, (vu)sample, 0, PURPOSE_CAMERA, u);
-        split_pixel(pixel, c->width, &px, &py);
+        load_numbers(b, k / LANES, u);
+        split_pixel(vi_load_any(b->pixel + k), c->width, &px, &py);
         vf x = px + u[0], y = py + u[1];
         vf sx = (2 * x / (float)c->width - 1) * c->tan_h;
         vf sy = (1 - 2 * y / (float)c->height) * c->tan_v;
@@ -80,9 +123,6 @@ static void generate(const struct integrator *it, struct batch *b, int n)
         rgb_store(&b->gathered, k, (rgbv){zero, zero, zero});
         vf_store_any(b->pdf_w + k, zero);
         vf_store_any(b->eta2 + k, one);
-        vf_store_any(b->slot + k, (vf)(lane_number + k));
-        vf_store_any(b->slot_pixel + k, (vf)pixel);
-        vf_store_any(b->slot_sample + k, (vf)sample);
     }
 }
 
@@ -92,6 +132,15 @@ struct surfacev {
     vf eps;
     vi material, light;
 };
+
+/* Shading normals, on the side of ng. */
+INLINE vec3v interpolate_normals(vec3v n0, vec3v n1, vec3v n2, vec3v ng, vf u, vf v)
+{
+    vec3v ns = madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2);
+    vf l = vf_sqrt(dotv(ns, ns));
+    ns = v3_select(vf_lt(vf_set(0), l), scalev(ns, 1 / l), ng);
+    return v3_negate_if(vf_lt(dotv(ns, ng), vf_set(0)), ns);
+}
 
 /* surface_at() of eight hits; lanes that hit nothing get anything. */
 INLINE void surfaces(const struct lanes_scene *ls, uint32_t num_triangles, const struct batch *b,
@@ -109,10 +158,7 @@ INLINE void surfaces(const struct lanes_scene *ls, uint32_t num_triangles, const
     vec3v n2 = v3v(w[2][2], w[2][3], w[2][4]);
     s->p = madv(madv(v3v(w[0][0], w[0][1], w[0][2]), u, e1), v, e2);
     s->ng = v3v(w[1][1], w[1][2], w[1][3]);
-    vec3v ns = madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2);
-    vf l = vf_sqrt(dotv(ns, ns));
-    ns = v3_select(vf_lt(vf_set(0), l), scalev(ns, 1 / l), s->ng);
-    s->ns = v3_negate_if(vf_lt(dotv(ns, s->ng), vf_set(0)), ns);
+    s->ns = interpolate_normals(n0, n1, n2, s->ng, u, v);
     s->eps = w[2][RECORD_EPS - 2 * LANES];
     s->material = (vi)w[2][RECORD_MATERIAL - 2 * LANES];
     s->light = (vi)w[2][RECORD_LIGHT - 2 * LANES];
@@ -206,9 +252,32 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
     }
 }
 
+/* Eight vertices as samples of lights want them. */
+struct vertexv {
+    vec3v p, ng, ns, wo, off; /* off: where rays leave on the side of ng */
+    rgbv throughput, diffuse; /* diffuse: reflectance / pi */
+    vf eps;
+    vi bits;
+};
+
+INLINE void load_vertex(const struct batch *b, int k, struct vertexv *v)
+{
+    v->p = v3_load(&b->p, k);
+    v->ng = v3_load(&b->ng, k);
+    v->ns = v3_load(&b->ns, k);
+    v->wo = v3_load(&b->wo, k);
+    v->eps = vf_load_any(b->eps + k);
+    v->off = madv(v->p, v->eps, v->ng);
+    v->throughput = rgb_load(&b->throughput, k);
+    v->diffuse = rgb_scalev(rgb_load(&b->reflectance, k), vf_set(INV_PI_F));
+    v->bits = vi_load_any(b->bits + k);
+}
+
 /* Beckmann, lane by lane. */
-static void scatter_towards_each(const struct integrator *it, const struct batch *b, int k,
-                                 unsigned mask, const vec3v *wi, rgbv *f, vf *pdf_w)
+static __attribute__((noinline)) void scatter_towards_each(const struct integrator *it,
+                                                           const struct batch *b, int k,
+                                                           unsigned mask, const vec3v *wi, rgbv *f,
+                                                           vf *pdf_w)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -223,33 +292,40 @@ static void scatter_towards_each(const struct integrator *it, const struct batch
 
 /* lane_scatter_towards() for the lanes of the mask; which of them scatter some. */
 INLINE unsigned scatter_towards(const struct integrator *it, const struct batch *b, int k,
-                                unsigned mask, vec3v wi, rgbv *f, vf *pdf_w)
+                                const struct vertexv *v, unsigned mask, vec3v wi, bool only_diffuse,
+                                rgbv *f, vf *pdf_w)
 {
     const vf zero = vf_set(0);
-    vec3v ns = v3_load(&b->ns, k), wo = v3_load(&b->wo, k);
-    vf cos_i = dotv(ns, wi);
-    mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v3_load(&b->ng, k), wi)));
+    vf cos_i = dotv(v->ns, wi);
+    mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v->ng, wi)));
+    *f = rgb_scalev(v->diffuse, cos_i);
+    *pdf_w = cos_i * INV_PI_F;
+    vi below = ~vf_lt(zero, dotv(v->wo, v->ns));
+    if (only_diffuse)
+        return mask & ~bits(below | rgb_is_zerov(*f));
     if (!mask)
         return 0;
-    *f = rgb_scalev(rgb_scalev(rgb_load(&b->reflectance, k), vf_set(INV_PI_F)), cos_i);
-    *pdf_w = cos_i * INV_PI_F;
-    vi about = vi_load_any(b->bits + k), diffuse = has_bits(about, 1 << MATERIAL_DIFFUSE);
-    unsigned rough = mask & ~bits(diffuse);
-    unsigned black = bits(diffuse & ~vf_lt(zero, dotv(wo, ns)));
+    vi diffuse = has_bits(v->bits, 1 << MATERIAL_DIFFUSE);
+    unsigned rough = mask & ~bits(diffuse), black = bits(diffuse & below);
     if (rough) {
-        unsigned beckmann = rough & bits(has_bits(about, MATERIAL_IS_BECKMANN));
+        unsigned beckmann = rough & bits(has_bits(v->bits, MATERIAL_IS_BECKMANN));
         if (rough & ~beckmann) {
             struct materialv m;
             materials_gather(it->lanes_scene, (const int32_t *)b->material + k, &m);
-            framev local = frame_from_normalv(ns);
+            framev local = frame_from_normalv(v->ns);
             vf pdf_ggx;
             rgbv ggx =
-                eval_ggx(&m, frame_to_localv(&local, wo), frame_to_localv(&local, wi), &pdf_ggx);
+                eval_ggx(&m, frame_to_localv(&local, v->wo), frame_to_localv(&local, wi), &pdf_ggx);
             *f = rgb_select(diffuse, *f, rgb_scalev(ggx, cos_i));
             *pdf_w = vf_select(diffuse, *pdf_w, pdf_ggx);
         }
-        if (beckmann)
-            scatter_towards_each(it, b, k, beckmann, &wi, f, pdf_w);
+        if (beckmann) {
+            rgbv each = *f;
+            vf pdf_each = *pdf_w;
+            scatter_towards_each(it, b, k, beckmann, &wi, &each, &pdf_each);
+            *f = each;
+            *pdf_w = pdf_each;
+        }
     }
     return mask & ~black & ~bits(rgb_is_zerov(*f));
 }
@@ -269,88 +345,124 @@ INLINE vf power_heuristicv(vf a, vf b)
     return vf_select(vf_lt(vf_set(0), a), 1 / (1 + r * r), vf_set(0));
 }
 
-/* Adds what shadow rays let through. */
-static void add_visible(struct batch *b, int n)
+/* Samples of a light that one call for each vertex takes. */
+struct light_samples {
+    uint32_t purpose; /* of the first; the next has the next */
+    int num, count;   /* this call's, and what a vertex takes in all */
+    bool chosen;      /* of the light in b->choice, else of `light` */
+    uint32_t light;
+    struct lamp lamp; /* the light, if it is one, where only diffuse things scatter */
+};
+
+/* A sample, by the numbers of row j, for the lanes of the mask of vertices k ..: shadow rays behind the
+ * `rays` that there are, and what they bring into row j; the lanes that cast one. */
+INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
+                             const struct vertexv *v, unsigned mask,
+                             const struct light_samples *what, bool simple, int j, int rays)
 {
-    const rgbv black = {vf_set(0), vf_set(0), vf_set(0)};
-    for (int k = 0; k < n; k += LANES) {
-        unsigned cast = b->shadow_bits[k / LANES];
-        unsigned seen = cast & ~spread_flags(b->occluded + b->shadow_first[k / LANES], cast);
-        rgbv l = rgb_select(lanes_of(seen), rgb_load(&b->shadow_light, k), black);
-        rgbv g = rgb_load(&b->gathered, k);
-        rgb_store(&b->gathered, k, (rgbv){g.r + l.r, g.g + l.g, g.b + l.b});
+    vf u[4], pdf_bsdf;
+    load_numbers(b, j, u);
+    struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
+    if (simple) {
+        sample_lampv(&what->lamp, v->p, u, &ls);
+    } else if (what->chosen) {
+        uint32_t light[LANES];
+        for (int i = 0; i < LANES; i++)
+            light[i] = b->choice[k + i].light;
+        vf probability = vf_load_any(b->choice_probability + k);
+        mask &= bits(vf_lt(vf_set(0), probability));
+        sample_each(it->lights, light, v->p, u, mask, &ls);
+        ls.pdf_w *= probability;
+    } else {
+        sample_lightv(it->scene, it->lanes_scene, it->lights, what->light, v->p, u, mask, &ls);
     }
+    mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
+    rgbv f;
+    mask = scatter_towards(it, b, k, v, mask, ls.wi, simple, &f, &pdf_bsdf);
+    /* Without a branch where there is little to save. */
+    if (!simple && !mask)
+        return 0;
+    vf per = (float)what->count * ls.pdf_w, w = vf_set(1);
+    if (it->opt.direct == DIRECT_MIS)
+        w = vf_select(ls.delta, w, power_heuristicv(per, pdf_bsdf));
+    rgbv light = rgb_mulv(rgb_mulv(v->throughput, f), ls.radiance);
+    rgb_store(&b->shadow_light, LANES * j, rgb_scalev(light, w / per));
+    vi order = front_order(mask);
+    pick_v3(&b->shadow.o, rays, v->off, order);
+    pick_v3(&b->shadow.d, rays, ls.wi, order);
+    vf end = ls.distance * (1 - 1e-4f) - 2 * v->eps;
+    vf_store_any(b->shadow.tmax + rays, pick(end, order));
+    vf_store_any(b->shadow.tmin + rays, vf_set(0));
+    vf_store_any(b->shadow.ignore + rays, pick((vf)ls.sphere, order));
+    return mask;
 }
 
-/* One sample of a light from every lane that is not mirror-like, as one of `count` per lane; of light l,
- * or if `chosen` of the one in b->choice. */
-static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
-                          uint32_t purpose, int count, bool chosen, uint32_t l)
+/* Adds what the shadow rays of vertices k .. let through, from row j on. */
+INLINE void add_visible(struct batch *b, int k, int j, int num)
 {
-    const struct scene *s = it->scene;
-    const bool mis = it->opt.direct == DIRECT_MIS;
-    int rays = 0;
-    for (int k = 0; k < n; k += LANES) {
+    const rgbv black = {vf_set(0), vf_set(0), vf_set(0)};
+    rgbv g = rgb_load(&b->gathered, k);
+    for (int end = j + num; j < end; j++) {
+        unsigned cast = b->shadow_bits[j];
+        unsigned seen = cast & ~spread_flags(b->occluded + b->shadow_first[j], cast);
+        rgbv l = rgb_select(lanes_of(seen), rgb_load(&b->shadow_light, LANES * j), black);
+        g = (rgbv){g.r + l.r, g.g + l.g, g.b + l.b};
+    }
+    rgb_store(&b->gathered, k, g);
+}
+
+/* Shadow rays from lanes first .. end; how many. */
+INLINE int connect_rows(const struct integrator *it, struct batch *b, int first, int end,
+                        const struct light_samples *what, bool simple)
+{
+    int rays = 0, j = 0;
+    for (int k = first; k < end; k += LANES) {
         unsigned mask = b->goes_on[k / LANES];
         mask &= bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
-        b->shadow_bits[k / LANES] = 0;
-        b->shadow_first[k / LANES] = (uint16_t)rays;
-        if (!mask)
-            continue;
-        vf u[4], pdf_bsdf;
-        drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k),
-              (vu)vi_load_any(b->slot_sample + k), (uint32_t)vertex + 1, purpose, u);
-        struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
-        vec3v p = v3_load(&b->p, k);
-        if (chosen) {
-            uint32_t light[LANES];
-            for (int i = 0; i < LANES; i++)
-                light[i] = b->choice[k + i].light;
-            vf probability = vf_load_any(b->choice_probability + k);
-            mask &= bits(vf_lt(vf_set(0), probability));
-            sample_each(it->lights, light, &p, u, mask, &ls);
-            ls.pdf_w *= probability;
-        } else {
-            sample_lightv(s, it->lanes_scene, it->lights, l, p, u, mask, &ls);
+        struct vertexv v;
+        load_vertex(b, k, &v);
+        for (int i = 0; i < what->num; i++, j++) {
+            unsigned cast = mask ? connect_once(it, b, k, &v, mask, what, simple, j, rays) : 0;
+            b->shadow_bits[j] = (uint8_t)cast;
+            b->shadow_first[j] = (uint16_t)rays;
+            rays += (int)count_bits(cast);
         }
-        mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
-        rgbv f;
-        mask = scatter_towards(it, b, k, mask, ls.wi, &f, &pdf_bsdf);
-        if (!mask)
-            continue;
-        vf per = (float)count * ls.pdf_w, w = vf_set(1);
-        if (mis)
-            w = vf_select(ls.delta, w, power_heuristicv(per, pdf_bsdf));
-        rgbv light = rgb_mulv(rgb_mulv(rgb_load(&b->throughput, k), f), ls.radiance);
-        rgb_store(&b->shadow_light, k, rgb_scalev(light, w / per));
-        vi order = front_order(mask);
-        pick_v3(&b->shadow.o, rays, leaving(b, k, ls.wi), order);
-        pick_v3(&b->shadow.d, rays, ls.wi, order);
-        vf end = ls.distance * (1 - 1e-4f) - 2 * vf_load_any(b->eps + k);
-        vf_store_any(b->shadow.tmax + rays, pick(end, order));
-        vf_store_any(b->shadow.tmin + rays, vf_set(0));
-        vf_store_any(b->shadow.ignore + rays, pick((vf)ls.sphere, order));
-        b->shadow_bits[k / LANES] = (uint8_t)mask;
-        rays += (int)count_bits(mask);
     }
-    bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
-    add_visible(b, n);
+    return rays;
+}
+
+/* Samples a light from every lane that is not mirror-like, for as many lanes at a time as all these shadow
+ * rays have room for. */
+static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
+                          struct light_samples what)
+{
+    const struct light *light = &it->scene->lights[what.light];
+    const bool simple = !what.chosen && is_lamp(light) && it->lanes_scene->only_diffuse;
+    if (simple)
+        what.lamp = lamp_of(it->scene, it->lanes_scene, it->lights, light);
+    const int most = BATCH_LANES / LANES / what.num * LANES;
+    for (int first = 0; first < n; first += most) {
+        const int end = n - first < most ? n : first + most;
+        draw_numbers(it, b, first, end, vertex + 1, what.purpose, what.num);
+        int rays = simple ? connect_rows(it, b, first, end, &what, true)
+                          : connect_rows(it, b, first, end, &what, false);
+        bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
+        for (int k = first, j = 0; k < end; k += LANES, j += what.num)
+            add_visible(b, k, j, what.num);
+    }
 }
 
 /* Every lane chooses a light. */
 static void choose(const struct integrator *it, struct batch *b, int n, int vertex,
                    uint32_t purpose, bool only_delta)
 {
-    for (int k = 0; k < n; k += LANES) {
-        vf u[4];
-        drawv(&it->opt.sampler, (vu)vi_load_any(b->slot_pixel + k),
-              (vu)vi_load_any(b->slot_sample + k), (uint32_t)vertex + 1, purpose, u);
+    draw_numbers(it, b, 0, n, vertex + 1, purpose, 1);
+    for (int k = 0; k < n; k += LANES)
         for (unsigned mask = b->goes_on[k / LANES]; mask; mask &= mask - 1) {
-            int i = __builtin_ctz(mask);
-            b->choice[k + i] = light_choose(it->lights, only_delta, u[0][i]);
-            b->choice_probability[k + i] = b->choice[k + i].probability;
+            int i = k + __builtin_ctz(mask);
+            b->choice[i] = light_choose(it->lights, only_delta, b->numbers[0][i]);
+            b->choice_probability[i] = b->choice[i].probability;
         }
-    }
 }
 
 static void connect(const struct integrator *it, struct batch *b, int n, int vertex)
@@ -361,7 +473,11 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
     if (chooses_light(it)) {
         for (int k = 0; k < it->opt.light_samples; k++) {
             choose(it, b, n, vertex, purpose++, only_delta);
-            connect_light(it, b, n, vertex, purpose++, it->opt.light_samples, true, 0);
+            connect_light(it, b, n, vertex,
+                          (struct light_samples){.purpose = purpose++,
+                                                 .num = 1,
+                                                 .count = it->opt.light_samples,
+                                                 .chosen = true});
         }
         return;
     }
@@ -370,14 +486,21 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
         if (!delta && only_delta)
             continue;
         int count = delta ? 1 : it->opt.light_samples;
-        for (int k = 0; k < count; k++)
-            connect_light(it, b, n, vertex, purpose++, count, false, l);
+        for (int k = 0; k < count; k += TOGETHER) {
+            const int num = count - k < TOGETHER ? count - k : TOGETHER;
+            connect_light(
+                it, b, n, vertex,
+                (struct light_samples){.purpose = purpose, .num = num, .count = count, .light = l});
+            purpose += (uint32_t)num;
+        }
     }
 }
 
 /* bsdf_sample_direction() of Beckmann, lane by lane. */
-static void sample_each_bsdf(const struct integrator *it, const struct batch *b, int k,
-                             unsigned mask, const vec3v *wo, const vf u[4], struct bsdf_samplev *s)
+static __attribute__((noinline)) void sample_each_bsdf(const struct integrator *it,
+                                                       const struct batch *b, int k, unsigned mask,
+                                                       const vec3v *wo, const vf u[4],
+                                                       struct bsdf_samplev *s)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -424,8 +547,12 @@ INLINE void sample_bsdf(const struct integrator *it, const struct batch *b, int 
     vi beckmann = rough & has_bits(about, MATERIAL_IS_BECKMANN);
     if (bits(rough & ~beckmann))
         sample_ggxv(&m, rough & ~beckmann, wo, u[0], u[1], s);
-    if (bits(beckmann))
-        sample_each_bsdf(it, b, k, bits(beckmann), &wo, u, s);
+    if (bits(beckmann)) {
+        const vf numbers[4] = {u[0], u[1], u[2], u[3]};
+        struct bsdf_samplev each = *s;
+        sample_each_bsdf(it, b, k, bits(beckmann), &wo, numbers, &each);
+        *s = each;
+    }
 }
 
 /* Chance to go on, as survival(). */
@@ -450,6 +577,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
 {
     const vf zero = vf_set(0);
     int kept = 0;
+    draw_numbers(it, b, 0, n, vertex + 1, PURPOSE_BSDF, 1);
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n), mask = b->goes_on[k / LANES];
         if (!mask) {
@@ -457,8 +585,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
             continue;
         }
         vf u[4];
-        vi pixel = vi_load_any(b->slot_pixel + k), sample = vi_load_any(b->slot_sample + k);
-        drawv(&it->opt.sampler, (vu)pixel, (vu)sample, (uint32_t)vertex + 1, PURPOSE_BSDF, u);
+        load_numbers(b, k / LANES, u);
         framev f = frame_from_normalv(v3_load(&b->ns, k));
         vec3v wo = frame_to_localv(&f, v3_load(&b->wo, k));
         struct bsdf_samplev s;
@@ -485,12 +612,58 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         vf_store_any(b->ray.tmax + kept, vf_set(INFINITY));
         vf_store_any(b->pdf_w + kept, pick(vf_select(s.delta, zero, s.pdf_w), order));
         vf_store_any(b->eta2 + kept, pick(eta2, order));
-        vf_store_any(b->slot_pixel + kept, pick((vf)pixel, order));
-        vf_store_any(b->slot_sample + kept, pick((vf)sample, order));
+        vf_store_any(b->slot_pixel + kept, pick(vf_load_any(b->slot_pixel + k), order));
+        vf_store_any(b->slot_sample + kept, pick(vf_load_any(b->slot_sample + k), order));
         vf_store_any(b->slot + kept, pick(vf_load_any(b->slot + k), order));
         kept += (int)count_bits(mask);
     }
     return kept;
+}
+
+/* Shading normals of hits on triangles, from the scene itself: for one ray a pixel records do not pay. */
+INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int k, vi prim)
+{
+    enum { WORDS = 9 };
+    const float *const from[2] = {&s->position[0].x, &s->normal[0].x};
+    int32_t row[LANES];
+    vf_store_any(row, (vf)prim);
+    vf w[2][LANES], last[2][LANES];
+    for (int i = 0; i < 2; i++) {
+        gather_columns(from[i], WORDS, row, w[i]);
+        gather_columns(from[i] + 1, WORDS, row, last[i]);
+    }
+    vec3v p = v3v(w[0][0], w[0][1], w[0][2]);
+    vec3v e1 = subv(v3v(w[0][3], w[0][4], w[0][5]), p);
+    vec3v e2 = subv(v3v(w[0][6], w[0][7], last[0][7]), p);
+    return interpolate_normals(v3v(w[1][0], w[1][1], w[1][2]), v3v(w[1][3], w[1][4], w[1][5]),
+                               v3v(w[1][6], w[1][7], last[1][7]), normalizev(crossv(e1, e2)),
+                               vf_load_any(b->hit.u + k), vf_load_any(b->hit.v + k));
+}
+
+/* integrate_normals() of integrator.c, behind the rays. */
+static void show_normals(const struct integrator *it, struct batch *b, int n)
+{
+    const struct scene *s = it->scene;
+    const vf zero = vf_set(0);
+    for (int k = 0; k < n; k += LANES) {
+        vi prim = vi_load_any(b->hit.prim + k);
+        vi flat = vi_lt(vi_set(-1), prim) & vi_lt(prim, vi_set((int32_t)s->num_triangles));
+        rgbv c = {zero, zero, zero};
+        if (bits(flat)) {
+            vec3v ns = triangle_normals(s, b, k, prim & flat);
+            c = rgb_select(flat, (rgbv){0.5f + 0.5f * ns.x, 0.5f + 0.5f * ns.y, 0.5f + 0.5f * ns.z},
+                           c);
+        }
+        rgb_store(&b->radiance, k, c);
+        unsigned round = lanes_there(k, n) & ~bits(flat | vi_eq(prim, vi_set(-1)));
+        for (; round; round &= round - 1) {
+            int i = k + __builtin_ctz(round);
+            ray r = rays_get(&b->ray, i);
+            vec3 ns = surface_at(s, b->hit.prim[i], &r, b->hit.t[i], 0, 0).ns;
+            rgbs_set(&b->radiance, i,
+                     (rgb){0.5f + 0.5f * ns.x, 0.5f + 0.5f * ns.y, 0.5f + 0.5f * ns.z});
+        }
+    }
 }
 
 static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
@@ -499,6 +672,13 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
     generate(it, b, n);
     for (int i = 0; i < n; i++)
         b->active[i] = (uint16_t)i;
+    if (it->opt.kind == INTEGRATE_NORMALS) {
+        bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
+        if (it->opt.first_hits)
+            first_hits_record(it, b, n);
+        show_normals(it, b, n);
+        return;
+    }
     for (int vertex = 0; n > 0; vertex++) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
         if (vertex == 0 && it->opt.first_hits)

@@ -8,7 +8,7 @@
 #include "isa.h"
 
 struct lanes_kernel {
-    /* As integrate(), of INTEGRATE_PATHS and without DIRECT_HEMISPHERE. */
+    /* As integrate(), but for paths with DIRECT_HEMISPHERE. */
     void (*integrate)(const struct integrator *it, struct batch *b, int num_lanes);
     /* Adds lane i of a batch to pixel[i], as film_add() of a film without first hits. */
     void (*film_add)(struct film *f, const size_t *pixel, int num_lanes, const struct batch *b);

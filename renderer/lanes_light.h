@@ -35,18 +35,42 @@ INLINE void finish_area_samplev(struct light_samplev *s, rgb radiance, bool both
     s->pdf_w = vf_select(lit, pdf_a * d2 / cos_l, zero);
 }
 
-INLINE void sample_trianglesv(const struct scene *s, const struct lanes_scene *ls, const float *cdf,
-                              const struct light *light, vec3v p, const vf u[4],
-                              struct light_samplev *out)
+/* A light of few triangles: what its samples have in common. */
+struct lamp {
+    const float *record; /* of the first triangle, RECORD_WORDS of each */
+    const float *cdf;    /* area up to and including each */
+    int count;
+    float pdf_a;
+    rgb radiance;
+    bool both_sides;
+};
+
+static inline bool is_lamp(const struct light *light)
 {
-    const uint32_t first = light->first, last = first + light->count - 1;
-    const vf target = u[2] * cdf[last];
-    const float *r = ls->primitive + RECORD_WORDS * (size_t)first;
+    return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES;
+}
+
+static inline struct lamp lamp_of(const struct scene *s, const struct lanes_scene *ls,
+                                  const struct light_table *t, const struct light *light)
+{
+    const struct material *m = &s->materials[s->tri_material[light->first]];
+    return (struct lamp){.record = ls->primitive + RECORD_WORDS * (size_t)light->first,
+                         .cdf = light_table_areas(t) + light->first,
+                         .count = (int)light->count,
+                         .pdf_a = 1 / light->area,
+                         .radiance = m->radiance,
+                         .both_sides = m->radiance_both_sides};
+}
+
+INLINE void sample_lampv(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
+{
+    const vf target = u[2] * l->cdf[l->count - 1];
+    const float *r = l->record;
     vf q[12];
     for (int k = 0; k < 12; k++)
         q[k] = vf_set(r[k]);
-    for (uint32_t i = first; i < last; i++) {
-        vi beyond = vf_le(vf_set(cdf[i]), target);
+    for (int i = 0; i < l->count - 1; i++) {
+        vi beyond = vf_le(vf_set(l->cdf[i]), target);
         r += RECORD_WORDS;
         for (int k = 0; k < 12; k++)
             q[k] = vf_select(beyond, vf_set(r[k]), q[k]);
@@ -54,9 +78,7 @@ INLINE void sample_trianglesv(const struct scene *s, const struct lanes_scene *l
     vf root = vf_sqrt(u[0]), b1 = 1 - root, b2 = u[1] * root;
     vec3v to =
         madv(madv(v3v(q[0], q[1], q[2]), b1, v3v(q[3], q[4], q[5])), b2, v3v(q[6], q[7], q[8]));
-    const struct material *m = &s->materials[s->tri_material[first]];
-    finish_area_samplev(out, m->radiance, m->radiance_both_sides, p, to, v3v(q[9], q[10], q[11]),
-                        1 / light->area);
+    finish_area_samplev(out, l->radiance, l->both_sides, p, to, v3v(q[9], q[10], q[11]), l->pdf_a);
 }
 
 /* From outside the cone, else lane by lane. */
@@ -107,8 +129,9 @@ INLINE void sample_directionalv(const struct light *light, struct light_samplev 
 }
 
 /* Lanes of the mask one by one, each of light number l[lane]. */
-static void sample_each(const struct light_table *t, const uint32_t *l, const vec3v *p,
-                        const vf u[4], unsigned mask, struct light_samplev *out)
+static __attribute__((noinline)) void sample_each_at(const struct light_table *t, const uint32_t *l,
+                                                     const vec3v *p, const vf u[4], unsigned mask,
+                                                     struct light_samplev *out)
 {
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
@@ -128,20 +151,31 @@ static void sample_each(const struct light_table *t, const uint32_t *l, const ve
     }
 }
 
+/* By way of copies: what an address is taken of lives in memory for all its life. */
+INLINE void sample_each(const struct light_table *t, const uint32_t *l, vec3v p, const vf u[4],
+                        unsigned mask, struct light_samplev *out)
+{
+    const vf numbers[4] = {u[0], u[1], u[2], u[3]};
+    struct light_samplev each = *out;
+    sample_each_at(t, l, &p, numbers, mask, &each);
+    *out = each;
+}
+
 /* The lanes of the mask sample light l. */
 INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
                           const struct light_table *t, uint32_t l, vec3v p, const vf u[4],
                           unsigned mask, struct light_samplev *out)
 {
     const struct light *light = &s->lights[l];
-    const uint32_t same[LANES] = {l, l, l, l, l, l, l, l};
     vi done = vi_set(0);
     switch (light->kind) {
     case LIGHT_TRIANGLES:
-        if (light->count > FEW_TRIANGLES)
-            break;
-        sample_trianglesv(s, ls, light_table_areas(t), light, p, u, out);
-        return;
+        if (is_lamp(light)) {
+            const struct lamp lamp = lamp_of(s, ls, t, light);
+            sample_lampv(&lamp, p, u, out);
+            return;
+        }
+        break;
     case LIGHT_SPHERE: done = sample_spherev(s, light, p, u, out); break;
     case LIGHT_POINT: sample_pointv(light, p, out); return;
     case LIGHT_DIRECTIONAL: sample_directionalv(light, out); return;
@@ -149,8 +183,9 @@ INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
     case LIGHT_ENVIRONMENT: break;
     }
     mask &= ~bits(done);
+    const uint32_t same[LANES] = {l, l, l, l, l, l, l, l};
     if (mask)
-        sample_each(t, same, &p, u, mask, out);
+        sample_each(t, same, p, u, mask, out);
 }
 
 #endif

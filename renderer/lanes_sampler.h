@@ -10,21 +10,38 @@ INLINE vu vu_set(uint32_t x)
     return (vu)vi_set((int32_t)x);
 }
 
-/* philox4x32() of ten rounds. */
-INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose, uint64_t seed,
-                    vu out[4])
+enum { PHILOX_ROUNDS = 10 };
+
+/* What the rounds mix in, made once for many numbers. */
+struct philox_keys {
+    uint32_t k[PHILOX_ROUNDS][2];
+};
+
+static inline struct philox_keys philox_keys(uint64_t seed)
 {
+    struct philox_keys keys;
     uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
-    vw c0 = vw_of(pixel), c1 = vw_of(sample), c2 = vw_of(vu_set(vertex));
-    vw c3 = vw_of(vu_set(purpose));
-    for (int r = 0; r < 10; r++) {
-        vw p0 = vw_mul(c0, 0xD2511F53u), p1 = vw_mul(c2, 0xCD9E8D57u);
-        c0 = vw_xor(vw_high(p1), c1, k0);
-        c1 = p1;
-        c2 = vw_xor(vw_high(p0), c3, k1);
-        c3 = p0;
+    for (int r = 0; r < PHILOX_ROUNDS; r++) {
+        keys.k[r][0] = k0;
+        keys.k[r][1] = k1;
         k0 += 0x9E3779B9u;
         k1 += 0xBB67AE85u;
+    }
+    return keys;
+}
+
+/* philox4x32() */
+INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
+                    const struct philox_keys *keys, vu out[4])
+{
+    vw c0 = vw_of(pixel), c1 = vw_of(sample), c2 = vw_of(vu_set(vertex));
+    vw c3 = vw_of(vu_set(purpose));
+    for (int r = 0; r < PHILOX_ROUNDS; r++) {
+        vw p0 = vw_mul(c0, 0xD2511F53u), p1 = vw_mul(c2, 0xCD9E8D57u);
+        c0 = vw_xor(vw_high(p1), c1, keys->k[r][0]);
+        c1 = p1;
+        c2 = vw_xor(vw_high(p0), c3, keys->k[r][1]);
+        c3 = p0;
     }
     out[0] = vu_of(c0);
     out[1] = vu_of(c1);
@@ -76,16 +93,16 @@ INLINE vu scramble_upwardsv(vu x, vu seed)
     return x;
 }
 
-INLINE void drawv(const struct sampler *s, vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
-                  vf u[4])
+INLINE void drawv(enum sampler_kind kind, const struct philox_keys *keys, vu pixel, vu sample,
+                  uint32_t vertex, uint32_t purpose, vf u[4])
 {
     vu x[4];
-    if (s->kind == SAMPLER_INDEPENDENT) {
-        philoxv(pixel, sample, vertex, purpose, s->seed, x);
+    if (kind == SAMPLER_INDEPENDENT) {
+        philoxv(pixel, sample, vertex, purpose, keys, x);
     } else {
         vu order[4], scramble[4];
-        philoxv(pixel, vu_set(0), vertex, purpose, s->seed, order);
-        philoxv(pixel, vu_set(1), vertex, purpose, s->seed, scramble);
+        philoxv(pixel, vu_set(0), vertex, purpose, keys, order);
+        philoxv(pixel, vu_set(1), vertex, purpose, keys, scramble);
         x[0] = scramble_upwardsv(reverse_bitsv(sample), order[0]);
         x[1] = pascal_2v(x[0]);
         x[2] = pascal_4v(x[0]);

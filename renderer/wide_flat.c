@@ -126,14 +126,17 @@ static void fill_faces(struct wide_flat *f)
     }
 }
 
-void wide_flat_fill(const struct scene *s, struct wide_flat *f)
+void wide_flat_fill(const struct scene *s, const uint32_t *prim, int num, struct wide_flat *f)
 {
-    *f = (struct wide_flat){.num_triangles = (int)s->num_triangles,
-                            .num_spheres = (int)s->num_spheres};
-    for (int i = 0; i < f->num_triangles; i++) {
+    *f = (struct wide_flat){0};
+    for (int i = 0; i < num; i++)
+        f->number[i] = (int32_t)prim[i];
+    for (; f->num_triangles < num && prim[f->num_triangles] < s->num_triangles;
+         f->num_triangles++) {
+        const int i = f->num_triangles;
         uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
         for (int k = 0; k < 3; k++)
-            c[k] = find_corner(f, s->position[3 * i + k]);
+            c[k] = find_corner(f, s->position[3 * (size_t)prim[i] + (size_t)k]);
         e[0] = find_edge(f, c[1], c[2]);
         e[1] = find_edge(f, c[2], c[0]);
         e[2] = find_edge(f, c[0], c[1]);
@@ -142,10 +145,10 @@ void wide_flat_fill(const struct scene *s, struct wide_flat *f)
             f->reach = maxf(f->reach, fabsf(f->row[i][k]));
         }
     }
-    for (int i = 0; i < f->num_spheres; i++) {
-        const struct sphere *sp = &s->spheres[i];
+    for (int i = f->num_triangles; i < num; i++) {
+        const struct sphere *sp = &s->spheres[prim[i] - s->num_triangles];
         const float q[4] = {sp->centre.x, sp->centre.y, sp->centre.z, sp->radius};
-        memcpy(f->sphere[i], q, sizeof q);
+        memcpy(f->sphere[f->num_spheres++], q, sizeof q);
     }
     fill_faces(f);
 }

@@ -1,4 +1,4 @@
-/* A scene of few primitives without a tree, in two forms. Exact: corners and edges that triangles share
+/* A scene of few primitives without a tree, or the few large ones of a scene, in two forms. Exact: corners and edges that triangles share
  * bit for bit are there once, so that each is taken to a ray once. Quick: planes with two coordinates
  * in them, of which two triangles that make a parallelogram are one; they tell which triangle a ray
  * meets unless that is a matter of rounding. */
@@ -30,8 +30,9 @@ struct wide_flat {
     float sphere[WIDE_FLAT][4]; /* centre, radius */
     struct flat_face face[WIDE_FLAT];
     float row[WIDE_FLAT][FLAT_ROW]; /* of a triangle: its corners, one after the other */
-    float reach;                    /* largest coordinate of a corner */
-    bool quick;                     /* the quick form is there, and of use */
+    int32_t number[WIDE_FLAT]; /* of each triangle, then of each sphere, in the scene; ascending */
+    float reach;               /* largest coordinate of a corner */
+    bool quick;                /* the quick form is there, and of use */
 };
 
 /* How far the quick form's u and v and the exact test's barycentric coordinates are apart, at most:
@@ -43,7 +44,7 @@ struct wide_flat {
 #define FLAT_ERROR (512 * FLT_EPSILON)
 #define FLAT_SLACK (16 * FLT_EPSILON)
 
-/* Of a scene of up to WIDE_FLAT primitives. */
-void wide_flat_fill(const struct scene *s, struct wide_flat *f);
+/* Of up to WIDE_FLAT primitives of a scene, in ascending order. */
+void wide_flat_fill(const struct scene *s, const uint32_t *prim, int num, struct wide_flat *f);
 
 #endif

@@ -5,6 +5,33 @@
 #include "wide_packet.h"
 #include "wide_single.h"
 
+/* The list beside the tree, first; lanes that the tree is for. */
+INLINE unsigned trace_list(const struct wide *w, struct octet *o, const uint16_t *eight, bool any,
+                           struct hits *h, bool *occluded, struct bvh_stats *stats)
+{
+    const struct wide_flat *f = w->flat;
+    stats->primitive_tests += w->num_list_leaves;
+    if (any) {
+        vi met = list_occluded_eight(f, o, true);
+        octet_store_flags(o, eight, bits(met), occluded);
+        o->limit = vf_select(met, vf_set(-INFINITY), o->limit);
+        o->prim = vi_select(met, vi_set(0), o->prim);
+        return octet_box(w, o);
+    }
+    struct list_hits best;
+    list_closest_eight(f, o, &best);
+    vi met = vi_lt(vi_set(-1), best.prim), prim = vi_set(-1);
+    for (int i = 0; i < LANES; i++)
+        if (best.prim[i] >= 0)
+            prim[i] = f->number[best.prim[i]];
+    octet_store(o, eight, best.t, best.u, best.v, prim, h);
+    o->limit = vf_select(met, best.t, o->limit);
+    o->prim = vi_select(met, prim, o->prim);
+    o->u = best.u;
+    o->v = best.v;
+    return octet_box(w, o);
+}
+
 /* One batch: rays that are alike go in packets, the others one by one. h is NULL: occlusion. */
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                   bool any, struct hits *h, bool *occluded, struct bvh_stats *stats)
@@ -13,31 +40,37 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
-        int some = num_lanes - k < LANES ? num_lanes - k : LANES;
+        unsigned open = num_lanes - k < LANES ? (1u << (num_lanes - k)) - 1 : 255;
+        const bool full = open == 255;
         octet_init(r, eight, o);
         if (any)
             octet_ignore(r, eight, o);
         octet_slabs(w, o);
-        if (some == LANES && are_alike(w, o)) {
+        if (w->flat != NULL)
+            open &= trace_list(w, o, eight, any, h, occluded, stats);
+        if (open == 0)
+            continue;
+        if (full && are_alike(w, o)) {
             struct packet p;
             struct bundle b;
-            packet_init(o, LANES, &p);
+            packet_init(o, &p);
             bundle_init(w, o, &b);
             packet_traverse(w, &b, &p, any, stats);
             if (any)
-                packet_verdict(&p, eight, LANES, occluded);
+                packet_verdict(&p, eight, occluded);
             else
-                packet_result(&p, r, eight, LANES, h);
+                packet_result(&p, eight, h);
             continue;
         }
         struct single single[LANES];
-        for (int j = 0; j < some; j++) {
-            single_init(o, j, &single[j]);
-            single_root(w, &single[j]);
+        int n = 0;
+        for (; open; open &= open - 1, n++) {
+            single_init(o, __builtin_ctz(open), &single[n]);
+            single_root(w, &single[n]);
         }
-        for (int j = 0; j < some; j++) {
-            int i = eight[j];
+        for (int j = 0; j < n; j++) {
             struct single *s = &single[j];
+            int i = eight[s->lane];
             if (any) {
                 occluded[i] = single_occluded(w, s, stats);
                 continue;

@@ -1,4 +1,4 @@
-/* A scene without a tree: eight rays at a time against every primitive, each ray sheared along its own
+/* A list without a tree: eight rays at a time against every primitive, each ray sheared along its own
  * largest axis. Part of wide_kernel.c. */
 #ifndef ASSAY_WIDE_LIST_H
 #define ASSAY_WIDE_LIST_H
@@ -71,7 +71,7 @@ INLINE vi list_sphere(const struct wide_flat *f, int i, const struct octet *q, v
                       vf_set(s[3]), q->tmin, below(limit), t);
 }
 
-/* What eight rays meet first. */
+/* What eight rays meet first. prim: place in the list, -1: nothing. */
 struct list_hits {
     vf t, u, v;
     vi prim;
@@ -100,6 +100,11 @@ list_closest_exact(const struct wide_flat *f, const struct octet *q, struct list
     }
 }
 
+INLINE vi does_not_ignore(const struct wide_flat *f, int i, const struct octet *q)
+{
+    return ~vi_eq(q->ignore, vi_set(f->number[i]));
+}
+
 static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *f,
                                                         const struct octet *q)
 {
@@ -108,15 +113,16 @@ static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *
     vi met = vi_set(0);
     list_init(f, q, &l);
     for (int i = 0; i < f->num_triangles; i++)
-        met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & ~vi_eq(q->ignore, vi_set(i));
+        met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & does_not_ignore(f, i, q);
     for (int i = 0; i < f->num_spheres; i++)
-        met |= list_sphere(f, i, q, q->tmax, &t) & ~vi_eq(q->ignore, vi_set(f->num_triangles + i));
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
     return met;
 }
 
 /* Rays to the quick form: bounds of its errors, per |normal.d|, and lanes that it serves. */
 struct quick {
     vf error, slack; /* FLAT_ERROR m^2, FLAT_SLACK m */
+    vf end;          /* where the ray ends, or has left the scene */
     vi fit;
 };
 
@@ -124,7 +130,8 @@ INLINE struct quick quick_init(const struct wide_flat *f, const struct octet *q)
 {
     vf m = vf_max(vf_max(vf_abs(q->o[0]), vf_abs(q->o[1])), vf_abs(q->o[2]));
     m = vf_max(vf_set(f->reach), m);
-    return (struct quick){FLAT_ERROR * m * m, FLAT_SLACK * m, vf_lt(m, vf_set(1e5f))};
+    return (struct quick){FLAT_ERROR * m * m, FLAT_SLACK * m, vf_min(4 * m, q->tmax),
+                          vf_lt(m, vf_set(1e5f))};
 }
 
 /* Where a ray meets a face. `inside`: how far from the rim, in u or v; off by no more than `error`. t
@@ -133,13 +140,34 @@ struct quick_hit {
     vf inside, error, low, high, sum;
 };
 
-INLINE struct quick_hit quick_face(const struct flat_face *face, const struct octet *q,
-                                   const struct quick *k)
+/* normal.d, and how far the plane is from the origin along the normal. */
+struct quick_plane {
+    vf nd, no;
+};
+
+INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct octet *q)
 {
-    const float *n = face->normal, *ur = face->u_row, *vr = face->v_row;
+    const float *n = face->normal;
     const vf *o = q->o, *d = q->d;
     vf nd = mul_add(vf_set(n[0]), d[0], mul_add(vf_set(n[1]), d[1], n[2] * d[2]));
     vf no = face->offset - mul_add(vf_set(n[0]), o[0], mul_add(vf_set(n[1]), o[1], n[2] * o[2]));
+    return (struct quick_plane){nd, no};
+}
+
+/* Lanes that begin and end on the same side of the plane, farther from it than rounding matters; at the
+ * end that is twice as far, since k->end can be four times m. */
+INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
+{
+    vf end = mul_add(-k->end, p->nd, p->no);
+    return vf_lt(k->slack, vf_min(p->no, end - k->slack)) |
+           vf_lt(vf_max(p->no, end + k->slack), -k->slack);
+}
+
+INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
+                                   const struct octet *q, const struct quick *k)
+{
+    const float *ur = face->u_row, *vr = face->v_row;
+    const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
     /* Along the plane t is huge, and so is its error, but both are numbers. */
     vf inv = 1 / (nd + 1e-20f), t = no * inv;
     vf x = mul_add(t, d[0], o[0]), y = mul_add(t, d[1], o[1]), z = mul_add(t, d[2], o[2]);
@@ -167,7 +195,8 @@ INLINE vi list_closest_quick(const struct wide_flat *f, const struct octet *q,
     vi prim = vi_set(-1);
     for (int i = 0; i < f->num_faces; i++) {
         const struct flat_face *face = &f->face[i];
-        struct quick_hit h = quick_face(face, q, &k);
+        const struct quick_plane p = quick_plane(face, q);
+        struct quick_hit h = quick_face(face, &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin);
         vf begin = vf_select(out, far, h.low), surely = h.inside - h.error;
         vi number = vi_set(face->prim[0]);
@@ -234,7 +263,10 @@ INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, 
     vf worst = zero;
     vi met = vi_set(0), maybe = vi_set(0);
     for (int i = 0; i < f->num_faces; i++) {
-        struct quick_hit h = quick_face(&f->face[i], q, &k);
+        const struct quick_plane p = quick_plane(&f->face[i], q);
+        if (bits(quick_clear(&p, &k)) == 255)
+            continue;
+        struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
         met |= vf_lt(h.error, h.inside) & vf_lt(q->tmin, h.low) & vf_lt(h.high, q->tmax);
         maybe |= ~out;
@@ -242,66 +274,61 @@ INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, 
     }
     for (int i = 0; i < f->num_spheres; i++) {
         vf t;
-        met |= list_sphere(f, i, q, q->tmax, &t) & ~vi_eq(q->ignore, vi_set(f->num_triangles + i));
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
     }
     *known = k.fit & vf_lt(worst, vf_set(INFINITY)) & (met | ~maybe);
     return met;
 }
 
+/* Sheared rays. */
+INLINE void list_closest_eight(const struct wide_flat *f, const struct octet *q,
+                               struct list_hits *best)
+{
+    if (!f->quick || bits(list_closest_quick(f, q, best)) != 255)
+        list_closest_exact(f, q, best);
+}
+
+/* Lanes that meet something. is_sheared: the rays are; else they will be if need be. */
+INLINE vi list_occluded_eight(const struct wide_flat *f, struct octet *q, bool is_sheared)
+{
+    vi known = vi_set(0), met = known;
+    if (f->quick)
+        met = list_occluded_quick(f, q, &known);
+    if (bits(known) == 255)
+        return met;
+    if (!is_sheared)
+        octet_shear(q);
+    return list_occluded_exact(f, q);
+}
+
 static void list_closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
                          struct hits *h, struct bvh_stats *stats)
 {
-    const struct wide_flat *f = w->flat;
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
         struct list_hits best;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_load(r, eight, &q);
+        octet_load(r, eight, &q);
         octet_shear(&q);
-        if (!f->quick || bits(list_closest_quick(f, &q, &best)) != 255)
-            list_closest_exact(f, &q, &best);
+        list_closest_eight(w->flat, &q, &best);
         stats->primitive_tests += w->num_leaves;
-        if (in_row) {
-            vf_store_any(h->t + eight[0], best.t);
-            vf_store_any(h->u + eight[0], best.u);
-            vf_store_any(h->v + eight[0], best.v);
-            vf_store_any(h->prim + eight[0], (vf)best.prim);
-            continue;
-        }
-        for (int i = 0; i < LANES; i++) {
-            h->t[eight[i]] = best.t[i];
-            h->u[eight[i]] = best.u[i];
-            h->v[eight[i]] = best.v[i];
-            h->prim[eight[i]] = (uint32_t)best.prim[i];
-        }
+        octet_store(&q, eight, best.t, best.u, best.v, best.prim, h);
     }
 }
 
 static void list_occluded(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
                           bool *occluded, struct bvh_stats *stats)
 {
-    const struct wide_flat *f = w->flat;
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
-        bool in_row = octet_load(r, eight, &q);
+        octet_load(r, eight, &q);
         octet_ignore(r, eight, &q);
-        vi known = vi_set(0), met = known;
-        if (f->quick)
-            met = list_occluded_quick(f, &q, &known);
-        if (bits(known) != 255) {
-            octet_shear(&q);
-            met = list_occluded_exact(f, &q);
-        }
+        vi met = list_occluded_eight(w->flat, &q, false);
         stats->primitive_tests += w->num_leaves;
-        const uint64_t flags = bytes_of(bits(met));
-        if (in_row)
-            memcpy(occluded + eight[0], &flags, sizeof flags);
-        else
-            for (int i = 0; i < LANES; i++)
-                occluded[eight[i]] = flags >> 8 * i & 1;
+        octet_store_flags(&q, eight, bits(met), occluded);
     }
 }
 

@@ -14,6 +14,9 @@ struct octet {
     vf o[3], d[3], sx, sy, sz, tmin, tmax;
     vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
                  distance counts only if its number is smaller */
+    vf u, v; /* with prim: what has been met so far */
+    vi prim;
+    bool in_row;                   /* the lanes follow each other */
     vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
     vi axis;                       /* of the largest component of d, the third of the shear */
     vi ignore;
@@ -42,8 +45,8 @@ INLINE void octet_shear(struct octet *q)
     q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
 }
 
-/* Origins, directions and ends; true if the lanes follow each other. */
-INLINE bool octet_load(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+/* Origins, directions and ends. */
+INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
 {
     bool in_row = true;
     for (int i = 1; i < LANES; i++)
@@ -56,7 +59,37 @@ INLINE bool octet_load(const struct rays *r, const uint16_t lane[LANES], struct 
     q->d[2] = gather(r->d.z, lane, in_row);
     q->tmin = gather(r->tmin, lane, in_row);
     q->tmax = gather(r->tmax, lane, in_row);
-    return in_row;
+    q->in_row = in_row;
+}
+
+/* Results of all lanes; prim -1: nothing. */
+INLINE void octet_store(const struct octet *q, const uint16_t lane[LANES], vf t, vf u, vf v,
+                        vi prim, struct hits *h)
+{
+    if (q->in_row) {
+        vf_store_any(h->t + lane[0], t);
+        vf_store_any(h->u + lane[0], u);
+        vf_store_any(h->v + lane[0], v);
+        vf_store_any(h->prim + lane[0], (vf)prim);
+        return;
+    }
+    for (int i = 0; i < LANES; i++) {
+        h->t[lane[i]] = t[i];
+        h->u[lane[i]] = u[i];
+        h->v[lane[i]] = v[i];
+        h->prim[lane[i]] = (uint32_t)prim[i];
+    }
+}
+
+INLINE void octet_store_flags(const struct octet *q, const uint16_t lane[LANES], unsigned mask,
+                              bool *flag)
+{
+    const uint64_t flags = bytes_of(mask);
+    if (q->in_row)
+        memcpy(flag + lane[0], &flags, sizeof flags);
+    else
+        for (int i = 0; i < LANES; i++)
+            flag[lane[i]] = flags >> 8 * i & 1;
 }
 
 INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
@@ -66,6 +99,8 @@ INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct 
     vi zero = vf_eq((vf)tmax, vf_set(0));
     q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
     octet_shear(q);
+    q->u = q->v = vf_set(0);
+    q->prim = vi_set(NOTHING);
 }
 
 /* Lanes k .. k+7 of a list of n; behind its end the last again. */
@@ -114,6 +149,19 @@ INLINE void octet_slabs(const struct wide *w, struct octet *q)
         q->enter[a] = q->o[a] * inv + by;
         q->leave[a] = q->o[a] * inv - by;
     }
+}
+
+/* Lanes that meet the tree's box within (tmin, limit]. */
+INLINE unsigned octet_box(const struct wide *w, const struct octet *q)
+{
+    vf begin = q->tmin, end = q->limit;
+    for (int a = 0; a < 3; a++) {
+        vi backwards = vf_lt(q->inv[a], vf_set(0));
+        vf low = vf_set(w->tree_min[a]), high = vf_set(w->tree_max[a]);
+        begin = vf_max(begin, mul_sub(vf_select(backwards, high, low), q->inv[a], q->enter[a]));
+        end = vf_min(end, mul_sub(vf_select(backwards, low, high), q->inv[a], q->leave[a]));
+    }
+    return bits(vf_le(begin, end));
 }
 
 #endif

@@ -15,17 +15,16 @@ struct packet {
     vi prim;
 };
 
-/* The first `n` lanes. */
-INLINE void packet_init(const struct octet *q, int n, struct packet *p)
+INLINE void packet_init(const struct octet *q, struct packet *p)
 {
-    const vi number = {0, 1, 2, 3, 4, 5, 6, 7};
     p->q = q;
     p->k[2] = q->axis[0];
     p->k[0] = (p->k[2] + 1) % 3;
     p->k[1] = (p->k[2] + 2) % 3;
-    p->limit = vf_select(vi_lt(number, vi_set(n)), q->limit, vf_set(-INFINITY));
-    p->u = p->v = vf_set(0);
-    p->prim = vi_set(NOTHING);
+    p->limit = q->limit;
+    p->u = q->u;
+    p->v = q->v;
+    p->prim = q->prim;
 }
 
 /* All primitives of a leaf against all rays. Shortens limit to the nearest; any: to -infinity for
@@ -168,23 +167,15 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
     }
 }
 
-static void packet_result(const struct packet *p, const struct rays *r, const uint16_t *lane, int n,
-                          struct hits *h)
+static void packet_result(const struct packet *p, const uint16_t *lane, struct hits *h)
 {
-    for (int i = 0; i < n; i++) {
-        bool none = p->prim[i] == NOTHING;
-        h->t[lane[i]] = none ? r->tmax[lane[i]] : p->limit[i];
-        h->u[lane[i]] = p->u[i];
-        h->v[lane[i]] = p->v[i];
-        h->prim[lane[i]] = none ? NO_HIT : (uint32_t)p->prim[i];
-    }
+    vi none = vi_eq(p->prim, vi_set(NOTHING));
+    octet_store(p->q, lane, vf_select(none, p->q->tmax, p->limit), p->u, p->v, p->prim | none, h);
 }
 
-static void packet_verdict(const struct packet *p, const uint16_t *lane, int n, bool *occluded)
+static void packet_verdict(const struct packet *p, const uint16_t *lane, bool *occluded)
 {
-    unsigned met = ~bits(vi_eq(p->prim, vi_set(NOTHING)));
-    for (int i = 0; i < n; i++)
-        occluded[lane[i]] = met >> i & 1;
+    octet_store_flags(p->q, lane, ~bits(vi_eq(p->prim, vi_set(NOTHING))) & 255, occluded);
 }
 
 #endif

@@ -41,8 +41,9 @@ INLINE void single_init(const struct octet *q, int lane, struct single *s)
         s->k[a] = shear[((const int32_t *)&q->axis)[lane]][a];
     }
     s->limit = lane_of(&q->limit, lane);
-    s->u = s->v = 0;
-    s->prim = NOTHING;
+    s->u = lane_of(&q->u, lane);
+    s->v = lane_of(&q->v, lane);
+    s->prim = ((const int32_t *)&q->prim)[lane];
 }
 
 /* Lanes of the leaf that the ray meets inside (tmin, limit]. */

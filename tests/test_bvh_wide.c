@@ -2,6 +2,7 @@
  * the same primitive or another at the same distance with a larger number, whatever the rays, the
  * scale and the instructions; and for a ray alone, in a batch or in a packet the same bits of
  * everything. */
+#include "../renderer/bvh_priv.h"
 #include "../renderer/bvh_wide.h"
 #include "../renderer/sampler.h"
 #include "../renderer/warp.h"
@@ -247,6 +248,50 @@ static void spheres_and_triangles(void **state)
     }
 }
 
+/* Some of a room: two walls of one number each, a floor, a pane and a large ball. */
+static void add_large(struct scene *s, uint32_t m, bool second_half)
+{
+    if (second_half) {
+        build_quad(s, v3(-1, -1, -1), v3(0, 0, 2), v3(2, 0, 0), m);
+        build_sphere(s, v3(0.5f, -0.4f, 0.2f), 0.6f, 1, m);
+        return;
+    }
+    build_quad(s, v3(-1, -1, -1), v3(2, 0, 0), v3(0.3f, 2, 0), m);
+    build_quad(s, v3(-1, -1, 1), v3(0, 0, -2), v3(0, 2, 0.1f), m);
+    build_triangle(s, v3(-0.7f, 0.6f, 0.3f), v3(0.4f, 0.5f, -0.2f), v3(0.1f, -0.4f, 0.6f), m);
+}
+
+/* Large primitives, which are a list, among small ones: triangles anywhere, and tiles that lie in the floor
+ * and at the very same distance as it. */
+static void walls_beside_a_tree(void **state)
+{
+    (void)state;
+    for (int half = 0; half < 2; half++) {
+        struct scene s = build_scene();
+        struct err e = {0};
+        uint32_t m = build_material(&s, grey(0.5f), grey(0));
+        add_large(&s, m, half);
+        for (uint32_t i = 0; i < 200; i++) {
+            vec3 c = random_point(i, 20);
+            if (i % 4 == 0)
+                build_sphere(&s, c, 0.04f, 1, m);
+            else if (i % 4 == 1)
+                build_triangle(&s, v3(c.x, -1, c.z), v3(c.x, -1, c.z + 0.2f),
+                               v3(c.x + 0.2f, -1, c.z), m);
+            else
+                build_triangle(&s, c, mad(c, 0.2f, random_point(i, 21)),
+                               mad(c, 0.2f, random_point(i, 22)), m);
+        }
+        add_large(&s, m, !half);
+        assert_true(scene_finish(&s, "test", &e));
+        struct bvh *b = bvh_build(&s, BVH_WIDE, &e);
+        assert_non_null(b);
+        assert_true(b->wide->flat != NULL && b->wide->num_nodes > 0);
+        bvh_free(b);
+        compare("room", s, 140, 1);
+    }
+}
+
 /* A shadow ray ignores the sphere that it goes to, and nothing else. */
 static void ignored_sphere(void **state)
 {
@@ -331,8 +376,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(generated_meshes),     cmocka_unit_test(huge_and_tiny),
         cmocka_unit_test(degenerate_triangles), cmocka_unit_test(spheres_and_triangles),
-        cmocka_unit_test(ignored_sphere),       cmocka_unit_test(small_enough),
-        cmocka_unit_test(same_on_any_threads),
+        cmocka_unit_test(walls_beside_a_tree),  cmocka_unit_test(ignored_sphere),
+        cmocka_unit_test(small_enough),         cmocka_unit_test(same_on_any_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -269,6 +269,23 @@ static void depths_and_threads_do_not_matter(void **state)
     scene_free(&s);
 }
 
+/* Triangles and spheres, smooth and flat, seen and missed. */
+static void normals_too(void **state)
+{
+    (void)state;
+    struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
+    for (int which = 0; which < 3; which++) {
+        struct scene s = make[which]();
+        complete(&s, false);
+        compare(&s, (struct how){
+                        .opt = {.kind = INTEGRATE_NORMALS, .sampler = {SAMPLER_INDEPENDENT, 9}},
+                        .lens = 0.1f,
+                        .spp = 2,
+                        .threads = 2});
+        scene_free(&s);
+    }
+}
+
 /* Against the library's functions in double: 1.5e-7 at every 2^-16 of a turn. */
 static void sine_and_cosine_are_near(void **state)
 {
@@ -291,6 +308,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bits_are_those_of_the_scalar_stages),
         cmocka_unit_test(depths_and_threads_do_not_matter),
+        cmocka_unit_test(normals_too),
         cmocka_unit_test(sine_and_cosine_are_near),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
