@@ -30,7 +30,9 @@ class Scene {
 
   load() {
     if (this.loading) return this.loading;
-    this.loading = Promise.all(this.shots.map((s) => loadLayer(s.id))).then((all) => {
+    const flips = this.claims.map((c) => loadFlip(c.article.id.slice("claim-".length)).then((map) => { c.flip = map; }));
+    this.loading = Promise.all([...this.shots.map((s) => loadLayer(s.id)), ...flips]).then((loaded) => {
+      const all = loaded.slice(0, this.shots.length);
       this.ready = all.every((layer) => layer !== null);
       if (!this.ready) {
         this.box.replaceChildren(make("p", { className: "caption" },
@@ -48,7 +50,7 @@ class Scene {
   map(kind, claim) {
     const key = kind + " " + claim.a.id + " " + claim.b.id;
     if (!this.maps.has(key)) {
-      const value = makeMap[kind](claim.a.layer, claim.b.layer);
+      const value = makeMap[kind](claim.a.layer, claim.b.layer, claim);
       this.maps.set(key, { value, range: mapKinds[kind].range(value) });
     }
     return this.maps.get(key);

@@ -1,5 +1,6 @@
 #include "report_parts.h"
 
+#include "report_alike.h"
 #include "report_html.h"
 #include "report_plot.h"
 #include "report_power.h"
@@ -295,14 +296,15 @@ static void write_approval(FILE *f, const json_t *claim)
     fputs("</code></pre>\n", f);
 }
 
-void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b)
+bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
+                  const struct claim_side *b, double white, struct err *e)
 {
     FILE *f = p->f;
     const json_t *json = claim->json;
     fprintf(f,
             "<article class=\"claim\" id=\"claim-%zu\" data-a=\"%zu\" data-b=\"%zu\" "
             "data-tile=\"%.0f\"",
-            claim->index, layer_a, layer_b, member_number(json, "tile"));
+            claim->index, a->layer, b->layer, member_number(json, "tile"));
     write_list(f, "data-tile-p", json_object_get(json, "tile_log10_p"));
     write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
     fputs(" data-name=\"", f);
@@ -326,6 +328,8 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     html_text(f, member_text(json, "reason"));
     fputs("</p>\n", f);
     write_notes(f, json);
+    if (!report_alike(p, claim, a->m, b->m, white, e))
+        return false;
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
     report_qq(f, json);
@@ -343,4 +347,5 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     write_command(f, "To run this claim again:", member_text(json, "rerun"));
     write_approval(f, json);
     fputs("</details>\n</article>\n", f);
+    return true;
 }
