@@ -56,6 +56,13 @@ class Scene {
     return this.maps.get(key);
   }
 
+  // The map's sentence, made once: it may count pixels.
+  sentence(kind, claim) {
+    const m = this.map(kind, claim);
+    if (m.sentence === undefined) m.sentence = mapKinds[kind].says(claim.a.name, claim.b.name, m.value);
+    return m.sentence;
+  }
+
   // What a pane is to show.
   mapSource(kind, claim) {
     if (!this.ready) return null;
@@ -189,7 +196,7 @@ class Scene {
     if (figure.querySelector("figcaption")) return;
     const k = mapKinds[kind], m = this.map(kind, claim);
     figure.append(legend(m.range, k), make("figcaption", {}, make("b", {}, k.name + ". "),
-      k.says(claim.a.name, claim.b.name, m.value)));
+      this.sentence(kind, claim)));
   }
 
   show(shown, kind) {
@@ -214,7 +221,7 @@ class Scene {
       const m = this.map(this.kind, this.claim);
       this.stageLegend.replaceChildren(legend(m.range, kind));
       this.stageCaption.replaceChildren(make("b", {}, kind.name + ", " + this.claim.name + ". "),
-        kind.says(this.claim.a.name, this.claim.b.name, m.value));
+        this.sentence(this.kind, this.claim));
       return;
     }
     const shot = this.shots[this.shown - 1], other = this.shots[this.against];

@@ -10,6 +10,7 @@
 #include "report_page.h"
 #include "report_parts.h"
 #include "report_plot.h"
+#include "report_rays.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -274,6 +275,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
         p->num_scenes++;
     }
     report_alike_table(p);
+    report_rays(f, json_object_get(root, "claims"));
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);

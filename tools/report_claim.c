@@ -1,6 +1,7 @@
 #include "report_parts.h"
 
 #include "report_alike.h"
+#include "report_csv.h"
 #include "report_html.h"
 #include "report_plot.h"
 #include "report_power.h"
@@ -84,8 +85,17 @@ static void write_histogram(FILE *f, const json_t *claim)
         "every p-value is as likely as any other: the bars stay near the dashed line (%.3g tiles), "
         "each inside the shaded band 99 times of 100. A pile at the left is a real difference. It "
         "may still be far smaller than the margin, and then it does not change the verdict. Here "
-        "%d of %d tiles are below 0.05; %.1f would be by chance.</figcaption></figure>\n",
+        "%d of %d tiles are below 0.05; %.1f would be by chance. ",
         h.num_tiles, h.expected, h.below_5_percent, h.num_tiles, 0.05 * h.num_tiles);
+    struct csv csv = csv_open(f, "p_values.csv", "p_from,p_to,tiles");
+    for (int b = 0; b < h.bins; b++) {
+        csv_number(&csv, (double)b / h.bins);
+        csv_number(&csv, (double)(b + 1) / h.bins);
+        csv_number(&csv, count[b]);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+    fputs("</figcaption></figure>\n", f);
 }
 
 static void fact_open(FILE *f, const char *label)

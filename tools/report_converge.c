@@ -87,6 +87,27 @@ static void write_ticks(FILE *f, const struct axes *a, bool vertical)
         }
 }
 
+/* Circle, square, triangle, diamond: engines can be told apart without colours. */
+static void write_marker(FILE *f, size_t index, double x, double y, double r)
+{
+    switch (index % 4) {
+    case 0:
+        fprintf(f, "<circle class=\"dot\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", x, y, r);
+        return;
+    case 1:
+        fprintf(f, "<path class=\"dot\" d=\"M%.1f %.1fh%.1fv%.1fh-%.1fz\"/>", x - r, y - r, 2 * r,
+                2 * r, 2 * r);
+        return;
+    case 2:
+        fprintf(f, "<path class=\"dot\" d=\"M%.1f %.1fl%.1f %.1fh-%.1fz\"/>", x, y - 1.2 * r,
+                1.2 * r, 2.2 * r, 2.4 * r);
+        return;
+    default:
+        fprintf(f, "<path class=\"dot\" d=\"M%.1f %.1fl%.1f %.1fl-%.1f %.1fl-%.1f -%.1fz\"/>", x,
+                y - 1.4 * r, 1.4 * r, 1.4 * r, 1.4 * r, 1.4 * r, 1.4 * r, 1.4 * r);
+    }
+}
+
 static void write_series(FILE *f, const struct axes *a, const json_t *engine, size_t index)
 {
     const json_t *rungs = json_object_get(engine, "rungs");
@@ -110,10 +131,11 @@ static void write_series(FILE *f, const struct axes *a, const json_t *engine, si
             fprintf(f, "<path class=\"line\" d=\"M%.1f %.1fV%.1f\"/>", at_x(a, x),
                     fmin(BOTTOM, at_y(a, end(g, "rmse_ci", 0))),
                     fmax(TOP, at_y(a, end(g, "rmse_ci", 1))));
-        fprintf(f, "<circle class=\"dot\" cx=\"%.1f\" cy=\"%.1f\" r=\"3\"><title>", at_x(a, x),
-                at_y(a, member_number(g, "rmse")));
+        fputs("<g>", f);
+        write_marker(f, index, at_x(a, x), at_y(a, member_number(g, "rmse")), 3.2);
+        fputs("<title>", f);
         html_text(f, member_text(engine, "engine"));
-        fprintf(f, ", %g samples: %.4g %%, %.3g s</title></circle>", member_number(g, "spp"),
+        fprintf(f, ", %g samples: %.4g %%, %.3g s</title></g>", member_number(g, "spp"),
                 100 * member_number(g, "rmse"), member_number(g, "cpu_s"));
     }
     fputs("</g>", f);
@@ -140,14 +162,34 @@ static void write_legend(FILE *f, const json_t *engines)
         const json_t *j = json_array_get(engines, k);
         if (json_object_get(j, "error") != NULL)
             continue;
-        fprintf(f,
-                "<g class=\"e%zu\"><circle class=\"dot\" cx=\"%d\" cy=\"%.1f\" r=\"4\"/>"
-                "<text x=\"%d\" y=\"%.1f\">",
-                k, LEFT + PLOT_WIDTH - 128, y - 4, LEFT + PLOT_WIDTH - 118, y);
+        fprintf(f, "<g class=\"e%zu\"><text x=\"%d\" y=\"%.1f\">", k, LEFT + PLOT_WIDTH - 118, y);
         html_text(f, member_text(j, "engine"));
-        fputs("</text></g>", f);
+        fputs("</text>", f);
+        write_marker(f, k, LEFT + PLOT_WIDTH - 128, y - 4, 4);
+        fputs("</g>", f);
         y += 17;
     }
+}
+
+static void write_plot_csv(FILE *f, const json_t *engines, bool against_time)
+{
+    struct csv csv =
+        against_time ? csv_open(f, "error_time.csv", "engine,cpu_seconds,rmse,rmse_low,rmse_high")
+                     : csv_open(f, "error_samples.csv", "engine,samples,rmse,rmse_low,rmse_high");
+    for (size_t k = 0; k < json_array_size(engines); k++) {
+        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
+        for (size_t i = 0; i < json_array_size(rungs); i++) {
+            const json_t *g = json_array_get(rungs, i);
+            bool has_ci = json_array_size(json_object_get(g, "rmse_ci")) == 2;
+            csv_text(&csv, member_text(j, "engine"));
+            csv_number(&csv, rung_x(j, g, against_time));
+            csv_number(&csv, member_number(g, "rmse"));
+            for (size_t n = 0; n < 2; n++)
+                csv_number(&csv, has_ci ? end(g, "rmse_ci", n) : NAN);
+            csv_line(&csv);
+        }
+    }
+    csv_close(&csv);
 }
 
 static void write_plot(FILE *f, const json_t *scene, bool against_time)
@@ -170,17 +212,22 @@ static void write_plot(FILE *f, const json_t *scene, bool against_time)
         if (json_object_get(json_array_get(engines, k), "error") == NULL)
             write_series(f, &a, json_array_get(engines, k), k);
     write_legend(f, engines);
-    fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text></svg>",
-            LEFT + PLOT_WIDTH / 2, BOTTOM + 34, what);
+    fprintf(
+        f,
+        "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text><text transform=\"translate(11 %d) "
+        "rotate(-90)\" text-anchor=\"middle\">relative RMS error of a picture</text></svg>",
+        LEFT + PLOT_WIDTH / 2, BOTTOM + 34, what, TOP + PLOT_HEIGHT / 2);
     fputs(against_time
               ? "<figcaption><b>Error against time.</b> Further left is better: the same error for "
-                "less work. Times are this machine's.</figcaption></figure>\n"
+                "less work. Times are this machine's. "
               : "<figcaption><b>Error against samples.</b> The RMS over the pixels of the relative "
                 "error of one picture, with the noise of the reference taken out. The dashed line "
                 "falls as the square root of the samples does, which is what independent samples "
                 "must do; stratified ones may fall faster. A line that bends flat has a bias. "
-                "Upright strokes are intervals.</figcaption></figure>\n",
+                "Upright strokes are intervals. ",
           f);
+    write_plot_csv(f, engines, against_time);
+    fputs("</figcaption></figure>\n", f);
 }
 
 static void write_badge(FILE *f, const char *verdict, enum outcome outcome)

@@ -219,10 +219,13 @@ check("all tiles are outlined", await page.evaluate("scenes[0].grid") === side);
 await page.keyboard.press("g");
 
 // Figures' numbers as files.
-const [download] = await Promise.all([page.waitForEvent("download"), article.locator("a.csv").first().click()]);
+const [download] = await Promise.all([page.waitForEvent("download"), article.locator('a.csv[download="tiles.csv"]').first().click()]);
 const csv = readFileSync(await download.path(), "utf8").split("\r\n");
 check("a figure's numbers are saved as CSV", download.suggestedFilename() === "tiles.csv" && csv[0] === "x,y,t,log10_p" &&
   csv.length === tiles.length + 2 && Math.abs(csv[1].split(",")[3] - tiles[0]) < 1e-5, csv.slice(0, 2).join(" | "));
+const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
+  !(f.querySelector("figcaption a.csv") && f.querySelector("figcaption b") && f.querySelectorAll("svg text").length > 3)).length`);
+check("every plot has a caption, labels and its numbers", bare === 0, bare + " have not");
 await article.locator("summary").click();
 check("the facts unfold", await article.locator("dl.facts").isVisible());
 
