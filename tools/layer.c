@@ -216,7 +216,7 @@ bool layer_encode_map(const float *map, int width, int height, uint8_t **bytes, 
     if (raw == NULL)
         return err_set(e, "out of memory for the report");
     for (size_t i = 0; i < pixels; i++) {
-        uint8_t q = (uint8_t)lrintf(200 * fminf(fmaxf(map[i], 0), 1));
+        uint8_t q = (uint8_t)lrintf(128 * sqrtf(fminf(fmaxf(map[i], 0), 1)));
         raw[i] = (uint8_t)(q - (i % w > 0 ? left : 0));
         left = q;
     }

@@ -119,6 +119,6 @@ function loadFlip(index) {
   return inflate(bytesOf(element.textContent)).then((raw) => {
     element.textContent = "";
     for (let i = 0; i < raw.length; i++) if (i % width > 0) raw[i] += raw[i - 1];
-    return Float64Array.from(raw, (v) => v / 200);
+    return Float64Array.from(raw, (v) => (v / 128) ** 2);
   });
 }

@@ -78,7 +78,7 @@ static void write_plot(FILE *f, const struct bar *bar, size_t num)
     }
     fprintf(f,
             "<path class=\"axis\" d=\"M%d %dV%dH%d\"/><text x=\"%d\" y=\"%d\" "
-            "text-anchor=\"middle\">tests of a ray</text></svg>\n",
+            "text-anchor=\"middle\">tests of a ray</text></svg></div>\n",
             LEFT, TOP, bottom, LEFT + WIDTH, LEFT + WIDTH / 2, bottom + 34);
 }
 
@@ -87,10 +87,12 @@ void report_rays(FILE *f, const json_t *claims)
     struct bar *bar = calloc(json_array_size(claims) + 1, sizeof *bar);
     size_t num = bar != NULL ? gather(claims, bar) : 0;
     if (num > 0) {
-        fputs("<section id=\"rays\">\n<h2>What a ray costs</h2>\n<figure>", f);
+        fputs(
+            "<section id=\"rays\">\n<h2>What a ray costs</h2>\n<figure><div class=\"wide plain\" tabindex=\"0\" role=\"region\" aria-label=\"Plot of tests of a ray\">",
+            f);
         write_plot(f, bar, num);
         fputs(
-            "<figcaption><b>Tests of a ray.</b> Dark: with boxes of the hierarchy; light, with a rim: with primitives. A test is "
+            "<figcaption><b>Tests of a ray.</b> Filled: with boxes of the hierarchy; outlined: with primitives. A test is "
             "of a node or a leaf, of up to eight boxes or triangles at once, and packets of rays share some, so that "
             "it may be less than one. What is fast has short bars; a bar that has grown since the last commit is work "
             "that the hierarchy no longer saves. Unlike times these counts do not depend on how busy the machine was. ",
