@@ -330,7 +330,7 @@ static bool render_singles(const struct rates *r, struct pool *p, const char *pr
                                      .picture = picture,
                                      .log = log};
         double cpu_s;
-        if (!ours_render(&job, &p->single[k], &cpu_s, e))
+        if (!ours_render(&job, &p->single[k], &cpu_s, NULL, e))
             return false;
     }
     return true;

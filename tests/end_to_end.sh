@@ -321,6 +321,7 @@ converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16
 expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
     $converge --margin 0.2 -o "$tmp/conv" 41_cornell
 expect "converge: results have all rungs" 0 "^3$" grep -c '"spp"' "$tmp/conv/results.json"
+expect "converge: the depth ladder is on the page" 0 "Depth ladder" grep -o "<b>Depth ladder" "$tmp/conv/index.html"
 expect "converge: too few samples to tell a bias" 2 "RMS bias.*INCONCLUSIVE" \
     $converge --margin 0.001 -o "$tmp/conv2" 41_cornell
 expect "converge: against a long run of our own" 0 "pathtracer, 1024 samples" \

@@ -146,7 +146,7 @@ static void test_idiff_boundary(void **state)
     memcpy(m.mean, light, sizeof light);
     uint8_t got[6];
     static const uint8_t want[6] = {0, 255, 255, 188, 7, 0};
-    idiff_quantise(&m, got);
+    idiff_quantise(&m, 1, got);
     assert_memory_equal(got, want, 6);
     moments_free(&m);
 
@@ -397,8 +397,8 @@ static void test_real_renders(void **state)
                 mitsuba_allowed(MITSUBA_SHARE, CELLS));
     uint8_t a[3 * CELLS], b[3 * CELLS];
     size_t count[256];
-    idiff_quantise(&wrong, a);
-    idiff_quantise(&p.render[1], b);
+    idiff_quantise(&wrong, 1, a);
+    idiff_quantise(&p.render[1], 1, b);
     idiff_histogram(a, b, CELLS, count);
     assert_true(idiff_differs(count, CELLS, BLENDER_FAIL, BLENDER_PERCENT));
     free(z);
