@@ -27,9 +27,7 @@ static void angles_cgl(struct camera *c, const struct scene_camera *f)
 {
     float tan_h = tanf(f->hfov / 2), tan_v = tanf(f->vfov / 2);
     const float shape = (float)CGL_WIDTH / CGL_HEIGHT;
-    if (tan_h / tan_v < shape)
-        tan_h = tan_v * shape;
-    else
+    if (tan_h / tan_v >= shape)
         tan_v = tan_h / shape;
     float screen_distance = CGL_HEIGHT / (2 * tan_v);
     c->tan_h = (float)c->width / (2 * screen_distance);

@@ -199,6 +199,8 @@ static bool run(struct session *s, struct err *e)
     if (ok && s->signal != 0)
         print_how_to_resume(&s->out, &film);
 done:
+    s->out.id = NULL; /* this function's own */
+    s->out.scene = NULL;
     film_free(&film);
     bvh_free(bvh);
     scene_free(&scene);

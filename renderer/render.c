@@ -210,7 +210,7 @@ static bool render_passes(struct job *j, struct watch *w, enum render_end *end, 
         if (!render_pass(j, w, f->num_samples + count, e))
             return false;
         double now = now_seconds(), each = (now - before) / count;
-        if (c->write_every > 0 && now - w->last_write >= c->write_every) {
+        if (c->write != NULL && c->write_every > 0 && now - w->last_write >= c->write_every) {
             if (!c->write(c->arg, f, e))
                 return false;
             w->last_write = now_seconds();

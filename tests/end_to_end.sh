@@ -650,6 +650,11 @@ expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/no
 expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
 expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 
+# The same bits on any number of threads.
+tests/threads.sh "$pathtracer" >"$tmp/threads"
+cat "$tmp/threads"
+failures=$((failures + $(grep -c '^not ok' "$tmp/threads")))
+
 # The page, in a browser.
 tests/browser/run.sh "$build" >"$tmp/browser"
 cat "$tmp/browser"

@@ -247,7 +247,7 @@ static void conclude(const char *out, const struct sandbox_job *job, const struc
     snprintf(path, sizeof path, "%s/.report", out);
     FILE *f = fopen(path, "r");
     long ticks = 0;
-    bool known = f != NULL && fscanf(f, "%d %15s %ld", &r->status, word, &ticks) >= 2;
+    bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2;
     if (ticks > 0)
         r->cpu_s = (double)ticks / (double)sysconf(_SC_CLK_TCK);
     if (f != NULL)

@@ -53,7 +53,7 @@ static double float_step(const struct picture *pic, float v, const float *px)
 {
     if (pic->info.type == IMAGE_HALF)
         return fmax(ldexp(fabs((double)v), -10), 0x1p-24);
-    double brightest = fmax(px[0], fmax(px[1], px[2]));
+    double brightest = fmaxf(px[0], fmaxf(px[1], px[2]));
     int exponent;
     frexp(brightest, &exponent);
     return strcmp(pic->info.format, "hdr") == 0 && brightest > 0 ? 2 * ldexp(1, exponent - 8) : 0;
