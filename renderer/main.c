@@ -3,6 +3,7 @@
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
+#include "starter.h"
 #include "state.h"
 
 #include <signal.h>
@@ -85,6 +86,7 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_dark_lights > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
                 scene->num_dark_lights);
+    starter_apply(scene, o->starter);
     if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)

@@ -17,8 +17,9 @@ struct options {
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
     int dialect, accel, isa, kind, direct, fresnel, sampler;
-    int spp;         /* of the whole picture, the most if adaptive */
-    int first, last; /* sample numbers first .. last-1 are this program's share */
+    unsigned starter; /* 1 << enum starter (starter.h) */
+    int spp;          /* of the whole picture, the most if adaptive */
+    int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
     bool quiet, aov, keep_state;
     enum roulette_kind roulette;
