@@ -60,6 +60,10 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
 {
     if (!camera_init(c, scene, o->width, o->height, e))
         return err_prefix(e, "%s", o->scene);
+    if (o->frame == FRAME_WHOLE && (scene->dialect != DIALECT_CGL || o->camera_file != NULL))
+        return err_set(e, "%s: --frame is of the assignment's camera, without --camera", o->scene);
+    if (o->frame == FRAME_WHOLE)
+        camera_show_whole(c);
     if (o->camera_file != NULL && !camera_read_file(c, o->camera_file, e))
         return false;
     if (o->lens_radius >= 0)

@@ -48,6 +48,7 @@ enum option {
     OPT_ISA,
     OPT_DIALECT,
     OPT_FRESNEL,
+    OPT_FRAME,
     OPT_STARTER,
     OPT_QUIET,
     OPT_LIST,
@@ -121,6 +122,9 @@ static const struct cli_option options[] = {
                      "auto: cgl if the file has CGL extras (auto)"},
     [OPT_FRESNEL] = {0, "fresnel", 1, "HOW",
                      "of glass: exact, or schlick as in the assignment (exact)"},
+    [OPT_FRAME] = {0, "frame", 1, "HOW",
+                   "dialect cgl: crop the assignment's 800 x 600 to -r as it\n"
+                   "does, or the whole of it (crop)"},
     [OPT_STARTER] = {0, "starter", 1, "DEFECT",
                      "do wrong what the assignment's starter code does: light-pdf,\n"
                      "turned-lamp; for grading; may be given again"},
@@ -131,6 +135,7 @@ static const struct cli_option options[] = {
     {0}};
 
 static const char *const fresnel_names[] = {"exact", "schlick", NULL};
+static const char *const frame_names[] = {"crop", "whole", NULL};
 static const char *const dialect_names[] = {"auto", "collada", "cgl", NULL};
 
 enum { DEFAULT_SPP = 16, MAX_SPP = 1 << 24 };
@@ -265,6 +270,7 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_SEED: return cli_uint64("--seed", v, &s->seed, e);
     case OPT_SAMPLER: return cli_choice("--sampler", v, sampler_kind_names, &s->sampler, e);
     case OPT_FRESNEL: return cli_choice("--fresnel", v, fresnel_names, &s->fresnel, e);
+    case OPT_FRAME: return cli_choice("--frame", v, frame_names, &s->frame, e);
     case OPT_STARTER: return parse_starter(s, v, e);
     case OPT_INTEGRATOR: return cli_choice("--integrator", v, integrator_kind_names, &s->kind, e);
     case OPT_ACCEL: return cli_choice("--accel", v, bvh_kind_names, &s->accel, e);
