@@ -15,7 +15,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
   nettle-dev zlib1g-dev libmicrohttpd-dev bubblewrap
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_LIVE := blender povray python3-numpy
@@ -118,6 +118,11 @@ golden: all $(BUILD)/deps-live
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
 
+# A zip to upload to Gradescope, which grades by RUBRIC.
+RUBRIC ?= tools/rubrics/cs184.rubric
+autograder: all $(BUILD)/deps-test
+	tools/autograder/pack.sh $(BUILD) $(RUBRIC) $(BUILD)/autograder.zip '$(COMMIT)' $(DEPS)
+
 # For tests/mutants.sh.
 print-compile:
 	@echo $(CC) $(filter-out -g,$(cflags))
@@ -162,6 +167,7 @@ help:
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
+	@echo 'make autograder  BUILD/autograder.zip for Gradescope (RUBRIC=tools/rubrics/cs184.rubric)'
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'
 
@@ -369,7 +375,7 @@ $(BUILD)/deps-lint: | $(BUILD)/deps-test
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check lint threads tsan coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+.PHONY: all validate check lint threads tsan coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -34,6 +34,13 @@ static void angles_cgl(struct camera *c, const struct scene_camera *f)
     c->tan_v = (float)c->height / (2 * screen_distance);
 }
 
+void camera_show_whole(struct camera *c)
+{
+    float shrunk = fminf((float)c->width / CGL_WIDTH, (float)c->height / CGL_HEIGHT);
+    c->tan_h /= shrunk;
+    c->tan_v /= shrunk;
+}
+
 bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
 {
     const struct scene_camera *f = &s->camera;

@@ -131,6 +131,7 @@ struct scene {
     unsigned num_zero_normals; /* corners whose normal in the file had no length; they got the
                                   triangle's own */
     unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
+    unsigned starter;          /* starter.h; 0: nothing is done wrong */
     char note[256];            /* what the dialect merged, one line for the user; else empty */
 };
 

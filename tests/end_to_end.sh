@@ -1,5 +1,6 @@
 #!/bin/bash
-# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME" or "not ok NAME".
+# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME", "not ok NAME", or "skip NAME" with
+# the reason where this machine cannot do it.
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
@@ -642,10 +643,17 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     fi
     expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
 elif grep -q "no sandbox" "$tmp/out"; then
-    ok "grade: refuses without a sandbox ($(cat "$tmp/out"))"
+    echo "skip grade: programs of submissions, hostile and right ($(cat "$tmp/out"))"
 else
     not_ok "grade: one submission" "$(cat "$tmp/out")"
 fi
+expect "grade: references alone" 0 "" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
+expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
+expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
+tests/autograder.sh "$build" >"$tmp/autograder"
+cat "$tmp/autograder"
+failures=$((failures + $(grep -c '^not ok' "$tmp/autograder")))
+grep -q '^ok ' "$tmp/autograder" || not_ok "the autograder" "nothing was looked at"
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
 expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
 expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"

@@ -56,18 +56,20 @@ for program in "${programs[@]}"; do
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
-# Lines "ok ..." and "not ok ...".
+# Lines "ok ...", "not ok ..." and "skip ...".
 for name in end_to_end fuzz; do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
     p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")
+    s=$(grep -c '^skip ' "$log/$name.out")
     if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f)) -eq 0 ]; then
         f=$((f + 1))
         echo "$name: died with status $status"
     fi
     [ "$f" -gt 0 ] && cat "$log/$name.out"
-    printf '%-24s %3d passed, %d failed  (%d s)\n' "$name" "$p" "$f" "$seconds"
-    passed=$((passed + p)) failed=$((failed + f))
+    [ "$s" -gt 0 ] && grep '^skip ' "$log/$name.out"
+    printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
+    passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
 if [ $skipped -gt 0 ]; then

@@ -104,18 +104,18 @@ static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t 
     const struct rubric *r = job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, cpu_s = 0;
-    bool ok = true;
+    struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
+    int set = 0;
+    bool ok = (result != NULL || err_set(e, "out of memory")) &&
+              grading_all(r, job->answers, h, job->alpha, result, &set, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
-        struct result result;
-        ok = grading_check(r, &r->check[i], job->answers, h, job->alpha, &result, e);
-        if (!ok)
-            break;
-        json_array_append_new(checks, check_json(r, &r->check[i], &result));
-        part[r->check[i].part] += r->check[i].points * result.share;
+        json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
+        part[r->check[i].part] += r->check[i].points * result[i].share;
         of[r->check[i].part] += r->check[i].points;
-        points += r->check[i].points * result.share;
-        result_free(&result);
+        points += r->check[i].points * result[i].share;
+        result_free(&result[i]);
     }
+    free(result);
     for (int i = 0; i < r->num_parts; i++)
         json_array_append_new(parts,
                               json_pack("{ss, ss, sf, sf}", "number", r->part[i].number, "title",
@@ -128,6 +128,7 @@ static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t 
     json_object_set_new(grade, "points", json_real(points));
     json_object_set_new(grade, "of", json_real(rubric_points(r)));
     json_object_set_new(grade, "cpu_s", json_real(cpu_s));
+    json_object_set_new(grade, "accepted", json_string(r->set[set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
     json_object_set_new(grade, "pictures", pictures);

@@ -36,6 +36,7 @@ struct work {
     const struct rubric *r;
     const struct rubric_check *check;
     const struct answers *answers;
+    int set;
     struct handed_in *h;
     double alpha;
 };
@@ -53,13 +54,15 @@ static const struct student *student(const struct work *w, int k)
 /* NULL: the rubric gives none. */
 static const struct moments *reference(const struct work *w, int k)
 {
-    const struct moments *m = &w->answers->picture[w->check->picture[k]].m;
-    return m->width > 0 ? m : NULL;
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m,
+                         *plain = &w->answers->of[0][w->check->picture[k]].m;
+    return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
 }
 
 static const struct moments *expected_noise(const struct work *w, int k)
 {
-    return &w->answers->picture[w->check->picture[k]].noise;
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m;
+    return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
 }
 
 static unsigned char *usable(const struct work *w, struct err *e)
@@ -142,44 +145,24 @@ static void compare(const struct work *w, const struct student *a, const struct 
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
 }
 
-static void add_name(char *names, size_t size, const char *name)
-{
-    size_t n = strlen(names);
-    snprintf(names + n, size - n, "%s%s", n > 0 ? ", " : "", name);
-}
-
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_picture *p = picture(w, 0);
-    const struct answer *answer = &w->answers->picture[w->check->picture[0]];
+    const struct moments *plain = &w->answers->of[0][w->check->picture[0]].m;
     unsigned char *use = usable(w, e);
-    bool ok = use != NULL;
+    struct student b;
     snprintf(
         out->expected, sizeof out->expected,
         "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
-    for (int k = -1; ok && k < p->num_accepted && out->share < 1; k++) {
-        struct result tried = {.judged = true};
-        struct student b;
-        ok = student_from(k < 0 ? &answer->m : &answer->accepted[k], student(w, 0), &b, e);
-        if (!ok)
-            break;
-        compare(w, student(w, 0), &b, use, &tried);
-        student_free(&b);
-        if (k < 0 || tried.share > out->share) {
-            agreement_free(&out->agreement);
-            out->share = tried.share;
-            out->chance = tried.chance;
-            out->agreement = tried.agreement;
-            snprintf(out->seen, sizeof out->seen, "%s", tried.seen);
-            out->accepted[0] = '\0';
-            if (k >= 0)
-                add_name(out->accepted, sizeof out->accepted, p->accept[k].name);
-        } else {
-            agreement_free(&tried.agreement);
-        }
+    if (use == NULL || !student_from(reference(w, 0), student(w, 0), &b, e)) {
+        free(use);
+        return false;
     }
-    if (ok && is_copy(student(w, 0), &answer->m, p->spp, use)) {
+    compare(w, student(w, 0), &b, use, out);
+    student_free(&b);
+    if (is_copy(student(w, 0), reference(w, 0), p->spp, use) ||
+        is_copy(student(w, 0), plain, p->spp, use)) {
         out->share = out->chance = 0;
         snprintf(
             out->seen, sizeof out->seen,
@@ -188,26 +171,51 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
         snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
     }
     free(use);
+    return true;
+}
+
+/* A copy of q, moved by the difference of two references, with their noise. */
+static bool moved(const struct student *q, const struct moments *to, const struct moments *from,
+                  struct student *out, struct err *e)
+{
+    struct student a, b;
+    if (!student_from(to, q, &a, e))
+        return false;
+    bool ok = student_from(from, q, &b, e);
+    if (ok && !(ok = student_copy(q, out, e)))
+        student_free(&b);
+    for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
+        out->mean[i] += a.mean[i] - b.mean[i];
+        out->variance[i] += a.variance[i] + b.variance[i];
+    }
+    if (ok)
+        student_free(&b);
+    student_free(&a);
     return ok;
 }
 
 static bool check_agree(const struct work *w, struct result *out, struct err *e)
 {
+    const struct moments *m = reference(w, 0), *n = reference(w, 1);
+    bool deviates = w->set > 0 && m != NULL && n != NULL;
     snprintf(out->expected, sizeof out->expected,
-             "%s and %s have the same mean, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
-             picture(w, 0)->name, picture(w, 1)->name, 100 * w->check->image.full,
-             100 * w->check->tile.full);
+             "%s and %s %s, within %.3g %% (any 8 x 8 pixels: %.3g %%)", picture(w, 0)->name,
+             picture(w, 1)->name,
+             deviates ? "differ as in our renders with the same deviation" : "have the same mean",
+             100 * w->check->image.full, 100 * w->check->tile.full);
     if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
         snprintf(out->seen, sizeof out->seen,
                  "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
     unsigned char *use = usable(w, e);
-    if (use == NULL)
-        return false;
-    compare(w, student(w, 0), student(w, 1), use, out);
+    struct student b = {0};
+    bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
+    if (ok)
+        compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out);
+    student_free(&b);
     free(use);
-    return true;
+    return ok;
 }
 
 static bool check_sum(const struct work *w, struct result *out, struct err *e)
@@ -313,7 +321,8 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
     const struct made *made = &w->h->made[c->picture[0]];
-    const struct moments *ours = &w->answers->picture[c->picture[0]].as_asked;
+    const struct moments *own = &w->answers->of[w->set][c->picture[0]].as_asked,
+                         *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
     struct rates rates;
     struct err why;
     (void)e;
@@ -353,14 +362,14 @@ static void expect_noise(const struct work *w)
 }
 
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
-                   struct err *e)
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
                                                 struct err *) = {
         [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
         [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
-    const struct work w = {r, check, a, h, alpha};
+    const struct work w = {r, check, a, set, h, alpha};
     *out = (struct result){.judged = true, .picture = check->picture[0]};
     for (int k = 0; k < check->num_pictures; k++) {
         int i = check->picture[k];

@@ -12,10 +12,10 @@ struct answer {
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments
         as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
-    struct moments accepted[RUBRIC_ACCEPTED];
 };
+/* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
 struct answers {
-    struct answer picture[RUBRIC_PICTURES];
+    struct answer of[RUBRIC_SETS][RUBRIC_PICTURES];
 };
 
 struct answer_options {
@@ -44,10 +44,10 @@ struct result {
     bool
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
     char expected[256], seen[400];
-    char accepted[RUBRIC_ACCEPTED * 64]; /* names of accepted deviations that were found, or "" */
-    char flag[256];                      /* for staff only */
-    int picture;                         /* that shows it best: index in the rubric */
-    struct agreement agreement;          /* of equal, agree and sum; tiles 0: none */
+    char accepted[160];         /* the deviations by which it has more points than without, or "" */
+    char flag[256];             /* for staff only */
+    int picture;                /* that shows it best: index in the rubric */
+    struct agreement agreement; /* of equal, agree and sum; tiles 0: none */
 };
 
 /* One student's pictures, read. */
@@ -57,11 +57,17 @@ struct handed_in {
     char why[RUBRIC_PICTURES][400];          /* why not */
 };
 
-/* alpha: of one check: the chance that a program which is right loses points in it. Fails only for our own
- * trouble. The caller frees with result_free(). */
+/* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
+ * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
-                   struct err *e) __attribute__((warn_unused_result));
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e) __attribute__((warn_unused_result));
+
+/* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
+ * another brings 1 % of all points more. What a program does wrong besides still costs. On failure there
+ * is nothing to free. */
+bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
+                 struct result *out, int *set, struct err *e) __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

@@ -160,6 +160,16 @@ bool student_from(const struct moments *m, const struct student *like, struct st
     return true;
 }
 
+bool student_copy(const struct student *s, struct student *out, struct err *e)
+{
+    if (!student_from(NULL, s, out, e))
+        return false;
+    memcpy(out->sha256, s->sha256, sizeof out->sha256);
+    student_add(out, s);
+    memcpy(out->k3, s->k3, 3 * (size_t)s->width * (size_t)s->height * sizeof *s->k3);
+    return true;
+}
+
 void student_add(struct student *dst, const struct student *src)
 {
     for (size_t i = 0; i < 3 * (size_t)dst->width * (size_t)dst->height; i++) {
