@@ -13,7 +13,7 @@ bugs=(
     light_samples_not_averaged light_area_doubled light_pdf_no_cosine light_pdf_no_distance
     depth_one_short depth_one_long emission_twice indirect_missing indirect_times_pdf indirect_albedo_squared roulette_not_divided
     adaptive_one_sigma adaptive_without_root adaptive_absolute mean_over_n_plus_1
-    fresnel_swapped index_inverted mirror_back metal_without_shadowing beckmann_lambda sky_pdf_without_sine
+    fresnel_swapped index_inverted mirror_back metal_without_shadowing sky_pdf_without_sine
     lens_radius_is_diameter
     light_pdf_unnormalised light_pdf_unnormalised+cosine_missing light_pdf_unnormalised+indirect_missing)
 [ -n "$few" ] && bugs=(cosine_missing light_pdf_unnormalised)
@@ -22,7 +22,7 @@ subs=$work/submissions
 rubric=$work/rubric/cs184.rubric
 rm -rf "$subs" "$work/rubric"
 mkdir -p "$subs" "$work/rubric" "$work/told"
-tests/mutants.sh --build-only "$build" "${bugs[@]}" || exit 1
+tests/mutants.sh --build-only "$build" "${bugs[@]}" cosine_missing beckmann_lambda || exit 1
 cp tools/rubrics/*.dae tools/rubrics/*.exr "$work/rubric"
 # As the course's program would: lights are sampled alone. Programs that lose points render the views of assay diagnose.
 sed "s/^command {program} /&--direct light /; s/^# diagnose /diagnose /" tools/rubrics/cs184.rubric >"$rubric"
@@ -47,6 +47,8 @@ sub right_other_seed "right: with another seed, always the same" <<<'exec ./ours
 sub right_png "right: writes 8-bit PNG alone" <<<"$png; exec ./ours \"\$@\"" && with_ours right_png
 mkdir -p "$subs/cosine_png" && cp "$build/mutants/cosine_missing/mutant" "$subs/cosine_png"
 sub cosine_png "the cosine is missing; writes 8-bit PNG alone" <<<"$png; exec ./mutant --accel sah --isa scalar \"\$@\""
+mkdir -p "$subs/course_header" && cp "$build/mutants/beckmann_lambda/mutant" "$subs/course_header"
+sub course_header "right: Beckmann's shadowing as in the course's header" <<<'exec ./mutant --accel sah --isa scalar "$@"'
 sub crash "ends with a signal" <<<'kill -SEGV $$'
 sub noise "uniform noise" <<<'for a; do case $last in -r) size=$a ;; esac; last=$a; done; exec cp noise_$size.png out.png'
 for w in "64 48" "128 96"; do
