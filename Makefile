@@ -48,7 +48,7 @@ TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
 BENCH    := $(wildcard tests/bench*.c) tests/embree_tracer.c
-SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/grade_table.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -102,6 +102,10 @@ calibrate: $(BUILD)/tests/make_calibration
 
 bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
+
+# Fifty submissions, known bugs most of them, graded by the rubric of the course: tests/grading.
+grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
+	tests/grade_show.sh $(BUILD)
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -162,6 +166,7 @@ help:
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)'
+	@echo 'make grade-show  grade a class of fifty, write tests/grading/'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
@@ -267,7 +272,7 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
-$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates: \
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
@@ -336,7 +341,7 @@ $(BUILD)/lint/cppcheck.ok: .cppcheck-suppressions $(wildcard renderer/*.[ch] ref
 
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c tests/diagnose_rates.c) $(BENCH))
+  $(wildcard tests/make_*.c tests/diagnose_rates.c tests/grade_table.c) $(BENCH))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -375,7 +380,7 @@ $(BUILD)/deps-lint: | $(BUILD)/deps-test
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check lint threads tsan coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+.PHONY: all validate check lint threads tsan coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

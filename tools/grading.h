@@ -43,6 +43,7 @@ struct result {
     double chance; /* score_chance() of what decided */
     bool
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
+    bool consistent; /* of equal, agree and sum: no interval misses 0 */
     char expected[256], seen[400];
     char accepted[160];         /* the deviations by which it has more points than without, or "" */
     char flag[256];             /* for staff only */
@@ -64,7 +65,8 @@ bool grading_check(const struct rubric *r, const struct rubric_check *check,
                    struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
- * another brings 1 % of all points more. What a program does wrong besides still costs. On failure there
+ * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
+ * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
 bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
                  struct result *out, int *set, struct err *e) __attribute__((warn_unused_result));

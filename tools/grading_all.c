@@ -26,6 +26,21 @@ static bool grade_with(const struct rubric *r, const struct answers *a, int set,
     return true;
 }
 
+/* A picture that is wrong against our own reference and, as far as can be seen, right against another. */
+static bool is_explained(const struct rubric_check *c, double plain, const struct result *with)
+{
+    return plain < 1 && ((c->kind == CHECK_EQUAL && with->consistent) ||
+                         (c->kind == CHECK_EXACT && with->share == 1));
+}
+
+static bool explains(const struct rubric *r, const double *plain, const struct result *with)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        if (is_explained(&r->check[i], plain[i], &with[i]))
+            return true;
+    return false;
+}
+
 bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
                  struct result *out, int *set, struct err *e)
 {
@@ -44,7 +59,7 @@ bool grading_all(const struct rubric *r, const struct answers *a, struct handed_
         ok = grade_with(r, a, k, h, alpha, tried, &points, e);
         if (!ok) {
             free_results(out, r->num_checks);
-        } else if (points > best) {
+        } else if (points > best && explains(r, plain, tried)) {
             free_results(out, r->num_checks);
             memcpy(out, tried, (size_t)r->num_checks * sizeof *out);
             best = points;
