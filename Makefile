@@ -76,6 +76,11 @@ THREADED := test_bvh_wide test_integrator test_lanes test_render
 tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/tests/%)
 	tests/tsan.sh $(BUILD)/tsan $(THREADED)
 
+# kill -9 at 200 moments each of a render, a golden update, a grading batch, a report and a validation; every allocation
+# failed in turn (an hour).
+faults: $(BUILD)/pathtracer $(BUILD)/assay
+	tests/faults.sh $(BUILD) 200 1
+
 # Lines of renderer/ and tools/ that the tests and the end-to-end runs reach.
 coverage: $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
@@ -158,6 +163,7 @@ help:
 	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests'
 	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes)'
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
+	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
 	@echo 'make coverage   lines of renderer/ and tools/ that the tests reach (an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
@@ -380,7 +386,7 @@ $(BUILD)/deps-lint: | $(BUILD)/deps-test
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check lint threads tsan coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -663,6 +663,11 @@ tests/threads.sh "$pathtracer" >"$tmp/threads"
 cat "$tmp/threads"
 failures=$((failures + $(grep -c '^not ok' "$tmp/threads")))
 
+# Kills, full disks and missing memory.
+tests/faults.sh "$build" 2 173 >"$tmp/faults"
+cat "$tmp/faults"
+failures=$((failures + $(grep -c '^not ok' "$tmp/faults")))
+
 # The page, in a browser.
 tests/browser/run.sh "$build" >"$tmp/browser"
 cat "$tmp/browser"
