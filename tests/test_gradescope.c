@@ -244,8 +244,8 @@ static void other_fields_and_values_are_rejected(void **state)
     };
     static const char *const right[] = {
         "{\"score\": 4}",
-        "{\"tests\": [{\"score\": 1, \"max_score\": 2, \"number\": \"1.1\", \"tags\": [\"a\"], "
-        "\"status\": \"passed\", \"visibility\": \"hidden\"}], \"stdout_visibility\": \"hidden\"}",
+        ("{\"tests\": [{\"score\": 1, \"max_score\": 2, \"number\": \"1.1\", \"tags\": [\"a\"], "
+         "\"status\": \"passed\", \"visibility\": \"hidden\"}], \"stdout_visibility\": \"hidden\"}"),
         "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"asc\"}]}",
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
