@@ -633,6 +633,8 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
     expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
     expect "grade: on the page" 0 "This looks like a known bug" cat "$tmp/named/student/index.html"
+    expect "grade: the plot of it" 0 "all points while a bar touches green" cat "$tmp/named/student/index.html"
+    expect "grade: and whether another run would change it" 0 "gets the same points here" cat "$tmp/named/student/index.html"
     expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
     expect "grade: staff see who has it" 0 'student/index.html.*point_light_linear' bash -c "tr -d '\n' <'$tmp/named/index.html'"
     if ! grep -q "<html" "$tmp/named/student/index.html" ||

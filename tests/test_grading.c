@@ -45,6 +45,7 @@ struct bug {
     double noise;  /* samples for one */
     int shift;     /* pixels to the right */
     bool white, lamp_black;
+    bool mark; /* 48 x 5 pixels at the bottom left are of radiance 10 */
 };
 static const struct bug none = {.scale = 1, .square = 1, .noise = 1};
 
@@ -57,6 +58,8 @@ static double with_bug(const struct bug *b, size_t p, size_t c)
         v *= b->square;
     if (b->lamp_black && is_lamp(p))
         v = 0;
+    if (b->mark && x < 48 && y >= HEIGHT - 5)
+        return 10;
     return b->white ? 9 : v;
 }
 
@@ -360,6 +363,42 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
     free(r);
 }
 
+/* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
+static void a_watermark_is_masked(void **state)
+{
+    (void)state;
+    static const struct {
+        int mask[4];
+        struct bug bug;
+        bool all;
+    } cases[] = {{{0, 0, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, true},
+                 {{0, 0, 0, 0}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 1, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 0, 48, 5}, {.scale = 1, .square = 0.5, .noise = 1, .mark = true}, false}};
+    for (int kind = 0; kind < 2; kind++)
+        for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+            struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
+            struct handed_in *h = calloc(1, sizeof *h);
+            struct answers *a = calloc(1, sizeof *a);
+            struct result out;
+            struct err e;
+            char path[128];
+            assert_true(h != NULL && a != NULL);
+            memcpy(r->mask, cases[k].mask, sizeof r->mask);
+            write_picture("mark", &cases[k].bug, SPP, path);
+            h->picture[0] = read_back(path);
+            a->of[0][0].m = a->of[0][0].noise = reference;
+            assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+            if ((out.share == 1) != cases[k].all)
+                fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
+            result_free(&out);
+            student_free(&h->picture[0]);
+            free(r);
+            free(h);
+            free(a);
+        }
+}
+
 static void two_estimators_agree_or_not(void **state)
 {
     (void)state;
@@ -509,6 +548,7 @@ int main(void)
         cmocka_unit_test(bugs_cost_points),
         cmocka_unit_test(a_copy_of_the_reference_is_seen),
         cmocka_unit_test(what_is_accepted_costs_nothing_and_hides_nothing),
+        cmocka_unit_test(a_watermark_is_masked),
         cmocka_unit_test(two_estimators_agree_or_not),
         cmocka_unit_test(parts_add_up_or_not),
         cmocka_unit_test(noise_falls_or_not),

@@ -153,6 +153,8 @@ static void each_mistake_is_named_with_its_line(void **state)
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
         {1, 2, "rubric a\nrubric b", "second"},
+        {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
+        {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
         {1, 2, "rubric a\naccept slow", "needs a text"},
         {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
         {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},

@@ -69,20 +69,39 @@ static json_t *relative_of(const struct agreement *a, const struct rubric_pictur
     return array;
 }
 
+/* What points are a function of, with the margins. */
+static json_t *intervals_of(const struct agreement *a, const struct rubric_check *c)
+{
+    static const char *const names[] = {"red", "green", "blue", "luminance", "furthest tile"};
+    json_t *array = json_array();
+    if (c->kind != CHECK_EQUAL && c->kind != CHECK_AGREE && c->kind != CHECK_SUM)
+        return array;
+    for (int k = 0; k <= NUM_CHANNELS && a->relative != NULL; k++) {
+        const struct interval *i = k < NUM_CHANNELS ? &a->image[k] : &a->tile;
+        const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
+        if (k < NUM_CHANNELS || a->tiles > 0)
+            json_array_append_new(array, json_pack("{ss, sf, sf, sf, sf, sf}", "what", names[k],
+                                                   "value", i->value, "lo", i->lo, "hi", i->hi,
+                                                   "full", m->full, "none", m->none));
+    }
+    return array;
+}
+
 static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
                           const struct result *result)
 {
-    return json_pack("{ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so}",
-                     "part", r->part[c->part].number, "name", c->name, "title", c->title, "points",
-                     c->points * result->share, "of", c->points, "share", result->share, "chance",
-                     result->chance, "judged", result->judged, "expected", result->expected, "seen",
-                     result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility,
-                     "accepted", result->accepted, "flag", result->flag, "picture",
-                     r->picture[result->picture].name, "tile",
-                     result->agreement.tiles > 0
-                         ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
-                         : json_null(),
-                     "relative", relative_of(&result->agreement, &r->picture[result->picture]));
+    return json_pack(
+        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}", "kind",
+        check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
+        c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
+        "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
+        result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
+        result->accepted, "flag", result->flag, "picture", r->picture[result->picture].name, "tile",
+        result->agreement.tiles > 0
+            ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
+            : json_null(),
+        "relative", relative_of(&result->agreement, &r->picture[result->picture]), "intervals",
+        intervals_of(&result->agreement, c));
 }
 
 static json_t *picture_json(const struct rubric_picture *p, const struct made *made,

@@ -65,13 +65,20 @@ static const struct moments *expected_noise(const struct work *w, int k)
     return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
 }
 
+static bool is_masked(const struct work *w, const struct student *s, size_t p)
+{
+    const int *m = w->r->mask;
+    int x = (int)(p % (size_t)s->width), y = s->height - 1 - (int)(p / (size_t)s->width);
+    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
+}
+
 static unsigned char *usable(const struct work *w, struct err *e)
 {
     size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
     unsigned char *use = malloc(pixels);
     bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
-    if (ok)
-        memset(use, 1, pixels);
+    for (size_t p = 0; ok && p < pixels; p++)
+        use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; ok && k < w->check->num_pictures; k++)
         ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
     if (ok)
@@ -250,6 +257,19 @@ static void score_pixels(const struct work *w, double wrong, double num, struct 
     out->chance = 0;
 }
 
+/* One wrong pixel: the share of its tile's, and which tile has most. */
+static void map_wrong(struct agreement *map, int columns, int x, int y)
+{
+    double *here = &map->relative[y / RUBRIC_TILE * columns + x / RUBRIC_TILE];
+    *here += 1.0 / (RUBRIC_TILE * RUBRIC_TILE);
+    if (map->tiles > 0 &&
+        *here <= map->relative[map->tile_y / RUBRIC_TILE * columns + map->tile_x / RUBRIC_TILE])
+        return;
+    map->tiles = 1;
+    map->tile_x = x / RUBRIC_TILE * RUBRIC_TILE;
+    map->tile_y = y / RUBRIC_TILE * RUBRIC_TILE;
+}
+
 /* A picture without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
  * the reference's own samples, and the rounding to codes. */
 static bool check_exact(const struct work *w, struct result *out, struct err *e)
@@ -258,8 +278,12 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     const struct student *s = student(w, 0);
     const struct moments *m = reference(w, 0);
     double wrong = 0, num = 0;
-    int first = -1;
-    (void)e;
+    int first = -1, columns = s->width / RUBRIC_TILE;
+    struct agreement *map = &out->agreement;
+    map->relative =
+        calloc((size_t)columns * (size_t)(s->height / RUBRIC_TILE), sizeof *map->relative);
+    if (map->relative == NULL)
+        return err_set(e, "out of memory");
     for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
         bool off = false, lit = false;
         for (size_t i = 3 * p; i < 3 * p + 3; i++) {
@@ -269,10 +293,13 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
             off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
                    allowed_sd * sd + 2 * s->tolerance[i] + 1e-3;
         }
+        lit &= !is_masked(w, s, p);
         num += lit;
         wrong += lit && off;
-        if (lit && off && first < 0)
-            first = (int)p;
+        if (lit && off) {
+            first = first < 0 ? (int)p : first;
+            map_wrong(map, columns, (int)(p % (size_t)s->width), (int)(p / (size_t)s->width));
+        }
     }
     score_pixels(w, wrong, num, out);
     snprintf(out->expected, sizeof out->expected,

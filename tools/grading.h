@@ -45,10 +45,12 @@ struct result {
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
     bool consistent; /* of equal, agree and sum: no interval misses 0 */
     char expected[256], seen[400];
-    char accepted[160];         /* the deviations by which it has more points than without, or "" */
-    char flag[256];             /* for staff only */
-    int picture;                /* that shows it best: index in the rubric */
-    struct agreement agreement; /* of equal, agree and sum; tiles 0: none */
+    char accepted[160]; /* the deviations by which it has more points than without, or "" */
+    char flag[256];     /* for staff only */
+    int picture;        /* that shows it best: index in the rubric */
+    /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
+     * are wrong, and where most are. */
+    struct agreement agreement;
 };
 
 /* One student's pictures, read. */

@@ -139,6 +139,14 @@ static void read_limit(struct statement *s)
                 what);
 }
 
+static void read_mask(struct statement *s)
+{
+    if (s->r->mask[2] > 0)
+        mistake(s->m, s->line, "a second 'mask'");
+    for (int i = 0; i < 4; i++)
+        take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
+}
+
 static void read_picture(struct statement *s)
 {
     struct rubric *r = s->r;
@@ -332,6 +340,8 @@ static void read_statement(struct statement *s)
         take_number(s, word, 0, 1e6, &r->total);
     else if (strcmp(word, "limit") == 0)
         read_limit(s);
+    else if (strcmp(word, "mask") == 0)
+        read_mask(s);
     else if (strcmp(word, "accept") == 0 && s->picture == NULL && s->check == NULL)
         read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
     else if (strcmp(word, "picture") == 0)

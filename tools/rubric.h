@@ -15,6 +15,8 @@
  *                                       programs that lose points are then diagnosed, and the bug is named
  *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
  *   total POINTS                        what all checks have to add up to
+ *   mask X Y W H                        pixels that no check looks at, of every picture, from the bottom left as in the
+ *                                       assignment's -p: a watermark of a library that students were given
  *   accept NAME WORDS                   a deviation that is not the student's fault: our renderer shows it with WORDS
  *                                       besides its other options. A program is graded against our own references,
  *                                       and against those of each deviation and of all of them together in every
@@ -134,6 +136,7 @@ struct rubric {
     char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512];
     struct sandbox_limits limit;
     double build_s, total;
+    int mask[4]; /* x y width height, from the bottom left; width 0: none */
     struct accepted accept[RUBRIC_ACCEPTED];
     int num_accepted;
     struct rubric_set set[RUBRIC_SETS];

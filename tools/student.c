@@ -94,7 +94,7 @@ bool student_read(const char *path, const char *curve, int width, int height, st
     struct curve c;
     *out = (struct student){.width = width, .height = height};
     if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
-        !picture_read(path, &pic, e))
+        !picture_read_inspected(path, &info, &pic, e))
         return false;
     bool ok = allocate(out, e) && fill(out, &pic, &c, e);
     picture_free(&pic);
