@@ -665,8 +665,13 @@ tests/threads.sh "$pathtracer" >"$tmp/threads"
 cat "$tmp/threads"
 failures=$((failures + $(grep -c '^not ok' "$tmp/threads")))
 
+# Pictures made again from what they say of themselves.
+tests/reproduce.sh "$build" >"$tmp/reproduce"
+cat "$tmp/reproduce"
+failures=$((failures + $(grep -c '^not ok' "$tmp/reproduce")))
+
 # Kills, full disks and missing memory.
-tests/faults.sh "$build" 2 173 >"$tmp/faults"
+tests/faults.sh "$build" 2 499 >"$tmp/faults"
 cat "$tmp/faults"
 failures=$((failures + $(grep -c '^not ok' "$tmp/faults")))
 

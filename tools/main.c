@@ -26,6 +26,7 @@ static const struct {
     {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
+    {"reproduce", verb_reproduce, "render again what made a picture, and compare bits"},
     {"export", verb_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
 };
 
