@@ -225,6 +225,8 @@ static int grade(const struct settings *s, const struct rubric *r, const struct 
                                        .timeout_s = 3600};
     if (s->prepare) {
         code = make_dirs(cache, e) && answers_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
+        if (code == 0)
+            printf("references of %s: %s\n", r->path, cache);
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
                             &box, e)) {
         if (make_dirs(cache, e) && answers_make(r, &opt, answers, e))
