@@ -325,11 +325,28 @@ memory() {
     no_memory "compare" "$tmp/memory/c.json" "$assay" compare -q --margin 0.3 --margin-tile 0.9 --json "$tmp/memory/c.json" "$tmp/one.exr" "$tmp/two.exr"
 }
 
+# --time, --write-every, Ctrl-C and the time limit of a program are measured by a clock that nobody sets.
+clock() {
+    local so=$tmp/clock.so why="" start took
+    gcc -O1 -shared -fPIC -o "$so" tests/faults/clock.c -ldl || why="cannot build it"
+    [ "$(LD_PRELOAD="$so" date +%s)" -gt "$(($(date +%s) + 3000))" ] || why="the clock does not jump"
+    start=$(milliseconds)
+    timeout -s KILL 60 env LD_PRELOAD="$so" "$pathtracer" -q -r 32 32 --time 0.5s --write-every 0.1 -f "$tmp/clock.exr" "$scene" >/dev/null 2>"$tmp/err" ||
+        why="status $?: $(cat "$tmp/err")"
+    took=$(($(milliseconds) - start))
+    [ $took -ge 500 ] || why="${why:-it ended after $took ms of 500}"
+    [ -z "$why" ] && ! "$assay" reproduce "$tmp/clock.exr" >"$tmp/out" 2>&1 && why="other bits: $(cat "$tmp/out")"
+    timeout --preserve-status -k 60 -s INT 2 env LD_PRELOAD="$so" "$pathtracer" -q -r 32 32 -s 16000000 -f "$tmp/clock.exr" "$scene" >/dev/null 2>&1
+    [ $? -eq 130 ] || why="${why:-an interrupted render ended otherwise}"
+    tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
+}
+
 kill_renders
 kill_golden
 kill_grading
 kill_report
 kill_validation
 disk
+clock
 memory
 [ $failures -eq 0 ]
