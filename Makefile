@@ -15,8 +15,9 @@ MAKEFLAGS += --jobs=$(shell nproc)
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
   nettle-dev zlib1g-dev libmicrohttpd-dev bubblewrap
-DEPS_TEST := libcmocka-dev clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
+DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -47,7 +48,7 @@ TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
 BENCH    := $(wildcard tests/bench*.c) tests/embree_tracer.c
-SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/grade_table.c tests/student_tracer.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -62,6 +63,28 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer \
   $(BUILD)/libassay.a $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json
 	tests/run.sh $(BUILD) $(CHECKED)
+
+# clang-tidy (.clang-tidy) over the programs, cppcheck over all C (.cppcheck-suppressions): no finding.
+LINT := $(filter-out $(KERNELS),$(RENDERER)) renderer/main.c tools/main.c $(filter %.c,$(HARNESS))
+lint: $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
+	@echo '$(words $(LINT) $(KERNELS)) files, no finding'
+
+# The same bits on 1 to 16 threads, on every scene; and no race, as ThreadSanitizer sees it.
+threads: $(BUILD)/pathtracer
+	tests/threads.sh $(BUILD)/pathtracer
+THREADED := test_bvh_wide test_integrator test_lanes test_render
+tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/tests/%)
+	tests/tsan.sh $(BUILD)/tsan $(THREADED)
+
+# kill -9 at 200 moments each of a render, a golden update, a grading batch, a report and a validation; every allocation
+# failed in turn (an hour).
+faults: $(BUILD)/pathtracer $(BUILD)/assay
+	tests/faults.sh $(BUILD) 200 1
+
+# Lines of renderer/ and tools/ that the tests and the end-to-end runs reach.
+coverage: $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
+  $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
+	tests/coverage.sh $(BUILD) $(patsubst %,$(BUILD)/cov/%,$(TESTS))
 
 # Each bug of tests/mutants must be found by the suite (ONLY="NAME ...": some of them).
 mutants: all $(BUILD)/libassay.a
@@ -85,6 +108,10 @@ calibrate: $(BUILD)/tests/make_calibration
 bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
 
+# Fifty submissions, known bugs most of them, graded by the rubric of the course: tests/grading.
+grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
+	tests/grade_show.sh $(BUILD)
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
@@ -99,6 +126,11 @@ golden: all $(BUILD)/deps-live
 
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
+
+# A zip to upload to Gradescope, which grades by RUBRIC.
+RUBRIC ?= tools/rubrics/cs184.rubric
+autograder: all $(BUILD)/deps-test
+	tools/autograder/pack.sh $(BUILD) $(RUBRIC) $(BUILD)/autograder.zip '$(COMMIT)' $(DEPS)
 
 # For tests/mutants.sh.
 print-compile:
@@ -129,6 +161,10 @@ help:
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
 	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests'
+	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes)'
+	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
+	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
+	@echo 'make coverage   lines of renderer/ and tools/ that the tests reach (an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
@@ -136,11 +172,13 @@ help:
 	@echo 'make diagnose-rates  measure how often it is right (an hour)'
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)'
+	@echo 'make grade-show  grade a class of fifty, write tests/grading/'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
+	@echo 'make autograder  BUILD/autograder.zip for Gradescope (RUBRIC=tools/rubrics/cs184.rubric)'
 	@echo 'make deps       install the Debian packages that building needs'
 	@echo 'make install    into PREFIX=$(PREFIX)'
 
@@ -152,6 +190,12 @@ $(BUILD)/clang/%: CC := clang
 $(BUILD)/clang/%: CXX := clang++
 $(BUILD)/clang/%: OPT := $(SANITIZE),fuzzer-no-link
 $(BUILD)/clang/%: WERROR := 1
+# Two more on demand: under ThreadSanitizer, and with clang's counts of what ran.
+$(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
+$(BUILD)/cov/%: CC := clang
+$(BUILD)/cov/%: CXX := clang++
+$(BUILD)/cov/%: OPT := -O1 -g -fprofile-instr-generate -fcoverage-mapping
+$(BUILD)/cov/%: WERROR := 1
 
 define compile_c
 	$(call say,CC,$@)
@@ -183,6 +227,15 @@ $(BUILD)/san/%.cc.o: %.cc | $(BUILD)/deps
 $(BUILD)/clang/%.cc.o: %.cc | $(BUILD)/deps-test
 	$(compile_cxx)
 
+$(BUILD)/tsan/%.c.o: %.c | $(BUILD)/deps-test
+	$(compile_c)
+$(BUILD)/tsan/%.cc.o: %.cc | $(BUILD)/deps-test
+	$(compile_cxx)
+$(BUILD)/cov/%.c.o: %.c | $(BUILD)/deps-lint
+	$(compile_c)
+$(BUILD)/cov/%.cc.o: %.cc | $(BUILD)/deps-lint
+	$(compile_cxx)
+
 isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
@@ -193,7 +246,8 @@ $(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
 $(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
 	$$(compile_c)
 endef
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
+TREES := $(BUILD) $(BUILD)/san $(BUILD)/clang $(BUILD)/tsan $(BUILD)/cov
+$(foreach b,$(TREES),$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
   $(eval $(call kernel_object,$(b),$(k),$(i))))))
 
 $(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
@@ -224,7 +278,7 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
-$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates: \
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
@@ -233,6 +287,24 @@ $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anch
   tests/anchors_plot.c tests/anchor_images.c tests/anchor_rules.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_calibration: $(call obj,$(BUILD),tests/make_calibration.c $(SUPPORT)) $(BUILD)/libassay.a
+	$(link)
+$(BUILD)/tsan/pathtracer: $(call obj,$(BUILD)/tsan,renderer/main.c $(RENDERER))
+	$(link)
+$(BUILD)/tsan/libassay.a: $(call obj,$(BUILD)/tsan,$(HARNESS) $(RENDERER))
+	$(archive)
+$(BUILD)/cov/libassay.a: $(call obj,$(BUILD)/cov,$(HARNESS) $(RENDERER))
+	$(archive)
+$(BUILD)/tsan/assay $(BUILD)/cov/assay: $(BUILD)/%/assay: $(BUILD)/%/tools/main.c.o $(BUILD)/%/libassay.a
+	$(link)
+$(BUILD)/cov/pathtracer: $(call obj,$(BUILD)/cov,renderer/main.c) $(BUILD)/cov/libassay.a
+	$(link)
+$(BUILD)/tsan/tests/% $(BUILD)/cov/tests/%: TEST_LIBS := -lcmocka
+$(BUILD)/cov/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
+$(BUILD)/tsan/tests/%: $(BUILD)/tsan/tests/%.c.o $(call obj,$(BUILD)/tsan,$(SUPPORT)) $(BUILD)/tsan/libassay.a
+	$(link)
+$(BUILD)/cov/tests/%: $(BUILD)/cov/tests/%.c.o $(call obj,$(BUILD)/cov,$(SUPPORT)) $(BUILD)/cov/libassay.a
+	$(link)
+$(BUILD)/cov/tests/student_tracer: $(BUILD)/cov/tests/student_tracer.c.o
 	$(link)
 # playwright-core, by which the page is tested in Debian's chromium.
 $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
@@ -253,15 +325,35 @@ programs-fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ))
 fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
 	tests/fuzz/run.sh $(BUILD) $(SECONDS_EACH) $(or $(ONLY),$(FUZZ))
 
+# A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
+# every va_list but the first file's for one that was never started.
+define clang_tidy
+	$(call say,TIDY,$<)
+	$(Q)mkdir -p $(@D); clang-tidy --quiet $< -- -std=c17 -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) >$@.log 2>&1 || { cat $@.log; exit 1; }; touch $@
+endef
+$(patsubst %,$(BUILD)/lint/%.ok,$(LINT)): $(BUILD)/lint/%.ok: % .clang-tidy $(wildcard renderer/*.h reference/*.h tools/*.h) | $(BUILD)/deps-lint
+	$(call clang_tidy,-DASSAY_VERSION='""' -DASSAY_COMMIT='""')
+define kernel_lint
+$(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(wildcard renderer/*.h) | $(BUILD)/deps-lint
+	$$(call clang_tidy,$(call isa_flags,$(2)))
+endef
+$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),$(eval $(call kernel_lint,$(k),$(i)))))
+$(BUILD)/lint/cppcheck.ok: .cppcheck-suppressions $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch]) | $(BUILD)/deps-lint
+	$(call say,CHECK,cppcheck)
+	$(Q)mkdir -p $(@D); cppcheck --enable=warning,performance,portability --std=c11 --quiet --inline-suppr --error-exitcode=1 \
+	  --suppressions-list=.cppcheck-suppressions -D_XOPEN_SOURCE=700 -DISA=avx2 \
+	  '-Djson_array_foreach(a,i,v)=for(i=0;i<json_array_size(a)&&(v=json_array_get(a,i));i++)' \
+	  '-Djson_object_foreach(o,k,v)=for(;(k=json_key(o))&&(v=json_value(o));)' renderer reference tools tests && touch $@
+
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
 programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
-  $(wildcard tests/make_*.c tests/diagnose_rates.c) $(BENCH))
+  $(wildcard tests/make_*.c tests/diagnose_rates.c tests/grade_table.c) $(BENCH))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/tools/report_page.c.o): tools/page.css $(wildcard tools/page*.js)
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): $(BUILD)/commit
-$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/clang,$(b)/renderer/version.c.o): \
+$(foreach b,$(TREES),$(b)/tools/report_page.c.o): tools/page.css $(wildcard tools/page*.js)
+$(foreach b,$(TREES),$(b)/renderer/version.c.o): $(BUILD)/commit
+$(foreach b,$(TREES),$(b)/renderer/version.c.o): \
   CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
 $(BUILD)/commit: FORCE
 	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
@@ -289,10 +381,12 @@ $(BUILD)/deps:
 	$(call install_missing,$(DEPS))
 $(BUILD)/deps-test: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_TEST))
+$(BUILD)/deps-lint: | $(BUILD)/deps-test
+	$(call install_missing,$(DEPS_LINT))
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report deps deps-live install format clean help catalogue diagnose-rates calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -7,6 +7,8 @@
 #include "../renderer/bsdf.h"
 
 #include <assert.h>
+#include <errno.h>
+#include <string.h>
 
 /* Of the extent: the distance of the black sheet behind a one-sided emitter. mesh2 vertices are
  * float32, 1e-7 of the extent. */
@@ -326,6 +328,6 @@ bool export_povray(const struct scene *s, const struct camera *c, int depth,
         povray_put_lights(&w);
     povray_put_sky(&w);
     if (ferror(f))
-        return err_set(e, "cannot write the POV-Ray scene");
+        return err_set(e, "cannot write the POV-Ray scene: %s", strerror(errno));
     return true;
 }

@@ -59,13 +59,29 @@ static int lock_directory(const char *golden_dir, const char *scene, struct err 
     return -1;
 }
 
-/* The image goes first: until the manifest follows, its hash there is another's, and golden_read()
- * refuses the pair. */
+static bool has_hash(const char *path, const json_t *entry)
+{
+    char sha256[65];
+    struct err ignored;
+    const char *want = json_string_value(json_object_get(entry, "exr_sha256"));
+    return want != NULL && access(path, F_OK) == 0 && sha256_file(path, sha256, &ignored) &&
+           strcmp(want, sha256) == 0;
+}
+
+/* Which file is the image of an entry: after an interruption it may be the next one still. */
+static const char *image_of(const json_t *entry, const char *exr, const char *next)
+{
+    return !has_hash(exr, entry) && has_hash(next, entry) ? next : exr;
+}
+
+/* The new image waits beside the old one until the manifest names it by its hash; the manifest's rename decides.
+ * Whatever a kill leaves, image_of() finds the image that the manifest describes. */
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
 {
-    char exr[PATH_SIZE], path[PATH_SIZE], sha256[65];
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], sha256[65];
     if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
         !golden_path(path, golden_dir, scene, "manifest", ".json", e))
         return false;
     int lock = lock_directory(golden_dir, scene, e);
@@ -73,12 +89,17 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
         return false;
     json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
-    bool ok = all != NULL && moments_write(exr, m, attrs, 2, e) && sha256_file(exr, sha256, e);
+    bool ok = all != NULL;
+    if (ok && image_of(json_object_get(all, engine), exr, next) == next && rename(next, exr) != 0)
+        ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+    ok = ok && moments_write(next, m, attrs, 2, e) && sha256_file(next, sha256, e);
     if (ok) {
         ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
              json_object_set(all, engine, entry) == 0;
         ok = ok ? json_write(path, all, e) : err_set(e, "%s: out of memory", path);
     }
+    if (ok && rename(next, exr) != 0)
+        ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
     json_decref(entry);
     json_decref(all);
     close(lock);
@@ -87,8 +108,9 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
 
 bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
 {
-    char exr[PATH_SIZE], path[PATH_SIZE];
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
     if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
         !golden_path(path, golden_dir, scene, "manifest", ".json", e))
         return false;
     if (access(path, F_OK) != 0 && access(exr, F_OK) != 0)
@@ -100,7 +122,7 @@ bool golden_remove(const char *golden_dir, const char *scene, const char *engine
     bool ok = all != NULL;
     if (ok && json_object_del(all, engine) == 0)
         ok = json_write(path, all, e);
-    if (ok && unlink(exr) != 0 && errno != ENOENT)
+    if (ok && ((unlink(exr) != 0 && errno != ENOENT) || (unlink(next) != 0 && errno != ENOENT)))
         ok = err_set(e, "%s: cannot remove: %s", exr, strerror(errno));
     json_decref(all);
     close(lock);
@@ -190,10 +212,11 @@ static bool read_pair(const char *exr, const json_t *entry, struct moments *out,
 void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out)
 {
-    char exr[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32];
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32];
     *out = (struct golden){.state = GOLDEN_DAMAGED};
     struct err *e = &out->why;
     if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene->name, ref->engine, ".exr.next", e) ||
         !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
         return;
     json_t *all = load_manifest(path, e);
@@ -207,7 +230,7 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
         err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
-        if (read_pair(exr, entry, &out->m, e)) {
+        if (read_pair(image_of(entry, exr, next), entry, &out->m, e)) {
             out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
             out->manifest = json_incref(entry);
         }

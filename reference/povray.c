@@ -52,7 +52,7 @@ static bool check_log(const char *path, struct err *e)
     char line[512];
     long kept = -1;
     while (kept < 0 && fgets(line, sizeof line, f) != NULL)
-        if (sscanf(line, " retained for re-use: %ld", &kept) != 1)
+        if (sscanf(line, " retained for re-use: %18ld", &kept) != 1)
             kept = -1;
     fclose(f);
     if (kept < 0)

@@ -59,9 +59,10 @@ static int by_ends(const void *a, const void *b)
 static bool is_closed(const struct scene *s, const struct object *o)
 {
     size_t n = 3 * (size_t)o->num_triangles;
-    vec3 *edge = malloc(4 * n * sizeof *edge), *back = edge + 2 * n;
+    vec3 *edge = malloc(4 * n * sizeof *edge);
     if (edge == NULL)
         return false;
+    vec3 *back = edge + 2 * n;
     double volume = 0;
     for (size_t i = 0; i < n; i++) {
         const vec3 *p = &s->position[3 * (size_t)o->first_triangle + i / 3 * 3];

@@ -78,7 +78,7 @@ static bool one_plane_reflects(const struct scene *s, double extent)
             found = true;
         }
         for (int k = 0; k < 3; k++)
-            if (fabs(dot(n, sub(p[k], o))) > 1e-6 * extent)
+            if (fabsf(dot(n, sub(p[k], o))) > 1e-6 * extent)
                 return false;
     }
     return true;

@@ -35,9 +35,10 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
                       struct err *e) __attribute__((warn_unused_result));
 
 /* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
- * what reference_render() said and exr_sha256; the others are kept. Both appear by rename, the image
- * first, so that after an interruption golden_read() refuses the pair. Engines may be written at the
- * same time. */
+ * what reference_render() said and exr_sha256; the others are kept. Both appear by rename: the
+ * image beside its place (.exr.next), the manifest with its hash, the image in its place. So whenever a
+ * writer is killed there is the old pair or the new one, which golden_read() finds. Engines may be
+ * written at the same time. */
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));

@@ -61,7 +61,7 @@ static const struct truth_kind *const families[] = {furnaces,   truth_lights, tr
 
 static const struct truth_kind *find_kind(const char *name)
 {
-    for (size_t i = 0; i < sizeof families / sizeof *families; i++)
+    for (size_t i = 0; i < sizeof families / sizeof families[0]; i++)
         for (const struct truth_kind *k = families[i]; k->name != NULL; k++)
             if (strcmp(k->name, name) == 0)
                 return k;

@@ -27,13 +27,18 @@ static void angles_cgl(struct camera *c, const struct scene_camera *f)
 {
     float tan_h = tanf(f->hfov / 2), tan_v = tanf(f->vfov / 2);
     const float shape = (float)CGL_WIDTH / CGL_HEIGHT;
-    if (tan_h / tan_v < shape)
-        tan_h = tan_v * shape;
-    else
+    if (tan_h / tan_v >= shape)
         tan_v = tan_h / shape;
     float screen_distance = CGL_HEIGHT / (2 * tan_v);
     c->tan_h = (float)c->width / (2 * screen_distance);
     c->tan_v = (float)c->height / (2 * screen_distance);
+}
+
+void camera_show_whole(struct camera *c)
+{
+    float shrunk = fminf((float)c->width / CGL_WIDTH, (float)c->height / CGL_HEIGHT);
+    c->tan_h /= shrunk;
+    c->tan_v /= shrunk;
 }
 
 bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
@@ -91,8 +96,15 @@ bool camera_read_file(struct camera *c, const char *path, struct err *e)
         return false;
     if (n != NUMBERS)
         return err_set(e, "%s: %d numbers, a camera file has %d", path, n, NUMBERS);
-    if (!(x[0] > 0 && x[0] < 180 && x[1] > 0 && x[1] < 180 && x[3] >= 0 && x[4] > x[3]))
+    const double narrow = 1e-3, wide = 179.9;
+    if (!(x[0] >= narrow && x[0] <= wide && x[1] >= narrow && x[1] <= wide && x[3] >= 0 &&
+          x[4] > x[3]))
         return err_set(e, "%s: angles of view or clip distances out of range", path);
+    for (int k = 5; k < 8; k++)
+        if (fabs(x[k]) > FARTHEST)
+            return err_set(e, "%s: position beyond %g", path, FARTHEST);
+    if (!(x[28] >= 1e-6 && x[28] <= 1e9 && x[29] >= 0 && x[29] <= 1e6))
+        return err_set(e, "%s: focal distance or lens radius out of range", path);
     const double *m = x + 16;
     vec3 axes[3];
     for (int k = 0; k < 3; k++) {
@@ -101,6 +113,9 @@ bool camera_read_file(struct camera *c, const char *path, struct err *e)
             return err_set(e, "%s: column %d of the camera's matrix is not of unit length", path,
                            k + 1);
     }
+    if (fabsf(dot(axes[0], axes[1])) > 1e-3f ||
+        length(sub(cross(axes[0], axes[1]), axes[2])) > 2e-3f)
+        return err_set(e, "%s: the camera's matrix is not a rotation", path);
     const double degree = 3.14159265358979323846 / 180;
     c->right = normalize(axes[0]);
     c->up = normalize(axes[1]);
@@ -124,9 +139,11 @@ ray camera_ray(const struct camera *c, float x, float y, float u, float v)
     if (c->lens_radius > 0) {
         float lx, ly;
         warp_disk(u, v, &lx, &ly);
-        vec3 focus = mad(o, c->focal_distance, d);
-        o = mad(mad(o, lx * c->lens_radius, c->right), ly * c->lens_radius, c->up);
-        d = sub(focus, o);
+        /* Both as seen from the eye: far from the origin their difference would be lost. */
+        vec3 focus = scale(d, c->focal_distance);
+        vec3 lens = mad(scale(c->right, lx * c->lens_radius), ly * c->lens_radius, c->up);
+        o = add(o, lens);
+        d = sub(focus, lens);
     }
     return (ray){.o = o, .d = normalize(d), .tmin = c->near, .tmax = c->far};
 }

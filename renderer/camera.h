@@ -23,6 +23,9 @@ struct camera {
 bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
     __attribute__((warn_unused_result));
 
+/* Of a camera of the CGL dialect: shows in any size what the assignment shows at 800 x 600, or as much as fits. */
+void camera_show_whole(struct camera *c);
+
 /* Replaces pose and angles by those of a camera file of the assignment (its key D writes them).
  * The picture's size stays. */
 bool camera_read_file(struct camera *c, const char *path, struct err *e)

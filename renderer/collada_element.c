@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool fail_line(struct loader *ld, long line, const char *fmt, ...)
+bool(fail_line)(struct loader *ld, long line, const char *fmt, ...)
 {
     char text[900];
     va_list ap;
@@ -19,7 +19,7 @@ bool fail_line(struct loader *ld, long line, const char *fmt, ...)
     return err_set(ld->err, "%s:%ld: %s", ld->path, line, text);
 }
 
-bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
+bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
 {
     char text[900];
     va_list ap;
@@ -29,7 +29,7 @@ bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
     return fail_line(ld, line_of(n), "%s", text);
 }
 
-bool fail_memory(struct loader *ld)
+bool(fail_memory)(struct loader *ld)
 {
     return err_set(ld->err, "%s: out of memory", ld->path);
 }

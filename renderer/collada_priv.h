@@ -21,9 +21,6 @@ enum {
     MAX_POLYGON_CORNERS = 1 << 14
 };
 
-/* Coordinates beyond this would overflow float32 when squared. */
-#define FARTHEST 1e18
-
 struct id_entry {
     const char *id;
     xmlNode *node;
@@ -111,6 +108,11 @@ bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
 bool fail_line(struct loader *ld, long line, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 bool fail_memory(struct loader *ld);
+#ifdef __clang_analyzer__ /* as in err.h */
+#define fail_at(...)    ((void)fail_at(__VA_ARGS__), false)
+#define fail_line(...)  ((void)fail_line(__VA_ARGS__), false)
+#define fail_memory(ld) ((void)fail_memory(ld), false)
+#endif
 /* "unexpected <child> in <parent>". */
 bool fail_unexpected(struct loader *ld, const xmlNode *child);
 long line_of(const xmlNode *n);

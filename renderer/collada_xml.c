@@ -20,6 +20,7 @@ static void element_start(void *ctx, const xmlChar *name, const xmlChar *prefix,
     xmlSAX2StartElementNs(ctx, name, prefix, uri, num_namespaces, namespaces, num_attributes,
                           num_defaulted, attributes);
     if (ctxt->node != NULL && ctxt->node != before)
+        /* NOLINTNEXTLINE(performance-no-int-to-ptr): a number is what the field is for here. */
         ctxt->node->_private = (void *)(intptr_t)ctxt->input->line;
 }
 
@@ -30,17 +31,32 @@ typedef xmlError *xml_complaint;
 #endif
 
 /* Only the first complaint is kept: those after it are mostly its consequences. */
-static void parse_error(void *ctx, xml_complaint error)
+static void complain(struct loader *ld, xml_complaint error)
 {
-    xmlParserCtxt *ctxt = ctx;
-    struct loader *ld = ctxt->_private;
     if (error->level < XML_ERR_ERROR || ld->parse_failed)
         return;
     ld->parse_failed = true;
+    if (error->code == XML_ERR_NO_MEMORY) {
+        fail_memory(ld);
+        return;
+    }
     char text[512];
     snprintf(text, sizeof text, "%s", error->message != NULL ? error->message : "malformed XML");
     text[strcspn(text, "\n")] = '\0';
     fail_line(ld, error->line, "not well-formed: %s", text);
+}
+
+static void parse_error(void *ctx, xml_complaint error)
+{
+    xmlParserCtxt *ctxt = ctx;
+    complain(ctxt->_private, error);
+}
+
+/* What the library says without saying of which parser, that memory is out above all: it goes on then, and may leave
+ * something out of the tree. Without this it would print it, too. */
+static void library_error(void *ld, xml_complaint error)
+{
+    complain(ld, error);
 }
 
 /* Without document types there are no entities to expand, so no entity bombs and no outside files.
@@ -88,9 +104,12 @@ static int read_some(void *context, char *buffer, int size)
 static bool parse(struct loader *ld, struct text_input *in)
 {
     struct reading reading = {ld, in};
+    xmlSetStructuredErrorFunc(ld, library_error); /* of this thread */
     xmlParserCtxt *ctxt = xmlNewParserCtxt();
-    if (ctxt == NULL)
+    if (ctxt == NULL) {
+        xmlSetStructuredErrorFunc(NULL, NULL);
         return fail_memory(ld);
+    }
     ctxt->_private = ld;
     ctxt->sax->startElementNs = element_start;
     ctxt->sax->internalSubset = document_type;
@@ -99,8 +118,11 @@ static bool parse(struct loader *ld, struct text_input *in)
      * (depth, entities) is checked here. */
     ld->doc = xmlCtxtReadIO(ctxt, read_some, NULL, &reading, NULL, NULL,
                             XML_PARSE_NONET | XML_PARSE_HUGE);
+    if (ctxt->errNo == XML_ERR_NO_MEMORY && !ld->parse_failed)
+        ld->parse_failed = !fail_memory(ld);
     bool failed = ld->parse_failed;
     xmlFreeParserCtxt(ctxt);
+    xmlSetStructuredErrorFunc(NULL, NULL);
     if (failed)
         return false;
     if (ld->doc == NULL || xmlDocGetRootElement(ld->doc) == NULL)

@@ -13,7 +13,7 @@ static void hide_controls(char *text)
             *c = '?';
 }
 
-bool err_set(struct err *e, const char *fmt, ...)
+bool(err_set)(struct err *e, const char *fmt, ...)
 {
     if (e == NULL)
         return false;
@@ -25,7 +25,7 @@ bool err_set(struct err *e, const char *fmt, ...)
     return false;
 }
 
-bool err_prefix(struct err *e, const char *fmt, ...)
+bool(err_prefix)(struct err *e, const char *fmt, ...)
 {
     if (e == NULL)
         return false;

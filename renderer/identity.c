@@ -22,6 +22,11 @@ bool identity_make(const struct options *o, struct identity *id, struct err *e)
              o->first_bounce, o->light_samples, (int)o->roulette, o->survival,
              bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
              environment, o->fresnel, sampler_kind_names[o->sampler]);
+    if (o->starter != 0 || o->frame != FRAME_CROP) {
+        size_t n = strlen(id->settings);
+        snprintf(id->settings + n, sizeof id->settings - n, "; starter %u; frame %d", o->starter,
+                 o->frame);
+    }
     if (o->adaptive_batch > 0)
         snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,
                  o->adaptive_tolerance);

@@ -17,6 +17,8 @@ struct stream {
     char why[200];
 };
 
+/* Only while reading: a file that is written holds its lock where memory runs out, and asking it for our data would
+ * wait for that forever. */
 static void keep_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
 {
     void *s = NULL;
@@ -26,6 +28,13 @@ static void keep_complaint(exr_const_context_t f, exr_result_t code, const char 
     struct stream *stream = s;
     if (stream->why[0] == '\0')
         snprintf(stream->why, sizeof stream->why, "%s", msg);
+}
+
+static void drop_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
+{
+    (void)f;
+    (void)code;
+    (void)msg;
 }
 
 static int64_t read_at(exr_const_context_t f, void *s, void *buffer, uint64_t size, uint64_t offset,
@@ -57,8 +66,11 @@ static int64_t write_at(exr_const_context_t f, void *s, const void *buffer, uint
     while (done < size) {
         ssize_t n = pwrite(((struct stream *)s)->fd, (const char *)buffer + done, size - done,
                            (off_t)(offset + done));
-        if (n <= 0)
-            return error(f, EXR_ERR_WRITE_IO, "%s", strerror(errno)), -1;
+        if (n <= 0) {
+            struct stream *stream = s;
+            snprintf(stream->why, sizeof stream->why, "%s", strerror(n < 0 ? errno : EIO));
+            return error(f, EXR_ERR_WRITE_IO, "%s", stream->why), -1;
+        }
         done += (uint64_t)n;
     }
     return (int64_t)done;
@@ -142,6 +154,7 @@ bool image_write_exr(const char *path, const struct image *im, struct err *e)
         return false;
     struct stream s = {.fd = fileno(file.f)};
     exr_context_initializer_t init = initializer(&s);
+    init.error_handler_fn = drop_complaint;
     exr_context_t f = NULL;
     exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (r == EXR_ERR_SUCCESS)

@@ -21,7 +21,7 @@ static bool read_header(FILE *f, int *width, int *height)
         is_rgbe |= strcmp(line, "FORMAT=32-bit_rle_rgbe\n") == 0;
     char end;
     return is_rgbe && fgets(line, sizeof line, f) != NULL &&
-           sscanf(line, "-Y %d +X %d%c", height, width, &end) == 3 && end == '\n';
+           sscanf(line, "-Y %9d +X %9d%c", height, width, &end) == 3 && end == '\n';
 }
 
 /* One component of a row, in runs. */

@@ -109,10 +109,11 @@ static void generate(const struct integrator *it, struct batch *b, int n)
         if (c->lens_radius > 0) {
             vf lx, ly;
             warp_diskv(u[2], u[3], &lx, &ly);
-            vec3v focus = madv(o, vf_set(c->focal_distance), d);
-            o = madv(madv(o, lx * c->lens_radius, v3_all(c->right)), ly * c->lens_radius,
-                     v3_all(c->up));
-            d = subv(focus, o);
+            vec3v focus = scalev(d, vf_set(c->focal_distance));
+            vec3v lens = madv(scalev(v3_all(c->right), lx * c->lens_radius), ly * c->lens_radius,
+                              v3_all(c->up));
+            o = addv(o, lens);
+            d = subv(focus, lens);
         }
         v3_store(&b->ray.o, k, o);
         v3_store(&b->ray.d, k, normalizev(d));

@@ -3,6 +3,7 @@
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
+#include "starter.h"
 #include "state.h"
 
 #include <signal.h>
@@ -59,6 +60,10 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
 {
     if (!camera_init(c, scene, o->width, o->height, e))
         return err_prefix(e, "%s", o->scene);
+    if (o->frame == FRAME_WHOLE && (scene->dialect != DIALECT_CGL || o->camera_file != NULL))
+        return err_set(e, "%s: --frame is of the assignment's camera, without --camera", o->scene);
+    if (o->frame == FRAME_WHOLE)
+        camera_show_whole(c);
     if (o->camera_file != NULL && !camera_read_file(c, o->camera_file, e))
         return false;
     if (o->lens_radius >= 0)
@@ -85,6 +90,7 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_dark_lights > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
                 scene->num_dark_lights);
+    starter_apply(scene, o->starter);
     if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)
@@ -199,6 +205,8 @@ static bool run(struct session *s, struct err *e)
     if (ok && s->signal != 0)
         print_how_to_resume(&s->out, &film);
 done:
+    s->out.id = NULL; /* this function's own */
+    s->out.scene = NULL;
     film_free(&film);
     bvh_free(bvh);
     scene_free(&scene);

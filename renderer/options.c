@@ -1,6 +1,7 @@
 #include "options.h"
 
 #include "cli.h"
+#include "starter.h"
 #include "version.h"
 
 #include <libxml/xmlversion.h>
@@ -47,6 +48,8 @@ enum option {
     OPT_ISA,
     OPT_DIALECT,
     OPT_FRESNEL,
+    OPT_FRAME,
+    OPT_STARTER,
     OPT_QUIET,
     OPT_LIST,
     OPT_VERSION,
@@ -119,6 +122,12 @@ static const struct cli_option options[] = {
                      "auto: cgl if the file has CGL extras (auto)"},
     [OPT_FRESNEL] = {0, "fresnel", 1, "HOW",
                      "of glass: exact, or schlick as in the assignment (exact)"},
+    [OPT_FRAME] = {0, "frame", 1, "HOW",
+                   "dialect cgl: crop the assignment's 800 x 600 to -r as it\n"
+                   "does, or the whole of it (crop)"},
+    [OPT_STARTER] = {0, "starter", 1, "DEFECT",
+                     "do wrong what the assignment's starter code does: light-pdf,\n"
+                     "turned-lamp; for grading; may be given again"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress, no statistics"},
     [OPT_LIST] = {0, "list", 0, "", "print the names that options take"},
     [OPT_VERSION] = {0, "version", 0, "", "print version and libraries"},
@@ -126,6 +135,7 @@ static const struct cli_option options[] = {
     {0}};
 
 static const char *const fresnel_names[] = {"exact", "schlick", NULL};
+static const char *const frame_names[] = {"crop", "whole", NULL};
 static const char *const dialect_names[] = {"auto", "collada", "cgl", NULL};
 
 enum { DEFAULT_SPP = 16, MAX_SPP = 1 << 24 };
@@ -206,6 +216,15 @@ static bool parse_cell(struct options *s, const char *const value[4], struct err
     return true;
 }
 
+static bool parse_starter(struct options *s, const char *v, struct err *e)
+{
+    int which;
+    if (!cli_choice("--starter", v, starter_names, &which, e))
+        return false;
+    s->starter |= 1u << which;
+    return true;
+}
+
 /* One option; *accumulate is -o, which counts only after all of them are read. */
 static bool parse_option(struct options *s, enum option o, const struct cli *c, int *accumulate,
                          struct err *e)
@@ -251,6 +270,8 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_SEED: return cli_uint64("--seed", v, &s->seed, e);
     case OPT_SAMPLER: return cli_choice("--sampler", v, sampler_kind_names, &s->sampler, e);
     case OPT_FRESNEL: return cli_choice("--fresnel", v, fresnel_names, &s->fresnel, e);
+    case OPT_FRAME: return cli_choice("--frame", v, frame_names, &s->frame, e);
+    case OPT_STARTER: return parse_starter(s, v, e);
     case OPT_INTEGRATOR: return cli_choice("--integrator", v, integrator_kind_names, &s->kind, e);
     case OPT_ACCEL: return cli_choice("--accel", v, bvh_kind_names, &s->accel, e);
     case OPT_ISA: return cli_choice("--isa", v, isa_names, &s->isa, e);
@@ -300,6 +321,14 @@ static bool complete(struct options *s, int accumulate, struct err *e)
         s->last = s->spp;
     if (s->last > s->spp)
         return err_set(e, "--samples: %d:%d goes past the %d of --spp", s->first, s->last, s->spp);
+    if (s->starter != 0 && s->direct == DIRECT_MIS && s->kind == INTEGRATE_PATHS)
+        return err_set(e,
+                       "--starter is about lights that are sampled alone: give --direct light too");
+    if (s->starter != 0 && s->isa > ISA_AUTO)
+        return err_set(e, "--starter is in the scalar code alone: not with --isa %s",
+                       isa_names[s->isa]);
+    if (s->starter != 0)
+        s->isa = ISA_SCALAR;
     if (s->isa < 0)
         s->isa = s->accel == BVH_WIDE ? ISA_AUTO : ISA_SCALAR;
     if (s->threads == 0)

@@ -7,6 +7,7 @@
 enum { MAX_OUTPUTS = 8 };
 
 enum { FRESNEL_EXACT, FRESNEL_SCHLICK }; /* options.fresnel */
+enum { FRAME_CROP, FRAME_WHOLE };        /* options.frame */
 
 struct options {
     const char *scene, *camera_file, *environment_file;
@@ -16,9 +17,10 @@ struct options {
     const char *resume;  /* the picture to go on with; NULL: from the start */
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
-    int dialect, accel, isa, kind, direct, fresnel, sampler;
-    int spp;         /* of the whole picture, the most if adaptive */
-    int first, last; /* sample numbers first .. last-1 are this program's share */
+    int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
+    unsigned starter; /* 1 << enum starter (starter.h) */
+    int spp;          /* of the whole picture, the most if adaptive */
+    int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
     bool quiet, aov, keep_state;
     enum roulette_kind roulette;

@@ -1,5 +1,6 @@
 #include "output.h"
 
+#include "shell_words.h"
 #include "tone.h"
 #include "version.h"
 
@@ -46,27 +47,13 @@ static bool write_rates(const char *png, const struct film *f, int most, struct 
     return ok;
 }
 
-/* Appends one argument as a shell would have to read it. */
-static void append_argument(char *text, size_t size, const char *arg)
-{
-    static const char safe[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                               "-_./:=,+%@";
-    size_t n = strlen(text);
-    const char *quote = arg[0] != '\0' && strspn(arg, safe) == strlen(arg) ? "" : "'";
-    n += (size_t)snprintf(text + n, size - n, "%s%s", n > 0 ? " " : "", quote);
-    for (; *arg != '\0' && n + 8 < size; arg++)
-        n += (size_t)snprintf(text + n, size - n, *arg == '\'' ? "'\\''" : "%c", *arg);
-    if (n + 2 < size)
-        snprintf(text + n, size - n, "%s", quote);
-}
-
 enum { COMMAND_SIZE = 8192 };
 
 static void command_line(const struct output *o, char text[COMMAND_SIZE])
 {
     text[0] = '\0';
-    for (int i = 0; i < o->argc && strlen(text) + 16 < COMMAND_SIZE; i++)
-        append_argument(text, COMMAND_SIZE, o->argv[i]);
+    for (int i = 0; i < o->argc && shell_append(text, COMMAND_SIZE, o->argv[i]); i++)
+        continue;
 }
 
 static bool write_exr(const struct output *o, const char *path, const struct film *f,
@@ -166,7 +153,7 @@ void print_how_to_resume(const struct output *o, const struct film *f)
     command_line(o, command);
     if (o->opt->resume == NULL && strlen(command) + 32 < COMMAND_SIZE) {
         strcat(command, " --resume");
-        append_argument(command, COMMAND_SIZE, o->opt->output[0]);
+        shell_append(command, COMMAND_SIZE, o->opt->output[0]);
     }
     fprintf(stderr, "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s\n",
             (unsigned long)f->num_samples, o->opt->last - o->opt->first, command);

@@ -155,7 +155,7 @@ static bool render_pass(struct job *j, struct watch *w, uint32_t last, struct er
     pthread_mutex_lock(&j->lock);
     while (j->running > 0) {
         struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
+        clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_nsec += 50 * 1000 * 1000;
         until.tv_sec += until.tv_nsec / 1000000000;
         until.tv_nsec %= 1000000000;
@@ -210,7 +210,7 @@ static bool render_passes(struct job *j, struct watch *w, enum render_end *end, 
         if (!render_pass(j, w, f->num_samples + count, e))
             return false;
         double now = now_seconds(), each = (now - before) / count;
-        if (c->write_every > 0 && now - w->last_write >= c->write_every) {
+        if (c->write != NULL && c->write_every > 0 && now - w->last_write >= c->write_every) {
             if (!c->write(c->arg, f, e))
                 return false;
             w->last_write = now_seconds();
@@ -239,7 +239,11 @@ static bool run_job(struct job *j, struct watch *w, enum render_end *end, struct
     j->tiles_x = (j->opt->width + TILE - 1) / TILE;
     j->num_tiles = j->tiles_x * ((j->opt->height + TILE - 1) / TILE);
     pthread_mutex_init(&j->lock, NULL);
-    pthread_cond_init(&j->ended, NULL);
+    pthread_condattr_t monotonic; /* a wall clock that is set must not make it wait */
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&j->ended, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     bool ok = render_passes(j, w, end, e);
     pthread_cond_destroy(&j->ended);
     pthread_mutex_destroy(&j->lock);

@@ -20,6 +20,9 @@ enum dialect {
     DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
 };
 
+/* Coordinates beyond this, which would overflow float32 when squared, are refused in every file. */
+#define FARTHEST 1e18
+
 /* Relative index of refraction: 1/MAX_IOR to MAX_IOR. */
 #define MAX_IOR 100.0f
 
@@ -128,6 +131,7 @@ struct scene {
     unsigned num_zero_normals; /* corners whose normal in the file had no length; they got the
                                   triangle's own */
     unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
+    unsigned starter;          /* starter.h; 0: nothing is done wrong */
     char note[256];            /* what the dialect merged, one line for the user; else empty */
 };
 

@@ -6,6 +6,7 @@ static uint8_t find_corner(struct wide_flat *f, vec3 p)
 {
     const float q[3] = {p.x, p.y, p.z};
     for (int i = 0; i < f->num_corners; i++)
+        /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): edges are shared bit for bit or not at all. */
         if (memcmp(f->corner[i], q, sizeof q) == 0)
             return (uint8_t)i;
     memcpy(f->corner[f->num_corners], q, sizeof q);

@@ -96,6 +96,7 @@ static void best_slots(struct build *b, uint32_t i)
     uint8_t left[WIDTH + 1];
     for (int n = 2; n <= WIDTH; n++) {
         split[n] = INFINITY;
+        left[n] = 1; /* costs that are infinite or not numbers are as good as each other */
         for (int k = 1; k < n; k++) {
             float c = l->cost[k - 1] + r->cost[n - k - 1];
             if (c < split[n]) {

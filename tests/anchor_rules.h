@@ -6,6 +6,7 @@
 #define ASSAY_TESTS_ANCHOR_RULES_H
 
 #include "../renderer/moments.h"
+#include "../tools/idiff.h"
 
 /* CIE XYZ (2 degrees) of linear RGB with the primaries of BT.709 and white D65, from the chromaticities
  * in the standard [BT.709-6 table 1]. */
@@ -44,21 +45,5 @@ double mitsuba_score(double *z, size_t pixels, size_t allowed);
 #define WELCH_LEVEL 0.01
 /* log10 of the family p of all pixels and channels; 0 if nothing can be tested. */
 double welch_log10_p(const struct moments *a, const struct moments *b);
-
-/* Blender, tests/python/modules/render_report.py (read at commit 002f5b8): idiff -fail 0.016
- * -failpercent 1 on 8-bit pictures. A pixel fails if any of its channels differs by more than `fail`;
- * the picture fails if more than `percent` of the pixels do [OpenImageIO idiff]. */
-#define BLENDER_FAIL    0.016
-#define BLENDER_PERCENT 1.0
-/* The 8-bit sRGB picture of the means, 3 bytes a pixel. */
-void idiff_quantise(const struct moments *m, uint8_t *rgb8);
-/* How many pixels have which largest difference of a channel, in steps of 1/255. */
-void idiff_histogram(const uint8_t *a, const uint8_t *b, size_t pixels, size_t count[256]);
-bool idiff_differs(const size_t count[256], size_t pixels, double fail, double percent);
-/* The smallest difference in 1/255 such that no more than `percent` of the pixels differ by more: the
- * picture passes with any `fail` of at least that. */
-int idiff_fail_score(const size_t count[256], size_t pixels, double percent);
-/* Percentage of the pixels that fail. */
-double idiff_percent_score(const size_t count[256], size_t pixels, double fail);
 
 #endif

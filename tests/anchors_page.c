@@ -10,7 +10,9 @@ static const struct {
     enum anchor_error kind;
     const char *heading, *what;
 } errors[] = {
-    {ANCHOR_GLOBAL, "Global brightness", "All light of A times 1 + b."},
+    {ANCHOR_GLOBAL, "Global brightness",
+     "All light of A times 1 + b. Where a lamp or the sky is seen directly there is no noise, and one "
+     "value on each side: ours and Welch's hold those to 1e-5, Mitsuba's to its floor on the variance."},
     {ANCHOR_BOUNCED, "Brightness of bounced light",
      "Light of A that has bounced times 1 + b, as a wrong factor in a BSDF or a light's density makes "
      "it; emitters and sky seen directly stay right."},

@@ -80,7 +80,7 @@ struct settings settings_published(double share)
     static const double margin_alpha[] = {0.05, 0.01, 0.001};
     struct settings s = {
         .blocks = 65536,
-        .synthetic_pairs = {part(share, 1e4), part(share, 3e4), 0},
+        .synthetic_pairs = {part(share, 2e4), part(share, 1e5), 0},
         .render_pairs = part(share, 200),
         .power_pairs = part(share, 2000),
         .cover_pairs = part(share, 2e4),

@@ -1,12 +1,12 @@
 /* diagnose_rates BUILD [PART]: how often `assay diagnose` is right, as a Markdown page on standard output (make
- * diagnose-rates). Renders of all bugs and of the correct renderer at sizes, numbers of samples and seeds that the
- * catalogue was not made with; the correct renderer also in TRIES synthetic looks.
+ * diagnose-rates). Renders of all bugs and of the correct renderer with seeds, and but for the first time at sizes and
+ * numbers of samples, that the catalogue was not made with; the correct renderer also in TRIES synthetic looks.
  *
  * A synthetic look: each cell of each view is that of a real correct render drawn from POOL, moved so that the pool's
  * mean is the catalogue's mean plus a normal error of the catalogue's own variance, and scaled by
  * sqrt(POOL/(POOL - 1)), which the pool's own mean takes from its scatter. Where a view asks for consistency, its
  * renders are drawn from POOL real ones without replacement, and judged; each such draw serves for
- * TRIES / CONSISTENT_DRAWS tries. PART (large, small, correct) measures only that. */
+ * TRIES / CONSISTENT_DRAWS tries. PART (same, large, small, few, correct) measures only that. */
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "../tools/diagnose.h"
@@ -204,7 +204,7 @@ static bool rate_bugs(const struct rates *r, int scale_percent, int spp_percent,
                                      .seed = seed};
     }
     printf(
-        "\n## Bugs, %d %% of the catalogue's width and height, %d %% of its samples, seed %d\n\n"
+        "\n## Bugs, %d %% of the catalogue's width and height, %d %% of its samples per pixel, seed %d\n\n"
         "Listed where the bug was not named first and alone, or where without it in the catalogue another "
         "was named.\n\n| bug | named | without it in the catalogue |\n|---|---|---|\n",
         scale_percent, spp_percent, (int)seed);
@@ -330,7 +330,7 @@ static bool render_singles(const struct rates *r, struct pool *p, const char *pr
                                      .picture = picture,
                                      .log = log};
         double cpu_s;
-        if (!ours_render(&job, &p->single[k], &cpu_s, e))
+        if (!ours_render(&job, &p->single[k], &cpu_s, NULL, e))
             return false;
     }
     return true;
@@ -421,7 +421,7 @@ int main(int argc, char **argv)
     struct rates r = {0};
     const char *part = argc == 3 ? argv[2] : "";
     if (argc != 2 && argc != 3) {
-        fprintf(stderr, "usage: diagnose_rates BUILD [large|small|correct]\n");
+        fprintf(stderr, "usage: diagnose_rates BUILD [same|large|small|few|correct]\n");
         return 3;
     }
     r.build = argv[1];
@@ -433,9 +433,14 @@ int main(int argc, char **argv)
             "# How often a bug is named rightly\n\nWritten by `make diagnose-rates` (`tests/diagnose_rates.c`); "
             "%d bugs, %d views. How: \"How a bug is named\" in tools/README.md.\n",
             r.c.num_bugs, r.c.num_views);
+    if (ok && (*part == '\0' || strcmp(part, "same") == 0))
+        ok = rate_bugs(&r, 100, 100, 74, &e);
     if (ok && (*part == '\0' || strcmp(part, "large") == 0))
         ok = rate_bugs(&r, 150, 75, 71, &e);
+    /* As many samples in all as the catalogue has, and half as many. */
     if (ok && (*part == '\0' || strcmp(part, "small") == 0))
+        ok = rate_bugs(&r, 50, 400, 73, &e);
+    if (ok && (*part == '\0' || strcmp(part, "few") == 0))
         ok = rate_bugs(&r, 50, 200, 72, &e);
     if (ok && (*part == '\0' || strcmp(part, "correct") == 0))
         ok = rate_correct(&r, &e);

@@ -1,5 +1,6 @@
 #!/bin/bash
-# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME" or "not ok NAME".
+# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME", "not ok NAME", or "skip NAME" with
+# the reason where this machine cannot do it.
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
@@ -321,6 +322,7 @@ converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16
 expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
     $converge --margin 0.2 -o "$tmp/conv" 41_cornell
 expect "converge: results have all rungs" 0 "^3$" grep -c '"spp"' "$tmp/conv/results.json"
+expect "converge: the depth ladder is on the page" 0 "Depth ladder" grep -o "<b>Depth ladder" "$tmp/conv/index.html"
 expect "converge: too few samples to tell a bias" 2 "RMS bias.*INCONCLUSIVE" \
     $converge --margin 0.001 -o "$tmp/conv2" 41_cornell
 expect "converge: against a long run of our own" 0 "pathtracer, 1024 samples" \
@@ -631,6 +633,8 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
     expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
     expect "grade: on the page" 0 "This looks like a known bug" cat "$tmp/named/student/index.html"
+    expect "grade: the plot of it" 0 "all points while a bar touches green" cat "$tmp/named/student/index.html"
+    expect "grade: and whether another run would change it" 0 "gets the same points here" cat "$tmp/named/student/index.html"
     expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
     expect "grade: staff see who has it" 0 'student/index.html.*point_light_linear' bash -c "tr -d '\n' <'$tmp/named/index.html'"
     if ! grep -q "<html" "$tmp/named/student/index.html" ||
@@ -641,13 +645,35 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     fi
     expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
 elif grep -q "no sandbox" "$tmp/out"; then
-    ok "grade: refuses without a sandbox ($(cat "$tmp/out"))"
+    echo "skip grade: programs of submissions, hostile and right ($(cat "$tmp/out"))"
 else
     not_ok "grade: one submission" "$(cat "$tmp/out")"
 fi
+expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
+expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
+expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
+tests/autograder.sh "$build" >"$tmp/autograder"
+cat "$tmp/autograder"
+failures=$((failures + $(grep -c '^not ok' "$tmp/autograder")))
+grep -q '^ok ' "$tmp/autograder" || not_ok "the autograder" "nothing was looked at"
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
 expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
 expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
+
+# The same bits on any number of threads.
+tests/threads.sh "$pathtracer" >"$tmp/threads"
+cat "$tmp/threads"
+failures=$((failures + $(grep -c '^not ok' "$tmp/threads")))
+
+# Pictures made again from what they say of themselves.
+tests/reproduce.sh "$build" >"$tmp/reproduce"
+cat "$tmp/reproduce"
+failures=$((failures + $(grep -c '^not ok' "$tmp/reproduce")))
+
+# Kills, full disks and missing memory.
+tests/faults.sh "$build" 2 499 >"$tmp/faults"
+cat "$tmp/faults"
+failures=$((failures + $(grep -c '^not ok' "$tmp/faults")))
 
 # The page, in a browser.
 tests/browser/run.sh "$build" >"$tmp/browser"

@@ -105,9 +105,9 @@ static double score(const struct measurement *m, struct bench *t, enum anchor_ru
     case RULE_IDIFF:
     case RULE_IDIFF_FAIL_TUNED:
     case RULE_IDIFF_PERCENT_TUNED:
-        idiff_quantise(a, t->a8);
+        idiff_quantise(a, 1, t->a8);
         if (t->in_b8 != b)
-            idiff_quantise(b, t->b8);
+            idiff_quantise(b, 1, t->b8);
         t->in_b8 = b;
         idiff_histogram(t->a8, t->b8, pixels, count);
         return rule == RULE_IDIFF_FAIL_TUNED ? idiff_fail_score(count, pixels, BLENDER_PERCENT)

@@ -2,7 +2,7 @@
 # tests/mutants.sh [--build-only | --quick | --table FILE] [--seconds S] BUILD [NAME...]
 #
 # Builds each bug of tests/mutants (or those named) into a renderer of its own,
-# BUILD/mutants/NAME/pathtracer, and runs it through the suite against goldens and closed forms until a
+# BUILD/mutants/NAME/pathtracer (A+B: both in one), and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
 # as there are processors. Mutants run their scalar code; "none" is the renderer as it is, of which nothing may differ.
 #   --build-only   builds, and that is all
@@ -46,9 +46,14 @@ build_mutant() {
     mkdir -p "$dir"
     [ "$1" = none ] && { cp "$build/pathtracer" "$dir" && return; }
     cp -r renderer "$dir/renderer"
-    patch --quiet --fuzz=0 --no-backup-if-mismatch -p1 -d "$dir" <"tests/mutants/$1.patch" || return 1
+    local patches
+    IFS=+ read -ra patches <<<"$1"
+    patches=("${patches[@]/#/tests/mutants/}") && patches=("${patches[@]/%/.patch}")
+    for file in "${patches[@]}"; do
+        patch --quiet --fuzz=0 --no-backup-if-mismatch -p1 -d "$dir" <"$file" || return 1
+    done
     # A header changes all that includes it: make's dependency files know.
-    for file in $(sed -n 's,^+++ b/,,p' "tests/mutants/$1.patch"); do
+    for file in $(sed -n 's,^+++ b/,,p' "${patches[@]}" | sort -u); do
         case $file in
         *.h) changed+=" $(cd "$build" && grep -l "$file" renderer/*.c.d | sed 's,\.d$,,')" ;;
         *) changed+=" $file" ;;

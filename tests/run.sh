@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and ten seconds of each fuzzer, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and a fixed run of each fuzzer, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
 build=${1:?usage: tests/run.sh BUILD PROGRAM...}
@@ -21,7 +21,7 @@ run_job() {
     local log=$1 name start=$SECONDS
     name=$(basename "$2" .sh)
     case $2 in
-    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" 10 ;;
+    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" fixed ;;
     *.sh) "$2" "$3" ;;
     *) "$2" ;;
     esac >"$log/$name.out" 2>&1
@@ -56,18 +56,20 @@ for program in "${programs[@]}"; do
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
-# Lines "ok ..." and "not ok ...".
+# Lines "ok ...", "not ok ..." and "skip ...".
 for name in end_to_end fuzz; do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
     p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")
+    s=$(grep -c '^skip ' "$log/$name.out")
     if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f)) -eq 0 ]; then
         f=$((f + 1))
         echo "$name: died with status $status"
     fi
     [ "$f" -gt 0 ] && cat "$log/$name.out"
-    printf '%-24s %3d passed, %d failed  (%d s)\n' "$name" "$p" "$f" "$seconds"
-    passed=$((passed + p)) failed=$((failed + f))
+    [ "$s" -gt 0 ] && grep '^skip ' "$log/$name.out"
+    printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
+    passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
 if [ $skipped -gt 0 ]; then

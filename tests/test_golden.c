@@ -194,6 +194,46 @@ static void an_image_without_its_manifest_is_refused(void **state)
     assert_refused(f, "cycles.exr: ");
 }
 
+static void assert_first_value(struct fixture *f, double want)
+{
+    struct err e = {""};
+    struct moments m;
+    json_t *manifest;
+    if (!golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e))
+        fail_msg("%s", e.msg);
+    assert_float_equal(m.mean[0], want, 1e-6);
+    moments_free(&m);
+    json_decref(manifest);
+}
+
+/* Every state that a kill in golden_write() can leave: the new image waits, the manifest is the old one; the manifest
+ * is the new one, the image waits still. Then another update. Mean of pixel 0: 5/3, by hand above. */
+static void a_killed_update_leaves_the_old_pair_or_the_new(void **state)
+{
+    struct fixture *f = *state;
+    char next[160], old[160];
+    snprintf(next, sizeof next, "%s.next", f->exr);
+    snprintf(old, sizeof old, "%s.old", f->exr);
+    write_golden(f);
+    assert_int_equal(rename(f->exr, old), 0);
+    f->m.mean[0] += 1;
+    write_golden(f);
+    assert_true(access(next, F_OK) != 0);
+    assert_first_value(f, 5.0 / 3 + 1);
+    assert_int_equal(rename(f->exr, next), 0);
+    assert_int_equal(rename(old, f->exr), 0);
+    assert_first_value(f, 5.0 / 3 + 1);
+    f->m.mean[0] += 1;
+    write_golden(f);
+    assert_first_value(f, 5.0 / 3 + 2);
+    assert_true(access(next, F_OK) != 0);
+    struct err e;
+    assert_true(moments_write(next, &f->m, NULL, 0, &e));
+    assert_first_value(f, 5.0 / 3 + 2);
+    assert_true(golden_remove(f->dir, "12_plane", "cycles", &e));
+    assert_true(access(next, F_OK) != 0);
+}
+
 static void replace_manifest(struct fixture *f, const char *text)
 {
     FILE *out = fopen(f->json, "wb");
@@ -356,6 +396,7 @@ int main(void)
         WITH_FILES(engines_share_a_manifest),
         WITH_FILES(a_missing_golden_is_named),
         WITH_FILES(a_golden_of_another_scene_or_setting_is_refused),
+        WITH_FILES(a_killed_update_leaves_the_old_pair_or_the_new),
         WITH_FILES(an_image_without_its_manifest_is_refused),
         WITH_FILES(a_broken_manifest_is_an_error_and_is_not_overwritten),
         WITH_FILES(an_image_that_contradicts_its_manifest_is_refused),

@@ -45,6 +45,7 @@ struct bug {
     double noise;  /* samples for one */
     int shift;     /* pixels to the right */
     bool white, lamp_black;
+    bool mark; /* 48 x 5 pixels at the bottom left are of radiance 10 */
 };
 static const struct bug none = {.scale = 1, .square = 1, .noise = 1};
 
@@ -57,6 +58,8 @@ static double with_bug(const struct bug *b, size_t p, size_t c)
         v *= b->square;
     if (b->lamp_black && is_lamp(p))
         v = 0;
+    if (b->mark && x < 48 && y >= HEIGHT - 5)
+        return 10;
     return b->white ? 9 : v;
 }
 
@@ -158,11 +161,11 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
         snprintf(name, sizeof name, "p%d", i);
         write_picture(name, bug[i], spp[i], path);
         h->picture[i] = read_back(path);
-        a->picture[i].m = a->picture[i].noise = reference;
+        a->of[0][i].m = a->of[0][i].noise = reference;
         if (asked != NULL)
             r->picture[i].spp = asked[i];
     }
-    if (!grading_check(r, &r->check[0], a, h, alpha, &out, &e))
+    if (!grading_check(r, &r->check[0], a, 0, h, alpha, &out, &e))
         fail_msg("%s", e.msg);
     for (int i = 0; i < num; i++)
         student_free(&h->picture[i]);
@@ -300,8 +303,8 @@ static void a_copy_of_the_reference_is_seen(void **state)
     snprintf(path, sizeof path, "%s/copy.png", dir);
     assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
     h->picture[0] = read_back(path);
-    a->picture[0].m = a->picture[0].noise = reference;
-    assert_true(grading_check(r, &r->check[0], a, h, 1e-5, &out, &e));
+    a->of[0][0].m = a->of[0][0].noise = reference;
+    assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
     result_free(&out);
@@ -309,6 +312,91 @@ static void a_copy_of_the_reference_is_seen(void **state)
     free(r);
     free(h);
     free(a);
+}
+
+/* What is accepted: everything 1.2 times as bright. A program that does that loses nothing, one that has a dark square besides
+ * does, one that is right or 1.5 times too bright is not said to have it. */
+static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
+{
+    (void)state;
+    static const struct {
+        struct bug bug;
+        int set;
+        double share;
+    } cases[] = {{{.scale = 1.2, .square = 1, .noise = 1}, 1, 1},
+                 {{.scale = 1.2, .square = 0.5, .noise = 1}, 0, 0},
+                 {{.scale = 1, .square = 1, .noise = 1}, 0, 1},
+                 {{.scale = 1.5, .square = 1, .noise = 1}, 0, 0}};
+    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
+    struct answers *a = calloc(1, sizeof *a);
+    struct err e;
+    r->num_sets = 2;
+    strcpy(r->set[1].name, "bright");
+    a->of[0][0].m = a->of[0][0].noise = reference;
+    assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
+    struct moments *m = &a->of[1][0].m;
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        m->n[i / 3] = REFERENCE;
+        m->mean[i] = 1.2 * reference.mean[i];
+        m->m2[i] = 1.2 * 1.2 * reference.m2[i];
+        m->m3[i] = 1.2 * 1.2 * 1.2 * reference.m3[i];
+    }
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct handed_in *h = calloc(1, sizeof *h);
+        struct result out;
+        char path[128];
+        int set = -1;
+        assert_non_null(h);
+        write_picture("accepted", &cases[k].bug, SPP, path);
+        h->picture[0] = read_back(path);
+        if (!grading_all(r, a, h, 1e-5, &out, &set, &e))
+            fail_msg("%s", e.msg);
+        if (set != cases[k].set || out.share != cases[k].share)
+            fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
+        assert_string_equal(out.accepted, set == 1 ? "bright" : "");
+        result_free(&out);
+        student_free(&h->picture[0]);
+        free(h);
+    }
+    moments_free(m);
+    free(a);
+    free(r);
+}
+
+/* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
+static void a_watermark_is_masked(void **state)
+{
+    (void)state;
+    static const struct {
+        int mask[4];
+        struct bug bug;
+        bool all;
+    } cases[] = {{{0, 0, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, true},
+                 {{0, 0, 0, 0}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 1, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 0, 48, 5}, {.scale = 1, .square = 0.5, .noise = 1, .mark = true}, false}};
+    for (int kind = 0; kind < 2; kind++)
+        for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+            struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
+            struct handed_in *h = calloc(1, sizeof *h);
+            struct answers *a = calloc(1, sizeof *a);
+            struct result out;
+            struct err e;
+            char path[128];
+            assert_true(h != NULL && a != NULL);
+            memcpy(r->mask, cases[k].mask, sizeof r->mask);
+            write_picture("mark", &cases[k].bug, SPP, path);
+            h->picture[0] = read_back(path);
+            a->of[0][0].m = a->of[0][0].noise = reference;
+            assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+            if ((out.share == 1) != cases[k].all)
+                fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
+            result_free(&out);
+            student_free(&h->picture[0]);
+            free(r);
+            free(h);
+            free(a);
+        }
 }
 
 static void two_estimators_agree_or_not(void **state)
@@ -459,6 +547,8 @@ int main(void)
         cmocka_unit_test(noise_is_not_bias),
         cmocka_unit_test(bugs_cost_points),
         cmocka_unit_test(a_copy_of_the_reference_is_seen),
+        cmocka_unit_test(what_is_accepted_costs_nothing_and_hides_nothing),
+        cmocka_unit_test(a_watermark_is_masked),
         cmocka_unit_test(two_estimators_agree_or_not),
         cmocka_unit_test(parts_add_up_or_not),
         cmocka_unit_test(noise_falls_or_not),

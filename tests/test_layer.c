@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <zlib.h>
+
 #include <cmocka.h>
 
 /* Uniform on (0, 1). */
@@ -161,13 +163,41 @@ static void one_observation(void **state)
     moments_free(&m);
 }
 
+/* Each root within half a step of 1/128, what is none of them at the end of the range, NaN at 0. */
+static void map_round_trip(void **state)
+{
+    (void)state;
+    enum { WIDTH = 37, HEIGHT = 11, PIXELS = WIDTH * HEIGHT };
+    static float map[PIXELS];
+    static uint8_t raw[PIXELS];
+    struct err e = {""};
+    uint32_t seed = 3;
+    for (size_t i = 0; i < PIXELS; i++)
+        map[i] = (float)(1.2 * noise(&seed) - 0.1);
+    map[40] = NAN;
+    uint8_t *bytes;
+    size_t size;
+    assert_true(layer_encode_map(map, WIDTH, HEIGHT, &bytes, &size, &e));
+    uLongf length = PIXELS;
+    assert_int_equal(uncompress(raw, &length, bytes, size), Z_OK);
+    assert_int_equal(length, PIXELS);
+    for (size_t y = 0; y < HEIGHT; y++) {
+        unsigned sum = 0;
+        for (size_t x = 0; x < WIDTH; x++) {
+            double v = (double)map[y * WIDTH + x];
+            sum = (sum + raw[y * WIDTH + x]) & 255;
+            assert_float_equal(sum / 128.0, v > 0 ? sqrt(fmin(v, 1)) : 0, 0.5 / 128 + 1e-6);
+        }
+    }
+    free(bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(noisy_grey_is_small),
-        cmocka_unit_test(hard_pictures_are_exact),
-        cmocka_unit_test(small_pictures),
-        cmocka_unit_test(one_observation),
+        cmocka_unit_test(noisy_grey_is_small), cmocka_unit_test(hard_pictures_are_exact),
+        cmocka_unit_test(small_pictures),      cmocka_unit_test(one_observation),
+        cmocka_unit_test(map_round_trip),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 
 #include "../renderer/fs.h"
 #include "../renderer/moments.h"
+#include "../tools/report_alike.h"
 #include "../tools/report_colour.h"
 #include "../tools/report_html.h"
 #include "../tools/report_page.h"
@@ -490,7 +491,7 @@ static void page_is_whole(void **state)
         char xpath[64];
         snprintf(xpath, sizeof xpath, "//article[@id='claim-%d']", i);
         assert_int_equal(count_nodes(doc, xpath), 1);
-        snprintf(xpath, sizeof xpath, "//td/../th/a[@href='#claim-%d']", i);
+        snprintf(xpath, sizeof xpath, "//table[@id='claims']//th/a[@href='#claim-%d']", i);
         assert_int_equal(count_nodes(doc, xpath), 1);
     }
     assert_text_has(doc, "//article[@id='claim-0']", 0, "assay validate --only this");
@@ -731,9 +732,82 @@ static void bad_input_is_named(void **state)
     run_free(&r);
 }
 
+static double redistributed(double hyab)
+{
+    /* Of green and blue, whose L*a*b* are in tests/test_flip.c, the distance is 203.2. */
+    double knee = 0.4 * pow(203.2, 0.7), d = pow(hyab, 0.7);
+    return d < knee ? 0.95 * d / knee : 0.95 + 0.05 * (d - knee) / (1.5 * knee);
+}
+
+static double lightness(double y)
+{
+    return 116 * cbrt(y) - 16;
+}
+
+/* Flat greys, of which FLIP is that of two lightnesses: here a reference of L* 50 (18.42 % of white) and white; for HDR
+ * the reference at 0.85 of the tone curve and 1/0.1842 times its light. */
+static void alike(void **state)
+{
+    (void)state;
+    enum { SIDE = 12, PIXELS = SIDE * SIDE };
+    const double grey = 0.18418651851, white = 3;
+    struct err e = {""};
+    struct moments a, b;
+    struct alike l;
+    float map[PIXELS];
+    assert_true(moments_alloc(&a, SIDE, SIDE, &e) && moments_alloc(&b, SIDE, SIDE, &e));
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        a.mean[i] = white;
+        b.mean[i] = white * grey;
+    }
+    assert_true(alike_measure(&a, &b, white, &l, map, &e));
+    assert_true(l.has_flip);
+    assert_float_equal(l.ldr, redistributed(50), 1e-3);
+    assert_int_equal(l.exposures.num, 2);
+    double gain = exp2(l.exposures.start);
+    assert_float_equal(flip_tone(gain * white * grey), 0.85, 1e-9);
+    assert_float_equal(l.hdr, redistributed(lightness(flip_tone(gain * white)) - lightness(0.85)),
+                       1e-3);
+    assert_float_equal((double)map[PIXELS / 2], l.hdr, 1e-6);
+    assert_true(l.idiff_differs);
+    assert_float_equal(l.idiff_percent, 100, 0);
+
+    assert_true(alike_measure(&b, &b, white, &l, map, &e));
+    assert_float_equal(l.ldr + l.hdr + l.idiff_percent, 0, 0);
+    assert_false(l.idiff_differs);
+    memset(b.mean, 0, 3 * PIXELS * sizeof *b.mean);
+    assert_true(alike_measure(&a, &b, white, &l, map, &e));
+    assert_false(l.has_flip);
+    moments_free(&a);
+    moments_free(&b);
+}
+
+/* Identical pictures, and a table that names who disagrees. */
+static void alike_on_the_page(void **state)
+{
+    (void)state;
+    struct run r = run_make();
+    write_small_files(&r);
+    add_claim(&r, "same", "truth", "EQUIVALENT", "EQUIVALENT", small_files);
+    add_claim(&r, "wrong", "truth", "DIFFERENT", "DIFFERENT", small_files);
+    run_report(&r);
+    htmlDocPtr doc = parse_page(r.page);
+    assert_int_equal(count_nodes(doc, "//section[@id='alike']//tbody/tr"), 2);
+    assert_text_has(doc, "//section[@id='alike']//tbody/tr", 0, "0.0000");
+    assert_text_has(doc, "//section[@id='alike']", 0,
+                    "Of 1 EQUIVALENT pairs it would fail 0, of 1 DIFFERENT ones pass 1.");
+    assert_text_has(doc, "//article[@id='claim-0']", 0, "Mean FLIP");
+    assert_int_equal(count_nodes(doc, "//script[starts-with(@id, 'flip-')]"), 2);
+    assert_int_equal(count_nodes(doc, "//a[@download='alike.csv']"), 1);
+    xmlFreeDoc(doc);
+    run_free(&r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(alike),
+        cmocka_unit_test(alike_on_the_page),
         cmocka_unit_test(numbers_and_text),
         cmocka_unit_test(exposure),
         cmocka_unit_test(diverging_map),

@@ -114,15 +114,22 @@ static void the_shipped_ones_are_right(void **state)
 {
     (void)state;
     static const char *const paths[] = {"tools/rubrics/cs184.rubric",
-                                        "tools/rubrics/template.rubric"};
-    static const double points[] = {137, 10};
+                                        "tools/rubrics/template.rubric",
+                                        "tools/rubrics/deviations.rubric"};
+    static const double points[] = {137, 10, 10};
+    static const int sets[] = {2, 1, 8};
     struct err e;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         assert_true(rubric_read(paths[i], &suite, rubric, &mistakes, &e));
         if (mistakes.num > 0)
             fail_msg("%s:%d: %s", paths[i], mistakes.at[0].line, mistakes.at[0].text);
         assert_true(rubric_points(rubric) == points[i]);
+        assert_int_equal(rubric->num_sets, sets[i]);
     }
+    /* Every choice, by its bits. */
+    assert_string_equal(rubric->set[0].name, "");
+    assert_string_equal(rubric->set[5].name, "light_pdf, camera_crop");
+    assert_string_equal(rubric->set[5].words, "--starter light-pdf --frame crop");
     assert_false(rubric_read("/nowhere.rubric", &suite, rubric, &mistakes, &e));
     assert_non_null(strstr(e.msg, "/nowhere.rubric: cannot read"));
 }
@@ -146,6 +153,12 @@ static void each_mistake_is_named_with_its_line(void **state)
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
         {1, 2, "rubric a\nrubric b", "second"},
+        {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
+        {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
+        {1, 2, "rubric a\naccept slow", "needs a text"},
+        {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
+        {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},
+        {7, 8, " reference truth\n accept x nowhere.exr", "no file"},
         {2, 2, "picture p/q", "no name"},
         {3, 3, " scene 99_nothing", "no scene"},
         {3, 3, " scene nowhere.dae", "no file"},

@@ -381,7 +381,7 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
     struct sandbox s;
     struct err e;
     struct sandbox_result r;
-    char out[600], script[600];
+    char out[600], script[1400];
     assert_true(sandbox_open(true, NULL, &s, &e));
     snprintf(out, sizeof out, "%s/out", s.dir);
     snprintf(script, sizeof script, "test -d %s && printf hello >out.png", s.dir);
@@ -396,6 +396,20 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
     job.argv = (const char *const[]){"sh", "-c", "exec head -c 100G /dev/zero >out.png", NULL};
     assert_true(sandbox_run(&s, &job, &r, &e));
     assert_int_equal(r.end, SANDBOX_FILE_SIZE);
+    /* Of root only that is left that nobody has: no file of ours, and no way back. */
+    char secret[600];
+    snprintf(secret, sizeof secret, "%s/secret", s.dir);
+    FILE *f = fopen(secret, "w");
+    assert_true(f != NULL && fchmod(fileno(f), 0600) == 0 && fputs("mine", f) >= 0);
+    fclose(f);
+    snprintf(script, sizeof script, "id -u >out.png; cat %s; ln -sf %s x", secret, secret);
+    job.argv = (const char *const[]){"sh", "-c", script, NULL};
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    if (geteuid() == 0)
+        assert_string_equal(kept("out.png"), "65533\n");
+    snprintf(script, sizeof script, "cat %s >out.png", secret);
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    assert_int_equal(r.end, geteuid() == 0 ? SANDBOX_FAILED : SANDBOX_OK);
     sandbox_close(&s);
     assert_int_not_equal(access(s.dir, F_OK), 0);
     snprintf(out_dir, sizeof out_dir, "%s/out", box.dir);

@@ -19,7 +19,7 @@ static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
 
 /* Our command for a picture: that of the assignment, which our renderer understands, in the directory in which
  * "scene" is staged. */
-static bool command_of(const struct rubric *r, const struct rubric_picture *p,
+static bool command_of(const struct rubric *r, const struct rubric_picture *p, const char *words,
                        const struct answer_options *opt, const char *out, char *text,
                        const char **argv, struct err *e)
 {
@@ -27,7 +27,8 @@ static bool command_of(const struct rubric *r, const struct rubric_picture *p,
     struct rubric_picture picture = *p;
     snprintf(
         ours.command, sizeof ours.command,
-        "{program} -q -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} --seed {seed} {options} -f {out} {scene}");
+        "{program} -q -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} --seed {seed} {options} %s -f {out} {scene}",
+        words);
     snprintf(ours.output, sizeof ours.output, "%s", out);
     if (p->reference_options[0] != '\0')
         snprintf(picture.options, sizeof picture.options, "%s",
@@ -69,12 +70,13 @@ static void scene_files(const struct rubric *r, const struct rubric_picture *p, 
         snprintf(environment, MAX_PATH, "%s/%s", r->dir, p->environment);
 }
 
-static bool render_ours(const struct rubric *r, const struct rubric_picture *p,
+/* words: besides those of the picture; "" none. */
+static bool render_ours(const struct rubric *r, const struct rubric_picture *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
 {
     char text[TEXT], key[65], path[MAX_PATH], scene[MAX_PATH], environment[MAX_PATH], log[MAX_PATH];
     const char *argv[MAX_ARGS];
-    if (!command_of(r, p, opt, "out.exr", text, argv, e))
+    if (!command_of(r, p, words, opt, "out.exr", text, argv, e))
         return false;
     scene_files(r, p, scene, environment);
     if (!key_of(argv, scene, environment[0] != '\0' ? environment : NULL, key, e))
@@ -85,7 +87,7 @@ static bool render_ours(const struct rubric *r, const struct rubric_picture *p,
     char made[MAX_PATH];
     snprintf(made, sizeof made, "%s/new.exr", opt->cache);
     snprintf(log, sizeof log, "%s/%s.log", opt->cache, p->name);
-    if (!command_of(r, p, opt, "new.exr", text, argv, e))
+    if (!command_of(r, p, words, opt, "new.exr", text, argv, e))
         return false;
     const struct process process = {
         .argv = argv, .cwd = opt->cache, .log = log, .timeout_s = opt->timeout_s};
@@ -102,7 +104,7 @@ static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
 {
     static const char *const engines[] = {"", "truth", "cycles", "povray"};
     if (p->reference == REFERENCE_OURS)
-        return render_ours(r, p, opt, out, e);
+        return render_ours(r, p, "", opt, out, e);
     struct suite_scene scene = *p->suite;
     const struct suite_reference *ref = suite_reference_of(&scene, engines[p->reference]);
     json_t *manifest = NULL;
@@ -125,20 +127,67 @@ static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
     struct rubric_picture ours = *p;
     if (p->reference != REFERENCE_OURS)
         ours.reference_spp = NOISE_SPP;
-    return render_ours(r, &ours, opt, out, e);
+    return render_ours(r, &ours, "", opt, out, e);
 }
 
 /* With the student's options and samples: how many of them each pixel takes. */
-static bool as_asked(const struct rubric *r, int picture, const struct answer_options *opt,
-                     struct moments *out, struct err *e)
+static bool as_asked(const struct rubric *r, int picture, const char *words,
+                     const struct answer_options *opt, struct moments *out, struct err *e)
 {
     struct rubric_picture ours = r->picture[picture];
+    char all[sizeof ours.reference_options + sizeof r->set->words];
     bool needed = false;
     for (int i = 0; i < r->num_checks; i++)
         needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
+    /* By the reference's estimator: its noise decides how many samples there are. */
+    bool has = ours.reference == REFERENCE_OURS && strcmp(ours.reference_options, "none") != 0;
+    snprintf(all, sizeof all, "%s %s", has ? ours.reference_options : "", words);
     ours.reference_spp = ours.spp;
     ours.reference_options[0] = '\0';
-    return !needed || render_ours(r, &ours, opt, out, e);
+    return !needed || render_ours(r, &ours, all, opt, out, e);
+}
+
+/* Does our renderer make another picture with these words? Told by one sample a pixel, of the same seed. */
+static bool words_matter(const struct rubric *r, const struct rubric_picture *p, const char *words,
+                         const struct answer_options *opt, bool *matter, struct err *e)
+{
+    struct rubric_picture quick = *p;
+    struct moments with = {0}, without = {0};
+    quick.reference_spp = 1;
+    bool ok = render_ours(r, &quick, words, opt, &with, e) &&
+              render_ours(r, &quick, "", opt, &without, e);
+    *matter = ok && memcmp(with.mean, without.mean,
+                           3 * (size_t)with.width * (size_t)with.height * sizeof *with.mean) != 0;
+    moments_free(&with);
+    moments_free(&without);
+    return ok;
+}
+
+static bool read_accepted(const struct rubric *r, const struct rubric_picture *p, const char *file,
+                          struct moments *out, struct err *e)
+{
+    char path[MAX_PATH];
+    snprintf(path, sizeof path, "%s/%s", r->dir, file);
+    return moments_read(path, out, NULL, e) &&
+           ((out->width == p->width && out->height == p->height) ||
+            err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path, out->width, out->height,
+                    p->name, p->width, p->height));
+}
+
+/* What picture i looks like with the deviations of a set; left empty where they change nothing. */
+static bool deviating(const struct rubric *r, const struct rubric_set *set, int i,
+                      const struct answer_options *opt, struct answer *out, struct err *e)
+{
+    const struct rubric_picture *p = &r->picture[i];
+    bool matter = false;
+    for (int a = 0; a < p->num_accepted; a++)
+        if (strcmp(p->accept[a].name, set->name) == 0)
+            return read_accepted(r, p, p->accept[a].how, &out->m, e);
+    if (set->words[0] == '\0' || p->reference != REFERENCE_OURS)
+        return true;
+    return words_matter(r, p, set->words, opt, &matter, e) &&
+           (!matter || (render_ours(r, p, set->words, opt, &out->m, e) &&
+                        as_asked(r, i, set->words, opt, &out->as_asked, e)));
 }
 
 bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
@@ -150,17 +199,11 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
     bool ok = submission_stage(r, path, e);
     for (int i = 0; ok && i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
-        struct answer *a = &out->picture[i];
+        struct answer *a = &out->of[0][i];
         ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
-        ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, opt, &a->as_asked, e);
-        for (int k = 0; ok && k < p->num_accepted; k++) {
-            snprintf(path, sizeof path, "%s/%s", r->dir, p->accept[k].file);
-            ok = moments_read(path, &a->accepted[k], NULL, e);
-            if (ok && (a->accepted[k].width != p->width || a->accepted[k].height != p->height))
-                ok = err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path,
-                             a->accepted[k].width, a->accepted[k].height, p->name, p->width,
-                             p->height);
-        }
+        ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, "", opt, &a->as_asked, e);
+        for (int k = 1; ok && k < r->num_sets; k++)
+            ok = deviating(r, &r->set[k], i, opt, &out->of[k][i], e);
     }
     if (!ok)
         answers_free(out);
@@ -169,11 +212,10 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
 
 void answers_free(struct answers *a)
 {
-    for (int i = 0; i < RUBRIC_PICTURES; i++) {
-        moments_free(&a->picture[i].m);
-        moments_free(&a->picture[i].noise);
-        moments_free(&a->picture[i].as_asked);
-        for (int k = 0; k < RUBRIC_ACCEPTED; k++)
-            moments_free(&a->picture[i].accepted[k]);
-    }
+    for (int k = 0; k < RUBRIC_SETS; k++)
+        for (int i = 0; i < RUBRIC_PICTURES; i++) {
+            moments_free(&a->of[k][i].m);
+            moments_free(&a->of[k][i].noise);
+            moments_free(&a->of[k][i].as_asked);
+        }
 }

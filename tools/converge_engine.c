@@ -43,7 +43,7 @@ static bool run_pathtracer(const struct converge_job *job, const char *sampler, 
                                   .timeout_s = job->timeout_s,
                                   .picture = path,
                                   .log = log};
-    bool ok = ours_render(&ours, out, cpu_s, e);
+    bool ok = ours_render(&ours, out, cpu_s, NULL, e);
     unlink(path);
     unlink(log);
     return ok;

@@ -5,6 +5,7 @@
 #include "../renderer/version.h"
 #include "claim.h"
 #include "converge.h"
+#include "depths.h"
 
 #include <errno.h>
 #include <math.h>
@@ -259,6 +260,11 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
     char name[64];
     if (!load_reference(r, scene, from, &job, &ref, name, e))
         return false;
+    json_t *depths = NULL;
+    struct err why;
+    if (o->depth_spp > 0 &&
+        !depths_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
+        depths = json_pack("{s:s}", "error", why.msg);
     struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
     json_t *engines = json_array(), *ratios = json_array();
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
@@ -276,6 +282,8 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
                   "depth", scene->depth, "replicates", o->replicates, "reference", name,
                   "reference_noise", sqrt(ref.noise), "alpha", r->alpha, "margin", o->margin,
                   "slope_margin", o->slope_margin, "engines", engines, "ratios", ratios);
+    if (depths != NULL)
+        json_object_set_new(j, "depths", depths);
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
         free(ladder[k].version);
     converge_reference_free(&ref);

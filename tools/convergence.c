@@ -1,6 +1,7 @@
 #include "convergence.h"
 
 #include "../reference/suite.h"
+#include "depths.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -135,7 +136,8 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
             !check_rungs(j, inner, check_ratio_rung, e))
             return false;
     }
-    return true;
+    const json_t *depths = json_object_get(s, "depths");
+    return depths == NULL || depths_check(depths, where, e);
 }
 
 bool convergence_check(const json_t *convergence, const char *path, struct err *e)

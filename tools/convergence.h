@@ -16,7 +16,8 @@
  *          "error": "one line"} ],
  *     "ratios": [ {"a": "pathtracer", "b": "cycles",
  *                  "rungs": [ {"spp": 1, "variance": 1.01, "variance_ci": [.99, 1.03],
- *                              "efficiency": 2.1, "efficiency_ci": [..]}, ... ]} ] }
+ *                              "efficiency": 2.1, "efficiency_ci": [..]}, ... ]} ],
+ *     "depths": {...} (depths.h; absent without such a ladder) }
  *
  * rmse, variance, bias and reference_noise are relative, pixel by pixel (converge.h); bias is the signed root of B^2 (converge.h), efficiency 1/(variance x CPU seconds of a replicate, start
  * left out). All intervals have the level 1 - alpha, floor_ci 1 - 2 alpha; alpha is that of one

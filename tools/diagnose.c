@@ -76,7 +76,7 @@ static void add_cell(const struct clue *clue, const struct effect *e, double amp
     for (int i = 3 * cell; i < 3 * cell + 3; i++) {
         double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
         double noise = variance_of(clue, i, factor) +
-                       (e != NULL ? amplitude * amplitude * (double)e->var[i] : 0);
+                       (e != NULL ? factor * amplitude * amplitude * (double)e->var[i] : 0);
         double fuzz = pow(rounding * (a->mean[i] + c->mean[i] + scale), 2);
         double var = noise + fuzz + pow(model_error * effect, 2);
         double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
@@ -92,6 +92,15 @@ static void add_cell(const struct clue *clue, const struct effect *e, double amp
     t->cells++;
 }
 
+/* What a bug makes of S at the size of the picture at hand: where all pixels depend on each other, S grows with their number. */
+static double image_fact(const struct effect *e, const struct clue *clue)
+{
+    double s = e->fact[FACT_IMAGE];
+    if (s > log(10))
+        s += 2 * log((double)clue->seen.cell / clue->view->correct.cell);
+    return s;
+}
+
 static void add_facts(const struct clue *clue, const struct effect *e, double amplitude,
                       struct tally *t)
 {
@@ -103,7 +112,8 @@ static void add_facts(const struct clue *clue, const struct effect *e, double am
         if (e != NULL && isnan(e->fact[f]))
             continue;
         if (e != NULL) {
-            fact += amplitude * (e->fact[f] - fact);
+            double bug = f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f];
+            fact += amplitude * (bug - fact);
             sd = e->fact_sd[f];
         }
         double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
@@ -161,19 +171,39 @@ static void sum_up(struct tally *to, const struct tally *t)
     to->all += t->all;
 }
 
-static struct tally total(const struct hypotheses *h, int bug, double amplitude)
+/* share: of the inflation, as an exponent. */
+static struct tally total_with(const struct hypotheses *h, int bug, double amplitude, double share,
+                               double *largest)
 {
     struct tally sum = {0};
+    *largest = 1;
     for (int k = 0; k < h->num_clues; k++) {
         const struct effect *e = h->clue[k].view->effect[bug];
         double factor = inflation_of(h->c, bug, &h->clue[k]);
         struct tally t = {0};
+        *largest = fmax(*largest, factor);
         if (e == NULL && factor == 1)
             t = h->correct[k];
         else
-            add_view(&h->clue[k], e, amplitude, factor, &t);
+            add_view(&h->clue[k], e, amplitude, pow(factor, share), &t);
         sum_up(&sum, &t);
     }
+    return sum;
+}
+
+/* How much a bug adds to the noise of the other views is known from one of them only: none of it, its root or all of it are
+ * equally likely beforehand, and the likeliest stands for the mean of the three. What is left is judged with all. */
+static struct tally total(const struct hypotheses *h, int bug, double amplitude)
+{
+    static const double share[] = {0, 0.5};
+    const double choices = 3;
+    double largest, best = -INFINITY;
+    struct tally sum = total_with(h, bug, amplitude, 1, &largest);
+    if (largest == 1)
+        return sum;
+    for (int i = 0; i < 2; i++)
+        best = fmax(best, total_with(h, bug, amplitude, share[i], &largest).log_likelihood);
+    sum.log_likelihood = fmax(best, sum.log_likelihood) - log(choices);
     return sum;
 }
 

@@ -33,7 +33,7 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
                                   .picture = picture,
                                   .log = log};
     double cpu_s;
-    bool ok = ours_render(&ours, out, &cpu_s, e) || err_prefix(e, "%s", job->scene->name);
+    bool ok = ours_render(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
     unlink(picture);
     unlink(log);
     return ok;

@@ -188,7 +188,7 @@ struct difference direction_at(const struct base *base, enum direction_kind kind
     struct difference out = {0};
     static const int same[3] = {0, 1, 2};
     int w = base->width, h = base->height;
-    size_t own = at(base, x, y), other = own;
+    size_t own = at(base, x, y), other;
     const double *mix = base->mix + own, *near = base->mix_around + own;
     switch (kind) {
     case DIRECTION_SCALE:
@@ -222,7 +222,8 @@ struct difference direction_at(const struct base *base, enum direction_kind kind
     case DIRECTION_FLIP_Y: other = at(base, x, h - 1 - y); break;
     case DIRECTION_ROTATE: other = at(base, w - 1 - x, h - 1 - y); break;
     case DIRECTION_TRANSPOSE: other = at(base, y, x); break;
-    case NUM_DIRECTIONS: assert(!"no direction");
+    case NUM_DIRECTIONS:
+    default: assert(!"no direction"); return out;
     }
     if (other != own)
         exchange(base, own, other, same, &out);

@@ -69,20 +69,39 @@ static json_t *relative_of(const struct agreement *a, const struct rubric_pictur
     return array;
 }
 
+/* What points are a function of, with the margins. */
+static json_t *intervals_of(const struct agreement *a, const struct rubric_check *c)
+{
+    static const char *const names[] = {"red", "green", "blue", "luminance", "furthest tile"};
+    json_t *array = json_array();
+    if (c->kind != CHECK_EQUAL && c->kind != CHECK_AGREE && c->kind != CHECK_SUM)
+        return array;
+    for (int k = 0; k <= NUM_CHANNELS && a->relative != NULL; k++) {
+        const struct interval *i = k < NUM_CHANNELS ? &a->image[k] : &a->tile;
+        const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
+        if (k < NUM_CHANNELS || a->tiles > 0)
+            json_array_append_new(array, json_pack("{ss, sf, sf, sf, sf, sf}", "what", names[k],
+                                                   "value", i->value, "lo", i->lo, "hi", i->hi,
+                                                   "full", m->full, "none", m->none));
+    }
+    return array;
+}
+
 static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
                           const struct result *result)
 {
-    return json_pack("{ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so}",
-                     "part", r->part[c->part].number, "name", c->name, "title", c->title, "points",
-                     c->points * result->share, "of", c->points, "share", result->share, "chance",
-                     result->chance, "judged", result->judged, "expected", result->expected, "seen",
-                     result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility,
-                     "accepted", result->accepted, "flag", result->flag, "picture",
-                     r->picture[result->picture].name, "tile",
-                     result->agreement.tiles > 0
-                         ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
-                         : json_null(),
-                     "relative", relative_of(&result->agreement, &r->picture[result->picture]));
+    return json_pack(
+        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}", "kind",
+        check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
+        c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
+        "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
+        result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
+        result->accepted, "flag", result->flag, "picture", r->picture[result->picture].name, "tile",
+        result->agreement.tiles > 0
+            ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
+            : json_null(),
+        "relative", relative_of(&result->agreement, &r->picture[result->picture]), "intervals",
+        intervals_of(&result->agreement, c));
 }
 
 static json_t *picture_json(const struct rubric_picture *p, const struct made *made,
@@ -104,18 +123,18 @@ static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t 
     const struct rubric *r = job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, cpu_s = 0;
-    bool ok = true;
+    struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
+    int set = 0;
+    bool ok = (result != NULL || err_set(e, "out of memory")) &&
+              grading_all(r, job->answers, h, job->alpha, result, &set, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
-        struct result result;
-        ok = grading_check(r, &r->check[i], job->answers, h, job->alpha, &result, e);
-        if (!ok)
-            break;
-        json_array_append_new(checks, check_json(r, &r->check[i], &result));
-        part[r->check[i].part] += r->check[i].points * result.share;
+        json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
+        part[r->check[i].part] += r->check[i].points * result[i].share;
         of[r->check[i].part] += r->check[i].points;
-        points += r->check[i].points * result.share;
-        result_free(&result);
+        points += r->check[i].points * result[i].share;
+        result_free(&result[i]);
     }
+    free(result);
     for (int i = 0; i < r->num_parts; i++)
         json_array_append_new(parts,
                               json_pack("{ss, ss, sf, sf}", "number", r->part[i].number, "title",
@@ -128,6 +147,7 @@ static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t 
     json_object_set_new(grade, "points", json_real(points));
     json_object_set_new(grade, "of", json_real(rubric_points(r)));
     json_object_set_new(grade, "cpu_s", json_real(cpu_s));
+    json_object_set_new(grade, "accepted", json_string(r->set[set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
     json_object_set_new(grade, "pictures", pictures);

@@ -28,11 +28,13 @@ struct grade_job {
  *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, submission, seed, alpha, version: while it
  *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
  *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
- *     "cpu_s": ,
+ *     "cpu_s": , "accepted": "light_pdf" (deviations that are not the student's fault, with which it was graded) | "",
  *     "parts": [{"number": , "title": , "points": , "of": }],
- *     "checks": [{"part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,
+ *     "checks": [{"kind": "equal", "part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,
  *                 "expected": , "seen": , "hint": , "where": , "visibility": , "accepted": , "flag": , "picture": ,
- *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null}],
+ *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null (exact: the share of
+ *                 its pixels that are wrong),
+ *                 "intervals": [{"what": "red", "value": , "lo": , "hi": , "full": , "none": }] (equal, agree, sum)}],
  *     "pictures": [{"name": , "file": "NAME.png" | null, "why": , "end": "ok", "cpu_s": , "wall_s": ,
  *                   "width": , "height": , "sha256": | null}] }
  *   "diagnosis": null | grade_diagnose.h

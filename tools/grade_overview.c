@@ -88,17 +88,20 @@ static void table(FILE *f, const json_t *grades)
         fputs("</td><td>", f);
         html_text(f, grade_text(g, "trouble"));
         html_text(f, grade_text(g, "wrong"));
+        if (grade_text(g, "accepted")[0] != '\0') {
+            fputs("accepted: ", f);
+            html_text(f, grade_text(g, "accepted"));
+            fputs("; ", f);
+        }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
-            if (grade_text(c, "flag")[0] != '\0' || !json_is_true(json_object_get(c, "judged")) ||
-                grade_text(c, "accepted")[0] != '\0') {
-                html_text(f, grade_text(c, "name"));
-                fputs(": ", f);
-                html_text(f, grade_text(c, "flag"));
-                html_text(f, !json_is_true(json_object_get(c, "judged")) ? "not judged" : "");
-                html_text(f, grade_text(c, "accepted"));
-                fputs("; ", f);
-            }
+            bool judged = json_is_true(json_object_get(c, "judged"));
+            if (grade_text(c, "flag")[0] == '\0' && judged)
+                continue;
+            html_text(f, grade_text(c, "name"));
+            fputs(": ", f);
+            html_text(f, grade_text(c, "flag"));
+            fputs(judged ? "; " : " not judged; ", f);
         }
         fputs("</td></tr>\n", f);
     }

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_PATH = 4400, SHOWN = 384 /* width of a picture on the page */ };
+enum { MAX_PATH = 4400 };
 
 const char grade_page_head[] =
     "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
@@ -65,7 +65,35 @@ static bool write_png(FILE *f, int width, int height, const uint8_t *rgb8, struc
     return true;
 }
 
-static bool show_picture(FILE *f, const char *path, const char *name, struct err *e)
+/* The tile with its neighbours, enlarged: three by three of them, fewer at the rim. Moves rows of rgb8 to its front. */
+static bool show_crop(FILE *f, const struct picture *pic, uint8_t *rgb8, const json_t *tile,
+                      struct err *e)
+{
+    if (json_array_size(tile) != 2)
+        return true;
+    int x = (int)json_number_value(json_array_get(tile, 0)) - GRADE_TILE,
+        y = (int)json_number_value(json_array_get(tile, 1)) - GRADE_TILE;
+    int right = x + 3 * GRADE_TILE < pic->width ? x + 3 * GRADE_TILE : pic->width,
+        bottom = y + 3 * GRADE_TILE < pic->height ? y + 3 * GRADE_TILE : pic->height;
+    x = x > 0 ? x : 0;
+    y = y > 0 ? y : 0;
+    int width = right - x, height = bottom - y;
+    if (width <= 0 || height <= 0)
+        return true;
+    for (int row = 0; row < height; row++)
+        memmove(rgb8 + 3 * (size_t)(row * width),
+                rgb8 + 3 * ((size_t)(y + row) * (size_t)pic->width + (size_t)x), 3 * (size_t)width);
+    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", 12 * width);
+    bool ok = write_png(f, width, height, rgb8, e);
+    fprintf(f,
+            "\"><figcaption>of it, pixels %d,%d to %d,%d, around what differs "
+            "most</figcaption></figure>\n",
+            x, y, right - 1, bottom - 1);
+    return ok;
+}
+
+static bool show_picture(FILE *f, const char *path, const char *name, const json_t *tile,
+                         struct err *e)
 {
     struct picture pic;
     struct err ignored;
@@ -73,48 +101,31 @@ static bool show_picture(FILE *f, const char *path, const char *name, struct err
         return true; /* what is wrong with it has been said */
     uint8_t *rgb8 = codes(&pic);
     bool ok = rgb8 != NULL || err_set(e, "out of memory");
-    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", SHOWN);
+    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", GRADE_SHOWN);
     ok = ok && write_png(f, pic.width, pic.height, rgb8, e);
     fputs("\"><figcaption>", f);
     html_text(f, name);
     fputs(", yours</figcaption></figure>\n", f);
+    ok = ok && show_crop(f, &pic, rgb8, tile, e);
     free(rgb8);
     picture_free(&pic);
     return ok;
 }
 
-/* Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. */
-static void show_difference(FILE *f, const json_t *check, double width, double height)
+/* The chance that another run gets other points. */
+static void show_chance(FILE *f, const json_t *c)
 {
-    const json_t *values = json_object_get(check, "relative"),
-                 *tile = json_object_get(check, "tile");
-    size_t columns = (size_t)(width / GRADE_TILE), i;
-    json_t *v;
-    if (json_array_size(values) == 0 || columns == 0)
-        return;
-    fprintf(f, "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\">", SHOWN, width,
-            height);
-    json_array_foreach(values, i, v)
-    {
-        double d = json_number_value(v), strength = fmin(1, fabs(d) / 0.5);
-        int other = (int)(255 * (1 - strength));
-        double x = (double)(i % columns * GRADE_TILE), y = (double)(i / columns * GRADE_TILE);
-        fprintf(f, "<rect x=\"%g\" y=\"%g\" width=\"8\" height=\"8\" fill=\"", x, y);
-        if (!json_is_number(v))
-            fputs("#bbb\"/>", f);
-        else
-            fprintf(f, "rgb(%d,%d,%d)\"><title>%+.1f %%</title></rect>", d > 0 ? 255 : other, other,
-                    d > 0 ? other : 255, 100 * d);
-    }
-    if (json_array_size(tile) == 2)
-        fprintf(
-            f,
-            "<rect x=\"%g\" y=\"%g\" width=\"8\" height=\"8\" fill=\"none\" stroke=\"#000\" stroke-width=\".6\"/>",
-            json_number_value(json_array_get(tile, 0)), json_number_value(json_array_get(tile, 1)));
-    fputs(
-        "</svg><figcaption>difference, 8 × 8 pixels each: red too bright, blue too dark, full colour from 50 %; framed: the "
-        "furthest</figcaption></figure>\n",
-        f);
+    double chance = member_number(c, "chance"), share = member_number(c, "share");
+    fputs("<p class=\"where\">", f);
+    if (share > 0 && share < 1)
+        fputs("Between none and all, points move a little with the noise of each run.", f);
+    else if (chance >= 1e-4)
+        fprintf(f,
+                "Another run of the same program gets other points here with a chance of %.2g %%.",
+                100 * chance);
+    else
+        fputs("Another run of the same program gets the same points here, but for 1 in 10 000.", f);
+    fputs("</p>\n", f);
 }
 
 static const json_t *picture_of(const json_t *grade, const char *name)
@@ -142,6 +153,7 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
     paragraph(f,
               "Explained by what you were given, no points lost for it:", grade_text(c, "accepted"),
               "");
+    show_chance(f, c);
     const json_t *p = picture_of(grade, grade_text(c, "picture"));
     bool ok = true;
     if (!full) {
@@ -151,8 +163,9 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
             char path[MAX_PATH];
             snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir, grade_text(grade, "id"),
                      grade_text(p, "file"));
-            ok = show_picture(f, path, grade_text(p, "name"), e);
-            show_difference(f, c, member_number(p, "width"), member_number(p, "height"));
+            ok = show_picture(f, path, grade_text(p, "name"), json_object_get(c, "tile"), e);
+            grade_show_difference(f, c, member_number(p, "width"), member_number(p, "height"));
+            grade_show_intervals(f, c);
         }
     }
     fputs("</section>\n", f);

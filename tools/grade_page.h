@@ -7,7 +7,7 @@
 #include <jansson.h>
 #include <stdio.h>
 
-enum { GRADE_TILE = 8 };
+enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
 
 extern const char grade_page_head[]; /* up to the title */
 
@@ -17,6 +17,14 @@ const char *grade_text(const json_t *object, const char *key);
 /* Of one grade.json (grade.h); its pictures are in dir/ID. */
 bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     __attribute__((warn_unused_result));
+
+/* A check's tiles. Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. Of `exact`: the share of
+ * pixels that differ. width, height: of the picture. */
+void grade_show_difference(FILE *f, const json_t *check, double width, double height);
+
+/* A check's intervals against its margins, each over that beyond which there are no points. Nothing where there are
+ * none. */
+void grade_show_intervals(FILE *f, const json_t *check);
 
 /* Of the whole class, for staff. */
 void grade_overview(FILE *f, const json_t *grades);

@@ -36,6 +36,7 @@ struct work {
     const struct rubric *r;
     const struct rubric_check *check;
     const struct answers *answers;
+    int set;
     struct handed_in *h;
     double alpha;
 };
@@ -53,13 +54,22 @@ static const struct student *student(const struct work *w, int k)
 /* NULL: the rubric gives none. */
 static const struct moments *reference(const struct work *w, int k)
 {
-    const struct moments *m = &w->answers->picture[w->check->picture[k]].m;
-    return m->width > 0 ? m : NULL;
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m,
+                         *plain = &w->answers->of[0][w->check->picture[k]].m;
+    return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
 }
 
 static const struct moments *expected_noise(const struct work *w, int k)
 {
-    return &w->answers->picture[w->check->picture[k]].noise;
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m;
+    return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
+}
+
+static bool is_masked(const struct work *w, const struct student *s, size_t p)
+{
+    const int *m = w->r->mask;
+    int x = (int)(p % (size_t)s->width), y = s->height - 1 - (int)(p / (size_t)s->width);
+    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
 }
 
 static unsigned char *usable(const struct work *w, struct err *e)
@@ -67,8 +77,8 @@ static unsigned char *usable(const struct work *w, struct err *e)
     size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
     unsigned char *use = malloc(pixels);
     bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
-    if (ok)
-        memset(use, 1, pixels);
+    for (size_t p = 0; ok && p < pixels; p++)
+        use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; ok && k < w->check->num_pictures; k++)
         ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
     if (ok)
@@ -115,6 +125,7 @@ static void score_agreement(const struct rubric_check *c, struct result *out)
 {
     out->share = 1;
     out->chance = 0;
+    out->consistent = true;
     for (int k = 0; k <= NUM_CHANNELS; k++) {
         const struct interval *i =
             k < NUM_CHANNELS ? &out->agreement.image[k] : &out->agreement.tile;
@@ -122,6 +133,7 @@ static void score_agreement(const struct rubric_check *c, struct result *out)
         if (k == NUM_CHANNELS && out->agreement.tiles == 0)
             continue;
         double share = score_share(m, i), chance = score_chance(m, i);
+        out->consistent = out->consistent && interval_distance(i) == 0;
         if (share < out->share)
             out->chance = chance;
         else if (share == 1 && out->share == 1)
@@ -142,44 +154,24 @@ static void compare(const struct work *w, const struct student *a, const struct 
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
 }
 
-static void add_name(char *names, size_t size, const char *name)
-{
-    size_t n = strlen(names);
-    snprintf(names + n, size - n, "%s%s", n > 0 ? ", " : "", name);
-}
-
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_picture *p = picture(w, 0);
-    const struct answer *answer = &w->answers->picture[w->check->picture[0]];
+    const struct moments *plain = &w->answers->of[0][w->check->picture[0]].m;
     unsigned char *use = usable(w, e);
-    bool ok = use != NULL;
+    struct student b;
     snprintf(
         out->expected, sizeof out->expected,
         "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
-    for (int k = -1; ok && k < p->num_accepted && out->share < 1; k++) {
-        struct result tried = {.judged = true};
-        struct student b;
-        ok = student_from(k < 0 ? &answer->m : &answer->accepted[k], student(w, 0), &b, e);
-        if (!ok)
-            break;
-        compare(w, student(w, 0), &b, use, &tried);
-        student_free(&b);
-        if (k < 0 || tried.share > out->share) {
-            agreement_free(&out->agreement);
-            out->share = tried.share;
-            out->chance = tried.chance;
-            out->agreement = tried.agreement;
-            snprintf(out->seen, sizeof out->seen, "%s", tried.seen);
-            out->accepted[0] = '\0';
-            if (k >= 0)
-                add_name(out->accepted, sizeof out->accepted, p->accept[k].name);
-        } else {
-            agreement_free(&tried.agreement);
-        }
+    if (use == NULL || !student_from(reference(w, 0), student(w, 0), &b, e)) {
+        free(use);
+        return false;
     }
-    if (ok && is_copy(student(w, 0), &answer->m, p->spp, use)) {
+    compare(w, student(w, 0), &b, use, out);
+    student_free(&b);
+    if (is_copy(student(w, 0), reference(w, 0), p->spp, use) ||
+        is_copy(student(w, 0), plain, p->spp, use)) {
         out->share = out->chance = 0;
         snprintf(
             out->seen, sizeof out->seen,
@@ -188,26 +180,51 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
         snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
     }
     free(use);
+    return true;
+}
+
+/* A copy of q, moved by the difference of two references, with their noise. */
+static bool moved(const struct student *q, const struct moments *to, const struct moments *from,
+                  struct student *out, struct err *e)
+{
+    struct student a, b;
+    if (!student_from(to, q, &a, e))
+        return false;
+    bool ok = student_from(from, q, &b, e);
+    if (ok && !(ok = student_copy(q, out, e)))
+        student_free(&b);
+    for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
+        out->mean[i] += a.mean[i] - b.mean[i];
+        out->variance[i] += a.variance[i] + b.variance[i];
+    }
+    if (ok)
+        student_free(&b);
+    student_free(&a);
     return ok;
 }
 
 static bool check_agree(const struct work *w, struct result *out, struct err *e)
 {
+    const struct moments *m = reference(w, 0), *n = reference(w, 1);
+    bool deviates = w->set > 0 && m != NULL && n != NULL;
     snprintf(out->expected, sizeof out->expected,
-             "%s and %s have the same mean, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
-             picture(w, 0)->name, picture(w, 1)->name, 100 * w->check->image.full,
-             100 * w->check->tile.full);
+             "%s and %s %s, within %.3g %% (any 8 x 8 pixels: %.3g %%)", picture(w, 0)->name,
+             picture(w, 1)->name,
+             deviates ? "differ as in our renders with the same deviation" : "have the same mean",
+             100 * w->check->image.full, 100 * w->check->tile.full);
     if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
         snprintf(out->seen, sizeof out->seen,
                  "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
     unsigned char *use = usable(w, e);
-    if (use == NULL)
-        return false;
-    compare(w, student(w, 0), student(w, 1), use, out);
+    struct student b = {0};
+    bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
+    if (ok)
+        compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out);
+    student_free(&b);
     free(use);
-    return true;
+    return ok;
 }
 
 static bool check_sum(const struct work *w, struct result *out, struct err *e)
@@ -240,6 +257,19 @@ static void score_pixels(const struct work *w, double wrong, double num, struct 
     out->chance = 0;
 }
 
+/* One wrong pixel: the share of its tile's, and which tile has most. */
+static void map_wrong(struct agreement *map, int columns, int x, int y)
+{
+    double *here = &map->relative[y / RUBRIC_TILE * columns + x / RUBRIC_TILE];
+    *here += 1.0 / (RUBRIC_TILE * RUBRIC_TILE);
+    if (map->tiles > 0 &&
+        *here <= map->relative[map->tile_y / RUBRIC_TILE * columns + map->tile_x / RUBRIC_TILE])
+        return;
+    map->tiles = 1;
+    map->tile_x = x / RUBRIC_TILE * RUBRIC_TILE;
+    map->tile_y = y / RUBRIC_TILE * RUBRIC_TILE;
+}
+
 /* A picture without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
  * the reference's own samples, and the rounding to codes. */
 static bool check_exact(const struct work *w, struct result *out, struct err *e)
@@ -248,8 +278,12 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     const struct student *s = student(w, 0);
     const struct moments *m = reference(w, 0);
     double wrong = 0, num = 0;
-    int first = -1;
-    (void)e;
+    int first = -1, columns = s->width / RUBRIC_TILE;
+    struct agreement *map = &out->agreement;
+    map->relative =
+        calloc((size_t)columns * (size_t)(s->height / RUBRIC_TILE), sizeof *map->relative);
+    if (map->relative == NULL)
+        return err_set(e, "out of memory");
     for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
         bool off = false, lit = false;
         for (size_t i = 3 * p; i < 3 * p + 3; i++) {
@@ -259,10 +293,13 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
             off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
                    allowed_sd * sd + 2 * s->tolerance[i] + 1e-3;
         }
+        lit &= !is_masked(w, s, p);
         num += lit;
         wrong += lit && off;
-        if (lit && off && first < 0)
-            first = (int)p;
+        if (lit && off) {
+            first = first < 0 ? (int)p : first;
+            map_wrong(map, columns, (int)(p % (size_t)s->width), (int)(p / (size_t)s->width));
+        }
     }
     score_pixels(w, wrong, num, out);
     snprintf(out->expected, sizeof out->expected,
@@ -279,6 +316,14 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
 static bool check_noise(const struct work *w, struct result *out, struct err *e)
 {
     const struct student *p = student(w, 0), *q = student(w, 1);
+    snprintf(out->expected, sizeof out->expected,
+             "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
+             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
+    if (strcmp(p->sha256, q->sha256) == 0) {
+        snprintf(out->seen, sizeof out->seen,
+                 "the two files are the same, though one has more samples");
+        return true;
+    }
     unsigned char *use = usable(w, e);
     struct student rp, rq;
     struct interval i;
@@ -288,9 +333,6 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         student_free(&rp);
         ok = false;
     }
-    snprintf(out->expected, sizeof out->expected,
-             "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
-             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
     if (!ok) {
         free(use);
         return false;
@@ -313,7 +355,8 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
     const struct made *made = &w->h->made[c->picture[0]];
-    const struct moments *ours = &w->answers->picture[c->picture[0]].as_asked;
+    const struct moments *own = &w->answers->of[w->set][c->picture[0]].as_asked,
+                         *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
     struct rates rates;
     struct err why;
     (void)e;
@@ -353,14 +396,14 @@ static void expect_noise(const struct work *w)
 }
 
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
-                   struct err *e)
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
                                                 struct err *) = {
         [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
         [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
-    const struct work w = {r, check, a, h, alpha};
+    const struct work w = {r, check, a, set, h, alpha};
     *out = (struct result){.judged = true, .picture = check->picture[0]};
     for (int k = 0; k < check->num_pictures; k++) {
         int i = check->picture[k];

@@ -12,10 +12,10 @@ struct answer {
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments
         as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
-    struct moments accepted[RUBRIC_ACCEPTED];
 };
+/* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
 struct answers {
-    struct answer picture[RUBRIC_PICTURES];
+    struct answer of[RUBRIC_SETS][RUBRIC_PICTURES];
 };
 
 struct answer_options {
@@ -43,11 +43,14 @@ struct result {
     double chance; /* score_chance() of what decided */
     bool
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
+    bool consistent; /* of equal, agree and sum: no interval misses 0 */
     char expected[256], seen[400];
-    char accepted[RUBRIC_ACCEPTED * 64]; /* names of accepted deviations that were found, or "" */
-    char flag[256];                      /* for staff only */
-    int picture;                         /* that shows it best: index in the rubric */
-    struct agreement agreement;          /* of equal, agree and sum; tiles 0: none */
+    char accepted[160]; /* the deviations by which it has more points than without, or "" */
+    char flag[256];     /* for staff only */
+    int picture;        /* that shows it best: index in the rubric */
+    /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
+     * are wrong, and where most are. */
+    struct agreement agreement;
 };
 
 /* One student's pictures, read. */
@@ -57,11 +60,18 @@ struct handed_in {
     char why[RUBRIC_PICTURES][400];          /* why not */
 };
 
-/* alpha: of one check: the chance that a program which is right loses points in it. Fails only for our own
- * trouble. The caller frees with result_free(). */
+/* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
+ * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, struct handed_in *h, double alpha, struct result *out,
-                   struct err *e) __attribute__((warn_unused_result));
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e) __attribute__((warn_unused_result));
+
+/* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
+ * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
+ * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
+ * is nothing to free. */
+bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
+                 struct result *out, int *set, struct err *e) __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

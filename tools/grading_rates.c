@@ -31,7 +31,7 @@ bool rates_read(const char *path, int width, int height, int most, int batch,
     if (info.width != width || info.height != height)
         return err_set(e, "it is %d x %d pixels, not %d x %d", info.width, info.height, width,
                        height);
-    if (!picture_read(path, &pic, e))
+    if (!picture_read_inspected(path, &info, &pic, e))
         return false;
     for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
         int nearest = 0;

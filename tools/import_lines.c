@@ -9,6 +9,7 @@ bool import_check_suite(const struct suite *suite, const char *const *only, int 
                         const struct import_options *opt, json_t **reports, struct err *e)
 {
     int num = num_only > 0 ? num_only : suite->num_scenes;
+    /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
     const struct suite_scene **scene = malloc((size_t)num * sizeof *scene);
     bool ok = scene != NULL || err_set(e, "out of memory");
     for (int i = 0; ok && i < num; i++) {

@@ -18,7 +18,7 @@ struct bin {
  * off, so that a whole step may be missing. */
 static double rgbe_step(const float *px)
 {
-    double brightest = fmax(px[0], fmax(px[1], px[2]));
+    double brightest = fmaxf(px[0], fmaxf(px[1], px[2]));
     int exponent;
     frexp(brightest, &exponent);
     return brightest > 0 ? ldexp(1, exponent - 8) : 0;
@@ -114,7 +114,7 @@ bool input_picture(const char *path, char side, const struct input_options *opt,
             out->m.tolerance[i] = b.tolerance;
             out->rounding[i] = b.step * b.step / 12;
         }
-        if (b.saturated)
+        if (b.saturated && out->censored != NULL)
             out->censored[i / 3] = 1;
     }
     out->kind = INPUT_PICTURE;

@@ -149,6 +149,18 @@ static void encode_counts(struct coder *c)
     c->plane += 4 * c->pixels;
 }
 
+static bool pack(const uint8_t *raw, size_t length, uint8_t **bytes, size_t *size, struct err *e)
+{
+    uLongf packed = compressBound((uLong)length);
+    *bytes = malloc(packed);
+    if (*bytes == NULL || compress2(*bytes, &packed, raw, (uLong)length, 9) != Z_OK) {
+        free(*bytes);
+        return err_set(e, "out of memory for the report");
+    }
+    *size = packed;
+    return true;
+}
+
 /* The planes of c with one predictor, compressed. */
 static bool encode(struct coder *c, uint8_t *raw, bool slope, bool uniform_n, uint8_t **bytes,
                    size_t *size, struct err *e)
@@ -160,15 +172,7 @@ static bool encode(struct coder *c, uint8_t *raw, bool slope, bool uniform_n, ui
     encode_values(c);
     if (!uniform_n)
         encode_counts(c);
-    uLong length = (uLong)(c->plane - raw);
-    uLongf packed = compressBound(length);
-    *bytes = malloc(packed);
-    if (*bytes == NULL || compress2(*bytes, &packed, raw, length, 9) != Z_OK) {
-        free(*bytes);
-        return err_set(e, "out of memory for the report");
-    }
-    *size = packed;
-    return true;
+    return pack(raw, (size_t)(c->plane - raw), bytes, size, e);
 }
 
 bool layer_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *uniform_n,
@@ -201,5 +205,22 @@ bool layer_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *
     free(raw);
     free(value);
     free(noise);
+    return ok;
+}
+
+bool layer_encode_map(const float *map, int width, int height, uint8_t **bytes, size_t *size,
+                      struct err *e)
+{
+    size_t w = (size_t)width, pixels = w * (size_t)height;
+    uint8_t *raw = malloc(pixels), left = 0;
+    if (raw == NULL)
+        return err_set(e, "out of memory for the report");
+    for (size_t i = 0; i < pixels; i++) {
+        uint8_t q = (uint8_t)lrintf(128 * sqrtf(fminf(fmaxf(map[i], 0), 1)));
+        raw[i] = (uint8_t)(q - (i % w > 0 ? left : 0));
+        left = q;
+    }
+    bool ok = pack(raw, pixels, bytes, size, e);
+    free(raw);
     return ok;
 }

@@ -6,7 +6,9 @@
 #include "verbs.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static const struct {
     const char *name;
@@ -24,6 +26,7 @@ static const struct {
     {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
+    {"reproduce", verb_reproduce, "render again what made a picture, and compare bits"},
     {"export", verb_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
 };
 
@@ -37,8 +40,21 @@ static void print_help(void)
          "3 could not judge, with one line on stderr.");
 }
 
+/* For jansson, whose calls add to documents in hundreds of places: a result that silently lacks a part would be worse
+ * than none, so without memory for it the program ends here, before anything is written. */
+static void *json_memory(size_t size)
+{
+    void *p = malloc(size);
+    if (p == NULL) {
+        fputs("assay: out of memory\n", stderr);
+        _exit(EXIT_NOT_JUDGED);
+    }
+    return p;
+}
+
 int main(int argc, char **argv)
 {
+    json_set_alloc_funcs(json_memory, free);
     if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
         print_help();
         return 0;

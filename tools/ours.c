@@ -6,7 +6,19 @@
 
 enum { MAX_ARGUMENTS = 64 };
 
-bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s, struct err *e)
+/* As renderer/output.c writes it. */
+static struct ours_rays read_rays(const struct image *im)
+{
+    struct ours_rays r;
+    const char *text = image_get_attr(im, "assay:rays");
+    if (text != NULL && sscanf(text, "%lf rays, %lf box tests, %lf primitive tests", &r.rays,
+                               &r.box_tests, &r.primitive_tests) == 3)
+        return r;
+    return (struct ours_rays){0};
+}
+
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
+                 struct ours_rays *rays, struct err *e)
 {
     const struct suite_scene *s = job->scene;
     char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
@@ -45,8 +57,12 @@ bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
     }
     const struct process p = {.argv = argv, .log = job->log, .timeout_s = job->timeout_s};
     struct process_usage usage;
-    if (!process_run(&p, &usage, e) || !moments_read(job->picture, out, NULL, e))
+    struct image im;
+    if (!process_run(&p, &usage, e) || !moments_read(job->picture, out, &im, e))
         return false;
+    if (rays != NULL)
+        *rays = read_rays(&im);
+    image_free(&im);
     *cpu_s = usage.cpu_s;
     if (out->width == s->width && out->height == s->height)
         return true;

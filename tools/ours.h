@@ -16,9 +16,15 @@ struct ours_job {
     const char *picture, *log; /* files to write; their directory exists */
 };
 
-/* The picture's moments, and the CPU time it took. Fails with the program's last line if it fails, and
- * on a picture of another size. */
-bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s, struct err *e)
-    __attribute__((warn_unused_result));
+/* What tracing took, as the picture says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
+ * leaves, of up to eight boxes or triangles each (renderer/bvh.h). */
+struct ours_rays {
+    double rays, box_tests, primitive_tests;
+};
+
+/* The picture's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
+ * fails, and on a picture of another size. */
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
+                 struct ours_rays *rays, struct err *e) __attribute__((warn_unused_result));
 
 #endif

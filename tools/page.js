@@ -30,7 +30,9 @@ class Scene {
 
   load() {
     if (this.loading) return this.loading;
-    this.loading = Promise.all(this.shots.map((s) => loadLayer(s.id))).then((all) => {
+    const flips = this.claims.map((c) => loadFlip(c.article.id.slice("claim-".length)).then((map) => { c.flip = map; }));
+    this.loading = Promise.all([...this.shots.map((s) => loadLayer(s.id)), ...flips]).then((loaded) => {
+      const all = loaded.slice(0, this.shots.length);
       this.ready = all.every((layer) => layer !== null);
       if (!this.ready) {
         this.box.replaceChildren(make("p", { className: "caption" },
@@ -48,10 +50,17 @@ class Scene {
   map(kind, claim) {
     const key = kind + " " + claim.a.id + " " + claim.b.id;
     if (!this.maps.has(key)) {
-      const value = makeMap[kind](claim.a.layer, claim.b.layer);
+      const value = makeMap[kind](claim.a.layer, claim.b.layer, claim);
       this.maps.set(key, { value, range: mapKinds[kind].range(value) });
     }
     return this.maps.get(key);
+  }
+
+  // The map's sentence, made once: it may count pixels.
+  sentence(kind, claim) {
+    const m = this.map(kind, claim);
+    if (m.sentence === undefined) m.sentence = mapKinds[kind].says(claim.a.name, claim.b.name, m.value);
+    return m.sentence;
   }
 
   // What a pane is to show.
@@ -187,7 +196,7 @@ class Scene {
     if (figure.querySelector("figcaption")) return;
     const k = mapKinds[kind], m = this.map(kind, claim);
     figure.append(legend(m.range, k), make("figcaption", {}, make("b", {}, k.name + ". "),
-      k.says(claim.a.name, claim.b.name, m.value)));
+      this.sentence(kind, claim)));
   }
 
   show(shown, kind) {
@@ -212,7 +221,7 @@ class Scene {
       const m = this.map(this.kind, this.claim);
       this.stageLegend.replaceChildren(legend(m.range, kind));
       this.stageCaption.replaceChildren(make("b", {}, kind.name + ", " + this.claim.name + ". "),
-        kind.says(this.claim.a.name, this.claim.b.name, m.value));
+        this.sentence(this.kind, this.claim));
       return;
     }
     const shot = this.shots[this.shown - 1], other = this.shots[this.against];

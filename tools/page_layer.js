@@ -110,3 +110,15 @@ function loadLayer(id) {
   }
   return layers.get(id);
 }
+
+// A promise of a claim's FLIP map, or of null where there is none (format: layer.h).
+function loadFlip(index) {
+  const element = document.getElementById("flip-" + index);
+  if (!element) return Promise.resolve(null);
+  const width = +element.dataset.width;
+  return inflate(bytesOf(element.textContent)).then((raw) => {
+    element.textContent = "";
+    for (let i = 0; i < raw.length; i++) if (i % width > 0) raw[i] += raw[i - 1];
+    return Float64Array.from(raw, (v) => (v / 128) ** 2);
+  });
+}

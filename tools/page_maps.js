@@ -81,6 +81,10 @@ const makeMap = {
       }
     return out;
   },
+  // Made by the harness; NaN where the page has no room for it.
+  flip(a, b, claim) {
+    return claim.flip || new Float64Array(a.width * a.height).fill(NaN);
+  },
   samples(a) {
     return Float64Array.from({ length: a.width * a.height }, (_, i) => countAt(a, i));
   },
@@ -113,6 +117,12 @@ const mapKinds = {
     label: (v) => (v < 0 ? "1/" + digits(2 ** -v) : digits(2 ** v)) + "\u00a0\u00d7",
     says: (a, b) => "How noisy one path of " + a + " is against one of " + b + ", in squares of 8 \u00d7 8 pixels. Red: " +
       a + " is the noisier one; grey: one of them has no noise. It need not be equal, but should be smooth.",
+  },
+  flip: {
+    key: "p", name: "FLIP", diverging: false, range: (v) => [0, symmetric(v, 0.02, 1)[1]], label: digits,
+    says: (a, b, v) => (v[0] === v[0] ? "How much the eye sees when " + a + " and " + b + " are swapped in place, at any exposure: " +
+      "0 nothing, 1 as green against blue. It knows nothing of noise: a right but noisy picture lights up too. Mean " +
+      digits(v.reduce((s, x) => s + x, 0) / v.length) + "." : "There is no such map of this pair on this page."),
   },
   samples: {
     key: "n", name: "Samples", diverging: false, range: (v) => [0, v.reduce((m, x) => Math.max(m, x), 1)],

@@ -88,6 +88,7 @@ static uint64_t next_random(uint64_t *state)
 static void random_subset(int *row, int num_a, int rows, uint64_t *state)
 {
     for (int i = 0; i < num_a; i++) {
+        /* NOLINTNEXTLINE(clang-analyzer-core.DivideZero): rows > num_a. */
         int j = i + (int)(next_random(state) % (uint64_t)(rows - i)), other = row[j];
         row[j] = row[i];
         row[i] = other;

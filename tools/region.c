@@ -8,7 +8,7 @@
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
 static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
 static const double float_tolerance = 1e-5; /* relative: two engines' float32 arithmetic */
-static const double least_dof = 0.2; /* below, the end of an interval is beyond any double */
+static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;
 const double region_mdb_none = 1e6;
@@ -41,6 +41,7 @@ static struct measured measure(const struct cell *cell, double unit, double size
                          .unit = unit,
                          .margin = margin,
                          .tolerance = float_tolerance * size + cell->tolerance,
+                         .log10_alike = cell->log10_alike,
                          .statistic = statistic};
     m.v = cell->va + cell->vb;
     m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
@@ -95,10 +96,21 @@ static double log10_p_missed(const struct judge *j, double excess, int channel)
     return fmax(region_smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
 }
 
+/* Of a region without noise, for |d| beyond what is no difference by `excess`. Two tests where a law
+ * for both sides can be asked for. */
+static double log10_p_noise_free(const struct judge *j, const struct measured *m, double excess,
+                                 int channel)
+{
+    double missed = log10_p_missed(j, excess, channel);
+    if (excess <= 0 || m->log10_alike == 0)
+        return missed;
+    return fmin(0, log10(2) + fmin(missed, m->log10_alike));
+}
+
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
 {
     if (m->noise_free)
-        return log10_p_missed(j, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
+        return log10_p_noise_free(j, m, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
     return fmax(region_smallest_log10_p, stats_t_log10_p(fmax(0, region_excess_t(m)), m->dof));
 }
 
@@ -106,7 +118,7 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
 {
     double excess = fmax(0, fabs(m->d) - m->tolerance);
     if (m->noise_free)
-        return log10_p_missed(j, excess, channel);
+        return log10_p_noise_free(j, m, excess, channel);
     double t = excess / sqrt(m->v);
     /* Beyond x = 1/g the expansion behind the factor has turned round. */
     double factor = skew_factor(m, fmin(t, 1 / m->skew)) / log(10);
@@ -125,7 +137,9 @@ double region_mdb(const struct judge *j, const struct measured *m, int channel)
     double tests = (double)j->num_tests[m->statistic], reach;
     double level = j->opt.alpha * j->share[m->statistic] / tests;
     if (m->noise_free)
-        reach = j->event[channel] / j->n_min * -log(level);
+        reach = m->log10_alike + log10(2) <= log10(level)
+                    ? 0
+                    : j->event[channel] / j->n_min * -log(level);
     else
         reach = sqrt(m->v_margin) *
                 (stats_t_quantile(level / 2, m->dof) + stats_t_quantile(0.05, m->dof));

@@ -30,8 +30,9 @@ struct measured {
     double dof;
     double dof_normal; /* if the law is normal; for heavier tails it says more of the mean of t^2 */
     double skew;       /* of d: |g| plus one standard error */
-    bool noise_free;   /* the standard error is within that of float32 arithmetic */
-    int statistic;     /* by which it is tested */
+    double log10_alike; /* of the cell */
+    bool noise_free;    /* the standard error is within that of float32 arithmetic */
+    int statistic;      /* by which it is tested */
 };
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);

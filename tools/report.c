@@ -1,6 +1,7 @@
 #include "report.h"
 
 #include "../renderer/fs.h"
+#include "report_alike.h"
 #include "report_consistency.h"
 #include "report_cost.h"
 #include "report_converge.h"
@@ -9,6 +10,7 @@
 #include "report_page.h"
 #include "report_parts.h"
 #include "report_plot.h"
+#include "report_rays.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -236,7 +238,7 @@ static void write_keys(FILE *f)
         "<section>\n<h2>How to look</h2>\n<p class=\"caption\">Each scene below has its pictures "
         "(keys <kbd>1</kbd> to <kbd>9</kbd>; <kbd>0</kbd> side by side), maps of two of them "
         "(<kbd>d</kbd> difference, <kbd>t</kbd> difference over its noise, <kbd>e</kbd> error without "
-        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples), a wipe (<kbd>w</kbd>), tiles "
+        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe (<kbd>w</kbd>), tiles "
         "(<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
         "<kbd>-</kbd>, <kbd>f</kbd> the whole picture, double click, Ctrl and the wheel, two "
         "fingers); drag to pan. All frames of a scene move together. Point at a pixel, or focus a "
@@ -272,6 +274,8 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
         done += of_scene;
         p->num_scenes++;
     }
+    report_alike_table(p);
+    report_rays(f, json_object_get(root, "claims"));
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);

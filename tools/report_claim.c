@@ -1,5 +1,7 @@
 #include "report_parts.h"
 
+#include "report_alike.h"
+#include "report_csv.h"
 #include "report_html.h"
 #include "report_plot.h"
 #include "report_power.h"
@@ -83,8 +85,17 @@ static void write_histogram(FILE *f, const json_t *claim)
         "every p-value is as likely as any other: the bars stay near the dashed line (%.3g tiles), "
         "each inside the shaded band 99 times of 100. A pile at the left is a real difference. It "
         "may still be far smaller than the margin, and then it does not change the verdict. Here "
-        "%d of %d tiles are below 0.05; %.1f would be by chance.</figcaption></figure>\n",
+        "%d of %d tiles are below 0.05; %.1f would be by chance. ",
         h.num_tiles, h.expected, h.below_5_percent, h.num_tiles, 0.05 * h.num_tiles);
+    struct csv csv = csv_open(f, "p_values.csv", "p_from,p_to,tiles");
+    for (int b = 0; b < h.bins; b++) {
+        csv_number(&csv, (double)b / h.bins);
+        csv_number(&csv, (double)(b + 1) / h.bins);
+        csv_number(&csv, count[b]);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+    fputs("</figcaption></figure>\n", f);
 }
 
 static void fact_open(FILE *f, const char *label)
@@ -295,14 +306,15 @@ static void write_approval(FILE *f, const json_t *claim)
     fputs("</code></pre>\n", f);
 }
 
-void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b)
+bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
+                  const struct claim_side *b, double white, struct err *e)
 {
     FILE *f = p->f;
     const json_t *json = claim->json;
     fprintf(f,
             "<article class=\"claim\" id=\"claim-%zu\" data-a=\"%zu\" data-b=\"%zu\" "
             "data-tile=\"%.0f\"",
-            claim->index, layer_a, layer_b, member_number(json, "tile"));
+            claim->index, a->layer, b->layer, member_number(json, "tile"));
     write_list(f, "data-tile-p", json_object_get(json, "tile_log10_p"));
     write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
     fputs(" data-name=\"", f);
@@ -326,6 +338,8 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     html_text(f, member_text(json, "reason"));
     fputs("</p>\n", f);
     write_notes(f, json);
+    if (!report_alike(p, claim, a->m, b->m, white, e))
+        return false;
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
     report_qq(f, json);
@@ -343,4 +357,5 @@ void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a,
     write_command(f, "To run this claim again:", member_text(json, "rerun"));
     write_approval(f, json);
     fputs("</details>\n</article>\n", f);
+    return true;
 }

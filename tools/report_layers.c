@@ -49,16 +49,22 @@ static void write_colours(FILE *f)
     fputs("</script>\n", f);
 }
 
+/* Whether that many bytes, as base64, may still go into the page. */
+static bool has_room(const struct page *p, size_t size)
+{
+    long here = ftell(p->f);
+    return here >= 0 &&
+           (p->num_scenes <= 1 || (size_t)here + size * 4 / 3 + PAGE_RESERVE <= PAGE_LIMIT);
+}
+
 void page_write_layers(struct page *p)
 {
-    size_t left_out = 0;
+    size_t left_out = 0, maps = 0, maps_left_out = 0;
     if (p->num_layers > 0)
         write_colours(p->f);
     for (size_t i = 0; i < p->num_layers; i++) {
         const struct page_layer *l = &p->layer[i];
-        long here = ftell(p->f);
-        size_t end = (size_t)here + l->size * 4 / 3 + PAGE_RESERVE;
-        if (here < 0 || (p->num_scenes > 1 && end > PAGE_LIMIT)) {
+        if (!has_room(p, l->size)) {
             left_out++;
             continue;
         }
@@ -71,12 +77,30 @@ void page_write_layers(struct page *p)
         html_base64(p->f, l->bytes, l->size);
         fputs("</script>\n", p->f);
     }
+    for (size_t i = 0; i < p->num_alike; i++) {
+        const struct page_alike *n = &p->alike[i];
+        maps += n->bytes != NULL;
+        if (n->bytes == NULL || !has_room(p, n->size)) {
+            maps_left_out += n->bytes != NULL;
+            continue;
+        }
+        fprintf(p->f,
+                "<script type=\"text/plain\" id=\"flip-%zu\" data-width=\"%d\" data-height=\"%d\">",
+                n->claim.index, n->width, n->height);
+        html_base64(p->f, n->bytes, n->size);
+        fputs("</script>\n", p->f);
+    }
     if (left_out > 0)
         fprintf(
             p->f,
             "<p class=\"caption\">To stay below 5 MB this page leaves out the numbers of %zu of "
             "its %zu pictures, and with them the pictures.</p>\n",
             left_out, p->num_layers);
+    if (maps_left_out > 0)
+        fprintf(p->f,
+                "<p class=\"caption\">To stay below 5 MB this page leaves out %zu of its %zu FLIP "
+                "maps.</p>\n",
+                maps_left_out, maps);
 }
 
 void page_free_layers(struct page *p)
@@ -86,4 +110,7 @@ void page_free_layers(struct page *p)
         free(p->layer[i].bytes);
     }
     free(p->layer);
+    for (size_t i = 0; i < p->num_alike; i++)
+        free(p->alike[i].bytes);
+    free(p->alike);
 }

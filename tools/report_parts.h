@@ -19,20 +19,6 @@ struct page_layer {
     size_t size;
 };
 
-struct page {
-    FILE *f;
-    char dir[4096]; /* of results.json, with a final slash, or "" */
-    struct page_layer *layer;
-    size_t num_layers, num_scenes;
-};
-
-/* The number on the page of the layer of m, which was read from path; the same path has one. */
-bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
-                    struct err *e) __attribute__((warn_unused_result));
-/* All layers, and the colours of maps, as base64 in elements that no browser runs. */
-void page_write_layers(struct page *p);
-void page_free_layers(struct page *p);
-
 /* One claim where it stands in the page. */
 struct claim_ref {
     const json_t *json;
@@ -40,14 +26,48 @@ struct claim_ref {
     enum outcome outcome;
 };
 
+/* A claim's row in the table of report_alike.h, and its packed FLIP map (layer.h; NULL: none). */
+struct page_alike {
+    struct claim_ref claim;
+    int width, height;
+    double hdr, ldr; /* NAN: not defined */
+    double idiff_percent;
+    bool idiff_differs;
+    uint8_t *bytes;
+    size_t size;
+};
+
+struct page {
+    FILE *f;
+    char dir[4096]; /* of results.json, with a final slash, or "" */
+    struct page_layer *layer;
+    struct page_alike *alike;
+    size_t num_layers, num_alike, num_scenes;
+};
+
+/* The number on the page of the layer of m, which was read from path; the same path has one. */
+bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
+                    struct err *e) __attribute__((warn_unused_result));
+/* All layers, then the FLIP maps, and the colours of maps, as base64 in elements that no browser runs. */
+void page_write_layers(struct page *p);
+void page_free_layers(struct page *p);
+
 /* <section> of one scene: what it is for, its pictures, each of its claims. All claims are of the
  * same scene. Fails when a picture cannot be read or the sizes differ. */
 bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, struct err *e)
     __attribute__((warn_unused_result));
 
+/* One side of a claim, as loaded. */
+struct claim_side {
+    const struct moments *m;
+    size_t layer; /* its number on the page */
+};
+
 /* <article> of one judged claim: where the page's script puts its maps, the histogram, and all that is
- * needed to doubt the verdict. layer_a and layer_b are the numbers of its sides. */
-void report_claim(struct page *p, const struct claim_ref *claim, size_t layer_a, size_t layer_b);
+ * needed to doubt the verdict. `white` is the radiance shown as white. */
+bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
+                  const struct claim_side *b, double white, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* <article> of a claim that could not be judged. */
 void report_claim_error(struct page *p, const struct claim_ref *claim);

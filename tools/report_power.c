@@ -141,12 +141,12 @@ void report_qq(FILE *f, const json_t *claim)
         for (int i = 1; i <= n; i++)
             outside += gsl_cdf_beta_P(pow(10, v[i - 1]), i, n + 1 - i) < 0.025;
         write_axes(f);
-        for (double x = 0, step = tick(a.right); x <= a.right; x += step)
+        for (int i = 0; i * tick(a.right) <= a.right; i++)
             fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>",
-                    LEFT + WIDTH * x / a.right, BOTTOM + 16, x);
-        for (double y = 0, step = tick(a.top); y <= a.top; y += step)
+                    LEFT + WIDTH * (i * tick(a.right)) / a.right, BOTTOM + 16, i * tick(a.right));
+        for (int i = 0; i * tick(a.top) <= a.top; i++)
             fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%g</text>", LEFT - 6,
-                    qq_y(&a, y) + 4, y);
+                    qq_y(&a, i * tick(a.top)) + 4, i * tick(a.top));
         fprintf(
             f,
             "</svg><figcaption><b>The same p-values against those that chance gives.</b> If both "
@@ -221,9 +221,10 @@ void report_power(FILE *f, const json_t *claim)
     for (int i = 0; i <= 4; i++)
         fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%d</text>", LEFT - 6,
                 power_y(i / 4.0) + 4, 25 * i);
-    for (double x = 0, step = tick(100 * top); x <= 100 * top; x += step)
+    for (int i = 0; i * tick(100 * top) <= 100 * top; i++)
         fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>",
-                LEFT + WIDTH * x / (100 * top), BOTTOM + 16, plain_number(x).s);
+                LEFT + WIDTH * (i * tick(100 * top)) / (100 * top), BOTTOM + 16,
+                plain_number(i * tick(100 * top)).s);
     fprintf(
         f,
         "</svg><figcaption><b>What this claim could have found.</b> If the image were too bright "

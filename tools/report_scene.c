@@ -216,11 +216,16 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
             report_claim_error(p, &claim[i]);
     if (s.num_shots > 0)
         write_images(p, &s);
-    for (size_t i = 0; i < num; i++)
-        if (claim[i].outcome != OUTCOME_NOT_JUDGED)
-            report_claim(p, &claim[i], shot_of(&s, claim[i].json, "a")->layer,
-                         shot_of(&s, claim[i].json, "b")->layer);
+    bool ok = true;
+    for (size_t i = 0; ok && i < num; i++) {
+        if (claim[i].outcome == OUTCOME_NOT_JUDGED)
+            continue;
+        const struct shot *a = shot_of(&s, claim[i].json, "a"),
+                          *b = shot_of(&s, claim[i].json, "b");
+        ok = report_claim(p, &claim[i], &(struct claim_side){&a->m, a->layer},
+                          &(struct claim_side){&b->m, b->layer}, s.white, e);
+    }
     fputs("</section>\n", p->f);
     scene_free(&s);
-    return true;
+    return ok;
 }

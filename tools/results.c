@@ -55,8 +55,9 @@ static const struct member judged_members[] = {
     {"class", STRING, false},        {"n_a", NUMBER, false},
     {"n_b", NUMBER, false},          {"unit_b", STRING, false},
     {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
-    {"seconds_b", NUMBER, false},    {"seed_a", COUNT, false},
-    {"seeds_b", COUNTS, false},      {"version_b", STRING, false}};
+    {"seconds_b", NUMBER, false},    {"rays_a", OBJECT, false},
+    {"seed_a", COUNT, false},        {"seeds_b", COUNTS, false},
+    {"version_b", STRING, false}};
 
 static const struct member worst_tile_members[] = {{"x", COUNT, true},
                                                    {"y", COUNT, true},
@@ -83,6 +84,9 @@ static const struct member direction_members[] = {{"name", STRING, true},
 
 static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
                                                        {"ci", INTERVAL, true}};
+
+static const struct member rays_members[] = {
+    {"rays", NUMBER, true}, {"box_tests", NUMBER, true}, {"primitive_tests", NUMBER, true}};
 
 static const struct member file_members[] = {
     {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
@@ -191,7 +195,10 @@ static bool check_findings(const json_t *claim, const char *where, struct err *e
 {
     const json_t *direction = json_object_get(claim, "direction");
     const json_t *ratio = json_object_get(claim, "variance_ratio");
-    return (direction == NULL ||
+    const json_t *rays = json_object_get(claim, "rays_a");
+    return (rays == NULL ||
+            check_members(rays, rays_members, LENGTH(rays_members), where, "rays_a.", e)) &&
+           (direction == NULL ||
             check_members(direction, direction_members, LENGTH(direction_members), where,
                           "direction.", e)) &&
            (ratio == NULL ||

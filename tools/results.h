@@ -24,7 +24,7 @@
  * "height":, "channel":}, "rms_bias": .., "extra_factor": 1, "skew_limited": false, "tile_log10_p":
  * [...], "tile_t": [...], "tiles_x": 8, "tiles_y": 8, "n_a": 2048, "n_b": 16, "unit_b":
  * "replicate", "spp_b": 256, "seconds_a": 12.3, "seconds_b": 120.0 (of the reference, from its
- * manifest), "seed_a": 1, "seeds_b": [...], "version_b": "Blender 3.4.1", "files": {"a":
+ * manifest), "rays_a": {"rays":, "box_tests":, "primitive_tests":} (of all its samples, ours.h), "seed_a": 1, "seeds_b": [...], "version_b": "Blender 3.4.1", "files": {"a":
  * "data/41_cornell/pathtracer.exr", "b": "data/41_cornell/cycles.exr", "z":
  * "data/41_cornell/z_cycles.exr", "relative": "data/41_cornell/rel_cycles.exr"}, "rerun": "assay
  * validate --only 41_cornell ..." } | { "scene":, "a":, "b":, "title":, "expected":, "passed":
@@ -50,7 +50,7 @@
  * A reader may rely on: assay, command, version, date, alpha, claims (at least one, or none where there
  * is convergence); of each claim
  * scene, a, b, expected, passed; of each judged claim everything above except title, detects,
- * blind_to, class, direction, variance_ratio, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, seed_a, seeds_b, version_b and
+ * blind_to, class, direction, variance_ratio, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, rays_a, seed_a, seeds_b, version_b and
  * rerun, which are provenance and absent where the claim has none (two files compared). */
 #ifndef ASSAY_RESULTS_H
 #define ASSAY_RESULTS_H

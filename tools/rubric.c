@@ -139,6 +139,14 @@ static void read_limit(struct statement *s)
                 what);
 }
 
+static void read_mask(struct statement *s)
+{
+    if (s->r->mask[2] > 0)
+        mistake(s->m, s->line, "a second 'mask'");
+    for (int i = 0; i < 4; i++)
+        take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
+}
+
 static void read_picture(struct statement *s)
 {
     struct rubric *r = s->r;
@@ -237,17 +245,21 @@ static void read_reference(struct statement *s, struct rubric_picture *p)
     }
 }
 
-static void read_accept(struct statement *s, struct rubric_picture *p)
+static void read_accept(struct statement *s, struct accepted *list, int most, int *num)
 {
-    if (p->num_accepted == RUBRIC_ACCEPTED) {
-        mistake(s->m, s->line, "more than %d accepted deviations of one picture", RUBRIC_ACCEPTED);
+    if (*num == most) {
+        mistake(s->m, s->line, "more than %d accepted deviations", most);
         return;
     }
-    p->accept[p->num_accepted].line = s->line;
-    if (take_name(s, "accept", p->accept[p->num_accepted].name, sizeof p->accept->name)) {
-        take_text(s, "accept NAME", p->accept[p->num_accepted].file, sizeof p->accept->file);
-        p->num_accepted++;
-    }
+    struct accepted *a = &list[*num];
+    *a = (struct accepted){.line = s->line};
+    if (!take_name(s, "accept", a->name, sizeof a->name))
+        return;
+    take_text(s, "accept NAME", a->how, sizeof a->how);
+    for (int i = 0; i < *num; i++)
+        if (strcmp(list[i].name, a->name) == 0)
+            mistake(s->m, s->line, "'%s' is already accepted in line %d", a->name, list[i].line);
+    ++*num;
 }
 
 /* False: no statement of a picture. */
@@ -272,7 +284,7 @@ static bool read_in_picture(struct statement *s, const char *word)
     else if (strcmp(word, "reference") == 0)
         read_reference(s, p);
     else if (strcmp(word, "accept") == 0)
-        read_accept(s, p);
+        read_accept(s, p->accept, RUBRIC_SETS, &p->num_accepted);
     else
         return false;
     return true;
@@ -328,6 +340,10 @@ static void read_statement(struct statement *s)
         take_number(s, word, 0, 1e6, &r->total);
     else if (strcmp(word, "limit") == 0)
         read_limit(s);
+    else if (strcmp(word, "mask") == 0)
+        read_mask(s);
+    else if (strcmp(word, "accept") == 0 && s->picture == NULL && s->check == NULL)
+        read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
     else if (strcmp(word, "picture") == 0)
         read_picture(s);
     else if (strcmp(word, "part") == 0)

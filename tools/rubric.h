@@ -15,6 +15,12 @@
  *                                       programs that lose points are then diagnosed, and the bug is named
  *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
  *   total POINTS                        what all checks have to add up to
+ *   mask X Y W H                        pixels that no check looks at, of every picture, from the bottom left as in the
+ *                                       assignment's -p: a watermark of a library that students were given
+ *   accept NAME WORDS                   a deviation that is not the student's fault: our renderer shows it with WORDS
+ *                                       besides its other options. A program is graded against our own references,
+ *                                       and against those of each deviation and of all of them together in every
+ *                                       choice; the best counts, for the whole program, and staff are told
  *
  *   picture NAME                        one run of the program, or NAME.png (.exr, .pfm, .hdr) of a directory
  *     scene SCENE                       of the suite, or FILE.dae beside the rubric
@@ -23,8 +29,8 @@
  *                                       a closed form or a golden of the suite's scene (golden: of its size and
  *                                       bounces), or our own render with as many samples and WORDS instead of
  *                                       `options` (or "none"); not needed where no check asks for it
- *     accept NAME FILE.exr              a deviation that is not the student's fault: what the picture then looks
- *                                       like, beside the rubric; may be given several times
+ *     accept NAME FILE.exr              the same by a picture of it (our moments) beside the rubric, where our renderer
+ *                                       cannot make it; pictures of one NAME belong together
  *     environment FILE.exr              beside the rubric; {options} then has -e too
  *   part NUMBER TITLE
  *   check NAME POINTS KIND PICTURES     of the part above it:
@@ -53,7 +59,8 @@ enum {
     RUBRIC_PICTURES = 96,
     RUBRIC_CHECKS = 128,
     CHECK_PICTURES = 8,
-    RUBRIC_ACCEPTED = 4,
+    RUBRIC_ACCEPTED = 3,                      /* by words */
+    RUBRIC_SETS = (1 << RUBRIC_ACCEPTED) + 4, /* choices of them, and those by pictures */
     RUBRIC_TILE = 8
 };
 
@@ -76,6 +83,17 @@ enum rubric_reference {
     REFERENCE_OURS
 };
 
+struct accepted {
+    int line;
+    char name[48], how[256]; /* words, or a file */
+};
+
+/* What a program may do wrong for which it is not to blame, all at once. The first set is empty. */
+struct rubric_set {
+    char name[160];  /* "light_pdf, turned_lamp" */
+    char words[800]; /* "" of those by pictures */
+};
+
 struct rubric_picture {
     int line;
     char name[48];
@@ -86,10 +104,7 @@ struct rubric_picture {
     enum rubric_reference reference;
     int reference_spp;
     char reference_options[256]; /* "" : those of the student */
-    struct {
-        int line;
-        char name[64], file[256];
-    } accept[RUBRIC_ACCEPTED];
+    struct accepted accept[RUBRIC_SETS];
     int num_accepted;
     bool used;
 };
@@ -121,6 +136,11 @@ struct rubric {
     char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512];
     struct sandbox_limits limit;
     double build_s, total;
+    int mask[4]; /* x y width height, from the bottom left; width 0: none */
+    struct accepted accept[RUBRIC_ACCEPTED];
+    int num_accepted;
+    struct rubric_set set[RUBRIC_SETS];
+    int num_sets;
     struct rubric_part part[RUBRIC_PARTS];
     struct rubric_picture picture[RUBRIC_PICTURES];
     struct rubric_check check[RUBRIC_CHECKS];

@@ -118,8 +118,8 @@ static void check_picture(const struct rubric *r, struct rubric_picture *p,
         mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
                 p->environment);
     for (int i = 0; i < p->num_accepted; i++)
-        if (!is_beside(r, p->accept[i].file))
-            mistake(m, p->accept[i].line, "no file '%s' beside the rubric", p->accept[i].file);
+        if (!is_beside(r, p->accept[i].how))
+            mistake(m, p->accept[i].line, "no file '%s' beside the rubric", p->accept[i].how);
     if (!p->used)
         mistake(m, p->line, "picture '%s' is in no check", p->name);
 }
@@ -184,6 +184,37 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
     set_default(c->title, sizeof c->title, c->name);
 }
 
+static void append(char *text, size_t size, const char *between, const char *more)
+{
+    size_t n = strlen(text);
+    snprintf(text + n, size - n, "%s%s", n > 0 ? between : "", more);
+}
+
+/* Every choice of those by words, then those that pictures show. */
+static void list_sets(struct rubric *r, struct rubric_mistakes *m)
+{
+    r->num_sets = 1 << r->num_accepted;
+    for (int k = 1; k < r->num_sets; k++)
+        for (int i = 0; i < r->num_accepted; i++)
+            if (k >> i & 1) {
+                append(r->set[k].name, sizeof r->set->name, ", ", r->accept[i].name);
+                append(r->set[k].words, sizeof r->set->words, " ", r->accept[i].how);
+            }
+    for (int i = 0; i < r->num_pictures; i++)
+        for (int a = 0; a < r->picture[i].num_accepted; a++) {
+            const struct accepted *by = &r->picture[i].accept[a];
+            int k = 0;
+            while (k < r->num_sets && strcmp(r->set[k].name, by->name) != 0)
+                k++;
+            if (k < r->num_sets && r->set[k].words[0] != '\0')
+                mistake(m, by->line, "'%s' is already accepted by words", by->name);
+            else if (k == RUBRIC_SETS)
+                mistake(m, by->line, "more accepted deviations than there is room for");
+            else if (k == r->num_sets)
+                append(r->set[r->num_sets++].name, sizeof r->set->name, "", by->name);
+        }
+}
+
 void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubric_mistakes *m)
 {
     check_head(r, m);
@@ -191,6 +222,7 @@ void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubr
         check_picture(r, &r->picture[i], suite, m);
     for (int i = 0; i < r->num_checks; i++)
         check_check(r, &r->check[i], m);
+    list_sets(r, m);
     if (r->num_checks == 0)
         mistake(m, LINE_WHOLE, "no checks");
     for (int i = 0; i < r->num_parts; i++) {

@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MAX_ARGS = 256, TEXT = 16 << 10, NOBODY = 65534, MAX_PATH = 4096 };
+enum { MAX_ARGS = 256, TEXT = 16 << 10, NOBODY = 65534, ALSO_NOBODY = 65533, MAX_PATH = 4096 };
 
 const struct sandbox_limits sandbox_default = {.wall_s = 120,
                                                .cpu_s = 120,
@@ -34,16 +34,18 @@ const char *const sandbox_end_name[] = {
 };
 
 /* Around the program; its arguments are the command that runs it. What it reports goes to a file that the
- * program cannot see. TREE, SCENE, KEEP_TREE: "" or not; WATCH: KiB, "" where other people's processes are
+ * program cannot see. AS: "" or what runs the program as somebody else, where there is no machine around it. TREE, SCENE, KEEP_TREE: "" or not; WATCH: KiB, "" where other people's processes are
  * visible. bwrap does not wait for the process that it starts, so the program's processor time is found with
  * the one that inherits it, number 1 of the outer machine: cutime and cstime, fields 16 and 17 of its stat. */
 static const char supervisor[] =
     "set -u\n"
+    "umask 022\n"
     "cd \"$BOX\" || exit 125\n"
     "if [ -n \"$TREE\" ] && ! tar -xf \"$TREE\"; then echo '125 unpack' >\"$OUT/.report\"; exit 125; fi\n"
+    "[ -z \"$AS\" ] || chown -hR 65533:65533 .\n"
     "rm -rf ./scene\n"
     "if [ -n \"$SCENE\" ] && ! cp -R \"$SCENE\" ./scene; then echo '125 unpack' >\"$OUT/.report\"; exit 125; fi\n"
-    "\"$@\" &\n"
+    "$AS \"$@\" &\n"
     "pid=$!\n"
     "if [ -n \"$WATCH\" ]; then\n"
     "  while sleep 0.2; do\n"
@@ -58,7 +60,7 @@ static const char supervisor[] =
     "[ ! -e \"$OUT/.memory\" ] || word=memory\n"
     "if [ $status -ne 0 ] && [ $word = ended ] && [ \"$(df --output=avail . | tail -n 1)\" -eq 0 ]; then word=disk; fi\n"
     "for name in $KEEP; do\n"
-    "  [ ! -f \"$name\" ] || [ -L \"$name\" ] || head -c $((FILE + 1)) <\"./$name\" >\"$OUT/$name\"\n"
+    "  [ ! -f \"$name\" ] || [ -L \"$name\" ] || $AS head -c $((FILE + 1)) \"./$name\" >\"$OUT/$name\"\n"
     "done\n"
     "cpu=0\n"
     "if [ -n \"$WATCH\" ]; then\n"
@@ -67,7 +69,7 @@ static const char supervisor[] =
     "  read -r stat </proc/1/stat && set -- ${stat##*)} && cpu=$((${14} + ${15}))\n"
     "fi\n"
     "rm -rf ./scene\n"
-    "[ -z \"$KEEP_TREE\" ] || tar -cSf - . | head -c $((DISK + 1)) >\"$OUT/tree.tar\"\n"
+    "[ -z \"$KEEP_TREE\" ] || $AS tar -cSf - . | head -c $((DISK + 1)) >\"$OUT/tree.tar\"\n"
     "echo \"$status $word $cpu\" >\"$OUT/.report\"\n"
     "exit $status\n";
 
@@ -171,6 +173,9 @@ static void add_inner(struct line *l, const struct sandbox *s, const struct sand
     add_limits(l, job);
 }
 
+/* Not the nobody of sandboxes, whose processes the kernel would count with these. */
+static const char as_nobody[] = "setpriv --reuid 65533 --regid 65533 --clear-groups --no-new-privs";
+
 /* The supervisor, with what it is told in variables that the program does not get. */
 static void add_supervisor(struct line *l, const struct sandbox *s, const struct sandbox_job *job,
                            const char *keep, const char *const where[4])
@@ -181,6 +186,7 @@ static void add_supervisor(struct line *l, const struct sandbox *s, const struct
     for (int i = 0; i < 4; i++)
         add_text(l, "%s=%s", name[i], where[i] != NULL ? where[i] : "");
     add_text(l, "KEEP=%s", keep);
+    add_text(l, "AS=%s", s->unsafe && s->drop ? as_nobody : "");
     add(l, job->keep_tree ? "KEEP_TREE=1" : "KEEP_TREE=");
     add_text(l, "FILE=%zu", job->limit.file);
     add_text(l, "DISK=%zu", job->limit.disk);
@@ -247,7 +253,7 @@ static void conclude(const char *out, const struct sandbox_job *job, const struc
     snprintf(path, sizeof path, "%s/.report", out);
     FILE *f = fopen(path, "r");
     long ticks = 0;
-    bool known = f != NULL && fscanf(f, "%d %15s %ld", &r->status, word, &ticks) >= 2;
+    bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2;
     if (ticks > 0)
         r->cpu_s = (double)ticks / (double)sysconf(_SC_CLK_TCK);
     if (f != NULL)
@@ -315,7 +321,7 @@ static bool make_out(const struct sandbox *s, const char *out, struct err *e)
 {
     if (!make_dirs(out, e))
         return false;
-    if (s->drop && chown(out, NOBODY, NOBODY) != 0)
+    if (s->drop && !s->unsafe && chown(out, NOBODY, NOBODY) != 0)
         return err_set(e, "%s: cannot give it to nobody: %s", out, strerror(errno));
     return true;
 }
@@ -329,7 +335,8 @@ bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct 
               join_names(job->keep, keep, sizeof keep, e) && make_out(s, job->out, e);
     if (ok && s->unsafe) {
         snprintf(box, sizeof box, "%s/box.XXXXXX", s->dir);
-        ok = mkdtemp(box) != NULL || err_set(e, "%s: %s", box, strerror(errno));
+        ok = (mkdtemp(box) != NULL && (!s->drop || chown(box, ALSO_NOBODY, ALSO_NOBODY) == 0)) ||
+             err_set(e, "%s: %s", box, strerror(errno));
     }
     if (ok) {
         compose(l, s, job, keep, box);
@@ -372,7 +379,7 @@ static bool add_hidden(struct sandbox *s, const char *const *hidden, struct err 
 bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
 {
     const char *temp = getenv("TMPDIR");
-    *out = (struct sandbox){.unsafe = unsafe, .drop = !unsafe && geteuid() == 0};
+    *out = (struct sandbox){.unsafe = unsafe, .drop = geteuid() == 0};
     if (!add_hidden(out, hidden, e))
         return false;
     int n = snprintf(out->dir, sizeof out->dir, "%s/assay-sandbox.XXXXXX",

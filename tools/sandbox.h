@@ -18,8 +18,9 @@
 #include <stddef.h>
 
 struct sandbox {
-    bool unsafe; /* no bubblewrap: limits of time, memory a process and file size, nothing else */
-    bool drop;   /* we are root: run as nobody */
+    bool
+        unsafe; /* no bubblewrap: limits of time, memory a process and file size; else only what `drop` does */
+    bool drop; /* we are root: run as nobody */
     char dir
         [256]; /* for what runs read and write: below TMPDIR or /tmp, readable by everybody, ours */
     char hidden[4][512]; /* directories that must not be seen though they lie below /usr */

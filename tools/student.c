@@ -53,7 +53,7 @@ static double float_step(const struct picture *pic, float v, const float *px)
 {
     if (pic->info.type == IMAGE_HALF)
         return fmax(ldexp(fabs((double)v), -10), 0x1p-24);
-    double brightest = fmax(px[0], fmax(px[1], px[2]));
+    double brightest = fmaxf(px[0], fmaxf(px[1], px[2]));
     int exponent;
     frexp(brightest, &exponent);
     return strcmp(pic->info.format, "hdr") == 0 && brightest > 0 ? 2 * ldexp(1, exponent - 8) : 0;
@@ -94,7 +94,7 @@ bool student_read(const char *path, const char *curve, int width, int height, st
     struct curve c;
     *out = (struct student){.width = width, .height = height};
     if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
-        !picture_read(path, &pic, e))
+        !picture_read_inspected(path, &info, &pic, e))
         return false;
     bool ok = allocate(out, e) && fill(out, &pic, &c, e);
     picture_free(&pic);
@@ -157,6 +157,16 @@ bool student_from(const struct moments *m, const struct student *like, struct st
         out->variance[i] = n > 1 ? m->m2[i] / (n * (n - 1)) : 0;
         out->k3[i] = n > 2 ? m->m3[i] / (n * (n - 1) * (n - 2)) : 0;
     }
+    return true;
+}
+
+bool student_copy(const struct student *s, struct student *out, struct err *e)
+{
+    if (!student_from(NULL, s, out, e))
+        return false;
+    memcpy(out->sha256, s->sha256, sizeof out->sha256);
+    student_add(out, s);
+    memcpy(out->k3, s->k3, 3 * (size_t)s->width * (size_t)s->height * sizeof *s->k3);
     return true;
 }
 

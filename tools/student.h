@@ -35,6 +35,10 @@ void student_expect(struct student *s, const struct moments *m, double spp);
 bool student_from(const struct moments *m, const struct student *like, struct student *out,
                   struct err *e) __attribute__((warn_unused_result));
 
+/* The caller frees it with student_free(). */
+bool student_copy(const struct student *s, struct student *out, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* dst += src, clipped where either is. */
 void student_add(struct student *dst, const struct student *src);
 

@@ -154,6 +154,7 @@ bool submission_command(const struct rubric *r, const struct rubric_picture *p, 
             size_t length = t < count ? strlen(value) : 1;
             if (used + length >= sizeof word)
                 return false;
+            /* NOLINTNEXTLINE(bugprone-not-null-terminated-result): into a longer text. */
             memcpy(word + used, value, length);
             used += length;
             c += t < count ? strlen(tokens[t].name) : 1;

@@ -42,8 +42,8 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
                      struct submission *out, struct err *e) __attribute__((warn_unused_result));
 
 /* Builds it in the sandbox, if it is to be built; the output goes to `log`. */
-bool submission_build(const struct rubric *r, const struct sandbox *s, const char *work,
-                      const char *log, struct submission *sub, struct err *e)
+bool submission_build(const struct rubric *r, const struct sandbox *box, const char *work,
+                      const char *log, struct submission *s, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The picture with that index: found, or made in the sandbox and then moved to out_dir, where its log goes too. A

@@ -79,6 +79,11 @@ static void add_provenance(json_t *claim, struct validation *v, const struct tas
     claim_add_observations(claim, "b", &b->m);
     json_object_set_new(claim, "seconds_a", json_real(a->seconds));
     json_object_set_new(claim, "seconds_b", json_real(b->seconds));
+    if (a->rays.rays > 0)
+        json_object_set_new(claim, "rays_a",
+                            json_pack("{s:f, s:f, s:f}", "rays", a->rays.rays, "box_tests",
+                                      a->rays.box_tests, "primitive_tests",
+                                      a->rays.primitive_tests));
     if (a->manifest == NULL)
         json_object_set_new(claim, "seed_a", json_integer((json_int_t)v->opt->seed));
     json_t *version = json_object_get(b->manifest, "version");

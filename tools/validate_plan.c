@@ -163,7 +163,7 @@ bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
     int most = 0, all = MAX_REFERENCES * 3 + MAX_VARIANTS + 2;
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
         most += is_selected(v->opt, v->suite.scene[i].name) ? all : 0;
-    v->task = ok ? calloc((size_t)most, sizeof *v->task) : NULL;
+    v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
     ok = ok && (v->task != NULL || err_set(e, "out of memory"));
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
         if (is_selected(v->opt, v->suite.scene[i].name))

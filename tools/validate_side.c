@@ -158,7 +158,7 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                                  .timeout_s = program_time(v),
                                  .picture = path,
                                  .log = log};
-    if (!make_parent_dirs(path, e) || !ours_render(&job, &out->m, &out->seconds, e))
+    if (!make_parent_dirs(path, e) || !ours_render(&job, &out->m, &out->seconds, &out->rays, e))
         return false;
     out->written = keep;
     if (!keep) {
@@ -221,6 +221,7 @@ static bool copy_observed(const struct observed *o, struct observed *out, struct
         return false;
     out->manifest = json_incref(o->manifest);
     out->seconds = o->seconds;
+    out->rays = o->rays;
     return true;
 }
 
@@ -237,6 +238,9 @@ static bool add_before(const struct observed *before, struct observed *more, str
     moments_free(&more->m);
     more->m = sum;
     more->seconds += before->seconds;
+    more->rays.rays += before->rays.rays;
+    more->rays.box_tests += before->rays.box_tests;
+    more->rays.primitive_tests += before->rays.primitive_tests;
     if (before->manifest == NULL)
         return true;
     json_t *manifest = json_deep_copy(before->manifest);

@@ -13,6 +13,7 @@ enum option {
     OPT_ENGINE,
     OPT_LADDER,
     OPT_REPLICATES,
+    OPT_DEPTH_SPP,
     OPT_SHRINK,
     OPT_REFERENCE,
     OPT_ALPHA,
@@ -39,6 +40,10 @@ static const struct cli_option options[] = {
                     "(1,4,16,64,256)"},
     [OPT_REPLICATES] = {'k', "replicates", 1, "K",
                         "pictures per rung, each with its own seed (16)"},
+    [OPT_DEPTH_SPP] =
+        {0, "depth-spp", 1, "N",
+         "samples per pixel of the depth ladder, pathtracer's picture at every greatest\n"
+         "depth up to the scene's; 0: none (64)"},
     [OPT_SHRINK] = {0, "shrink", 1, "N", "pictures N times smaller on both sides (1)"},
     [OPT_REFERENCE] = {0, "reference", 1, "NAME",
                        "what errors are measured against: truth (closed form), cycles or povray\n"
@@ -99,6 +104,7 @@ static bool parse_one(int i, const char *v, struct converge_options *o, bool *ch
     case OPT_LADDER: return parse_ladder(v, o, e);
     case OPT_REPLICATES:
         return cli_int("--replicates", v, 4, CONVERGE_MAX_REPLICATES, &o->replicates, e);
+    case OPT_DEPTH_SPP: return cli_int("--depth-spp", v, 0, 1 << 20, &o->depth_spp, e);
     case OPT_SHRINK: return cli_int("--shrink", v, 1, 1024, &o->shrink, e);
     case OPT_REFERENCE:
         if (!cli_choice("--reference", v, converge_against_names, &n, e))
@@ -181,6 +187,7 @@ int verb_converge(int argc, char **argv, struct err *e)
         .ladder = {1, 4, 16, 64, 256},
         .num_rungs = 5,
         .replicates = 16,
+        .depth_spp = 64,
         .shrink = 1,
         .seed = 1,
         .alpha = 1e-3,

@@ -12,6 +12,7 @@
 
 enum option {
     OPT_CHECK_RUBRIC,
+    OPT_PREPARE,
     OPT_OUT,
     OPT_JOBS,
     OPT_THREADS,
@@ -30,6 +31,7 @@ enum option {
 static const struct cli_option options[] = {
     [OPT_CHECK_RUBRIC] = {0, "check-rubric", 0, "",
                           "name every mistake of the rubric with its line, and that is all"},
+    [OPT_PREPARE] = {0, "prepare", 0, "", "make the references in DIR, and that is all"},
     [OPT_OUT] = {'o', "out", 1, "DIR",
                  "where grades and pages go (grades); what is there already is not done again"},
     [OPT_JOBS] = {'j', "jobs", 1, "N", "submissions at a time; 0: as many as processors (1)"},
@@ -39,7 +41,8 @@ static const struct cli_option options[] = {
                    "chance of a check that a right program loses points (1e-5)"},
     [OPT_AGAIN] = {0, "again", 0, "", "grade also what has been graded"},
     [OPT_UNSAFE] = {0, "unsafe-no-sandbox", 0, "",
-                    "run programs without a sandbox: they can read and write all that you can"},
+                    "run programs without a sandbox: they can read and write all that you can\n"
+                    "(as root: that nobody can)"},
     [OPT_PATHTRACER] = {0, "pathtracer", 1, "PROGRAM",
                         "our renderer, for references (the one beside this program)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
@@ -55,7 +58,7 @@ struct settings {
     int num, jobs, threads;
     uint64_t seed;
     double alpha;
-    bool only_check, again, unsafe, quiet, help;
+    bool only_check, prepare, again, unsafe, quiet, help;
 };
 
 static bool parse(int argc, char **argv, struct settings *s, struct err *e)
@@ -75,6 +78,7 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         }
         switch ((enum option)i) {
         case OPT_CHECK_RUBRIC: s->only_check = true; break;
+        case OPT_PREPARE: s->prepare = true; break;
         case OPT_OUT: s->out = v; break;
         case OPT_JOBS: ok = cli_int("--jobs", v, 0, 64, &s->jobs, e); break;
         case OPT_THREADS: ok = cli_int("--threads", v, 1, 1024, &s->threads, e); break;
@@ -94,16 +98,18 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
         return ok;
     if (s->rubric == NULL)
         return err_set(e, "no rubric given (see --help)");
-    if (s->only_check && s->num > 0)
-        return err_set(e, "--check-rubric takes no submissions");
-    return s->only_check || s->num > 0 || err_set(e, "no submission given (see --help)");
+    if ((s->only_check || s->prepare) && s->num > 0)
+        return err_set(e, "--%s takes no submissions", s->only_check ? "check-rubric" : "prepare");
+    return s->only_check || s->prepare || s->num > 0 ||
+           err_set(e, "no submission given (see --help)");
 }
 
 static void print_help(void)
 {
     puts(
         "usage: assay grade [options] RUBRIC SUBMISSION...\n"
-        "       assay grade --check-rubric RUBRIC\n\n"
+        "       assay grade --check-rubric RUBRIC\n"
+        "       assay grade --prepare [-o DIR] RUBRIC\n\n"
         "A submission is a directory of pictures, a program, or a source tree that the rubric says how to build.\n"
         "Programs run in a sandbox, without which nothing is graded.\n");
     cli_print_options(stdout, options);
@@ -217,8 +223,12 @@ static int grade(const struct settings *s, const struct rubric *r, const struct 
                                        .cache = cache,
                                        .threads = cli_processors(),
                                        .timeout_s = 3600};
-    if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL}, &box,
-                     e)) {
+    if (s->prepare) {
+        code = make_dirs(cache, e) && answers_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
+        if (code == 0)
+            printf("references of %s: %s\n", r->path, cache);
+    } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
+                            &box, e)) {
         if (make_dirs(cache, e) && answers_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, &box, e);
         sandbox_close(&box);

@@ -1,10 +1,10 @@
 #include "../renderer/cli.h"
+#include "../renderer/shell_words.h"
 #include "merge.h"
 #include "results.h"
 #include "verbs.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 static const struct cli_option options[] = {{'h', "help", 0, "", "print this"}, {0}};
 
@@ -43,10 +43,8 @@ int verb_merge(int argc, char **argv, struct err *e)
         err_set(e, "merge needs an output and two shares or more (see --help)");
         goto done;
     }
-    for (int i = 0; i < argc && strlen(command) + strlen(argv[i]) + 2 < sizeof command; i++) {
-        strcat(command, " ");
-        strcat(command, argv[i]);
-    }
+    for (int i = 0; i < argc && shell_append(command, sizeof command, argv[i]); i++)
+        continue;
     if (merge_shares(share, num, &whole, e) && share_write(out, &whole, command, e)) {
         printf("%s\n", out);
         code = 0;

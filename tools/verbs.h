@@ -16,6 +16,7 @@ int verb_merge(int argc, char **argv, struct err *e);
 int verb_diagnose(int argc, char **argv, struct err *e);
 int verb_watch(int argc, char **argv, struct err *e);
 int verb_grade(int argc, char **argv, struct err *e);
+int verb_reproduce(int argc, char **argv, struct err *e);
 int verb_report(int argc, char **argv, struct err *e);
 
 #endif

@@ -4,6 +4,7 @@
 #include "region.h"
 #include "stats.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -127,6 +128,7 @@ static void judge_different(struct comparison *c, const struct compare_options *
                            c->statistic[s].log10_p - log10(c->statistic[s].share) <
                                c->statistic[first].log10_p - log10(c->statistic[first].share))))
             first = s;
+    assert(first >= 0);
     const struct statistic *st = &c->statistic[first];
     c->verdict = VERDICT_DIFFERENT;
     if (directed)

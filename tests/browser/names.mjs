@@ -12,7 +12,7 @@ page.on("pageerror", (e) => events.push(e.message));
 page.on("console", (m) => m.type() === "error" && events.push(m.text()));
 await page.goto("file://" + resolve(pagePath));
 await page.evaluate("loadAll()");
-for (const key of ["1", "w", "d", "t", "e", "v", "n", "0"]) await page.keyboard.press(key);
+for (const key of ["1", "w", "d", "t", "e", "v", "n", "p", "0"]) await page.keyboard.press(key);
 await page.locator(".tiles button").first().click();
 const made = await page.evaluate(`document.querySelectorAll("img, iframe, [onerror]").length`);
 const shown = await page.evaluate(`document.body.innerText.includes("<img src=x onerror=alert(1)>")`);

@@ -144,13 +144,20 @@ check("the wiped picture is chosen", await page.evaluate("scenes[0].shots[scenes
 await page.keyboard.press("w");
 
 // Maps, each with its sentence, legend and colours.
-const maps = { d: "Difference", t: "t map", e: "Error", v: "Variance ratio", n: "Samples" };
+const maps = { d: "Difference", t: "t map", e: "Error", v: "Variance ratio", n: "Samples", p: "FLIP" };
 for (const [key, name] of Object.entries(maps)) {
   await page.keyboard.press(key);
   await frames(page);
   const caption = await page.textContent(".stage figcaption"), legend = await page.textContent(".stage .legend");
   check("key " + key + " shows: " + name, caption.startsWith(name) && caption.length > name.length + 60 && /\d/.test(legend), caption);
 }
+const flips = await page.evaluate(`scenes[0].claims.map((c) => {
+  const m = makeMap.flip(c.a.layer, c.b.layer, c);
+  return [m.length, Math.min(...m), Math.max(...m), m.reduce((s, v) => s + v, 0) / m.length];
+})`), means = (await page.locator("#alike tbody tr td:nth-child(5)").allTextContents()).map(Number);
+check("FLIP maps have the means of the table", flips.length === means.length && flips.every(([length, low, high, mean], i) =>
+  length === size.width * size.height && low >= 0 && high <= 1 && Math.abs(mean - means[i]) <= 0.0002 + 0.02 * means[i]) && means.some((m) => m > 0),
+  JSON.stringify([flips, means]));
 await page.keyboard.press("t");
 await frames(page);
 const red = [];
@@ -212,10 +219,13 @@ check("all tiles are outlined", await page.evaluate("scenes[0].grid") === side);
 await page.keyboard.press("g");
 
 // Figures' numbers as files.
-const [download] = await Promise.all([page.waitForEvent("download"), article.locator("a.csv").first().click()]);
+const [download] = await Promise.all([page.waitForEvent("download"), article.locator('a.csv[download="tiles.csv"]').first().click()]);
 const csv = readFileSync(await download.path(), "utf8").split("\r\n");
 check("a figure's numbers are saved as CSV", download.suggestedFilename() === "tiles.csv" && csv[0] === "x,y,t,log10_p" &&
   csv.length === tiles.length + 2 && Math.abs(csv[1].split(",")[3] - tiles[0]) < 1e-5, csv.slice(0, 2).join(" | "));
+const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
+  !(f.querySelector("figcaption a.csv") && f.querySelector("figcaption b") && f.querySelectorAll("svg text").length > 3)).length`);
+check("every plot has a caption, labels and its numbers", bare === 0, bare + " have not");
 await article.locator("summary").click();
 check("the facts unfold", await article.locator("dl.facts").isVisible());
 

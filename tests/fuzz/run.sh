@@ -1,7 +1,9 @@
 #!/bin/bash
 # tests/fuzz/run.sh [-j JOBS] BUILD SECONDS [NAME...]: runs fuzz_NAME (all of them) for that long each. A run starts from the
 # files that the suite and tests/fuzz/seeds have, from tests/fuzz/found/NAME (what was found once, and must not be
-# again) and from what earlier runs learned (BUILD/fuzz/NAME.corpus).
+# again) and from what earlier runs learned (BUILD/fuzz/NAME.corpus). SECONDS "fixed" is what a test can ask for: nothing
+# learned earlier, a fixed seed, and a fixed number of executions, some ten seconds, so that it says tomorrow what it says
+# today; searching is for the other runs.
 # A line for each, "ok fuzz NAME: N executions, M inputs kept, S s" or "not ok fuzz NAME: why"; what breaks is kept as
 # BUILD/fuzz/NAME-*, and the exit code is 1.
 set -u
@@ -20,27 +22,43 @@ seeds() {
     esac
 }
 
+fixed_executions() {
+    case $1 in
+    collada) echo 20000 ;;
+    picture) echo 4000 ;;
+    results) echo 50000 ;;
+    moments) echo 200000 ;;
+    *) echo 250000 ;;
+    esac
+}
+
 fuzz_one() {
-    local name=$1 dir=$build/fuzz options=() places=() status executions
-    mkdir -p "$dir/$name.corpus" "$dir/$name.seeds"
+    local name=$1 dir=$build/fuzz corpus options places status executions
+    if [ "$seconds" = fixed ]; then
+        corpus=$dir/$name.fixed options=(-seed=1 -runs="$(fixed_executions "$name")")
+        rm -rf "$corpus"
+    else
+        corpus=$dir/$name.corpus options=(-max_total_time="$seconds")
+    fi
+    mkdir -p "$corpus" "$dir/$name.seeds"
     seeds "$name" | xargs cp -t "$dir/$name.seeds" || return 1
-    places=("$dir/$name.corpus" "$dir/$name.seeds")
+    places=("$corpus" "$dir/$name.seeds")
     [ -d "tests/fuzz/found/$name" ] && places+=("tests/fuzz/found/$name")
-    [ -f "tests/fuzz/$name.dict" ] && options=(-dict="tests/fuzz/$name.dict")
+    [ -f "tests/fuzz/$name.dict" ] && options+=(-dict="tests/fuzz/$name.dict")
     # OpenImageIO's PNG reader leaves its strings behind where libpng jumps out of it; those leaks are not ours.
     [ "$name" = picture ] && export ASAN_OPTIONS=detect_leaks=0
-    "$build/clang/fuzz_$name" "${options[@]}" -max_total_time="$seconds" -max_len=20000 -rss_limit_mb=2048 -timeout=20 \
+    "$build/clang/fuzz_$name" "${options[@]}" -max_len=20000 -rss_limit_mb=2048 -timeout=20 \
         -print_final_stats=1 -artifact_prefix="$dir/$name-" "${places[@]}" >"$dir/$name.log" 2>&1
     status=$?
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$dir/$name.log")
     if [ $status -eq 0 ] && [ "${executions:-0}" -gt 0 ]; then
-        echo "ok fuzz $name: $executions executions, $(ls "$dir/$name.corpus" | wc -l) inputs kept," \
+        echo "ok fuzz $name: $executions executions, $(ls "$corpus" | wc -l) inputs kept," \
             "$(sed -n 's/^Done [0-9]* runs in \([0-9]*\) second.*/\1/p' "$dir/$name.log") s"
     else
         echo "not ok fuzz $name: $(grep -m1 -E '^(fuzz: |==[0-9]+== ?ERROR|.*runtime error)' "$dir/$name.log"), see $dir/$name.log"
         return 1
     fi
 }
-export -f fuzz_one seeds
+export -f fuzz_one fixed_executions seeds
 export build seconds
 printf '%s\n' "$@" | xargs -P "$jobs" -I{} bash -c 'fuzz_one {}'

@@ -1,0 +1,59 @@
+/* The rubric of a course: what is wrong with it is listed, a line each, in order. */
+#include "../../tools/rubric.h"
+#include "fuzz.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void check_mistakes(const struct rubric_mistakes *m)
+{
+    int most = sizeof m->at / sizeof m->at[0], kept = m->num < most ? m->num : most;
+    fuzz_require(m->num >= 0, "a count of mistakes below 0");
+    for (int i = 0; i < kept; i++) {
+        fuzz_require(m->at[i].text[0] != '\0', "a mistake without a word");
+        fuzz_require(strchr(m->at[i].text, '\n') == NULL, "a mistake of more than one line");
+        fuzz_require(i == 0 || m->at[i - 1].line <= m->at[i].line, "mistakes out of order");
+    }
+}
+
+/* What the grader relies on. */
+static void check_rubric(const struct rubric *r)
+{
+    fuzz_require(r->num_checks > 0 && r->num_checks <= RUBRIC_CHECKS, "no check, or too many");
+    fuzz_require(r->num_pictures >= 0 && r->num_pictures <= RUBRIC_PICTURES, "pictures");
+    double points = rubric_points(r);
+    fuzz_require(isfinite(points) && points > 0, "points that are no number");
+    for (int i = 0; i < r->num_checks; i++) {
+        const struct rubric_check *c = &r->check[i];
+        fuzz_require(c->part >= 0 && c->part < r->num_parts, "a check of no part");
+        fuzz_require(c->num_pictures > 0 && c->num_pictures <= CHECK_PICTURES,
+                     "a check of no picture");
+        for (int k = 0; k < c->num_pictures; k++)
+            fuzz_require(c->picture[k] >= 0 && c->picture[k] < r->num_pictures,
+                         "a check of a picture that is not there");
+    }
+    for (int i = 0; i < r->num_pictures; i++)
+        fuzz_require(r->picture[i].width > 0 && r->picture[i].height > 0,
+                     "a picture without pixels");
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static struct suite suite;
+    struct err e = {""};
+    if (suite.num_scenes == 0)
+        fuzz_require(suite_load("reference/scenes", &suite, &e), "the suite is not here");
+    const char *path = fuzz_file(data, size, ".rubric");
+    struct rubric *r = calloc(1, sizeof *r);
+    struct rubric_mistakes *m = calloc(1, sizeof *m);
+    if (!rubric_read(path, &suite, r, m, &e))
+        fuzz_check_line(&e, path);
+    else if (m->num > 0)
+        check_mistakes(m);
+    else
+        check_rubric(r);
+    free(r);
+    free(m);
+    return 0;
+}

@@ -1,0 +1,26 @@
+#!/bin/bash
+# tools/autograder/pack.sh BUILD RUBRIC OUT.zip COMMIT PACKAGE...: an autograder for Gradescope. The zip holds setup.sh and
+# run_autograder, our sources (built where they run: the libraries differ), the directory of the rubric, and its references,
+# which are rendered here, once.
+set -eu
+build=$(realpath "$1") rubric=$2 out=$3 commit=$4
+shift 4
+"$build/assay" grade --check-rubric "$rubric"
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+mkdir -p "$tmp/zip/assay/golden" "$tmp/zip/rubric" "$build/autograder"
+cp tools/autograder/setup.sh tools/autograder/run_autograder "$tmp/zip"
+cp -R Makefile LICENSE renderer reference tools "$tmp/zip/assay"
+cp -R golden "$tmp/zip/assay"
+find "$(dirname "$rubric")" -maxdepth 1 -type f -exec cp {} "$tmp/zip/rubric" \;
+basename "$rubric" >"$tmp/zip/rubric_name"
+echo "$commit" >"$tmp/zip/commit"
+echo "$@" >"$tmp/zip/packages"
+"$build/assay" grade --prepare -o "$build/autograder" "$rubric"
+cp -R "$build/autograder/.references" "$tmp/zip/references"
+rm -f "$tmp/zip/references"/*.log
+case $out in /*) ;; *) out=$PWD/$out ;; esac
+rm -f "$out.new"
+(cd "$tmp/zip" && zip -qr -X "$out.new" .)
+mv "$out.new" "$out"
+echo "$out: $(du -h "$out" | cut -f 1), $(basename "$rubric")"

@@ -1,0 +1,12 @@
+/* The report's plot of what a ray costs. */
+#ifndef ASSAY_REPORT_RAYS_H
+#define ASSAY_REPORT_RAYS_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+/* <section> with a bar for each scene of which a claim has "rays_a" (results.h), most tests first: box and primitive tests
+ * of a ray, of the first such claim. Nothing where none has. */
+void report_rays(FILE *f, const json_t *claims);
+
+#endif

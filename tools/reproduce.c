@@ -1,0 +1,231 @@
+#include "reproduce.h"
+
+#include "../reference/process.h"
+#include "../renderer/fs.h"
+#include "../renderer/options.h"
+#include "../renderer/sha256.h"
+#include "../renderer/shell_words.h"
+#include "merge.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_PATH = 4096 };
+
+/* What says how far, where to or how a render goes on, not what it is of: its samples are known by number now. */
+static const struct {
+    const char *name;
+    int args;
+} not_of_the_picture[] = {
+    {"-f", 1},           {"--out", 1},   {"--samples", 1},     {"-t", 1},       {"--threads", 1},
+    {"--time", 1},       {"--error", 1}, {"--write-every", 1}, {"--resume", 1}, {"--heatmap", 1},
+    {"--keep-state", 0}, {"-q", 0},      {"--quiet", 0},       {NULL, 0}};
+
+/* How many words of a command to leave out here. */
+static int words_to_drop(char *const *word, int left)
+{
+    for (int i = 0; not_of_the_picture[i].name != NULL; i++) {
+        size_t n = strlen(not_of_the_picture[i].name);
+        if (strcmp(word[0], not_of_the_picture[i].name) == 0)
+            return 1 + not_of_the_picture[i].args < left ? 1 + not_of_the_picture[i].args : left;
+        if (n > 2 && strncmp(word[0], not_of_the_picture[i].name, n) == 0 && word[0][n] == '=')
+            return 1;
+    }
+    return 0;
+}
+
+static const char *attr(const struct image *im, const char *name)
+{
+    const char *value = image_get_attr(im, name);
+    return value != NULL ? value : "";
+}
+
+static bool check_scene(const char *path, const char *scene, const char *sha256, struct err *e)
+{
+    char now[65];
+    if (access(scene, R_OK) != 0)
+        return err_set(e, "%s: its scene '%s' is not here: give --scene, or go where it was made",
+                       path, scene);
+    if (!sha256_file(scene, now, e))
+        return false;
+    return strcmp(now, sha256) == 0 ||
+           err_set(
+               e,
+               "%s: %s is not the file that it was made of (SHA-256 %.12s... then, %.12s... now)",
+               path, scene, sha256, now);
+}
+
+/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and 12 more. */
+static bool command_of(const char *path, const struct image *im,
+                       const struct reproduce_options *opt, char **word, int num,
+                       const char *samples, const char *threads, const char *out, const char **argv,
+                       struct err *e)
+{
+    struct options o;
+    struct err why = {""};
+    if (!options_parse(num, word, &o, &why) || o.action != ACTION_RENDER)
+        return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
+    if (!check_scene(path, opt->scene != NULL ? opt->scene : o.scene, attr(im, "assay:scene"), e))
+        return false;
+    int n = 0;
+    argv[n++] = opt->pathtracer;
+    for (int i = 1; i < num;) {
+        int drop = words_to_drop(&word[i], num - i);
+        if (drop == 0)
+            argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
+        i += drop > 0 ? drop : 1;
+    }
+    const char *more[] = {"-q", "-t", threads, "--samples", samples, "-f", out, NULL};
+    memcpy(argv + n, more, sizeof more);
+    return true;
+}
+
+/* The same render by metadata: another camera file, say, is another picture. */
+static bool check_same(const char *path, const struct image *a, const struct image *b,
+                       struct err *e)
+{
+    static const char *const same[] = {"assay:unit",     "assay:spp",      "assay:scene",
+                                       "assay:settings", "assay:adaptive", "assay:seed",
+                                       "assay:cell",     "assay:samples"};
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
+        if (strcmp(attr(a, same[i]), attr(b, same[i])) != 0)
+            return err_set(e, "%s: %s was '%.300s', and is '%.300s' of what its command makes now",
+                           path, same[i], attr(a, same[i]), attr(b, same[i]));
+    return true;
+}
+
+static bool compare(const char *path, const struct image *a, const struct image *b,
+                    struct reproduced *out, struct err *e)
+{
+    if (a->width != b->width || a->height != b->height || a->channels != b->channels)
+        return err_set(e, "%s: %d x %d x %d values, made again %d x %d x %d", path, a->width,
+                       a->height, a->channels, b->width, b->height, b->channels);
+    size_t num = (size_t)a->width * (size_t)a->height * (size_t)a->channels;
+    for (size_t i = 0; i < num; i++) {
+        size_t c = i % (size_t)a->channels, p = i / (size_t)a->channels;
+        int other = image_channel(b, a->names[c]);
+        if (other < 0)
+            return err_set(e, "%s: made again it has no channel %s", path, a->names[c]);
+        const float *x = &a->data[i], *y = &b->data[p * (size_t)b->channels + (size_t)other];
+        uint32_t bits[2];
+        memcpy(&bits[0], x, sizeof *x);
+        memcpy(&bits[1], y, sizeof *y);
+        if (bits[0] != bits[1] && out->num_different++ == 0)
+            snprintf(out->first, sizeof out->first, "%s at pixel %zu,%zu: %.9g there, %.9g now",
+                     a->names[c], p % (size_t)a->width, p / (size_t)a->width, (double)*x,
+                     (double)*y);
+    }
+    out->num_values += (double)num;
+    return true;
+}
+
+static bool remake_render(const char *path, const struct image *im, char **word, int num,
+                          const struct reproduce_options *opt, const char *to,
+                          struct reproduced *out, struct err *e)
+{
+    char threads[16], log[MAX_PATH];
+    snprintf(threads, sizeof threads, "%d", opt->threads);
+    snprintf(log, sizeof log, "%s.log", to);
+    const char **argv = calloc((size_t)num + 12, sizeof *argv);
+    bool ok = (argv != NULL || err_set(e, "out of memory")) &&
+              command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, argv, e);
+    out->command[0] = '\0';
+    for (int i = 0;
+         ok && argv[i] != NULL && shell_append(out->command, sizeof out->command, argv[i]); i++)
+        continue;
+    const struct process p = {.argv = argv, .log = log};
+    ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
+    free(argv);
+    return ok;
+}
+
+static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
+                   struct reproduced *out, struct err *e);
+
+/* Shares are made again each and then put together; their paths are those of the command. */
+static bool remake_merge(const char *path, char **word, int num,
+                         const struct reproduce_options *opt, const char *to, int depth,
+                         struct reproduced *out, struct err *e)
+{
+    int shares = num - 3, read = 0;
+    struct share whole = {0}, *share = calloc((size_t)(shares > 0 ? shares : 1), sizeof *share);
+    bool ok = share != NULL || err_set(e, "out of memory");
+    if (ok && shares < 2)
+        ok = err_set(e, "%s: its command names no shares", path);
+    for (int i = 0; ok && i < shares; i++) {
+        char part[MAX_PATH];
+        snprintf(part, sizeof part, "%.4000s.%d.exr", to, i);
+        ok = access(word[3 + i], R_OK) == 0 ||
+             err_set(e, "%s: its share '%s' is not here: go where it was made", path, word[3 + i]);
+        ok = ok && remake(word[3 + i], opt, part, depth + 1, out, e) &&
+             share_read(part, &share[i], e);
+        read += ok;
+    }
+    ok = ok && merge_shares(share, shares, &whole, e) && share_write(to, &whole, "assay merge", e);
+    for (int i = 0; i < read; i++)
+        share_free(&share[i]);
+    free(share);
+    share_free(&whole);
+    out->command[0] = '\0';
+    for (int i = 0; ok && i < num && shell_append(out->command, sizeof out->command, word[i]); i++)
+        continue;
+    return ok;
+}
+
+/* Into the file `to`. */
+static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
+                   struct reproduced *out, struct err *e)
+{
+    enum { MOST_DEPTH = 16 };
+    struct image im = {0};
+    int num = 0;
+    if (depth > MOST_DEPTH)
+        return err_set(e, "%s: merged from itself", path);
+    if (!image_read_exr(path, &im, NULL, e))
+        return false;
+    const char *command = image_get_attr(&im, "assay:command");
+    char **word = NULL;
+    bool ok =
+        command != NULL || err_set(e, "%s: does not say by what command it was made%s", path,
+                                   image_get_attr(&im, "assay:engine") != NULL
+                                       ? ": a stored reference, of which its manifest.json says it"
+                                       : "");
+    if (ok && (word = shell_split(command, &num, e)) == NULL)
+        ok = err_prefix(e, "%s", path);
+    snprintf(out->made_by, sizeof out->made_by, "%s", attr(&im, "assay:version"));
+    if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
+        ok = remake_merge(path, word, num, opt, to, depth, out, e);
+    else if (ok)
+        ok = remake_render(path, &im, word, num, opt, to, out, e);
+    free(word);
+    image_free(&im);
+    return ok;
+}
+
+bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
+               struct err *e)
+{
+    struct image then = {0}, now = {0};
+    struct err ignored;
+    char dir[] = "/tmp/assay-reproduce.XXXXXX", to[MAX_PATH];
+    *out = (struct reproduced){.command = ""};
+    if (!image_read_exr(path, &then, NULL, e))
+        return false;
+    if (mkdtemp(dir) == NULL) {
+        image_free(&then);
+        return err_set(e, "%s: cannot make a directory", dir);
+    }
+    snprintf(to, sizeof to, "%s/again.exr", dir);
+    bool ok = remake(path, opt, to, 0, out, e) && image_read_exr(to, &now, NULL, e) &&
+              check_same(path, &then, &now, e) && compare(path, &then, &now, out, e);
+    if (ok && opt->keep != NULL)
+        ok = image_write_exr(opt->keep, &now, e);
+    image_free(&then);
+    image_free(&now);
+    bool removed = remove_tree(dir, &ignored);
+    (void)removed; /* it is in /tmp */
+    return ok;
+}

@@ -1,0 +1,27 @@
+/* Makes an output again from what it says of its origin, and compares. */
+#ifndef ASSAY_REPRODUCE_H
+#define ASSAY_REPRODUCE_H
+
+#include "../renderer/err.h"
+
+struct reproduce_options {
+    const char *pathtracer;
+    const char *scene; /* NULL: where the command says, from the current directory */
+    const char *keep;  /* file that gets the render made again; NULL: none */
+    int threads;       /* 0: all processors */
+};
+
+struct reproduced {
+    char command[8192]; /* that was run, or "assay merge ..." */
+    char made_by[128];  /* version and commit of the program that wrote the file */
+    double num_values, num_different;
+    char first[256]; /* where and what, of the first value that differs */
+};
+
+/* A picture with moments, of pathtracer or of `assay merge`, whose shares are then made again in turn. All channels are compared bit
+ * by bit. False if it cannot be judged: no provenance, a scene, camera or environment file that is not
+ * the one of then, a program that fails. That bits differ is no failure but num_different > 0. */
+bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
+               struct err *e) __attribute__((warn_unused_result));
+
+#endif

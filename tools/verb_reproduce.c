@@ -1,0 +1,81 @@
+#include "../renderer/cli.h"
+#include "../renderer/version.h"
+#include "places.h"
+#include "reproduce.h"
+#include "results.h"
+#include "verbs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_HELP };
+
+static const struct cli_option options[] = {
+    [OPT_SCENE] = {0, "scene", 1, "FILE", "where the scene is now (as the picture says)"},
+    [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the renderer (the one beside this program)"},
+    [OPT_KEEP] = {0, "keep", 1, "FILE", "write what was made again"},
+    [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+static void print_help(void)
+{
+    puts(
+        "usage: assay reproduce [options] PICTURE.exr\n\n"
+        "Renders again what made a picture of pathtracer or of `assay merge`, by the command, samples and\n"
+        "hashes in its metadata, and compares all values bit by bit. Exit code 0: the same, 1: not.\n");
+    cli_print_options(stdout, options);
+}
+
+int verb_reproduce(int argc, char **argv, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    char beside[4096];
+    struct reproduce_options opt = {.pathtracer = beside};
+    const char *path = NULL;
+    beside_program(beside, sizeof beside, "pathtracer");
+    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return EXIT_NOT_JUDGED;
+        bool ok = true;
+        if (i == CLI_POSITIONAL) {
+            ok = path == NULL || err_set(e, "reproduce takes one picture");
+            path = c.value[0];
+        } else if (i == OPT_SCENE) {
+            opt.scene = c.value[0];
+        } else if (i == OPT_PATHTRACER) {
+            opt.pathtracer = c.value[0];
+        } else if (i == OPT_KEEP) {
+            opt.keep = c.value[0];
+        } else if (i == OPT_THREADS) {
+            ok = cli_int("--threads", c.value[0], 0, 1024, &opt.threads, e);
+        } else {
+            print_help();
+            return 0;
+        }
+        if (!ok)
+            return EXIT_NOT_JUDGED;
+    }
+    if (path == NULL) {
+        err_set(e, "reproduce needs a picture (see --help)");
+        return EXIT_NOT_JUDGED;
+    }
+    struct reproduced *r = malloc(sizeof *r);
+    if (r == NULL || !reproduce(path, &opt, r, e)) {
+        if (r == NULL)
+            err_set(e, "out of memory");
+        free(r);
+        return EXIT_NOT_JUDGED;
+    }
+    bool same = r->num_different == 0;
+    if (same)
+        printf("%s: the same bits in all %.0f values\n", path, r->num_values);
+    else
+        printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r->num_different, r->num_values,
+               r->first);
+    printf("made again by: %s\n", r->command);
+    if (strcmp(r->made_by, assay_version) != 0)
+        printf("the picture is of version %s, this is %s\n", r->made_by, assay_version);
+    free(r);
+    return same ? 0 : 1;
+}
