@@ -36,7 +36,7 @@ is_whole() {
 kill_renders() {
     local dir=$tmp/render why="" k=0 before=0 now most start resume="" killed_at lag=0 n
     mkdir -p "$dir"
-    local render=("$pathtracer" -q -t 2 -r 48 32 -s 3000 --aov)
+    local render=("$pathtracer" -q -t 2 -r 48 32 -s 1000 --aov)
     start=$(milliseconds)
     "${render[@]}" --keep-state -f "$dir/whole.exr" "$scene" >/dev/null
     most=$((($(milliseconds) - start) / 2 + 60))
