@@ -239,6 +239,13 @@ struct pool {
     int consistent_view;    /* -1: none */
 };
 
+/* All samples have one value. A rare event in one render of the pool moves the pool's mean, and with it the others away
+ * from the value that they have: such a cell stays as it was rendered. */
+static bool is_still(const struct sight *s, int value)
+{
+    return sqrt(s->var[value]) <= 1e-5 * s->mean[value];
+}
+
 static void draw_cells(const struct rates *r, const struct pool *p, int view, uint64_t *state,
                        struct clue *out)
 {
@@ -248,7 +255,8 @@ static void draw_cells(const struct rates *r, const struct pool *p, int view, ui
         const struct sight *from = &p->task[(int)(uniform(state) * POOL)].clue[view].seen;
         for (int j = 3 * i; j < 3 * i + 3; j++) {
             double noise = (from->mean[j] - p->mean[view][j]) * sqrt(POOL / (POOL - 1.0));
-            out->seen.mean[j] = fmax(0, c->mean[j] + noise + sqrt(c->var[j]) * normal(state));
+            double moved = fmax(0, c->mean[j] + noise + sqrt(c->var[j]) * normal(state));
+            out->seen.mean[j] = is_still(from, j) && is_still(c, j) ? from->mean[j] : moved;
             out->seen.var[j] = from->var[j];
             out->seen.k3[j] = from->k3[j];
         }
