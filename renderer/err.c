@@ -4,9 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What a file or a library said may end up in the line: a terminal must not obey it, and a log must not
- * take it for two lines. */
-static void hide_controls(char *text)
+void err_hide_controls(char *text)
 {
     for (char *c = text; *c != '\0'; c++)
         if ((unsigned char)*c < ' ' || *c == 127)
@@ -21,7 +19,7 @@ bool(err_set)(struct err *e, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(e->msg, sizeof e->msg, fmt, ap);
     va_end(ap);
-    hide_controls(e->msg);
+    err_hide_controls(e->msg);
     return false;
 }
 
@@ -35,7 +33,7 @@ bool(err_prefix)(struct err *e, const char *fmt, ...)
     va_start(ap, fmt);
     int n = vsnprintf(e->msg, sizeof e->msg, fmt, ap);
     va_end(ap);
-    hide_controls(e->msg);
+    err_hide_controls(e->msg);
     if (n < 0 || (size_t)n + 2 >= sizeof e->msg)
         return false;
     memcpy(e->msg + n, ": ", 2);

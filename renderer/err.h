@@ -20,6 +20,10 @@ bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 
  * returns false. */
 bool err_prefix(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
+/* Each control character becomes a '?'. What a file or a library said may end up in a line: a terminal must not obey
+ * it, and a log must not take it for two lines. */
+void err_hide_controls(char *text);
+
 /* `make lint` looks at one file at a time and would follow the paths on which these return true. */
 #ifdef __clang_analyzer__
 #define err_set(...)    ((void)err_set(__VA_ARGS__), false)

@@ -196,6 +196,7 @@ static void each_mistake_is_named_with_its_line(void **state)
     expect(4, "needs a whole number", with(4, " size 64"));
     expect(10, "must be less", with(10, " image 0.05 0.01"));
     expect(9, "needs 'image'", with(10, ""));
+    expect(7, "'refer?[31mense?'", with(7, " refer\x1b[31mense\x7f truth\n reference truth"));
     expect(7, "'referense'", with(7, " referense truth\n reference truth"));
     expect(12, "already in line 9",
            with(11, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2"));

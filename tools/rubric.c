@@ -32,6 +32,7 @@ void mistake(struct rubric_mistakes *m, int line, const char *format, ...)
         m->at[m->num].line = line;
         vsnprintf(m->at[m->num].text, sizeof m->at->text, format, ap);
         va_end(ap);
+        err_hide_controls(m->at[m->num].text);
     }
     m->num++;
 }

@@ -12,7 +12,7 @@ static void check_mistakes(const struct rubric_mistakes *m)
     fuzz_require(m->num >= 0, "a count of mistakes below 0");
     for (int i = 0; i < kept; i++) {
         fuzz_require(m->at[i].text[0] != '\0', "a mistake without a word");
-        fuzz_require(strchr(m->at[i].text, '\n') == NULL, "a mistake of more than one line");
+        fuzz_require(strpbrk(m->at[i].text, "\n\r\x1b") == NULL, "control characters in a mistake");
         fuzz_require(i == 0 || m->at[i - 1].line <= m->at[i].line, "mistakes out of order");
     }
 }
