@@ -641,7 +641,8 @@ INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int 
 }
 
 /* integrate_normals() of integrator.c, behind the rays. */
-static void show_normals(const struct integrator *it, struct batch *b, int n)
+static __attribute__((noinline)) void show_normals(const struct integrator *it, struct batch *b,
+                                                   int n)
 {
     const struct scene *s = it->scene;
     const vf zero = vf_set(0);

@@ -5,30 +5,33 @@
 #include "wide_packet.h"
 #include "wide_single.h"
 
-/* The list beside the tree, first; lanes that the tree is for. */
-INLINE unsigned trace_list(const struct wide *w, struct octet *o, const uint16_t *eight, bool any,
-                           struct hits *h, bool *occluded, struct bvh_stats *stats)
+/* The list beside the tree, first: results of all lanes, what is met so far into o, and the lanes that the
+ * tree is for. Functions of their own, or gcc takes minutes with sanitizers. */
+static __attribute__((noinline)) unsigned closest_beside(const struct wide *w, struct octet *o,
+                                                         const uint16_t *eight, struct hits *h)
 {
-    const struct wide_flat *f = w->flat;
-    stats->primitive_tests += w->num_list_leaves;
-    if (any) {
-        vi met = list_occluded_eight(f, o, true);
-        octet_store_flags(o, eight, bits(met), occluded);
-        o->limit = vf_select(met, vf_set(-INFINITY), o->limit);
-        o->prim = vi_select(met, vi_set(0), o->prim);
-        return octet_box(w, o);
-    }
     struct list_hits best;
-    list_closest_eight(f, o, &best);
-    vi met = vi_lt(vi_set(-1), best.prim), prim = vi_set(-1);
+    list_closest_eight(w->flat, o, &best);
+    int32_t place[LANES];
+    vf_store_any(place, (vf)best.prim);
     for (int i = 0; i < LANES; i++)
-        if (best.prim[i] >= 0)
-            prim[i] = f->number[best.prim[i]];
+        place[i] = place[i] < 0 ? -1 : w->flat->number[place[i]];
+    vi prim = vi_load_any(place), met = vi_lt(vi_set(-1), prim);
     octet_store(o, eight, best.t, best.u, best.v, prim, h);
     o->limit = vf_select(met, best.t, o->limit);
     o->prim = vi_select(met, prim, o->prim);
     o->u = best.u;
     o->v = best.v;
+    return octet_box(w, o);
+}
+
+static __attribute__((noinline)) unsigned occluded_beside(const struct wide *w, struct octet *o,
+                                                          const uint16_t *eight, bool *occluded)
+{
+    vi met = list_occluded_eight(w->flat, o, true);
+    octet_store_flags(o, eight, bits(met), occluded);
+    o->limit = vf_select(met, vf_set(-INFINITY), o->limit);
+    o->prim = vi_select(met, vi_set(0), o->prim);
     return octet_box(w, o);
 }
 
@@ -46,8 +49,10 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
         if (any)
             octet_ignore(r, eight, o);
         octet_slabs(w, o);
-        if (w->flat != NULL)
-            open &= trace_list(w, o, eight, any, h, occluded, stats);
+        if (w->flat != NULL) {
+            stats->primitive_tests += w->num_list_leaves;
+            open &= any ? occluded_beside(w, o, eight, occluded) : closest_beside(w, o, eight, h);
+        }
         if (open == 0)
             continue;
         if (full && are_alike(w, o)) {

@@ -301,8 +301,9 @@ INLINE vi list_occluded_eight(const struct wide_flat *f, struct octet *q, bool i
     return list_occluded_exact(f, q);
 }
 
-static void list_closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
-                         struct hits *h, struct bvh_stats *stats)
+static __attribute__((noinline)) void list_closest(const struct wide *w, const struct rays *r,
+                                                   const uint16_t *lane, int n, struct hits *h,
+                                                   struct bvh_stats *stats)
 {
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
@@ -317,8 +318,9 @@ static void list_closest(const struct wide *w, const struct rays *r, const uint1
     }
 }
 
-static void list_occluded(const struct wide *w, const struct rays *r, const uint16_t *lane, int n,
-                          bool *occluded, struct bvh_stats *stats)
+static __attribute__((noinline)) void list_occluded(const struct wide *w, const struct rays *r,
+                                                    const uint16_t *lane, int n, bool *occluded,
+                                                    struct bvh_stats *stats)
 {
     for (int k = 0; k < n; k += LANES) {
         struct octet q;
