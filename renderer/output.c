@@ -52,8 +52,7 @@ enum { COMMAND_SIZE = 8192 };
 static void command_line(const struct output *o, char text[COMMAND_SIZE])
 {
     text[0] = '\0';
-    for (int i = 0; i < o->argc && shell_append(text, COMMAND_SIZE, o->argv[i]); i++)
-        continue;
+    shell_append_all(text, COMMAND_SIZE, (const char *const *)o->argv);
 }
 
 static bool write_exr(const struct output *o, const char *path, const struct film *f,

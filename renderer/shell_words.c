@@ -21,6 +21,12 @@ bool shell_append(char *text, size_t size, const char *word)
     return true;
 }
 
+void shell_append_all(char *text, size_t size, const char *const *word)
+{
+    while (*word != NULL && shell_append(text, size, *word))
+        word++;
+}
+
 /* One word from *text on, unquoted to *to with its zero; false on what is not accepted. */
 static bool take_word(const char **text, char **to)
 {

@@ -10,6 +10,9 @@
  * text as it was, if it does not fit. */
 bool shell_append(char *text, size_t size, const char *word);
 
+/* Appends the words of a NULL-terminated array, as many as fit. */
+void shell_append_all(char *text, size_t size, const char *const *word);
+
 /* The words of a text that shell_append() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated
  * array, one block of memory, to free(). NULL with a line on anything else that a shell would act on, on an open quote,
  * and out of memory. */

@@ -563,28 +563,7 @@ sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubric
 expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
-cat >"$tmp/quick.rubric" <<'EOF'
-rubric Quick
-curve srgb
-command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}
-limit wall 10
-limit cpu 10
-limit memory 512
-limit disk 16
-limit processes 16
-total 8
-picture point
-  scene 12_point_plane
-  size 64 64
-  spp 16
-  bounces 1
-  reference truth
-part 1 Light
-check point 8 equal point
-  image 0.01 0.05
-  tile 0.03 0.12
-  hint falls with the square
-EOF
+cp tests/quick.rubric "$tmp/quick.rubric"
 mkdir -p "$tmp/subs" "$tmp/subs/pictures" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
 sub() { # NAME: a shell script from stdin
     { echo '#!/bin/sh' && cat; } >"$tmp/subs/$1" && chmod +x "$tmp/subs/$1"

@@ -123,6 +123,15 @@ static void check(const char *what, const struct moments *m, const struct sums *
     assert_true(worst < bound);
 }
 
+static void merge_in_turn(const struct blocks *b, int merges, struct moments *all,
+                          struct sums *sums)
+{
+    for (int i = 0; i < merges; i++)
+        merge(all, &b->m[i % NUM_BLOCKS]);
+    for (int i = 0; i < NUM_BLOCKS; i++)
+        add_sums(sums, &b->s[i], merges / NUM_BLOCKS);
+}
+
 /* One after the other, as passes come: 10^6 blocks of 10^4. */
 static void a_long_row_of_merges_does_not_drift(void **state)
 {
@@ -134,10 +143,7 @@ static void a_long_row_of_merges_does_not_drift(void **state)
     struct err e;
     make_blocks(&b);
     assert_true(moments_alloc(&all, 1, 1, &e));
-    for (int i = 0; i < MERGES; i++)
-        merge(&all, &b.m[i % NUM_BLOCKS]);
-    for (int i = 0; i < NUM_BLOCKS; i++)
-        add_sums(&sums, &b.s[i], MERGES / NUM_BLOCKS);
+    merge_in_turn(&b, MERGES, &all, &sums);
     check("one after the other", &all, &sums, MERGES);
     moments_free(&all);
     free_blocks(&b);
@@ -173,10 +179,7 @@ static void drift_would_be_seen(void **state)
     make_blocks(&b);
     assert_true(moments_alloc(&all, 1, 1, &e));
     b.m[3].mean[1] *= 1 + 1e-9;
-    for (int i = 0; i < MERGES; i++)
-        merge(&all, &b.m[i % NUM_BLOCKS]);
-    for (int i = 0; i < NUM_BLOCKS; i++)
-        add_sums(&sums, &b.s[i], MERGES / NUM_BLOCKS);
+    merge_in_turn(&b, MERGES, &all, &sums);
     double each[3];
     assert_true(worst_error(&all, &sums, each) > 100 * sqrt(MERGES) * 0x1p-53);
     moments_free(&all);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+const double float_tolerance = 1e-5;
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
 struct estimate estimate_from(double mean, double v, double k3, double n)
@@ -82,13 +83,13 @@ static double log10_one_value_each(double n, double m)
 
 static bool one_value(const struct moments *m, size_t pixel, int channel)
 {
-    static const double rounding = 1e-5; /* of float32 arithmetic on equal paths, relative */
     bool observed = strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "replicate") == 0;
     int first = channel < CHANNEL_LUMINANCE ? channel : 0;
     int last = channel < CHANNEL_LUMINANCE ? channel : 2;
     for (int c = first; observed && c <= last; c++) {
         size_t i = 3 * pixel + (size_t)c;
-        observed = m->mean[i] > 0 && m->m2[i] <= (m->n[pixel] - 1) * pow(rounding * m->mean[i], 2);
+        observed =
+            m->mean[i] > 0 && m->m2[i] <= (m->n[pixel] - 1) * pow(float_tolerance * m->mean[i], 2);
     }
     return observed;
 }

@@ -7,7 +7,6 @@
 
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
 static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
-static const double float_tolerance = 1e-5; /* relative: two engines' float32 arithmetic */
 static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;

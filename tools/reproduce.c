@@ -133,9 +133,8 @@ static bool remake_render(const char *path, const struct image *im, char **word,
     bool ok = (argv != NULL || err_set(e, "out of memory")) &&
               command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, argv, e);
     out->command[0] = '\0';
-    for (int i = 0;
-         ok && argv[i] != NULL && shell_append(out->command, sizeof out->command, argv[i]); i++)
-        continue;
+    if (ok)
+        shell_append_all(out->command, sizeof out->command, argv);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
     free(argv);
@@ -170,8 +169,8 @@ static bool remake_merge(const char *path, char **word, int num,
     free(share);
     share_free(&whole);
     out->command[0] = '\0';
-    for (int i = 0; ok && i < num && shell_append(out->command, sizeof out->command, word[i]); i++)
-        continue;
+    if (ok)
+        shell_append_all(out->command, sizeof out->command, (const char *const *)word);
     return ok;
 }
 

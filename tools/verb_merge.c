@@ -43,8 +43,7 @@ int verb_merge(int argc, char **argv, struct err *e)
         err_set(e, "merge needs an output and two shares or more (see --help)");
         goto done;
     }
-    for (int i = 0; i < argc && shell_append(command, sizeof command, argv[i]); i++)
-        continue;
+    shell_append_all(command, sizeof command, (const char *const *)argv);
     if (merge_shares(share, num, &whole, e) && share_write(out, &whole, command, e)) {
         printf("%s\n", out);
         code = 0;
