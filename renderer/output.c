@@ -47,19 +47,13 @@ static bool write_rates(const char *png, const struct film *f, int most, struct 
     return ok;
 }
 
-enum { COMMAND_SIZE = 8192 };
-
-static void command_line(const struct output *o, char text[COMMAND_SIZE])
-{
-    text[0] = '\0';
-    shell_append_all(text, COMMAND_SIZE, (const char *const *)o->argv);
-}
-
 static bool write_exr(const struct output *o, const char *path, const struct film *f,
                       const struct render_stats *stats, struct err *e)
 {
-    char command[COMMAND_SIZE], samples[64], seconds[64] = "", rays[128] = "";
-    command_line(o, command);
+    char samples[64], seconds[64] = "", rays[128] = "";
+    char *command = shell_join(NULL, (const char *const *)o->argv);
+    if (command == NULL)
+        return err_set(e, "%s: out of memory", path);
     snprintf(samples, sizeof samples, "%d:%lld", o->opt->first,
              (long long)o->opt->first + f->num_samples);
     if (stats != NULL) {
@@ -83,11 +77,11 @@ static bool write_exr(const struct output *o, const char *path, const struct fil
                                        {"assay:rays", rays}};
     int num_attrs = (int)(sizeof attrs / sizeof attrs[0]) - (stats == NULL ? 2 : 0);
     struct image layers = {0};
-    if (f->first != NULL && !film_layers(f, &layers, e))
-        return false;
     bool ok =
+        (f->first == NULL || film_layers(f, &layers, e)) &&
         moments_write_layers(path, &f->m, f->first != NULL ? &layers : NULL, attrs, num_attrs, e);
     image_free(&layers);
+    free(command);
     return ok;
 }
 
@@ -148,12 +142,14 @@ void print_summary(const struct output *o, const struct film *f, const struct re
 
 void print_how_to_resume(const struct output *o, const struct film *f)
 {
-    char command[COMMAND_SIZE];
-    command_line(o, command);
-    if (o->opt->resume == NULL && strlen(command) + 32 < COMMAND_SIZE) {
-        strcat(command, " --resume");
-        shell_append(command, COMMAND_SIZE, o->opt->output[0]);
-    }
-    fprintf(stderr, "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s\n",
-            (unsigned long)f->num_samples, o->opt->last - o->opt->first, command);
+    const char *const picture[] = {o->opt->output[0], NULL};
+    char *command = shell_join(NULL, (const char *const *)o->argv);
+    char *more = o->opt->resume == NULL ? shell_join("--resume", picture) : NULL;
+    fprintf(stderr,
+            "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s%s%s\n",
+            (unsigned long)f->num_samples, o->opt->last - o->opt->first,
+            command != NULL ? command : "the same command", more != NULL ? " " : "",
+            more != NULL ? more : "");
+    free(command);
+    free(more);
 }
