@@ -77,12 +77,12 @@ tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/te
 	tests/tsan.sh $(BUILD)/tsan $(THREADED)
 
 # kill -9 at 200 moments each of a render, a golden update, a grading batch, a report and a validation; every allocation
-# failed in turn (an hour).
+# failed in turn (an hour; ONLY="kill_golden ...": parts of it).
 faults: $(BUILD)/pathtracer $(BUILD)/assay
-	tests/faults.sh $(BUILD) 200 1
+	tests/faults.sh $(BUILD) 200 1 $(ONLY)
 
-# Lines of renderer/ and tools/ that the tests and the end-to-end runs reach.
-coverage: $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
+# Lines of renderer/, reference/ and tools/ that the tests and the end-to-end runs reach.
+coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
 	tests/coverage.sh $(BUILD) $(patsubst %,$(BUILD)/cov/%,$(TESTS))
 
@@ -164,7 +164,7 @@ help:
 	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes)'
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
-	@echo 'make coverage   lines of renderer/ and tools/ that the tests reach (an hour)'
+	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (half an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
@@ -194,7 +194,7 @@ $(BUILD)/clang/%: WERROR := 1
 $(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
 $(BUILD)/cov/%: CC := clang
 $(BUILD)/cov/%: CXX := clang++
-$(BUILD)/cov/%: OPT := -O1 -g -fprofile-instr-generate -fcoverage-mapping
+$(BUILD)/cov/%: OPT := -O2 -g -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: WERROR := 1
 
 define compile_c

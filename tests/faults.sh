@@ -1,12 +1,17 @@
 #!/bin/bash
-# tests/faults.sh BUILD [KILLS [STEP]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
-# render, a golden update, a grading batch and a report: no output is ever half written, going on ends with the bits of an
-# uninterrupted run. Full disk, read-only directory, closed pipe. Every STEP-th allocation (61st) fails in turn, in pathtracer
+# tests/faults.sh BUILD [KILLS [STEP [PART...]]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
+# render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
+# of an uninterrupted run. Full disk, read-only directory, closed pipe. Every STEP-th allocation (61st) fails in turn, in pathtracer
 # and in assay: one line and exit 3, or the right answer. Prints "ok NAME" or "not ok NAME: why".
+# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory (all; disk uses what grading and
+# validation leave).
 set -u
-build=$(realpath "${1:?usage: tests/faults.sh BUILD [KILLS [STEP]]}") kills=${2:-6} step=${3:-61}
+build=$(realpath "${1:?usage: tests/faults.sh BUILD [KILLS [STEP [PART...]]]}") kills=${2:-6} step=${3:-61}
+shift $(($# > 3 ? 3 : $#))
+[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory
 pathtracer=$build/pathtracer assay=$build/assay scene=$PWD/reference/scenes/41_cornell.dae
 tmp=$(mktemp -d)
+# What is killed here, or has no disk, keeps no counts for tests/coverage.sh (LLVM_PROFILE_FILE): it would spoil those of the others.
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 RANDOM=1 # the moments are the same parts of a run in every run of this script
@@ -18,12 +23,14 @@ tell() { # NAME WHY: not ok where WHY says something
     fi
 }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
-# killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself.
+# killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself, else counted in hits.
+hits=0
 killed() {
     local part=$((1 + RANDOM * $1 / 32767)) status
     shift
-    { timeout -s KILL "$(printf '%d.%03d' $((part / 1000)) $((part % 1000)))" "$@" >"$tmp/out" 2>"$tmp/err" </dev/null; } 2>/dev/null
+    { LLVM_PROFILE_FILE=/dev/null timeout -s KILL "$(printf '%d.%03d' $((part / 1000)) $((part % 1000)))" "$@" >"$tmp/out" 2>"$tmp/err" </dev/null; } 2>/dev/null
     status=$?
+    [ $status -eq 137 ] && hits=$((hits + 1))
     [ $status -ne 137 ] && [ $status -ne 0 ] && echo "status $status: $(head -c 300 "$tmp/err")" >>"$tmp/why"
     return $status
 }
@@ -61,7 +68,7 @@ kill_renders() {
     [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr" || resume=""
     [ -z "$why" ] && "${render[@]}" --keep-state $resume -f "$dir/x.exr" "$scene" >/dev/null 2>"$tmp/err"
     [ -z "$why" ] && ! cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null && why="other bits at the end: $(cat "$tmp/err")"
-    tell "kill -9, $kills moments of a render: whole pictures, none of the samples lost, the same bits" "$why"
+    tell "kill -9, $kills moments of a render ($hits before its end): whole pictures, none of the samples lost, the same bits" "$why"
 }
 
 # New references that differ in the last bits from those stored.
@@ -112,7 +119,7 @@ kill_golden() {
     "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >/dev/null 2>&1
     [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") && why="other images at the end"
     [ -z "$why" ] && [ -n "$(find "$store" -name '*.next')" ] && why="an image is left beside its place"
-    tell "kill -9, $kills moments of a golden update: no reference is lost, the same images at the end" "$why"
+    tell "kill -9, $kills moments of a golden update ($hits before its end): no reference is lost, the same images at the end" "$why"
 }
 
 kill_grading() {
@@ -143,7 +150,7 @@ kill_grading() {
     done
     "$assay" grade -q -o "$out" "$tmp/quick.rubric" "$tmp/subs"/* >/dev/null 2>&1
     [ -z "$why" ] && ! cmp -s "$tmp/straight_grades/grades.csv" "$out/grades.csv" && why="other points at the end"
-    tell "kill -9, $kills moments of a grading batch: no half of a file, the same points at the end" "$why"
+    tell "kill -9, $kills moments of a grading batch ($hits before its end): no half of a file, the same points at the end" "$why"
 }
 # A JSON file is whole when its braces close; the last byte that is no blank says it, since all are objects.
 json_is_whole() { [ "$(tr -d ' \n' <"$1" | tail -c 1)" = "}" ] && [ "$(tr -d ' \n' <"$1" | head -c 1)" = "{" ]; }
@@ -165,7 +172,7 @@ kill_report() {
         [ -e "$dir/index.html" ] && ! cmp -s "$tmp/page.html" "$dir/index.html" && why="kill $k left another page"
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
     done
-    tell "kill -9, $kills moments of a report: the whole page or none" "$why"
+    tell "kill -9, $kills moments of a report ($hits before its end): the whole page or none" "$why"
 }
 
 kill_validation() {
@@ -188,7 +195,7 @@ kill_validation() {
     done
     "$assay" report --markdown "$tmp/straight_suite/results.json" >"$tmp/a.md" && "$assay" report --markdown "$dir/results.json" >"$tmp/b.md"
     cmp -s "$tmp/a.md" "$tmp/b.md" || why="${why:-other verdicts at the end: $(diff "$tmp/a.md" "$tmp/b.md" | head -n 5)}"
-    tell "kill -9, $kills moments of a validation: whole results or none, the same verdicts at the end" "$why"
+    tell "kill -9, $kills moments of a validation ($hits before its end): whole results or none, the same verdicts at the end" "$why"
 }
 
 # refused NAME PATTERN DIR COMMAND...: exit 3, one line with the pattern, and DIR as it was.
@@ -211,6 +218,7 @@ cat >"$tmp/limited" <<'END'
 trap '' XFSZ
 ulimit -f "$1"
 shift
+export LLVM_PROFILE_FILE=/dev/null
 exec "$@"
 END
 chmod +x "$tmp/limited"
@@ -246,7 +254,7 @@ disk() {
         else tell "disk full: what ${small##*/} prints" "$(head -c 300 "$tmp/err")"; fi
     done
     if bwrap --ro-bind / / --dev /dev true 2>/dev/null; then
-        local ro=(bwrap --ro-bind / / --dev /dev)
+        local ro=(env LLVM_PROFILE_FILE=/dev/null bwrap --ro-bind / / --dev /dev)
         refused "read-only directory: a picture" "n.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$pathtracer" -q -r 8 8 -f "$dir/n.exr" "$scene"
         refused "read-only directory: merge" "m.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
         refused "read-only directory: a validation" "Read-only" "$dir" "${ro[@]}" "$assay" validate -q --only 12_point_plane --out "$dir/v"
@@ -316,12 +324,8 @@ clock() {
     tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
 }
 
-kill_renders
-kill_golden
-kill_grading
-kill_report
-kill_validation
-disk
-clock
-memory
+for part in "$@"; do
+    hits=0
+    $part
+done
 [ $failures -eq 0 ]
