@@ -559,7 +559,7 @@ INLINE void sample_bsdf(const struct integrator *it, const struct batch *b, int 
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
 {
     if (o->roulette == ROULETTE_THROUGHPUT && vertex >= 2)
-        return vf_min(vf_set(1), rgb_maxv(throughput) * eta2);
+        return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
     return vf_set(o->roulette == ROULETTE_FIXED && vertex >= 1 ? o->survival : 1);
 }
 
