@@ -22,6 +22,9 @@ tell() { # NAME WHY: not ok where WHY says something
         failures=$((failures + 1))
     fi
 }
+# As many kills as asked for, of at most five times as many tries.
+more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills)) ]; }
+too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
 # killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself, else counted in hits.
 hits=0
@@ -48,7 +51,7 @@ kill_renders() {
     "${render[@]}" --keep-state -f "$dir/whole.exr" "$scene" >/dev/null
     most=$((($(milliseconds) - start) / 2 + 60))
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr"
         if killed $most "${render[@]}" --keep-state --write-every 0.05 $resume -f "$dir/x.exr" "$scene"; then
             # It came to its end: again from the start.
@@ -68,7 +71,7 @@ kill_renders() {
     [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr" || resume=""
     [ -z "$why" ] && "${render[@]}" --keep-state $resume -f "$dir/x.exr" "$scene" >/dev/null 2>"$tmp/err"
     [ -z "$why" ] && ! cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null && why="other bits at the end: $(cat "$tmp/err")"
-    tell "kill -9, $kills moments of a render ($hits before its end): whole pictures, none of the samples lost, the same bits" "$why"
+    tell "kill -9, $hits moments of a render ($k tries): whole pictures, none of the samples lost, the same bits" "${why:-$(too_few $k)}"
 }
 
 # New references that differ in the last bits from those stored.
@@ -106,7 +109,7 @@ kill_golden() {
     cmp -s "$tmp/straight.txt" <(hashes "$tmp/first") && why="nothing was updated"
     rm -f "$tmp/why"
     cp -r "$tmp/first" "$store"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names
         [ $? -eq 0 ] && rm -rf "$store" && cp -r "$tmp/first" "$store"
         k=$((k + 1))
@@ -119,7 +122,7 @@ kill_golden() {
     "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >/dev/null 2>&1
     [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") && why="other images at the end"
     [ -z "$why" ] && [ -n "$(find "$store" -name '*.next')" ] && why="an image is left beside its place"
-    tell "kill -9, $kills moments of a golden update ($hits before its end): no reference is lost, the same images at the end" "$why"
+    tell "kill -9, $hits moments of a golden update ($k tries): no reference is lost, the same images at the end" "${why:-$(too_few $k)}"
 }
 
 kill_grading() {
@@ -139,7 +142,7 @@ kill_grading() {
     most=$(($(milliseconds) - start))
     [ "$(grep -c '"8.00"\|8\.00' "$tmp/straight_grades/grades.csv")" -gt 2 ] || why="$(cat "$tmp/straight_grades/grades.csv")"
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "$assay" grade -q -o "$out" "$tmp/quick.rubric" "$tmp/subs"/*
         [ $? -eq 0 ] && rm -rf "$out"
         k=$((k + 1))
@@ -150,7 +153,7 @@ kill_grading() {
     done
     "$assay" grade -q -o "$out" "$tmp/quick.rubric" "$tmp/subs"/* >/dev/null 2>&1
     [ -z "$why" ] && ! cmp -s "$tmp/straight_grades/grades.csv" "$out/grades.csv" && why="other points at the end"
-    tell "kill -9, $kills moments of a grading batch ($hits before its end): no half of a file, the same points at the end" "$why"
+    tell "kill -9, $hits moments of a grading batch ($k tries): no half of a file, the same points at the end" "${why:-$(too_few $k)}"
 }
 # A JSON file is whole when its braces close; the last byte that is no blank says it, since all are objects.
 json_is_whole() { [ "$(tr -d ' \n' <"$1" | tail -c 1)" = "}" ] && [ "$(tr -d ' \n' <"$1" | head -c 1)" = "{" ]; }
@@ -165,14 +168,14 @@ kill_report() {
     [ -s "$dir/index.html" ] || why="no page"
     cp "$dir/index.html" "$tmp/page.html"
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         [ $((k % 2)) -eq 0 ] && rm -f "$dir/index.html"
         killed $most "$assay" report "$dir/results.json"
         k=$((k + 1))
         [ -e "$dir/index.html" ] && ! cmp -s "$tmp/page.html" "$dir/index.html" && why="kill $k left another page"
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
     done
-    tell "kill -9, $kills moments of a report ($hits before its end): the whole page or none" "$why"
+    tell "kill -9, $hits moments of a report ($k tries): the whole page or none" "${why:-$(too_few $k)}"
 }
 
 kill_validation() {
@@ -182,7 +185,7 @@ kill_validation() {
     "${validate[@]}" --out "$tmp/straight_suite" >/dev/null 2>&1
     most=$(($(milliseconds) - start))
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "${validate[@]}" --out "$dir"
         [ $? -eq 0 ] && rm -rf "$dir"
         k=$((k + 1))
@@ -195,7 +198,7 @@ kill_validation() {
     done
     "$assay" report --markdown "$tmp/straight_suite/results.json" >"$tmp/a.md" && "$assay" report --markdown "$dir/results.json" >"$tmp/b.md"
     cmp -s "$tmp/a.md" "$tmp/b.md" || why="${why:-other verdicts at the end: $(diff "$tmp/a.md" "$tmp/b.md" | head -n 5)}"
-    tell "kill -9, $kills moments of a validation ($hits before its end): whole results or none, the same verdicts at the end" "$why"
+    tell "kill -9, $hits moments of a validation ($k tries): whole results or none, the same verdicts at the end" "${why:-$(too_few $k)}"
 }
 
 # refused NAME PATTERN DIR COMMAND...: exit 3, one line with the pattern, and DIR as it was.
