@@ -656,6 +656,11 @@ tests/limits.sh "$build" >"$tmp/limits"
 cat "$tmp/limits"
 failures=$((failures + $(grep -c '^not ok' "$tmp/limits")))
 
+# Verbs, and ways through them, that nothing above takes.
+tests/verbs.sh "$build" >"$tmp/verbs"
+cat "$tmp/verbs"
+failures=$((failures + $(grep -c '^not ok' "$tmp/verbs")))
+
 # Kills, full disks and missing memory.
 tests/faults.sh "$build" 2 499 >"$tmp/faults"
 cat "$tmp/faults"
