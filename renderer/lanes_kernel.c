@@ -671,7 +671,7 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 {
     const bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     generate(it, b, n);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < BATCH_LANES; i++) /* n of paths, but of shadow rays there may be more */
         b->active[i] = (uint16_t)i;
     if (it->opt.kind == INTEGRATE_NORMALS) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
