@@ -44,7 +44,7 @@ is_whole() {
 }
 
 kill_renders() {
-    local dir=$tmp/render why="" k=0 before=0 now most start resume="" killed_at lag=0 n
+    local dir=$tmp/render why="" k=0 before=0 most start began resume="" lost=0 now n
     mkdir -p "$dir"
     local render=("$pathtracer" -q -t 2 -r 48 32 -s 1000 --aov)
     start=$(milliseconds)
@@ -53,10 +53,17 @@ kill_renders() {
     rm -f "$tmp/why"
     while more_kills $k && [ -z "$why" ]; do
         [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr"
+        began=$(milliseconds)
         if killed $most "${render[@]}" --keep-state --write-every 0.05 $resume -f "$dir/x.exr" "$scene"; then
             # It came to its end: again from the start.
             cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null || why="other bits after $k kills"
             rm -f "$dir"/x.exr* && resume="" && before=0
+        else
+            # What was done since the state was written, or since the start.
+            now=$(milliseconds)
+            n=$(stat -c %.3Y "$dir/x.exr.state" 2>/dev/null | tr -d .)
+            [ "${n:-0}" -gt "$began" ] && began=$n
+            [ $((now - began)) -gt $lost ] && lost=$((now - began))
         fi
         k=$((k + 1))
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
@@ -71,7 +78,7 @@ kill_renders() {
     [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr" || resume=""
     [ -z "$why" ] && "${render[@]}" --keep-state $resume -f "$dir/x.exr" "$scene" >/dev/null 2>"$tmp/err"
     [ -z "$why" ] && ! cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null && why="other bits at the end: $(cat "$tmp/err")"
-    tell "kill -9, $hits moments of a render ($k tries): whole pictures, none of the samples lost, the same bits" "${why:-$(too_few $k)}"
+    tell "kill -9, $hits moments of a render ($k tries): whole pictures, no written sample lost (at most $lost ms of work), the same bits" "${why:-$(too_few $k)}"
 }
 
 # New references that differ in the last bits from those stored.
@@ -226,12 +233,16 @@ exec "$@"
 END
 chmod +x "$tmp/limited"
 
+render_shares() {
+    "$pathtracer" -q -r 64 64 --samples 4:8 -f "$tmp/share1.exr" "$scene" >/dev/null
+    "$pathtracer" -q -r 64 64 --samples 0:4 -f "$tmp/share0.exr" "$scene" >/dev/null
+}
+
 disk() {
     local dir=$tmp/disk small
     mkdir -p "$dir"
     "$pathtracer" -q -r 64 64 -s 4 -f "$dir/x.exr" -f "$dir/x.png" "$scene" >/dev/null
-    "$pathtracer" -q -r 64 64 --samples 4:8 -f "$tmp/share1.exr" "$scene" >/dev/null
-    "$pathtracer" -q -r 64 64 --samples 0:4 -f "$tmp/share0.exr" "$scene" >/dev/null
+    render_shares
     refused "disk full: a picture; the one before stays" "x.exr: cannot write: File too large" "$dir" \
         "$tmp/limited" 16 "$pathtracer" -q -r 64 64 -s 8 -f "$dir/x.exr" "$scene"
     refused "disk full: a PNG picture" "x.png: cannot write" "$dir" \
@@ -242,6 +253,11 @@ disk() {
     refused "disk full: merge" "m.exr: cannot write: File too large" "$dir" \
         "$tmp/limited" 16 "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
     refused "disk full: export" "cannot write.*: File too large" "$dir" "$tmp/limited" 1 "$assay" export -o "$dir/s.pov" "$scene"
+    refused "disk full: a comparison" "c.json.z.exr: cannot write: File too large" "$dir" \
+        "$tmp/limited" 4 "$assay" compare -q --margin 0.9 --margin-tile 0.9 --json "$dir/c.json" "$tmp/share0.exr" "$tmp/share1.exr"
+    refused "disk full: a validation" "cannot write: File too large" "$dir" \
+        "$tmp/limited" 16 "$assay" validate -q --only 12_point_plane --out "$tmp/full_suite"
+    [ -e "$tmp/full_suite/index.html" ] && tell "disk full: no page of a validation" "there is one"
     refused "disk full: the page" "index.html: cannot write: File too large" "$tmp/straight_suite" \
         "$tmp/limited" 16 "$assay" report "$tmp/straight_suite/results.json"
     if [ -d "$tmp/candidates" ]; then
@@ -261,6 +277,12 @@ disk() {
         refused "read-only directory: a picture" "n.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$pathtracer" -q -r 8 8 -f "$dir/n.exr" "$scene"
         refused "read-only directory: merge" "m.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
         refused "read-only directory: a validation" "Read-only" "$dir" "${ro[@]}" "$assay" validate -q --only 12_point_plane --out "$dir/v"
+        refused "read-only directory: export" "s.pov: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" export -o "$dir/s.pov" "$scene"
+        refused "read-only directory: the page" "index.html: cannot write: Read-only" "$tmp/straight_suite" "${ro[@]}" "$assay" report "$tmp/straight_suite/results.json"
+        if [ -d "$tmp/candidates" ]; then
+            refused "read-only directory: a golden update" "Read-only" "$tmp/first" \
+                "${ro[@]}" "$assay" golden approve --from "$tmp/candidates" --golden "$tmp/first" 41_cornell/cycles
+        fi
         refused "read-only directory: grading" "no temporary directory\|Read-only" "$dir" "${ro[@]}" "$assay" grade -q -o "$dir/g" "$tmp/quick.rubric" "$tmp/subs/s1"
     else
         echo "ok bubblewrap is not here: no read-only directory"
@@ -302,6 +324,7 @@ no_memory() { # NAME OUTPUT COMMAND...
 
 memory() {
     mkdir -p "$tmp/memory"
+    [ -e "$tmp/share1.exr" ] || render_shares
     gcc -O1 -shared -fPIC -o "$tmp/no_memory.so" tests/faults/no_memory.c -ldl || tell "no memory" "cannot build it"
     no_memory "render" "$tmp/memory/x.png.state" "$pathtracer" -q -r 8 8 -s 2 -t 1 --aov --keep-state -f "$tmp/memory/x.png" -f "$tmp/memory/x.exr" "$scene"
     no_memory "merge" "$tmp/memory/m.exr" "$assay" merge "$tmp/memory/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
