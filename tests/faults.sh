@@ -126,8 +126,9 @@ kill_golden() {
         done
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
     done
-    "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >/dev/null 2>&1
-    [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") && why="other images at the end"
+    "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >"$tmp/last" 2>&1
+    [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") &&
+        why="other images at the end: $(diff "$tmp/straight.txt" <(hashes "$store")); $(cat "$tmp/last")"
     [ -z "$why" ] && [ -n "$(find "$store" -name '*.next')" ] && why="an image is left beside its place"
     tell "kill -9, $hits moments of a golden update ($k tries): no reference is lost, the same images at the end" "${why:-$(too_few $k)}"
 }
