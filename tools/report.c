@@ -186,8 +186,18 @@ static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
 static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
     fputs(
-        "<section>\n"
-        "<h2>The claims</h2>\n"
+        "<section id=\"table\">\n<h2>The claims</h2>\n"
+        "<details class=\"help\"><summary>What the columns mean</summary>\n<p class=\"caption\">"
+        "<b>Difference</b>: how much brighter (+) or darker (−) the tested image "
+        "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
+        "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
+        "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
+        "detectable bias: a true difference of this size would have come out DIFFERENT with a "
+        "probability of 95 %. In the drawing the band is the margin, the line is the interval "
+        "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
+        "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
+        "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
+        "samples to tell.</p></details>\n"
         "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
         "<table id=\"claims\"><thead><tr><th scope=\"col\">Verdict</th><th scope=\"col\">Scene</th>"
         "<th scope=\"col\">Tested</th><th scope=\"col\">Against</th><th scope=\"col\">Expected</th>"
@@ -199,21 +209,12 @@ static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
         f);
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
-    fputs("</tbody></table>\n</div>\n<p class=\"caption\">The table as a file: ", f);
+    fputs(
+        "</tbody></table>\n</div>\n<p class=\"caption\">What did not come out as expected comes first. The table as a "
+        "file: ",
+        f);
     write_csv(f, claim, num);
-    fputs("</p>\n"
-          "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
-          "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
-          "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
-          "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
-          "detectable bias: a true difference of this size would have come out DIFFERENT with a "
-          "probability of 95 %. In the drawing the band is the margin, the line is the interval "
-          "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
-          "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
-          "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
-          "samples to tell.</p>\n"
-          "</section>\n",
-          f);
+    fputs("</p>\n</section>\n", f);
 }
 
 /* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
@@ -235,11 +236,23 @@ static size_t gather_scene(struct claim_ref *claim, size_t num)
 static void write_keys(FILE *f)
 {
     fputs(
-        "<section>\n<h2>How to look</h2>\n<p class=\"caption\">Each scene below has its pictures "
+        "<section class=\"how\">\n<h2>How to look</h2>\n<dl class=\"purpose\">\n"
+        "<div><dt>Why two right pictures differ</dt><dd>A path tracer guesses each pixel from random paths. What is left of "
+        "that is noise: grain that another seed would put elsewhere. A difference means something only where it is larger "
+        "than the noise of both pictures explains.</dd></div>\n"
+        "<div><dt>±, n and t</dt><dd>The standard error ± says how far noise moves a mean, n how often the pixel was "
+        "observed. t is a difference divided by its ±: within 2 in 95 of 100 places where nothing is wrong, beyond 4 hardly "
+        "ever.</dd></div>\n"
+        "<div><dt>p</dt><dd>How often noise alone would make a difference at least as large. Of many places some are small "
+        "by chance, so that they are counted together, and a small p may still belong to a difference far inside the "
+        "margin.</dd></div>\n"
+        "<div><dt>Tiles</dt><dd>Squares of the picture, each judged by its own mean: an error that cancels over the whole "
+        "picture shows there.</dd></div>\n</dl>\n"
+        "<p class=\"caption keys\">Each scene has its pictures "
         "(keys <kbd>1</kbd> to <kbd>9</kbd>; <kbd>0</kbd> side by side), maps of two of them "
         "(<kbd>d</kbd> difference, <kbd>t</kbd> difference over its noise, <kbd>e</kbd> error without "
-        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe (<kbd>w</kbd>), tiles "
-        "(<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
+        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe "
+        "(<kbd>w</kbd>), tiles (<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
         "<kbd>-</kbd>, <kbd>f</kbd> the whole picture, double click, Ctrl and the wheel, two "
         "fingers); drag to pan. All frames of a scene move together. Point at a pixel, or focus a "
         "picture and use the arrow keys, to read its values. A key goes to the scene in the middle "
@@ -249,10 +262,14 @@ static void write_keys(FILE *f)
         f);
 }
 
+/* On a page of more claims the evidence of those as expected is folded. */
+enum { FOLD_FROM = 8 };
+
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
                        struct err *e)
 {
     FILE *f = p->f;
+    p->folded = num > FOLD_FROM;
     fprintf(f,
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
             "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "

@@ -208,7 +208,8 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
     html_text(p->f, title != NULL ? title : name);
     fputs(" <code>", p->f);
     html_text(p->f, name);
-    fputs("</code></h2>\n", p->f);
+    fputs("</code>", p->f);
+    fputs(p->folded ? "<a class=\"up\" href=\"#table\">↑ all claims</a></h2>\n" : "</h2>\n", p->f);
     write_purpose(p->f, purpose);
 
     for (size_t i = 0; i < num; i++)

@@ -226,8 +226,40 @@ check("a figure's numbers are saved as CSV", download.suggestedFilename() === "t
 const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
   !(f.querySelector("figcaption a.csv") && f.querySelector("figcaption b") && f.querySelectorAll("svg text").length > 3)).length`);
 check("every plot has a caption, labels and its numbers", bare === 0, bare + " have not");
-await article.locator("summary").click();
+await article.getByText("Everything needed to doubt it").click();
 check("the facts unfold", await article.locator("dl.facts").isVisible());
+
+// The table: found, sorted by each kind of column, and its links unfold what is folded.
+const rowsShown = () => page.locator("#claims tbody tr:visible").count(), total = await rowsShown();
+const find = page.getByRole("searchbox", { name: "Find" });
+await find.fill("pathtracer CYCLES");
+const found = await page.locator("#claims tbody tr:visible td:nth-child(4)").allTextContents();
+check("rows are found by their words", found.length > 0 && found.length < total && found.every((t) => t === "cycles"), found.join());
+await find.fill("");
+check("all rows are back", await rowsShown() === total);
+await page.evaluate("scenes[0].show(1, null)");
+await find.press("2");
+check("what is typed there shows no picture", await page.evaluate("scenes[0].shown") === 1);
+await find.fill("");
+await page.evaluate("scenes[0].show(0, null)");
+const column = async (name, n, read, order) => {
+  const values = () => page.locator("#claims tbody tr td:nth-child(" + n + ")").allTextContents();
+  const before = await values(), sorted = [...before].sort((a, b) => order(read(a), read(b))), got = [];
+  for (let i = 0; i < 3; i++) {
+    await page.locator("#claims").getByRole("button", { name, exact: true }).click();
+    got.push((await values()).map(read).join());
+  }
+  check("rows are sorted by " + name, got[0] === sorted.map(read).join() && got[1] === sorted.reverse().map(read).join() &&
+    got[2] === before.map(read).join(), got.join(" | "));
+};
+await column("Difference %", 7, number, (a, b) => a - b);
+await column("Against", 4, String, (a, b) => (a < b ? -1 : a > b ? 1 : 0));
+await page.getByRole("button", { name: "Fold all", exact: true }).click();
+check("evidence is folded", !await article.locator(".maps").isVisible());
+await page.locator("#claims a[href='#" + await article.getAttribute("id") + "']").click();
+check("a row's link unfolds its evidence", await article.locator(".maps").isVisible());
+await page.getByRole("button", { name: "Unfold all evidence" }).click();
+check("all evidence is unfolded", await page.locator(".evidence:not([open])").count() === 0);
 
 // Widths, colours, paper.
 for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
