@@ -48,8 +48,8 @@ static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
     fputs("</ul>\n", f);
 }
 
-/* claim is sorted: not judged, wrong, as expected. */
-static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num)
+/* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
+static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left)
 {
     size_t errors = 0, wrong = 0, must_differ = 0;
     for (size_t i = 0; i < num; i++) {
@@ -58,23 +58,33 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num)
         must_differ += claim[i].outcome == OUTCOME_AS_EXPECTED &&
                        strcmp(member_text(claim[i].json, "expected"), "DIFFERENT") == 0;
     }
+    if (left > 0)
+        fprintf(f,
+                "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
+                " more are to be judged.</p>\n",
+                left);
+    fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
+            left > 0 ? "So far " : "");
     const char *s = num == 1 ? "" : "s";
-    if (errors + wrong == 0 && num == 1)
-        fputs("<h1 class=\"good\">The claim came out as expected.</h1>\n", f);
-    else if (errors + wrong == 0)
-        fprintf(f, "<h1 class=\"good\">All %zu claims came out as expected.</h1>\n", num);
-    else if (errors > 0 && wrong > 0)
-        fprintf(
-            f,
-            "<h1 class=\"bad\">Of %zu claims, %zu could not be judged and %zu did not come out as "
-            "expected.</h1>\n",
-            num, errors, wrong);
+    if (errors > 0 && wrong > 0)
+        fprintf(f, "%s %zu claims, %zu could not be judged and %zu did not come out as expected.",
+                left > 0 ? "of" : "Of", num, errors, wrong);
     else if (errors > 0)
-        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s could not be judged.</h1>\n", errors, num,
-                s);
+        fprintf(f, "%zu of %zu claim%s could not be judged.", errors, num, s);
+    else if (wrong > 0)
+        fprintf(f, "%zu of %zu claim%s did not come out as expected.", wrong, num, s);
+    else if (num == 1)
+        fprintf(f, "%s claim came out as expected.", left > 0 ? "the" : "The");
     else
-        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s did not come out as expected.</h1>\n",
-                wrong, num, s);
+        fprintf(f, "%s %zu claims came out as expected.", left > 0 ? "all" : "All", num);
+    fputs("</h1>\n", f);
+    if (num == 1 && errors == 0) {
+        fputs("<p class=\"lede\"><b>", f);
+        html_text(f, member_text(claim->json, "verdict"));
+        fputs("</b>: ", f);
+        html_text(f, member_text(claim->json, "reason"));
+        fputs("</p>\n", f);
+    }
     if (errors + wrong > 0)
         write_claim_list(f, claim, errors + wrong);
     if (must_differ == 1)
@@ -101,7 +111,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 {
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
-        write_verdict(f, claim, num);
+        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")));
     report_consistency_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
