@@ -77,7 +77,7 @@ class Scene {
   shotSource(shot) {
     if (!this.ready) return null;
     return { id: "picture " + shot.id, key: this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
-             paint: (rgba) => paintPicture(rgba, shot.layer, 2 ** this.stops / this.white, this.curve) };
+             layer: shot.layer, paint: (rgba, layer) => paintPicture(rgba, layer, 2 ** this.stops / this.white, this.curve) };
   }
 
   stageSource() {

@@ -206,6 +206,32 @@ await page.keyboard.press("Shift+ArrowDown");
 const after = await page.evaluate("({...scenes[0].pixel})");
 check("arrow keys move the pixel", after.x === at.x && after.y === Math.min(at.y + 8, size.height - 1));
 
+// A frame smaller than the picture: each of its pixels shows the mean radiance of what it covers, here 40 of 64.
+const SMALL = 40;
+await page.evaluate((width) => {
+  scenes[0].show(4, null);
+  scenes[0].stagePane.frame.style.cssText += "; flex: none; width: " + width + "px";
+}, SMALL);
+await frames(page);
+await frames(page);
+const covered = (x, y, k) => {
+  let sum = 0;
+  const share = (i, n, at) => Math.max(0, Math.min(i + 1, (at + 1) * n / SMALL) - Math.max(i, at * n / SMALL)) * SMALL / n;
+  for (let j = 0; j < size.height; j++)
+    for (let i = 0; i < size.width; i++) {
+      const weight = share(i, size.width, x) * share(j, size.height, y);
+      if (weight > 0) sum += weight * pixelOf(pictures[names[3]], i, j).value[k];
+    }
+  return sum;
+};
+const reduced = await page.evaluate(() => {
+  const c = scenes[0].stagePane.canvas;
+  return { size: [c.width, c.height], at: [[5, 7], [19, 30], [31, 12], [36, 38]].map((p) => [p, [...c.getContext("2d").getImageData(...p, 1, 1).data]]) };
+});
+const far = reduced.at.filter(([[x, y], rgb]) => [0, 1, 2].some((k) => Math.abs(rgb[k] - srgb(covered(x, y, k) / white)) > 1));
+check("a picture larger than its frame is averaged", reduced.size.join() === SMALL + "," + SMALL && far.length === 0, JSON.stringify(reduced));
+await page.evaluate(`scenes[0].stagePane.frame.style.cssText = "aspect-ratio: 1"; scenes[0].show(0, null)`);
+
 // Tiles: sorted by p, one press marks and reads.
 const article = page.locator("article.claim").first(), tiles = claims[0].tile_log10_p;
 const first = tiles.indexOf(Math.min(...tiles.filter((p) => p !== null))), columns = claims[0].tiles_x, side = claims[0].tile;
