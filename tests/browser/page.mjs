@@ -1,7 +1,7 @@
 // node page.mjs MODULES PAGE RESULTS SHOTS [--values-only]: the page of one scene of four pictures, in Debian's chromium.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
-import { readFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { readExr, pixelOf, grey, srgb } from "./files.mjs";
 
@@ -306,6 +306,16 @@ for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
     await other.context().close();
   }
 }
+// So far out of sight that chromium does not lay the scene out.
+writeFileSync(shots + "/far.html", readFileSync(pagePath, "utf8").replace('<section class="scene"', '<div style="height: 20000px"></div>$&'));
+const paper = await open(shots + "/far.html", 1280, 300);
+const blank = () => paper.evaluate(() => [...document.querySelectorAll(".side canvas, .maps .frame canvas")].filter((c) =>
+  c.getContext("2d").getImageData(c.width >> 1, c.height >> 1, 1, 1).data[3] !== 255).length);
+const unseen = await blank();
+await paper.evaluate(`window.dispatchEvent(new Event("beforeprint"))`);
+const printed = await blank();
+check("pictures out of sight are drawn for paper, and only then", unseen > 0 && printed === 0, unseen + " and " + printed + " are blank");
+await paper.context().close();
 const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true });
 check("it prints", pdf.length > 20000, pdf.length + " bytes");
 const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>
