@@ -525,16 +525,11 @@ static void test_hdr(void **state_)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_published),
-        cmocka_unit_test(test_matrix),
-        cmocka_unit_test(test_lab),
-        cmocka_unit_test(test_largest),
-        cmocka_unit_test(test_csf),
-        cmocka_unit_test(test_flat),
-        cmocka_unit_test(test_brute_force),
-        cmocka_unit_test(test_brute_force_sees),
-        cmocka_unit_test(test_exposures),
-        cmocka_unit_test(test_hdr),
+        cmocka_unit_test(test_published),   cmocka_unit_test(test_matrix),
+        cmocka_unit_test(test_lab),         cmocka_unit_test(test_largest),
+        cmocka_unit_test(test_csf),         cmocka_unit_test(test_flat),
+        cmocka_unit_test(test_brute_force), cmocka_unit_test(test_brute_force_sees),
+        cmocka_unit_test(test_exposures),   cmocka_unit_test(test_hdr),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
