@@ -1,5 +1,6 @@
 /* OpenEXR files through the C interface of its own library, which loads in a millisecond. */
 #define _GNU_SOURCE
+#include "exr_zip.h"
 #include "fs.h"
 #include "image.h"
 
@@ -95,7 +96,7 @@ static bool failed(const char *path, const char *what, const struct stream *s, e
                    s->why[0] != '\0' ? s->why : exr_get_default_error_message(code));
 }
 
-/* Where the pixels of each channel of a chunk are in the interleaved picture: the first is number
+/* Where the pixels of each channel of a chunk go in the interleaved picture: the first is number
  * `at`. */
 static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im, size_t at)
 {
@@ -126,24 +127,29 @@ static exr_result_t write_header(exr_context_t f, const struct image *im)
 
 static exr_result_t write_rows(exr_context_t f, const struct image *im)
 {
-    exr_encode_pipeline_t encoder = EXR_ENCODE_PIPELINE_INITIALIZER;
-    exr_chunk_info_t chunk;
+    const exr_attr_chlist_t *list;
     int32_t rows;
     exr_result_t r = exr_get_scanlines_per_chunk(f, 0, &rows);
-    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
-        r = exr_write_scanline_chunk_info(f, 0, y, &chunk);
-        if (r == EXR_ERR_SUCCESS)
-            r = y == 0 ? exr_encoding_initialize(f, 0, &chunk, &encoder)
-                       : exr_encoding_update(f, 0, &chunk, &encoder);
-        if (r != EXR_ERR_SUCCESS)
-            break;
-        point_channels(encoder.channels, encoder.channel_count, im, (size_t)y * (size_t)im->width);
-        if (y == 0)
-            r = exr_encoding_choose_default_routines(f, 0, &encoder);
-        if (r == EXR_ERR_SUCCESS)
-            r = exr_encoding_run(f, 0, &encoder);
+    if (r == EXR_ERR_SUCCESS)
+        r = exr_get_channels(f, 0, &list);
+    int *from = malloc((size_t)im->channels * sizeof *from);
+    struct exr_zip *z = NULL;
+    if (r == EXR_ERR_SUCCESS && from != NULL) {
+        for (int k = 0; k < im->channels; k++)
+            from[k] = image_channel(im, list->entries[k].name.str);
+        z = exr_zip_new(im->width, im->channels, from, rows);
     }
-    exr_encoding_destroy(f, &encoder);
+    free(from);
+    if (r == EXR_ERR_SUCCESS && z == NULL)
+        r = EXR_ERR_OUT_OF_MEMORY;
+    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
+        size_t size;
+        const void *bytes =
+            exr_zip_rows(z, im->data + (size_t)y * (size_t)im->width * (size_t)im->channels,
+                         rows < im->height - y ? rows : im->height - y, &size);
+        r = exr_write_scanline_chunk(f, 0, y, bytes, size);
+    }
+    exr_zip_free(z);
     return r;
 }
 

@@ -559,7 +559,7 @@ INLINE void sample_bsdf(const struct integrator *it, const struct batch *b, int 
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
 {
     if (o->roulette == ROULETTE_THROUGHPUT && vertex >= 2)
-        return vf_min(vf_set(1), rgb_maxv(throughput) * eta2);
+        return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
     return vf_set(o->roulette == ROULETTE_FIXED && vertex >= 1 ? o->survival : 1);
 }
 
@@ -671,7 +671,7 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 {
     const bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     generate(it, b, n);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < BATCH_LANES; i++) /* n of paths, but of shadow rays there may be more */
         b->active[i] = (uint16_t)i;
     if (it->opt.kind == INTEGRATE_NORMALS) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);
