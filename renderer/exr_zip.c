@@ -12,23 +12,24 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 enum { LEVEL = 4 };
 
 struct exr_zip {
-    const struct image *im;
+    size_t width, channels;
     struct libdeflate_compressor *compressor;
     int *from;
     uint8_t *raw, *mixed, *packed;
     size_t room; /* of packed */
 };
 
-struct exr_zip *exr_zip_new(const struct image *im, const int *from, int rows)
+struct exr_zip *exr_zip_new(int width, int channels, const int *from, int rows)
 {
-    const size_t most = (size_t)rows * (size_t)im->width * (size_t)im->channels * sizeof(float);
+    const size_t most = (size_t)rows * (size_t)width * (size_t)channels * sizeof(float);
     struct exr_zip *z = calloc(1, sizeof *z);
     if (z == NULL)
         return NULL;
-    z->im = im;
+    z->width = (size_t)width;
+    z->channels = (size_t)channels;
     z->compressor = libdeflate_alloc_compressor(LEVEL);
     z->room = libdeflate_zlib_compress_bound(z->compressor, most);
-    z->from = malloc((size_t)im->channels * sizeof *z->from);
+    z->from = malloc(z->channels * sizeof *z->from);
     z->raw = malloc(most);
     z->mixed = malloc(most);
     z->packed = malloc(z->room);
@@ -37,7 +38,7 @@ struct exr_zip *exr_zip_new(const struct image *im, const int *from, int rows)
         exr_zip_free(z);
         return NULL;
     }
-    memcpy(z->from, from, (size_t)im->channels * sizeof *from);
+    memcpy(z->from, from, z->channels * sizeof *from);
     return z;
 }
 
@@ -53,15 +54,14 @@ void exr_zip_free(struct exr_zip *z)
     free(z);
 }
 
-const void *exr_zip_rows(struct exr_zip *z, int y, int rows, size_t *size)
+const void *exr_zip_rows(struct exr_zip *z, const float *rows, int num, size_t *size)
 {
-    const struct image *im = z->im;
-    const size_t width = (size_t)im->width, channels = (size_t)im->channels;
-    const size_t length = (size_t)rows * width * channels * sizeof(float);
+    const size_t width = z->width, channels = z->channels;
+    const size_t length = (size_t)num * width * channels * sizeof(float);
     uint8_t *raw = z->raw, *even = z->mixed, *odd = z->mixed + length / 2;
-    for (size_t row = 0; row < (size_t)rows; row++)
+    for (size_t row = 0; row < (size_t)num; row++)
         for (size_t c = 0; c < channels; c++) {
-            const float *p = im->data + ((size_t)y + row) * width * channels + z->from[c];
+            const float *p = rows + row * width * channels + z->from[c];
             for (size_t x = 0; x < width; x++, raw += sizeof(float))
                 memcpy(raw, p + x * channels, sizeof(float));
         }

@@ -137,7 +137,7 @@ static exr_result_t write_rows(exr_context_t f, const struct image *im)
     if (r == EXR_ERR_SUCCESS && from != NULL) {
         for (int k = 0; k < im->channels; k++)
             from[k] = image_channel(im, list->entries[k].name.str);
-        z = exr_zip_new(im, from, rows);
+        z = exr_zip_new(im->width, im->channels, from, rows);
     }
     free(from);
     if (r == EXR_ERR_SUCCESS && z == NULL)
@@ -145,7 +145,8 @@ static exr_result_t write_rows(exr_context_t f, const struct image *im)
     for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
         size_t size;
         const void *bytes =
-            exr_zip_rows(z, y, rows < im->height - y ? rows : im->height - y, &size);
+            exr_zip_rows(z, im->data + (size_t)y * (size_t)im->width * (size_t)im->channels,
+                         rows < im->height - y ? rows : im->height - y, &size);
         r = exr_write_scanline_chunk(f, 0, y, bytes, size);
     }
     exr_zip_free(z);

@@ -32,6 +32,7 @@ enum option {
     OPT_BUDGET,
     OPT_STAGES,
     OPT_UNTIL_DIFFERENT,
+    OPT_PAGE_EVERY,
     OPT_QUIET,
     OPT_HELP
 };
@@ -68,6 +69,9 @@ static const struct cli_option options[] = {
     [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
                              "few samples first, then more, up to the declared; stop at the\n"
                              "first claim that differs where it should not"},
+    [OPT_PAGE_EVERY] = {0, "page-every", 1, "S",
+                        "seconds after which the page of what is judged so far is\n"
+                        "written, again and again, for assay watch (off)"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -130,6 +134,9 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
             break;
         case OPT_STAGES: ok = cli_int("--stages", v, 1, 2, &o->stages, e); break;
         case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
+        case OPT_PAGE_EVERY:
+            ok = cli_double("--page-every", v, 0.1, 1e6, &o->show_every_s, e);
+            break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
@@ -160,6 +167,17 @@ static void print_not_expressible(const json_t *results)
     json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
         printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
                member_text(entry, "scene"), member_text(entry, "reason"));
+}
+
+/* index.html from results that are there only as long as that takes, so that nothing takes them for a run's. */
+static bool write_page_so_far(const json_t *so_far, const struct validate_options *o, struct err *e)
+{
+    char json[4096], html[4096];
+    snprintf(json, sizeof json, "%s/so_far.json", o->out_dir);
+    snprintf(html, sizeof html, "%s/index.html", o->out_dir);
+    bool ok = json_write(json, so_far, e) && report_write(json, html, e);
+    remove(json);
+    return ok;
 }
 
 static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
@@ -235,7 +253,8 @@ int verb_validate(int argc, char **argv, struct err *e)
         .timeout_s = 3600,
         .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
         .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
+        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay"),
+        .show = write_page_so_far};
     struct wishes wish = {0};
     struct engine engine = {0};
     json_t *results = NULL;
