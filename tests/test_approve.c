@@ -170,7 +170,7 @@ static void a_new_one_has_to_be_called_new(void **state)
 static void an_interrupted_approval_is_ended(void **state)
 {
     struct fixture *f = *state;
-    char exr[256], next[256], old[65], now[65];
+    char exr[256], next[sizeof exr + 8], old[65], now[65];
     snprintf(exr, sizeof exr, "%s/12_plane/cycles.exr", f->golden);
     snprintf(next, sizeof next, "%s.next", exr);
     render(f, f->from, 1, 2);
