@@ -331,6 +331,8 @@ static void read_statement(struct statement *s)
         take_text(s, word, r->command, sizeof r->command);
     else if (strcmp(word, "diagnose") == 0)
         take_text(s, word, r->diagnose, sizeof r->diagnose);
+    else if (strcmp(word, "bugs") == 0)
+        take_name(s, word, r->bugs, sizeof r->bugs);
     else if (strcmp(word, "output") == 0)
         take_text(s, word, r->output, sizeof r->output);
     else if (strcmp(word, "program") == 0)
