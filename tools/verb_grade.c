@@ -1,6 +1,7 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "grade.h"
+#include "grade_alike.h"
 #include "places.h"
 #include "results.h"
 #include "verbs.h"
@@ -201,7 +202,7 @@ static int run_batch(const struct settings *s, const struct rubric *r, const str
         ok = diagnosis_open(r, s->catalogue, suite, views, &diagnosis, e);
         job.diagnosis = &diagnosis;
     }
-    ok = ok && grade_all(&job, &grades, e);
+    ok = ok && grade_all(&job, &grades, e) && grade_alike(s->out, r, answers, grades, e);
     if (ok && grade_write(s->out, grades, e) && grade_pages(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
