@@ -24,10 +24,12 @@ static uint64_t picture_seed(uint64_t seed, int picture)
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
-    char rubric[65], text[1024];
-    if (!sha256_file(job->rubric->path, rubric, e))
+    char rubric[65], bugs[65] = "", path[MAX_PATH], text[1024];
+    snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
+    if (!sha256_file(job->rubric->path, rubric, e) ||
+        (job->bugs != NULL && !sha256_file(path, bugs, e)))
         return false;
-    snprintf(text, sizeof text, "%s %s %s %llu %.17g %d", assay_version, rubric, s->sha256,
+    snprintf(text, sizeof text, "%s %s %s %s %llu %.17g %d", assay_version, rubric, bugs, s->sha256,
              (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
     sha256_text(text, key);
     return true;

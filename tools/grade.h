@@ -26,7 +26,7 @@ struct grade_job {
 };
 
 /* grade.json:
- *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, submission, seed, alpha, version: while it
+ *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
  *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
  *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
  *     "chance": of any check's points being others in another run, at most (the sum of theirs),

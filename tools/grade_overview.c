@@ -85,6 +85,12 @@ static void table(FILE *f, const json_t *grades)
             fputs(k > 0 ? " or " : "", f);
             html_text(f, grade_text(p, "name"));
         }
+        /* Of other deviations than those it was graded with: staff may want to know. */
+        const char *with = grade_text(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, grade_text(g, "accepted")) != 0) {
+            fputs(" on top of ", f);
+            html_text(f, with);
+        }
         fputs("</td><td>", f);
         html_text(f, grade_text(g, "trouble"));
         html_text(f, grade_text(g, "wrong"));

@@ -22,7 +22,7 @@ bool rubric_bugs_sees(const struct rubric *r, int picture)
     for (int i = 0; i < r->num_checks; i++)
         sees |= r->check[i].picture[0] == picture &&
                 (r->check[i].kind == CHECK_EQUAL || r->check[i].kind == CHECK_EXACT ||
-                 r->check[i].kind == CHECK_RATES);
+                 r->check[i].kind == CHECK_RATES || r->check[i].kind == CHECK_SUM);
     return sees && r->picture[picture].reference == REFERENCE_OURS;
 }
 
@@ -231,8 +231,7 @@ static bool sight_of_student(const struct rubric *r, int picture, const struct s
     double kappa = noise_of(out, correct, cells);
     for (int j = 0; j < 3 * out->columns * out->rows; j++)
         out->var[j] = kappa * correct->var[j] * correct->n / out->n +
-                      cells[j].rounding / (pixels * pixels) +
-                      pow(cells[j].tolerance / pixels, 2) / 3 +
+                      cells[j].rounding / (pixels * pixels) + pow(cells[j].tolerance / pixels, 2) +
                       (cells[j].clipped ? pow(clip_error * clip, 2) : 0);
     return true;
 }
@@ -291,7 +290,9 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                                 ? other.log_likelihood + other.candidate[0].log_likelihood
                                 : -INFINITY;
         if (ok && (k == 0 || likelihood > best)) {
-            best = likelihood;
+            /* Other deviations with a bug have to be likelier than these with none: a bug may be such a deviation. */
+            best =
+                k == 0 ? other.log_likelihood + diagnose_bound(&b->catalogue, alpha) : likelihood;
             *found = other;
             *with = tried;
         }

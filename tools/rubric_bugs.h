@@ -4,8 +4,8 @@
  * A view is a picture, alone or with a set of accepted deviations that changes it: "box", "box@light_pdf". Cells are those of
  * sight.h. What they hold is what an 8-bit picture of the rubric's curve and of as many samples as are asked for shows on
  * average: E[min(X, clip)] of each pixel, X normal with the mean and the variance of a render of ours, clip the radiance of
- * the brightest code. Decoded codes are the middle of their bin; what that is off by is added to the variance of a
- * student's cell, so rounding and clipping are part of every likelihood. The variance of an effect also holds the
+ * the brightest code. Decoded codes are the middle of their bin; half a bin, by which a flat cell may be off, is added to the standard
+ * deviation of a student's cell, so rounding and clipping are part of every likelihood. The variance of an effect also holds the
  * noise that the bug adds to one picture. Pictures of adaptive sampling have FACT_SAMPLES, by the rate picture. */
 #ifndef ASSAY_RUBRIC_BUGS_H
 #define ASSAY_RUBRIC_BUGS_H
@@ -21,7 +21,7 @@ struct rubric_bugs {
 };
 
 /* Whether the picture is one of those looked at: with a reference of ours, and the first of a check that is about what
- * it shows (equal, exact, rates). */
+ * it shows (equal, exact, rates, sum). */
 bool rubric_bugs_sees(const struct rubric *r, int picture);
 /* Is the number of its samples a fact (a check of rates)? */
 bool rubric_bugs_counts(const struct rubric *r, int picture);
