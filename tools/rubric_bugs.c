@@ -58,7 +58,6 @@ bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128
                      struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
-    bool counts = rubric_bugs_counts(r, picture);
     char text[4096], path[8192], scene[65], environment[65] = "";
     snprintf(name, 128, set > 0 ? "%s@%.70s" : "%s", p->name, r->set[set].name);
     for (char *c = strstr(name, ", "); c != NULL; c = strstr(c, ", ")) {
@@ -74,10 +73,10 @@ bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128
     snprintf(path, sizeof path, "%s/%s", r->dir, p->environment);
     if (p->environment[0] != '\0' && !sha256_file(path, environment, e))
         return false;
-    bool own = p->reference_options[0] == '\0' || counts;
+    const char *options = p->reference_options[0] != '\0' ? p->reference_options : p->options;
     snprintf(text, sizeof text, "%s %s %s %d %d %d %d %d %s %s %s", r->curve, scene, environment,
-             p->width, p->height, p->spp, p->lights, p->bounces, own ? p->options : "",
-             p->reference_options, r->set[set].words);
+             p->width, p->height, p->spp, p->lights, p->bounces, options,
+             rubric_bugs_counts(r, picture) ? p->options : "", r->set[set].words);
     sha256_text(text, key);
     return true;
 }
