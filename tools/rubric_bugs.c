@@ -19,10 +19,13 @@ static const double clip_error = 0.02;
 bool rubric_bugs_sees(const struct rubric *r, int picture)
 {
     bool sees = false;
-    for (int i = 0; i < r->num_checks; i++)
-        sees |= r->check[i].picture[0] == picture &&
-                (r->check[i].kind == CHECK_EQUAL || r->check[i].kind == CHECK_EXACT ||
-                 r->check[i].kind == CHECK_RATES || r->check[i].kind == CHECK_SUM);
+    for (int i = 0; i < r->num_checks; i++) {
+        const struct rubric_check *c = &r->check[i];
+        bool shows = c->kind == CHECK_EQUAL || c->kind == CHECK_EXACT || c->kind == CHECK_RATES ||
+                     c->kind == CHECK_SUM;
+        for (int k = 0; shows && k < c->num_pictures; k++)
+            sees |= c->picture[k] == picture;
+    }
     return sees && r->picture[picture].reference == REFERENCE_OURS;
 }
 

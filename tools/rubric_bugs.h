@@ -20,8 +20,8 @@ struct rubric_bugs {
     int view[RUBRIC_SETS][RUBRIC_PICTURES]; /* -1: none */
 };
 
-/* Whether the picture is one of those looked at: with a reference of ours, and the first of a check that is about what
- * it shows (equal, exact, rates, sum). */
+/* Whether the picture is one of those looked at: with a reference of ours, and of a check that is about what it shows (equal,
+ * exact, rates, sum). */
 bool rubric_bugs_sees(const struct rubric *r, int picture);
 /* Is the number of its samples a fact (a check of rates)? */
 bool rubric_bugs_counts(const struct rubric *r, int picture);
