@@ -266,7 +266,7 @@ static bool add_views(struct maker *m, const struct answer_options *ours, struct
                                .renders = 1,
                                .fixed_spp = true,
                                .seed = SEED,
-                               .effect = calloc((size_t)m->made.num_bugs, sizeof *v->effect)};
+                               .effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *))};
             m->picture[at] = i;
             m->set[at] = k;
             if (v->effect == NULL)

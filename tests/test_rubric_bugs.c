@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "../renderer/fs.h"
 #include "../renderer/tone.h"
 #include "../tools/rubric_bugs.h"
 
@@ -91,7 +92,7 @@ static int set_up(void **state)
 
 static int tear_down(void **state)
 {
-    char command[128];
+    struct err e;
     (void)state;
     rubric_bugs_close(&bugs);
     answers_free(answers);
@@ -99,8 +100,7 @@ static int tear_down(void **state)
     free(rubric);
     suite_free(&suite);
     gsl_rng_free(rng);
-    snprintf(command, sizeof command, "rm -rf %s", dir);
-    return system(command);
+    return remove_tree(dir, &e) ? 0 : -1;
 }
 
 /* bug -1: none. Noise: variance over ours. */

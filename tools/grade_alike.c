@@ -36,9 +36,10 @@ bool alike_noise_of(const struct student *s, const struct moments *m, double spp
 {
     int columns = s->width / 2, rows = s->height / 2;
     double found = 0, expected = 0;
+    size_t blocks = (size_t)columns * (size_t)rows;
     *out = (struct alike_noise){.blocks = columns * rows,
-                                .detail = calloc((size_t)(columns * rows), DETAILS * sizeof(float)),
-                                .shared = calloc((size_t)(columns * rows), sizeof(float))};
+                                .detail = calloc(blocks, DETAILS * sizeof(float)),
+                                .shared = calloc(blocks, sizeof(float))};
     if (out->detail == NULL || out->shared == NULL) {
         alike_noise_free(out);
         return err_set(e, "out of memory");
