@@ -101,7 +101,7 @@ TIMEFORMAT='%U %S'
 { time "$build/assay" grade -j2 -o "$work/grades" "$rubric" "$subs"/* 2>&3; } 3>&2 2>"$work/time"
 status=$?
 took="$(((SECONDS - started + 30) / 60)) minutes on $(nproc) processors, load average $(cut -d ' ' -f 2 /proc/loadavg), \
-$(awk '{ printf "%.0f", $1 + $2 }' "$work/time") CPU seconds in all$before"
+$(awk '{ printf "%.0f", $1 + $2 }' "$work/time") CPU seconds besides those of the submissions' programs$before"
 echo "$took" >&2
 [ $status -eq 3 ] && exit 3
 if [ -n "$few" ]; then
