@@ -112,6 +112,11 @@ bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
 	tests/grade_show.sh $(BUILD)
 
+# What known bugs do to the pictures of a rubric, by which they are named.
+rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
+	tests/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRIC)
+
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
@@ -173,6 +178,7 @@ help:
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)'
 	@echo 'make grade-show  grade a class of fifty, write tests/grading/'
+	@echo 'make rubric-bugs what known bugs do to the pictures of a rubric (RUBRIC=tools/rubrics/cs184.rubric)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
@@ -278,7 +284,7 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
-$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/make_rubric_bugs $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
@@ -386,7 +392,7 @@ $(BUILD)/deps-lint: | $(BUILD)/deps-test
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check lint threads tsan faults coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

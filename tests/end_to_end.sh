@@ -588,7 +588,7 @@ sub nothing <<<'exit 0'
 { printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
 mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
 if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
-    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
     for good in right pictures source; do
         [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
@@ -601,6 +601,7 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
         expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
     done
     expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"
+    expect "grade: the chance of another score" 0 '"chance": [0-9.e-]*' cat "$tmp/grades/right/grade.json"
     expect "grade: JUnit" 0 'testsuite name="fork_bomb" tests="1" failures="1"' xmllint "$tmp/grades/junit.xml"
     expect "grade: TAP" 0 "^ok [0-9]* - right point (8.00 of 8)" cat "$tmp/grades/grades.tap"
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
@@ -633,6 +634,9 @@ fi
 expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
 expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
 expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
+tests/grading.sh "$build" >"$tmp/grading"
+cat "$tmp/grading"
+failures=$((failures + $(grep -c '^not ok' "$tmp/grading")))
 tests/autograder.sh "$build" >"$tmp/autograder"
 cat "$tmp/autograder"
 failures=$((failures + $(grep -c '^not ok' "$tmp/autograder")))
