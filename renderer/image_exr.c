@@ -3,6 +3,7 @@
 #include "fs.h"
 #include "image.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -95,17 +96,16 @@ static bool failed(const char *path, const char *what, const struct stream *s, e
                    s->why[0] != '\0' ? s->why : exr_get_default_error_message(code));
 }
 
-/* Where the pixels of each channel of a chunk are in the interleaved picture: the first is number
- * `at`. */
-static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im, size_t at)
+/* Where the pixels of each channel of a chunk are: interleaved as in the image, from `first` on. */
+static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im,
+                           const float *first)
 {
     for (int k = 0; k < num; k++) {
         c[k].user_bytes_per_element = sizeof(float);
         c[k].user_data_type = EXR_PIXEL_FLOAT;
         c[k].user_pixel_stride = im->channels * (int32_t)sizeof(float);
         c[k].user_line_stride = im->width * c[k].user_pixel_stride;
-        c[k].decode_to_ptr = (uint8_t *)(im->data + at * (size_t)im->channels +
-                                         image_channel(im, c[k].channel_name));
+        c[k].decode_to_ptr = (uint8_t *)(first + image_channel(im, c[k].channel_name));
     }
 }
 
@@ -124,50 +124,105 @@ static exr_result_t write_header(exr_context_t f, const struct image *im)
     return r == EXR_ERR_SUCCESS ? exr_write_header(f) : r;
 }
 
-static exr_result_t write_rows(exr_context_t f, const struct image *im)
+struct image_writer {
+    const struct image *head;
+    struct out_file file;
+    struct stream s;
+    exr_context_t f;
+    exr_encode_pipeline_t encoder;
+    int y; /* the next row */
+};
+
+struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
 {
-    exr_encode_pipeline_t encoder = EXR_ENCODE_PIPELINE_INITIALIZER;
-    exr_chunk_info_t chunk;
-    int32_t rows;
-    exr_result_t r = exr_get_scanlines_per_chunk(f, 0, &rows);
-    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
-        r = exr_write_scanline_chunk_info(f, 0, y, &chunk);
-        if (r == EXR_ERR_SUCCESS)
-            r = y == 0 ? exr_encoding_initialize(f, 0, &chunk, &encoder)
-                       : exr_encoding_update(f, 0, &chunk, &encoder);
-        if (r != EXR_ERR_SUCCESS)
-            break;
-        point_channels(encoder.channels, encoder.channel_count, im, (size_t)y * (size_t)im->width);
-        if (y == 0)
-            r = exr_encoding_choose_default_routines(f, 0, &encoder);
-        if (r == EXR_ERR_SUCCESS)
-            r = exr_encoding_run(f, 0, &encoder);
+    struct image_writer *w = calloc(1, sizeof *w);
+    if (w == NULL) {
+        err_set(e, "%s: out of memory", path);
+        return NULL;
     }
-    exr_encoding_destroy(f, &encoder);
-    return r;
+    if (!out_open(&w->file, path, e)) {
+        free(w);
+        return NULL;
+    }
+    w->head = head;
+    w->s.fd = fileno(w->file.f);
+    w->encoder = (exr_encode_pipeline_t)EXR_ENCODE_PIPELINE_INITIALIZER;
+    exr_context_initializer_t init = initializer(&w->s);
+    init.error_handler_fn = drop_complaint;
+    exr_result_t r = exr_start_write(&w->f, path, EXR_WRITE_FILE_DIRECTLY, &init);
+    if (r == EXR_ERR_SUCCESS)
+        r = write_header(w->f, head);
+    if (r == EXR_ERR_SUCCESS)
+        return w;
+    failed(path, "write", &w->s, r, e);
+    image_writer_abandon(w);
+    return NULL;
+}
+
+bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
+{
+    exr_chunk_info_t chunk;
+    int32_t each;
+    exr_result_t r = exr_get_scanlines_per_chunk(w->f, 0, &each);
+    assert(r != EXR_ERR_SUCCESS || (each == IMAGE_BAND && w->y + num <= w->head->height));
+    assert(num == IMAGE_BAND || w->y + num == w->head->height);
+    if (r == EXR_ERR_SUCCESS)
+        r = exr_write_scanline_chunk_info(w->f, 0, w->y, &chunk);
+    if (r == EXR_ERR_SUCCESS)
+        r = w->y == 0 ? exr_encoding_initialize(w->f, 0, &chunk, &w->encoder)
+                      : exr_encoding_update(w->f, 0, &chunk, &w->encoder);
+    if (r == EXR_ERR_SUCCESS) {
+        point_channels(w->encoder.channels, w->encoder.channel_count, w->head, rows);
+        if (w->y == 0)
+            r = exr_encoding_choose_default_routines(w->f, 0, &w->encoder);
+    }
+    if (r == EXR_ERR_SUCCESS)
+        r = exr_encoding_run(w->f, 0, &w->encoder);
+    w->y += num;
+    return r == EXR_ERR_SUCCESS || failed(w->file.path, "write", &w->s, r, e);
+}
+
+bool image_writer_close(struct image_writer *w, struct err *e)
+{
+    assert(w->y == w->head->height);
+    exr_encoding_destroy(w->f, &w->encoder);
+    exr_result_t r = exr_finish(&w->f); /* writes the table of rows */
+    bool ok = r == EXR_ERR_SUCCESS;
+    if (ok) {
+        ok = out_commit(&w->file, e);
+    } else {
+        failed(w->file.path, "write", &w->s, r, e);
+        out_abandon(&w->file);
+    }
+    free(w);
+    return ok;
+}
+
+void image_writer_abandon(struct image_writer *w)
+{
+    if (w == NULL)
+        return;
+    if (w->f != NULL)
+        exr_encoding_destroy(w->f, &w->encoder);
+    exr_finish(&w->f);
+    out_abandon(&w->file);
+    free(w);
 }
 
 bool image_write_exr(const char *path, const struct image *im, struct err *e)
 {
-    struct out_file file;
-    if (!out_open(&file, path, e))
+    struct image_writer *w = image_writer_open(path, im, e);
+    if (w == NULL)
         return false;
-    struct stream s = {.fd = fileno(file.f)};
-    exr_context_initializer_t init = initializer(&s);
-    init.error_handler_fn = drop_complaint;
-    exr_context_t f = NULL;
-    exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
-    if (r == EXR_ERR_SUCCESS)
-        r = write_header(f, im);
-    if (r == EXR_ERR_SUCCESS)
-        r = write_rows(f, im);
-    exr_result_t end = exr_finish(&f); /* writes the table of rows */
-    if (r == EXR_ERR_SUCCESS)
-        r = end;
-    if (r == EXR_ERR_SUCCESS)
-        return out_commit(&file, e);
-    out_abandon(&file);
-    return failed(path, "write", &s, r, e);
+    for (int y = 0; y < im->height; y += IMAGE_BAND) {
+        int num = im->height - y < IMAGE_BAND ? im->height - y : IMAGE_BAND;
+        const float *rows = im->data + (size_t)y * (size_t)im->width * (size_t)im->channels;
+        if (!image_writer_rows(w, rows, num, e)) {
+            image_writer_abandon(w);
+            return false;
+        }
+    }
+    return image_writer_close(w, e);
 }
 
 /* An image of the shape that the header says, and its texts. */
@@ -229,7 +284,8 @@ static exr_result_t read_chunk(exr_context_t f, const exr_chunk_info_t *chunk, s
     exr_decode_pipeline_t decoder = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_result_t r = exr_decoding_initialize(f, 0, chunk, &decoder);
     if (r == EXR_ERR_SUCCESS) {
-        point_channels(decoder.channels, decoder.channel_count, im, at);
+        point_channels(decoder.channels, decoder.channel_count, im,
+                       im->data + at * (size_t)im->channels);
         r = exr_decoding_choose_default_routines(f, 0, &decoder);
     }
     if (r == EXR_ERR_SUCCESS)

@@ -302,8 +302,7 @@ bool share_write(const char *path, const struct share *s, const char *command, s
     for (int i = 0; i < s->num_ranges; i++)
         n += (size_t)snprintf(samples + n, size - n, "%s%lu:%lu", i > 0 ? "," : "",
                               (unsigned long)s->range[i][0], (unsigned long)s->range[i][1]);
-    snprintf(cell, sizeof cell, "%d %d %d %d of %d %d", s->cell[0], s->cell[1], s->cell[2],
-             s->cell[3], s->cell[4], s->cell[5]);
+    identity_cell(s->cell, s->cell[4], s->cell[5], cell);
     struct image_attr attrs[NUM_COMMON + 3] = {
         {"assay:command", command}, {"assay:cell", cell}, {"assay:samples", samples}};
     for (int i = 0; i < NUM_COMMON; i++)

@@ -112,26 +112,54 @@ static const struct sequence *sequence_of(const struct validate_options *o)
     return o->until_different ? &sequence_declared : &sequence_single;
 }
 
-static void describe_run(const struct validation *v, json_t *root)
+static int stages_of(const struct validate_options *o)
 {
-    const struct validate_options *o = v->opt;
+    return o->stages > 0 ? o->stages : o->alpha < small_alpha ? 2 : 1;
+}
+
+bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
+                    struct err *e)
+{
+    json_t *root = results_new(argc, argv, o->alpha);
+    if (root == NULL)
+        return err_set(e, "out of memory");
     json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));
     if (o->live)
         json_object_set_new(root, "reference_seed", json_integer(o->reference_seed));
-    json_object_set_new(root, "stages", json_integer(v->stages));
+    json_object_set_new(root, "stages", json_integer(stages_of(o)));
     if (o->budget_s > 0)
         json_object_set_new(root, "budget_s", json_real(o->budget_s));
+    json_object_set_new(root, "consistency", json_array());
+    *results = root;
+    return true;
 }
 
 /* Claims that --until-different did not look at are not in the results. */
 static void collect(const struct validation *v, json_t *root)
 {
-    json_t *consistency = json_array();
-    json_object_set_new(root, "consistency", consistency);
     for (int i = 0; i < v->num_tasks; i++)
         if (v->task[i].result != NULL)
-            json_array_append(v->task[i].a != NULL ? json_object_get(root, "claims") : consistency,
-                              v->task[i].result);
+            json_array_append(
+                json_object_get(root, v->task[i].a != NULL ? "claims" : "consistency"),
+                v->task[i].result);
+}
+
+static void validation_free(struct validation *v)
+{
+    for (int i = 0; i < v->num_tasks; i++)
+        task_free(&v->task[i]);
+    for (int i = 0; v->sides != NULL && i < v->suite.num_scenes; i++) {
+        struct scene_sides *s = &v->sides[i];
+        side_free(&s->ours);
+        side_free(&s->engine);
+        for (int k = 0; k < MAX_VARIANTS; k++)
+            side_free(&s->variant[k]);
+        for (int k = 0; k < MAX_REFERENCES; k++)
+            side_free(&s->reference[k]);
+    }
+    free(v->task);
+    free(v->sides);
+    suite_free(&v->suite);
 }
 
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
@@ -140,7 +168,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     struct validation v = {.opt = opt, .start = now_seconds(), .sequence = sequence_of(opt)};
     json_t *root = NULL, *cannot = json_array();
     v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
-    v.stages = opt->stages > 0 ? opt->stages : opt->alpha < small_alpha ? 2 : 1;
+    v.stages = stages_of(opt);
     if (!suite_load(opt->suite_dir, &v.suite, e)) {
         json_decref(cannot);
         return false;
@@ -149,13 +177,10 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     if (!ok)
         goto done;
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
-    v.alpha = opt->alpha / v.num_tasks;
-    root = results_new(argc, argv, opt->alpha);
-    if (root == NULL) {
-        ok = err_set(e, "out of memory");
+    v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
+    ok = validate_start(opt, argc, argv, &root, e);
+    if (!ok)
         goto done;
-    }
-    describe_run(&v, root);
     if (opt->engine != NULL)
         json_object_set(root, "not_expressible", cannot);
     if (opt->live) {
@@ -176,19 +201,36 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
 done:
     json_decref(root);
     json_decref(cannot);
-    for (int i = 0; i < v.num_tasks; i++)
-        task_free(&v.task[i]);
-    for (int i = 0; v.sides != NULL && i < v.suite.num_scenes; i++) {
-        struct scene_sides *s = &v.sides[i];
-        side_free(&s->ours);
-        side_free(&s->engine);
-        for (int k = 0; k < MAX_VARIANTS; k++)
-            side_free(&s->variant[k]);
-        for (int k = 0; k < MAX_REFERENCES; k++)
-            side_free(&s->reference[k]);
+    validation_free(&v);
+    return ok;
+}
+
+bool validate_scenes(const struct validate_options *opt, char ***scene, int *num, int *num_claims,
+                     struct err *e)
+{
+    struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
+    json_t *cannot = json_array();
+    if (!suite_load(opt->suite_dir, &v.suite, e)) {
+        json_decref(cannot);
+        return false;
     }
-    free(v.task);
-    free(v.sides);
-    suite_free(&v.suite);
+    bool ok = make_dirs(opt->out_dir, e) && plan_tasks(&v, cannot, e);
+    size_t most = (size_t)v.num_tasks, room = most * sizeof **scene;
+    for (size_t i = 0; i < most; i++)
+        room += strlen(v.task[i].scene->name) + 1;
+    char **names = ok ? malloc(room + 1) : NULL;
+    ok = ok && (names != NULL || err_set(e, "out of memory"));
+    char *at = ok ? (char *)(names + most) : NULL;
+    *num = 0;
+    for (int i = 0; ok && i < v.num_tasks; i++) {
+        if (i > 0 && v.task[i].scene == v.task[i - 1].scene)
+            continue;
+        names[(*num)++] = strcpy(at, v.task[i].scene->name);
+        at += strlen(at) + 1;
+    }
+    *scene = names;
+    *num_claims = v.num_tasks;
+    json_decref(cannot);
+    validation_free(&v);
     return ok;
 }
