@@ -649,6 +649,11 @@ tests/reproduce.sh "$build" >"$tmp/reproduce"
 cat "$tmp/reproduce"
 failures=$((failures + $(grep -c '^not ok' "$tmp/reproduce")))
 
+# The same work in jobs.
+tests/scale.sh "$build" >"$tmp/scale"
+cat "$tmp/scale"
+failures=$((failures + $(grep -c '^not ok' "$tmp/scale")))
+
 # Kills, full disks and missing memory.
 tests/faults.sh "$build" 2 499 >"$tmp/faults"
 cat "$tmp/faults"

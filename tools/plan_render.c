@@ -206,6 +206,7 @@ static bool write_whole(struct gathering *g, const struct output *out, struct er
         band.target = calloc((size_t)width * (size_t)height, sizeof *band.target);
         ok = band.target != NULL || err_set(e, "out of memory");
     }
+    film_set_sampler(&band, (enum sampler_kind)o->sampler);
     for (int y = 0; ok && y < height; y += each) {
         band.m.height = height - y < each ? height - y : each;
         ok = read_band(g, y, band.m.height, &band, e) && output_rows(w, &band, e);
