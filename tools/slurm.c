@@ -212,8 +212,9 @@ static bool submit(struct cluster *c, int lost, struct err *e)
     if (!fits)
         return err_set(e, "%.64s...: path too long", c->plan->dir);
     strcat(script, ")");
-    const char *const argv[] = {"sbatch", "--no-requeue", name,   array, cpus,
-                                output,   "--wrap",       script, NULL};
+    const char *const argv[] = {
+        "sbatch", "--no-requeue", "--open-mode=append", name, array, cpus, output, "--wrap", script,
+        NULL};
     return ask(c, argv, log, e);
 }
 
