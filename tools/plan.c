@@ -116,7 +116,8 @@ static void hash_common(const struct plan *p, char hex[65])
     json_decref(common);
 }
 
-bool plan_job(struct plan *p, const char *const *word, int num, const char *input, struct err *e)
+bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
+              struct err *e)
 {
     json_t *words = json_array(), *inputs = json_object();
     char *text = NULL, common[65], key[65];
@@ -124,7 +125,9 @@ bool plan_job(struct plan *p, const char *const *word, int num, const char *inpu
     bool ok = line != NULL || err_set(e, "out of memory");
     if (line != NULL)
         p->line = line;
-    ok = ok && add_words(words, word, num, e) && (input == NULL || add_input(inputs, input, e));
+    ok = ok && add_words(words, word, num, e);
+    for (; ok && *input != NULL; input++)
+        ok = add_input(inputs, *input, e);
     if (ok) {
         hash_common(p, common);
         json_t *job = json_pack("{ss, sO, sO}", "common", common, "words", words, "inputs", inputs);

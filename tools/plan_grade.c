@@ -66,7 +66,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
          plan_input(p, s->suite, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
     for (int k = 0; ok && k < s->num; k++)
-        ok = plan_job(p, &s->submission[k], 1, s->submission[k], e);
+        ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
     free(words);
     return ok;
 }

@@ -20,9 +20,9 @@ void plan_may_end(struct plan *p, int code);
 /* A file or directory that all jobs read. */
 bool plan_input(struct plan *p, const char *path, struct err *e)
     __attribute__((warn_unused_result));
-/* The next job; input: NULL or what it alone reads. After all of the above. */
-bool plan_job(struct plan *p, const char *const *word, int num, const char *input, struct err *e)
-    __attribute__((warn_unused_result));
+/* The next job; input: what it alone reads, NULL at the end. After all of the above. */
+bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
+              struct err *e) __attribute__((warn_unused_result));
 
 /* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
 bool render_plan(int argc, char **argv, int parts, struct plan *p, struct err *e);

@@ -108,7 +108,7 @@ bool render_plan(int argc, char **argv, int parts, struct plan *p, struct err *e
             snprintf(text[i], sizeof text[i], "%d", cell[i]);
             word[i + 1] = text[i];
         }
-        ok = plan_job(p, word, 5, NULL, e);
+        ok = plan_job(p, word, 5, (const char *const[]){NULL}, e);
     }
     return ok;
 }

@@ -47,29 +47,55 @@ static int threads_asked(int argc, char **argv, const struct validate_options *o
     return 1;
 }
 
+/* What a plan is made of. */
+struct planning {
+    struct plan *p;
+    const struct validate_options *opt;
+    int argc, cpus;
+    char **argv;
+};
+
+/* The words of all jobs with the first, when the number of claims is known. */
+static bool plan_scene(void *ctx, const struct suite_scene *s, int num_claims, struct err *e)
+{
+    struct planning *g = ctx;
+    char json[4096 + 8], from[4096 + 80], golden[4096 + 80], threads[16];
+    const char *input[6], **next = input;
+    snprintf(threads, sizeof threads, "%d", g->cpus);
+    if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, num_claims, e))
+        return false;
+    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    snprintf(from, sizeof from, "%s/%s.json", g->opt->suite_dir, s->references_of);
+    snprintf(golden, sizeof golden, "%s/%s", g->opt->golden_dir, s->references_of);
+    *next++ = s->dae;
+    *next++ = json;
+    if (strcmp(s->name, s->references_of) != 0)
+        *next++ = from;
+    if (s->environment[0] != '\0')
+        *next++ = s->environment;
+    if (!g->opt->live && access(golden, F_OK) == 0)
+        *next++ = golden;
+    *next = NULL;
+    return plan_job(g->p, (const char *const[]){"--only", s->name}, 2, input, e);
+}
+
 static bool plan_jobs(struct validate_command *c, int argc, char **argv, struct plan *p,
                       struct err *e)
 {
     const struct validate_options *o = &c->opt;
-    char threads[16], **scene = NULL;
-    int num, claims, cpus = threads_asked(argc, argv, o);
-    snprintf(threads, sizeof threads, "%d", cpus);
+    struct planning g = {.p = p, .opt = o, .argc = argc, .argv = argv};
+    g.cpus = threads_asked(argc, argv, o);
     if (o->budget_s > 0 || o->until_different || o->of_claims > 0)
         return err_set(e, "%s cannot be cut into jobs: what is looked at next depends on the rest",
                        o->budget_s > 0      ? "--budget"
                        : o->until_different ? "--until-different"
                                             : "--of-claims");
-    bool ok = plan_begin(p, o->out_dir, "results.json", cpus, e) &&
-              validate_scenes(o, &scene, &num, &claims, e) &&
-              add_words(p, argc, argv, o, threads, claims, e) && plan_input(p, o->pathtracer, e) &&
-              plan_input(p, o->suite_dir, e) && (o->live || plan_input(p, o->golden_dir, e)) &&
-              (o->engine == NULL || plan_input(p, o->engine->file, e));
     for (int code = EXIT_DIFFERENT; code <= EXIT_NOT_JUDGED; code++)
         plan_may_end(p, code);
-    for (int i = 0; ok && i < num; i++)
-        ok = plan_job(p, (const char *const[]){"--only", scene[i]}, 2, NULL, e);
-    free(scene);
-    return ok;
+    return plan_begin(p, o->out_dir, "results.json", g.cpus, e) &&
+           plan_input(p, o->pathtracer, e) &&
+           (o->engine == NULL || plan_input(p, o->engine->file, e)) &&
+           validate_parts(o, plan_scene, &g, e);
 }
 
 bool validate_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)

@@ -205,31 +205,18 @@ done:
     return ok;
 }
 
-bool validate_scenes(const struct validate_options *opt, char ***scene, int *num, int *num_claims,
-                     struct err *e)
+bool validate_parts(const struct validate_options *opt,
+                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
+                                 struct err *e),
+                    void *ctx, struct err *e)
 {
     struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
     json_t *cannot = json_array();
-    if (!suite_load(opt->suite_dir, &v.suite, e)) {
-        json_decref(cannot);
-        return false;
-    }
-    bool ok = make_dirs(opt->out_dir, e) && plan_tasks(&v, cannot, e);
-    size_t most = (size_t)v.num_tasks, room = most * sizeof **scene;
-    for (size_t i = 0; i < most; i++)
-        room += strlen(v.task[i].scene->name) + 1;
-    char **names = ok ? malloc(room + 1) : NULL;
-    ok = ok && (names != NULL || err_set(e, "out of memory"));
-    char *at = ok ? (char *)(names + most) : NULL;
-    *num = 0;
-    for (int i = 0; ok && i < v.num_tasks; i++) {
-        if (i > 0 && v.task[i].scene == v.task[i - 1].scene)
-            continue;
-        names[(*num)++] = strcpy(at, v.task[i].scene->name);
-        at += strlen(at) + 1;
-    }
-    *scene = names;
-    *num_claims = v.num_tasks;
+    bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
+              plan_tasks(&v, cannot, e);
+    for (int i = 0; ok && i < v.num_tasks; i++)
+        if (i == 0 || v.task[i].scene != v.task[i - 1].scene)
+            ok = part(ctx, v.task[i].scene, v.num_tasks, e);
     json_decref(cannot);
     validation_free(&v);
     return ok;

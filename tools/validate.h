@@ -56,11 +56,13 @@ struct validate_options {
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e) __attribute__((warn_unused_result));
 
-/* The same in parts, which together judge what one run does, with the same bits: how many claims there are in all, and the names of
- * the scenes that have some, in the order of the results, *num of them: a new array, whose names belong to it, to
- * free(). Fails where validate() would before it judges. */
-bool validate_scenes(const struct validate_options *opt, char ***scene, int *num, int *num_claims,
-                     struct err *e) __attribute__((warn_unused_result));
+/* The same in parts, a scene each, which together judge what one run does, with the same bits. Calls for each scene that
+ * has claims, in the order of the results, with the number of all claims; stops where that returns false, and returns it.
+ * Fails where validate() would before it judges. */
+bool validate_parts(const struct validate_options *opt,
+                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
+                                 struct err *e),
+                    void *ctx, struct err *e) __attribute__((warn_unused_result));
 /* *results as validate() on the whole, with all lists empty. */
 bool validate_start(const struct validate_options *opt, int argc, char **argv, json_t **results,
                     struct err *e) __attribute__((warn_unused_result));
