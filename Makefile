@@ -90,6 +90,10 @@ slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
 large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 	tests/large.sh $(BUILD) $(or $(SIDE),16384)
 
+# What a thousand nodes would do, simulated (tools/SCALE.md).
+scale: $(BUILD)/tests/make_scale
+	$(BUILD)/tests/make_scale
+
 # Lines of renderer/ and tools/ that the tests and the end-to-end runs reach.
 coverage: $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
@@ -175,6 +179,7 @@ help:
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
 	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'
 	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
+	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
 	@echo 'make coverage   lines of renderer/ and tools/ that the tests reach (an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
@@ -292,6 +297,8 @@ $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c te
 $(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_scale: $(call obj,$(BUILD),tests/make_scale.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
@@ -400,7 +407,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 $(BUILD)/deps-slurm: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_SLURM))
 
-.PHONY: all validate check lint threads tsan faults slurm large coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -156,30 +156,31 @@ static void last_words(const struct cluster *c, const struct job *j, char text[2
         fclose(f);
 }
 
-/* The jobs that are lost, a line of numbers for each task, at most MOST_TASKS of them. */
-static bool write_round(struct cluster *c, int lost, int *tasks, struct err *e)
+/* The jobs that are lost, a line of numbers for each task. Neighbours, which often cost alike, go to
+ * different tasks. */
+static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 {
     char path[ROOM];
     struct out_file out;
-    int each = (lost + MOST_TASKS - 1) / MOST_TASKS, at = 0;
+    int *job = calloc((size_t)lost, sizeof *job), num = 0;
+    if (job == NULL)
+        return err_set(e, "out of memory");
     round_path(c, c->rounds, path);
-    if (!out_open(&out, path, e))
+    if (!out_open(&out, path, e)) {
+        free(job);
         return false;
-    for (int k = 0; k < c->plan->num; k++) {
-        struct job *j = &c->job[k];
-        if (!is_lost(j))
-            continue;
-        if (at > 0)
-            fputc(at % each == 0 ? '\n' : ' ', out.f);
-        fprintf(out.f, "%d", k);
-        j->tries++;
-        j->round = c->rounds;
-        j->task = at++ / each + 1;
-        j->looks = 0;
-        j->queued = true;
     }
-    fputc('\n', out.f);
-    *tasks = (lost + each - 1) / each;
+    for (int k = 0; k < c->plan->num; k++)
+        if (is_lost(&c->job[k]))
+            job[num++] = k;
+    for (int task = 0; task < tasks; task++)
+        for (int i = task; i < lost; i += tasks) {
+            struct job *j = &c->job[job[i]];
+            fprintf(out.f, "%d%c", job[i], i + tasks < lost ? ' ' : '\n');
+            *j = (struct job){
+                .queued = true, .tries = j->tries + 1, .round = c->rounds, .task = task + 1};
+        }
+    free(job);
     return out_commit(&out, e);
 }
 
@@ -187,9 +188,9 @@ static bool write_round(struct cluster *c, int lost, int *tasks, struct err *e)
 static bool submit(struct cluster *c, int lost, struct err *e)
 {
     char assay[4096], todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM] = "";
-    int tasks;
+    int tasks = lost < MOST_TASKS ? lost : MOST_TASKS;
     c->rounds++;
-    if (!write_round(c, lost, &tasks, e))
+    if (!write_round(c, lost, tasks, e))
         return false;
     beside_program(assay, sizeof assay, "assay");
     round_path(c, c->rounds, todo);
