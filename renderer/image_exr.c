@@ -268,10 +268,12 @@ static bool read_header(exr_context_t f, const char *path, const struct stream *
                        (long long)width, (long long)height, channels, (long long)size);
     if (!image_alloc(im, (int)width, (int)height, channels, names, e))
         return err_prefix(e, "%s", path);
+    /* "type" says how the file is made, not what of, and a writer has its own. */
     for (int i = 0; i < num_attrs; i++) {
         const exr_attribute_t *a;
         if (exr_get_attribute_by_index(f, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a) == EXR_ERR_SUCCESS &&
-            a->type == EXR_ATTR_STRING && !image_set_attr(im, a->name, a->string->str, e))
+            a->type == EXR_ATTR_STRING && strcmp(a->name, "type") != 0 &&
+            !image_set_attr(im, a->name, a->string->str, e))
             return err_prefix(e, "%s", path);
     }
     return true;

@@ -106,11 +106,10 @@ static bool writer_head(struct moments_writer *w, const struct moments *m, int h
                         const struct image *layers, const struct image_attr *attrs, int num_attrs,
                         struct err *e)
 {
-    enum { MAX_LAYERS = 64 };
-    const char *names[10 + MAX_LAYERS];
+    const char *names[IMAGE_MAX_CHANNELS];
     char spp[32];
     int more = layers != NULL ? layers->channels : 0;
-    assert(more <= MAX_LAYERS);
+    assert(10 + more <= IMAGE_MAX_CHANNELS);
     memcpy(names, channel_names, sizeof channel_names);
     for (int c = 0; c < more; c++)
         names[10 + c] = layers->names[c];
@@ -158,7 +157,7 @@ static void interleave(const struct moments *m, const struct image *layers, size
             px[6 + c] = (float)m->m3[3 * p + c];
         }
         px[9] = (float)m->n[p];
-        for (size_t c = 0; c < more; c++)
+        for (size_t c = 0; layers != NULL && c < more; c++)
             px[10 + c] = layers->data[more * p + c];
     }
 }

@@ -289,7 +289,7 @@ bool plan_enter(const struct plan *p, struct err *e)
 
 int plan_gather(const struct plan *p, struct err *e)
 {
-    int argc, code = EXIT_NOT_JUDGED;
+    int argc = 0, code = EXIT_NOT_JUDGED;
     char **argv = plan_words(json_object_get(p->head, "command"), &argc);
     if (argv == NULL)
         err_set(e, "out of memory");
