@@ -51,10 +51,9 @@ in_jobs() {
 }
 in_jobs "cells beside each other" 6 again -s 5 --aov "$scene"
 in_jobs "more jobs than sixteens of rows" 23 again -s 3 --sampler sobol "$scene"
-in_jobs "a part of the samples of a cell" 3 once --samples 3:9 -p 5 4 27 21 "$scene"
 in_jobs "the assignment's adaptive rule" 2 once -s 24 -a 4 0.3 "$scene"
-in_jobs "a pilot" 2 once -s 24 --adaptive-unbiased 0.3 --pilot 4 -- "$scene"
-in_jobs "an environment" 2 once -s 3 -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae
+in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 \
+    -e reference/scenes/46_sky.exr -- reference/scenes/46_sky.dae
 
 # A plan, its jobs, and what is not done. Of 4 x 40 rows the third job's file is looked into.
 cp "$scene" "$tmp/s.dae"
@@ -91,7 +90,7 @@ expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay"
 
 # The class: what is right, what is dead, what is no program.
 mkdir "$tmp/class"
-cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && mkdir "$tmp/class/empty"
+cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && mkdir "$tmp/class/empty" && echo later >"$tmp/class/empty/note"
 no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date|key)":/d' "$1"; }
 "$assay" grade -o "$tmp/g1" tests/quick.rubric "$tmp"/class/* >/dev/null 2>"$tmp/err"
 one=$?
@@ -105,6 +104,9 @@ for f in grades.json right/grade.json dead/grade.json empty/grade.json; do
 done
 for f in grades.csv right/point.png; do cmp -s "$tmp/g1/$f" "$tmp/g2/$f" || why="$why $f differs"; done
 [ -e "$tmp/g2/index.html" ] || why="$why no page"
+# tree_hash.h, by other means.
+hash=$(printf 'f %s note\n' "$(sha256sum "$tmp/class/empty/note" | cut -c1-64)" | sha256sum | cut -c1-64)
+grep -q "\"$tmp/class/empty\":\"$hash\"" "$tmp/jobs" || why="$why no hash of a directory"
 tell "a grading batch" "$why"
 
 # The suite: two scenes that take no time, one with a claim of consistency.

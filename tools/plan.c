@@ -206,7 +206,7 @@ void plan_free(struct plan *p)
     *p = (struct plan){.dir = ""};
 }
 
-static bool are_texts(const json_t *array)
+bool plan_are_texts(const json_t *array)
 {
     size_t i;
     json_t *v;
@@ -225,8 +225,8 @@ static bool check_head(const struct plan *p)
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         ok = ok && plan_text(p, texts[i]) != NULL;
     return ok && kind_of(plan_text(p, "kind")) < NUM_KINDS &&
-           are_texts(json_object_get(p->head, "command")) &&
-           are_texts(json_object_get(p->head, "run")) &&
+           plan_are_texts(json_object_get(p->head, "command")) &&
+           plan_are_texts(json_object_get(p->head, "run")) &&
            json_is_object(json_object_get(p->head, "inputs"));
 }
 
@@ -253,7 +253,7 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
             p->line[p->num++] = copy;
     }
     free(line);
-    return (ok && p->head != NULL &&
+    return (ok && p->head != NULL && p->num > 0 &&
             json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
            err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);
 }

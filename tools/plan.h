@@ -55,7 +55,8 @@ bool plan_enter(const struct plan *p, struct err *e) __attribute__((warn_unused_
 void plan_artefact(const struct plan *p, int k, const char *name, char path[PLAN_PATH + 256]);
 /* A text of the head. */
 const char *plan_text(const struct plan *p, const char *name);
-/* The words of an array of texts, NULL-terminated; one block, to free(). NULL out of memory. */
+bool plan_are_texts(const json_t *array);
+/* The words of such an array, NULL-terminated; one block, to free(). NULL out of memory. */
 char **plan_words(const json_t *array, int *num);
 
 #endif

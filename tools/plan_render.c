@@ -55,15 +55,6 @@ static void cell_of(const struct options *o, int parts, int k, int *num, int out
     out[3] = y1 - y0;
 }
 
-/* Threads of a job: one, unless the user says how many. */
-static int threads_asked(int argc, char **argv, const struct options *o)
-{
-    for (int i = 1; i < argc; i++)
-        if (strcmp(argv[i], "-t") == 0 || strncmp(argv[i], "--threads", 9) == 0)
-            return o->threads;
-    return 1;
-}
-
 static bool add_words(struct plan *p, int argc, char **argv, const struct options *o, int threads,
                       struct err *e)
 {
@@ -93,7 +84,7 @@ bool render_plan(int argc, char **argv, int parts, struct plan *p, struct err *e
     if (!options_parse(argc, argv, &o, e) || !check_options(&o, e))
         return false;
     parts = o.slurm > 0 ? o.slurm : parts;
-    int threads = threads_asked(argc, argv, &o), num = 1;
+    int threads = has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
     const char *const inputs[] = {o.scene, o.camera_file, o.environment_file};
     bool ok =
         plan_begin(p, o.output[0], PRODUCT, threads, e) && add_words(p, argc, argv, &o, threads, e);

@@ -163,7 +163,7 @@ bool plan_run_job(const struct plan *p, int k, bool *made, struct err *e)
     json_t *job = job_of(p, k);
     key_of(job, key);
     *made = false;
-    if (key[0] == '\0') {
+    if (key[0] == '\0' || !plan_are_texts(json_object_get(job, "words"))) {
         json_decref(job);
         return err_set(e, "%s/plan.jsonl: line %d is no job", p->dir, k + 2);
     }

@@ -38,15 +38,6 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct valida
     return ok;
 }
 
-/* Threads of a job: one, unless the user says how many. */
-static int threads_asked(int argc, char **argv, const struct validate_options *o)
-{
-    for (int i = 1; i < argc; i++)
-        if (strcmp(argv[i], "-t") == 0 || strncmp(argv[i], "--threads", 9) == 0)
-            return o->threads;
-    return 1;
-}
-
 /* What a plan is made of. */
 struct planning {
     struct plan *p;
@@ -84,7 +75,7 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, struct 
 {
     const struct validate_options *o = &c->opt;
     struct planning g = {.p = p, .opt = o, .argc = argc, .argv = argv};
-    g.cpus = threads_asked(argc, argv, o);
+    g.cpus = has_word(argc, argv, "-t", "--threads") ? o->threads : 1;
     if (o->budget_s > 0 || o->until_different || o->of_claims > 0)
         return err_set(e, "%s cannot be cut into jobs: what is looked at next depends on the rest",
                        o->budget_s > 0      ? "--budget"
