@@ -157,7 +157,7 @@ static struct piece *list_pieces(const struct share *share, int num, int *num_pi
     int most = 0;
     for (int i = 0; i < num; i++)
         most += share[i].num_parts;
-    struct piece *piece = calloc((size_t)most, sizeof *piece);
+    struct piece *piece = calloc((size_t)most + 1, sizeof *piece);
     *num_pieces = 0;
     if (piece == NULL) {
         err_set(e, "out of memory");
@@ -208,10 +208,12 @@ static bool shape_whole(struct share *whole, struct piece *piece, int num, bool 
         }
     for (int i = 0; !keeps && i < num; i++)
         piece[i].kept = -1;
-    /* Without any channel it is there for its attributes. */
-    name[all] = "none";
-    ok = ok &&
-         image_alloc(&whole->im, whole->cell[2], whole->cell[3], all > 0 ? (int)all : 1, name, e);
+    if (ok) {
+        /* Without any channel it is there for its attributes. */
+        name[all] = "none";
+        ok = image_alloc(&whole->im, whole->cell[2], whole->cell[3], all > 0 ? (int)all : 1, name,
+                         e);
+    }
     if (ok && all == 0)
         whole->im.channels = 0;
     free(text);
