@@ -14,7 +14,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to check, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev zlib1g-dev libmicrohttpd-dev bubblewrap
+  nettle-dev zlib1g-dev libdeflate-dev libmicrohttpd-dev bubblewrap
 DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
@@ -23,7 +23,7 @@ DEPS_SLURM := slurm-wlm munge
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle zlib libmicrohttpd
+PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle zlib libdeflate libmicrohttpd
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')

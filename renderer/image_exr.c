@@ -1,5 +1,6 @@
 /* OpenEXR files through the C interface of its own library, which loads in a millisecond. */
 #define _GNU_SOURCE
+#include "exr_zip.h"
 #include "fs.h"
 #include "image.h"
 
@@ -96,16 +97,17 @@ static bool failed(const char *path, const char *what, const struct stream *s, e
                    s->why[0] != '\0' ? s->why : exr_get_default_error_message(code));
 }
 
-/* Where the pixels of each channel of a chunk are: interleaved as in the image, from `first` on. */
-static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im,
-                           const float *first)
+/* Where the pixels of each channel of a chunk go in the interleaved picture: the first is number
+ * `at`. */
+static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im, size_t at)
 {
     for (int k = 0; k < num; k++) {
         c[k].user_bytes_per_element = sizeof(float);
         c[k].user_data_type = EXR_PIXEL_FLOAT;
         c[k].user_pixel_stride = im->channels * (int32_t)sizeof(float);
         c[k].user_line_stride = im->width * c[k].user_pixel_stride;
-        c[k].decode_to_ptr = (uint8_t *)(first + image_channel(im, c[k].channel_name));
+        c[k].decode_to_ptr = (uint8_t *)(im->data + at * (size_t)im->channels +
+                                         image_channel(im, c[k].channel_name));
     }
 }
 
@@ -129,9 +131,28 @@ struct image_writer {
     struct out_file file;
     struct stream s;
     exr_context_t f;
-    exr_encode_pipeline_t encoder;
+    struct exr_zip *zip;
     int y; /* the next row */
 };
+
+/* What packs the rows: by the order of channels in the file. */
+static exr_result_t start_rows(struct image_writer *w)
+{
+    const exr_attr_chlist_t *list;
+    int32_t rows;
+    exr_result_t r = exr_get_scanlines_per_chunk(w->f, 0, &rows);
+    if (r == EXR_ERR_SUCCESS)
+        r = exr_get_channels(w->f, 0, &list);
+    int *from = malloc((size_t)w->head->channels * sizeof *from);
+    if (r == EXR_ERR_SUCCESS && from != NULL) {
+        assert(rows == IMAGE_BAND);
+        for (int k = 0; k < w->head->channels; k++)
+            from[k] = image_channel(w->head, list->entries[k].name.str);
+        w->zip = exr_zip_new(w->head->width, w->head->channels, from, rows);
+    }
+    free(from);
+    return r == EXR_ERR_SUCCESS && w->zip == NULL ? EXR_ERR_OUT_OF_MEMORY : r;
+}
 
 struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
 {
@@ -146,12 +167,13 @@ struct image_writer *image_writer_open(const char *path, const struct image *hea
     }
     w->head = head;
     w->s.fd = fileno(w->file.f);
-    w->encoder = (exr_encode_pipeline_t)EXR_ENCODE_PIPELINE_INITIALIZER;
     exr_context_initializer_t init = initializer(&w->s);
     init.error_handler_fn = drop_complaint;
     exr_result_t r = exr_start_write(&w->f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (r == EXR_ERR_SUCCESS)
         r = write_header(w->f, head);
+    if (r == EXR_ERR_SUCCESS)
+        r = start_rows(w);
     if (r == EXR_ERR_SUCCESS)
         return w;
     failed(path, "write", &w->s, r, e);
@@ -161,23 +183,11 @@ struct image_writer *image_writer_open(const char *path, const struct image *hea
 
 bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
 {
-    exr_chunk_info_t chunk;
-    int32_t each;
-    exr_result_t r = exr_get_scanlines_per_chunk(w->f, 0, &each);
-    assert(r != EXR_ERR_SUCCESS || (each == IMAGE_BAND && w->y + num <= w->head->height));
+    size_t size;
+    assert(w->y + num <= w->head->height);
     assert(num == IMAGE_BAND || w->y + num == w->head->height);
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_write_scanline_chunk_info(w->f, 0, w->y, &chunk);
-    if (r == EXR_ERR_SUCCESS)
-        r = w->y == 0 ? exr_encoding_initialize(w->f, 0, &chunk, &w->encoder)
-                      : exr_encoding_update(w->f, 0, &chunk, &w->encoder);
-    if (r == EXR_ERR_SUCCESS) {
-        point_channels(w->encoder.channels, w->encoder.channel_count, w->head, rows);
-        if (w->y == 0)
-            r = exr_encoding_choose_default_routines(w->f, 0, &w->encoder);
-    }
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_encoding_run(w->f, 0, &w->encoder);
+    const void *bytes = exr_zip_rows(w->zip, rows, num, &size);
+    exr_result_t r = exr_write_scanline_chunk(w->f, 0, w->y, bytes, size);
     w->y += num;
     return r == EXR_ERR_SUCCESS || failed(w->file.path, "write", &w->s, r, e);
 }
@@ -185,7 +195,6 @@ bool image_writer_rows(struct image_writer *w, const float *rows, int num, struc
 bool image_writer_close(struct image_writer *w, struct err *e)
 {
     assert(w->y == w->head->height);
-    exr_encoding_destroy(w->f, &w->encoder);
     exr_result_t r = exr_finish(&w->f); /* writes the table of rows */
     bool ok = r == EXR_ERR_SUCCESS;
     if (ok) {
@@ -194,6 +203,7 @@ bool image_writer_close(struct image_writer *w, struct err *e)
         failed(w->file.path, "write", &w->s, r, e);
         out_abandon(&w->file);
     }
+    exr_zip_free(w->zip);
     free(w);
     return ok;
 }
@@ -202,10 +212,9 @@ void image_writer_abandon(struct image_writer *w)
 {
     if (w == NULL)
         return;
-    if (w->f != NULL)
-        exr_encoding_destroy(w->f, &w->encoder);
     exr_finish(&w->f);
     out_abandon(&w->file);
+    exr_zip_free(w->zip);
     free(w);
 }
 
@@ -286,8 +295,7 @@ static exr_result_t read_chunk(exr_context_t f, const exr_chunk_info_t *chunk, s
     exr_decode_pipeline_t decoder = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_result_t r = exr_decoding_initialize(f, 0, chunk, &decoder);
     if (r == EXR_ERR_SUCCESS) {
-        point_channels(decoder.channels, decoder.channel_count, im,
-                       im->data + at * (size_t)im->channels);
+        point_channels(decoder.channels, decoder.channel_count, im, at);
         r = exr_decoding_choose_default_routines(f, 0, &decoder);
     }
     if (r == EXR_ERR_SUCCESS)

@@ -15,7 +15,8 @@ static float survival(const struct integrator_options *o, int vertex, rgb throug
 {
     switch (o->roulette) {
     case ROULETTE_OFF: break;
-    case ROULETTE_THROUGHPUT: return vertex >= 2 ? minf(1, rgb_max(throughput) * eta2) : 1;
+    case ROULETTE_THROUGHPUT:
+        return vertex >= 2 ? minf(1, roulette_factor(o) * (rgb_max(throughput) * eta2)) : 1;
     case ROULETTE_FIXED: return vertex >= 1 ? o->survival : 1;
     }
     return 1;

@@ -36,7 +36,7 @@ enum many_lights {
 enum roulette_kind {
     ROULETTE_OFF,
     ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the largest component of the
-                            throughput, 1 at most */
+                            throughput, with nets four times that, 1 at most */
     ROULETTE_FIXED       /* from the second vertex on: survive with the same probability each time,
                             as in the assignment */
 };
@@ -55,6 +55,13 @@ struct integrator_options {
     bool first_hits; /* fill the batch's `first`; changes nothing else */
     enum isa isa;    /* of the stages; ISA_SCALAR: none. Every choice gives the same bits */
 };
+
+/* ROULETTE_THROUGHPUT: the chance to go on, over the largest component of the throughput. With nets a coin at every
+ * vertex undoes what they gain: fewer coins are worth longer paths. */
+static inline float roulette_factor(const struct integrator_options *o)
+{
+    return o->sampler.kind == SAMPLER_INDEPENDENT ? 1 : 4;
+}
 
 struct integrator {
     struct integrator_options opt;

@@ -34,9 +34,29 @@ static void add_run(double *restrict n, double *restrict mean, double *restrict 
     }
 }
 
-static void film_add_lanes(struct film *f, const size_t *pixel, int num_lanes,
-                           const struct batch *b)
+/* The same for the first sample of a pixel. It reads no sum, and leaves M2 and M3 alone: memory that has not been
+ * written yet would be mapped twice, the second time with a call to all processors. */
+INLINE void first_of(struct film *f, size_t pixel, const struct rgbs *radiance, int lane)
 {
+    double r = radiance->r[lane], g = radiance->g[lane], b = radiance->b[lane];
+    double illuminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    double *mean = f->m.mean + 3 * pixel;
+    f->m.n[pixel] = 1;
+    mean[0] = 0 + r; /* not -0 */
+    mean[1] = 0 + g;
+    mean[2] = 0 + b;
+    f->s1[pixel] = 0 + illuminance;
+    f->s2[pixel] = illuminance * illuminance;
+}
+
+static void film_add_lanes(struct film *f, const size_t *pixel, int num_lanes,
+                           const struct batch *b, bool first)
+{
+    if (first) {
+        for (int i = 0; i < num_lanes; i++)
+            first_of(f, pixel[i], &b->radiance, i);
+        return;
+    }
     for (int i = 0, end; i < num_lanes; i = end) {
         const size_t p = pixel[i];
         const double n = f->m.n[p];

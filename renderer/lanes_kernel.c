@@ -354,28 +354,71 @@ struct light_samples {
     struct lamp lamp; /* the light, if it is one, where only diffuse things scatter */
 };
 
+/* Samples of the lamp for the vertices first .. end, a row of each, where their shadow rays will be: directions,
+ * distances and, for tmin, pdf_w. A loop of its own, as draw_numbers(). */
+static __attribute__((noinline)) void sample_lamp(struct batch *b, int first, int end,
+                                                  const struct light_samples *what)
+{
+    for (int k = first, j = 0; k < end; k += LANES) {
+        const vec3v p = v3_load(&b->p, k);
+        for (int i = 0; i < what->num; i++, j++) {
+            vf u[4];
+            struct light_samplev ls;
+            load_numbers(b, j, u);
+            sample_lampv(&what->lamp, p, u, &ls);
+            v3_store(&b->shadow.d, LANES * j, ls.wi);
+            vf_store_any(b->shadow.tmax + LANES * j, ls.distance);
+            vf_store_any(b->shadow.tmin + LANES * j, ls.pdf_w);
+        }
+    }
+}
+
+/* In time: rays are stored no further back than in the row of their sample. */
+INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *lamp,
+                             struct light_samplev *ls)
+{
+    ls->wi = v3_load(&b->shadow.d, LANES * j);
+    ls->distance = vf_load_any(b->shadow.tmax + LANES * j);
+    ls->pdf_w = vf_load_any(b->shadow.tmin + LANES * j);
+    ls->radiance = rgb_all(lamp->radiance);
+    ls->sphere = vi_set(-1);
+    ls->delta = vi_set(0);
+}
+
+/* The like for other lights and one row; which lanes of the mask have a light to sample. */
+INLINE unsigned sample_light(const struct integrator *it, const struct batch *b, int k,
+                             const struct vertexv *v, unsigned mask,
+                             const struct light_samples *what, int j, struct light_samplev *ls)
+{
+    vf u[4];
+    load_numbers(b, j, u);
+    *ls = (struct light_samplev){.sphere = vi_set(-1), .pdf_w = vf_set(0)};
+    if (!what->chosen) {
+        sample_lightv(it->scene, it->lanes_scene, it->lights, what->light, v->p, u, mask, ls);
+        return mask;
+    }
+    uint32_t light[LANES];
+    for (int i = 0; i < LANES; i++)
+        light[i] = b->choice[k + i].light;
+    vf probability = vf_load_any(b->choice_probability + k);
+    mask &= bits(vf_lt(vf_set(0), probability));
+    sample_each(it->lights, light, v->p, u, mask, ls);
+    ls->pdf_w *= probability;
+    return mask;
+}
+
 /* A sample, by the numbers of row j, for the lanes of the mask of vertices k ..: shadow rays behind the
  * `rays` that there are, and what they bring into row j; the lanes that cast one. */
 INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
                              const struct light_samples *what, bool simple, int j, int rays)
 {
-    vf u[4], pdf_bsdf;
-    load_numbers(b, j, u);
-    struct light_samplev ls = {.sphere = vi_set(-1), .pdf_w = vf_set(0)};
-    if (simple) {
-        sample_lampv(&what->lamp, v->p, u, &ls);
-    } else if (what->chosen) {
-        uint32_t light[LANES];
-        for (int i = 0; i < LANES; i++)
-            light[i] = b->choice[k + i].light;
-        vf probability = vf_load_any(b->choice_probability + k);
-        mask &= bits(vf_lt(vf_set(0), probability));
-        sample_each(it->lights, light, v->p, u, mask, &ls);
-        ls.pdf_w *= probability;
-    } else {
-        sample_lightv(it->scene, it->lanes_scene, it->lights, what->light, v->p, u, mask, &ls);
-    }
+    vf pdf_bsdf;
+    struct light_samplev ls;
+    if (simple)
+        load_lamp_sample(b, j, &what->lamp, &ls);
+    else
+        mask = sample_light(it, b, k, v, mask, what, j, &ls);
     mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
     rgbv f;
     mask = scatter_towards(it, b, k, v, mask, ls.wi, simple, &f, &pdf_bsdf);
@@ -444,6 +487,8 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
     for (int first = 0; first < n; first += most) {
         const int end = n - first < most ? n : first + most;
         draw_numbers(it, b, first, end, vertex + 1, what.purpose, what.num);
+        if (simple)
+            sample_lamp(b, first, end, &what);
         int rays = simple ? connect_rows(it, b, first, end, &what, true)
                           : connect_rows(it, b, first, end, &what, false);
         bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
@@ -559,7 +604,7 @@ INLINE void sample_bsdf(const struct integrator *it, const struct batch *b, int 
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
 {
     if (o->roulette == ROULETTE_THROUGHPUT && vertex >= 2)
-        return vf_min(vf_set(1), rgb_maxv(throughput) * eta2);
+        return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
     return vf_set(o->roulette == ROULETTE_FIXED && vertex >= 1 ? o->survival : 1);
 }
 
@@ -671,7 +716,7 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 {
     const bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     generate(it, b, n);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < BATCH_LANES; i++) /* n of paths, but of shadow rays there may be more */
         b->active[i] = (uint16_t)i;
     if (it->opt.kind == INTEGRATE_NORMALS) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);

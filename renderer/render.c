@@ -24,7 +24,8 @@ struct job {
     struct film *film;
     uint32_t last; /* the pass ends before this many samples per pixel */
     int tiles_x, num_tiles;
-    atomic_int next_tile;
+    int stretch; /* tiles of one of as many stretches of the picture as there are threads */
+    atomic_int next_ticket;
     atomic_bool out_of_memory;
     atomic_ullong samples_done;
     pthread_mutex_t lock; /* of running and stats */
@@ -64,7 +65,9 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         for (int x = x0; x < x1; x++) {
             at[n] = (size_t)y * (size_t)o->width + (size_t)x;
             pixel[n] = (uint32_t)(y + o->y) * (uint32_t)j->it->camera->width + (uint32_t)(x + o->x);
-            n += f->m.n[at[n]] == f->num_samples && !has_stopped(o, f, at[n], f->num_samples);
+            /* A new film is not read: see lanes_film.h. */
+            n += (f->num_samples == 0 || f->m.n[at[n]] == f->num_samples) &&
+                 !has_stopped(o, f, at[n], f->num_samples);
         }
     for (uint32_t k = f->num_samples; k < j->last && n > 0; k++) {
         for (int i = 0; i < n; i++) {
@@ -75,7 +78,7 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
         const bool plain = j->it->lanes != NULL && f->first == NULL;
         if (plain)
-            j->it->lanes->film_add(f, at, n, b);
+            j->it->lanes->film_add(f, at, n, b, k == 0);
         if (plain && f->target == NULL && o->adaptive_batch == 0)
             continue;
         int kept = 0;
@@ -90,14 +93,23 @@ static void render_tile(struct job *j, struct batch *b, int tile)
     }
 }
 
+/* The tile of a ticket, which may lie behind the last. Tickets go round the stretches: at neighbouring tiles two
+ * threads would take cache lines and pages from each other. */
+static int tile_of(const struct job *j, int ticket)
+{
+    return ticket % j->opt->threads * j->stretch + ticket / j->opt->threads;
+}
+
 static void *worker(void *arg)
 {
     struct job *j = arg;
     struct batch *b = calloc(1, sizeof *b);
     if (b == NULL)
         atomic_store(&j->out_of_memory, true);
-    for (int tile; b != NULL && (tile = atomic_fetch_add(&j->next_tile, 1)) < j->num_tiles;)
-        render_tile(j, b, tile);
+    const int num_tickets = j->stretch * j->opt->threads;
+    for (int t; b != NULL && (t = atomic_fetch_add(&j->next_ticket, 1)) < num_tickets;)
+        if (tile_of(j, t) < j->num_tiles)
+            render_tile(j, b, tile_of(j, t));
     pthread_mutex_lock(&j->lock);
     if (b != NULL) {
         j->stats.rays += b->stats.rays;
@@ -140,7 +152,7 @@ static bool render_pass(struct job *j, struct watch *w, uint32_t last, struct er
     pthread_t *threads = calloc((size_t)j->opt->threads, sizeof *threads);
     int started = 0;
     j->last = last;
-    atomic_store(&j->next_tile, 0);
+    atomic_store(&j->next_ticket, 0);
     for (; threads != NULL && started < j->opt->threads; started++) {
         pthread_mutex_lock(&j->lock);
         j->running++;
@@ -170,7 +182,7 @@ static bool render_pass(struct job *j, struct watch *w, uint32_t last, struct er
     free(threads);
     look(j, w);
     /* Fewer threads than asked for still render everything; none, or none with memory, do not. */
-    if (started == 0 || atomic_load(&j->next_tile) < j->num_tiles)
+    if (started == 0 || atomic_load(&j->next_ticket) < j->stretch * j->opt->threads)
         return err_set(e, "cannot start rendering: out of threads or memory");
     j->film->num_samples = last;
     return true;
@@ -238,6 +250,7 @@ static bool run_job(struct job *j, struct watch *w, enum render_end *end, struct
 {
     j->tiles_x = (j->opt->width + TILE - 1) / TILE;
     j->num_tiles = j->tiles_x * ((j->opt->height + TILE - 1) / TILE);
+    j->stretch = (j->num_tiles + j->opt->threads - 1) / j->opt->threads;
     pthread_mutex_init(&j->lock, NULL);
     pthread_condattr_t monotonic; /* a wall clock that is set must not make it wait */
     pthread_condattr_init(&monotonic);

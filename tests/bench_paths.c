@@ -1,4 +1,4 @@
-/* Paths per CPU second, and 1/(relative variance x CPU seconds), of our renderer, of a tracer on Embree,
+/* Paths per CPU second, relMSE, and 1/(relMSE x CPU seconds), of our renderer, of a tracer on Embree,
  * of Cycles and of POV-Ray: the same view, one thread. Each engine renders pictures of FEW and of MANY
  * samples in turn; what a sample costs is the slope between the two, so no start is counted. Image means
  * have to agree first.
@@ -19,6 +19,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* relMSE = mean of (x - truth)^2/(truth^2 + 0.01) [Rousselle11 4]: so that black does not count for all. */
+static const double relmse_floor = 0.01;
 
 enum { FEW, MANY, NUM_RUNGS, COUNT = 4, MAX_ROUNDS = 9 };
 enum { POVRAY_SHRINK = 2 };
@@ -50,8 +53,8 @@ struct runs {
     int shrink;                           /* of both sides */
     double cost[MAX_ROUNDS];              /* CPU seconds of a sample of all pixels */
     double mpaths, share, share_se;       /* M paths per CPU s; image mean over ours - 1 */
-    double variance[NUM_RUNGS];           /* relative, of one picture */
-    double log_variance_se, efficiency, efficiency_lo, efficiency_hi; /* at MANY */
+    double relmse[NUM_RUNGS];             /* of one picture */
+    double efficiency, efficiency_lo, efficiency_hi; /* at MANY */
 };
 
 static bool load_view(int i, const struct bench_options *o, struct bench_view *v, struct err *e)
@@ -153,6 +156,17 @@ static double mean_of(const float *images, int count, size_t size, double *var)
     return sum / count;
 }
 
+/* Values over sqrt(mean^2 + 0.01): their variance, without a bias, is relMSE. */
+static void use_relmse_units(struct converge_reference *r)
+{
+    for (size_t i = 0; i < r->size; i++) {
+        double mean = r->mean[i] * r->unit[i], unit = sqrt(mean * mean + relmse_floor);
+        r->mean[i] = mean / unit;
+        r->var[i] *= r->unit[i] * r->unit[i] / (unit * unit);
+        r->unit[i] = unit;
+    }
+}
+
 static bool judge(const struct bench_options *o, const struct bench_view *v,
                   const struct moments *units, struct runs *r, const struct runs *ours,
                   struct err *e)
@@ -161,11 +175,12 @@ static bool judge(const struct bench_options *o, const struct bench_view *v,
     double cost[MAX_ROUNDS], log_cost = 0, log_cost2 = 0, var, our_var, var_se = 0;
     if (!converge_reference_init(&ref, units, r->shrink, e))
         return false;
+    use_relmse_units(&ref);
     bool ok = true;
     for (int k = 0; ok && k < NUM_RUNGS; k++) {
         struct rung rung;
         ok = converge_rung(r->images[k], r->count[k], r->spp[k], &ref, &rung, e);
-        r->variance[k] = ok ? exp(rung.log_variance.value) : NAN;
+        r->relmse[k] = ok ? exp(rung.log_variance.value) : NAN;
         var_se = ok ? rung.log_variance.se : NAN;
     }
     double mean = mean_of(r->images[MANY], r->count[MANY], ref.size, &var);
@@ -184,7 +199,7 @@ static bool judge(const struct bench_options *o, const struct bench_view *v,
     }
     double cost_var =
         o->rounds > 1 ? fmax(0, log_cost2 - log_cost * log_cost) / (o->rounds - 1) : 0;
-    struct estimate log_efficiency = {-log(r->variance[MANY] * r->spp[MANY] * seconds),
+    struct estimate log_efficiency = {-log(r->relmse[MANY] * r->spp[MANY] * seconds),
                                       sqrt(var_se * var_se + cost_var), fmax(1, o->rounds - 1)};
     struct interval i = estimate_interval(log_efficiency, 0.05);
     r->efficiency = exp(log_efficiency.value);
@@ -219,7 +234,7 @@ static json_t *show(const struct bench_options *o, const struct bench_view *v,
         }
         bool same = o->smoke || fabs(r->share) <= 1e-3 + 5 * r->share_se;
         printf(" %8.3f %8.2f %9.4f %9.4f %9.2f [%.2f, %.2f] %+8.3f +- %.3f%s\n", r->mpaths,
-               of->mpaths / r->mpaths, r->variance[FEW], r->variance[MANY], r->efficiency,
+               of->mpaths / r->mpaths, r->relmse[FEW], r->relmse[MANY], r->efficiency,
                r->efficiency_lo, r->efficiency_hi, 100 * r->share, 100 * r->share_se,
                same ? "" : " another mean: no ratio holds");
         /* POV-Ray alone is 1 % darker in the course's boxes, not in 41_cornell: its fault or its export's. */
@@ -227,10 +242,10 @@ static json_t *show(const struct bench_options *o, const struct bench_view *v,
         json_object_set_new(engines, bench_engine_names[k],
                             json_pack("{s:b,s:f,s:f,s:[f,f],s:f,s:[f,f],s:[f,f]}", "same_mean",
                                       same, "mpaths_per_cpu_second", r->mpaths, "ours_faster",
-                                      of->mpaths / r->mpaths, "relative_variance", r->variance[FEW],
-                                      r->variance[MANY], "efficiency", r->efficiency,
-                                      "efficiency_95", r->efficiency_lo, r->efficiency_hi,
-                                      "mean_over_ours", r->share, r->share_se));
+                                      of->mpaths / r->mpaths, "relmse", r->relmse[FEW],
+                                      r->relmse[MANY], "efficiency", r->efficiency, "efficiency_95",
+                                      r->efficiency_lo, r->efficiency_hi, "mean_over_ours",
+                                      r->share, r->share_se));
     }
     return json_pack("{s:s,s:i,s:i,s:i,s:o}", "scene", v->name, "width", v->camera.width, "height",
                      v->camera.height, "depth", v->depth, "engines", engines);
@@ -245,7 +260,7 @@ static bool plot(const struct bench_options *o, const struct bench_view *v,
     snprintf(title, sizeof title, "%s: error of a picture against its CPU time", v->name);
     struct plot p = {.title = title,
                      .x_label = "CPU s",
-                     .y_label = "relative RMS error",
+                     .y_label = "root of relMSE",
                      .is_log_x = true,
                      .is_log_y = true,
                      .x0 = 1e-3,
@@ -259,7 +274,7 @@ static bool plot(const struct bench_options *o, const struct bench_view *v,
         snprintf(s->name, sizeof s->name, "%s", bench_engine_names[k]);
         double seconds = v->camera.width * v->camera.height / (runs[k].mpaths * 1e6);
         for (int r = 0; r < NUM_RUNGS; r++) {
-            double y = sqrt(runs[k].variance[r]);
+            double y = sqrt(runs[k].relmse[r]);
             plot_add(s, runs[k].spp[r] * seconds, y, y, y);
         }
     }
@@ -311,10 +326,10 @@ json_t *bench_paths(const struct bench_options *given, bool *wrong, struct err *
     o.rounds = o.smoke ? 1 : o.rounds < MAX_ROUNDS ? o.rounds : MAX_ROUNDS;
     printf(
         "One thread, %d rounds of %d pictures of %d and of %d samples. faster: our paths per CPU second "
-        "over the\nengine's, at the same estimator. Efficiency: 1/(relative variance x CPU s), with 95 %% "
+        "over the\nengine's, at the same estimator. Efficiency: 1/(relMSE x CPU s), with 95 %% "
         "intervals. mean: over\nours, in %%.\n%-21s %-12s %8s %8s %9s %9s %9s\n",
         o.rounds, COUNT, samples(&o, FEW), samples(&o, MANY), "scene", "", "Mpaths/s", "faster",
-        "variance", "", "efficiency");
+        "relMSE", "", "efficiency");
     json_t *scenes = json_array();
     bool ok = true;
     for (int i = 0; ok && i < NUM_VIEWS; i++) {

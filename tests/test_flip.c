@@ -1,6 +1,7 @@
-/* FLIP against what is known without it: the chromaticities of BT.709, published L*a*b* of its primaries, the Fourier
- * transform of the contrast sensitivity, closed forms on flat pictures, and a second implementation in double
- * precision with whole two-dimensional filters. The pictures whose means its authors publish are not here. */
+/* FLIP against what is known without it: the numbers that its authors publish, the chromaticities of BT.709, published
+ * L*a*b* of its primaries, the Fourier transform of the contrast sensitivity, closed forms on flat pictures, and a
+ * second implementation in double precision with whole two-dimensional filters. The pictures whose means its authors
+ * publish are not here. */
 #include "../tools/flip.h"
 #include "../tools/flip_colour.h"
 
@@ -67,6 +68,30 @@ static void test_matrix(void **state_)
                 product += (double)c.to[i][k] * (double)c.from[k][j];
             near(product, i == j, 1e-6, "inverse");
         }
+}
+
+/* The authors' own constants, to the nine digits of their published program (NVlabs/flip, version 1.4, FLIP.h): the white
+ * of D65, one over it, and RGB of XYZ. Ours are made from the matrix of sRGB. */
+static void test_published(void **state_)
+{
+    (void)state_;
+    static const double white[3] = {0.950428545, 1.000000000, 1.088900371};
+    static const double one_over_white[3] = {1.052156925, 1.000000000, 0.918357670};
+    static const double from_xyz[3][3] = {{3.241003275, -1.537398934, -0.498615861},
+                                          {-0.969224334, 1.875930071, 0.041554224},
+                                          {0.055639423, -0.204011202, 1.057148933}};
+    /* The largest entries of the sRGB matrix's rows, as the authors write them. */
+    static const double to_xyz[3] = {10135552.0 / 24577794, 8788810.0 / 12288897,
+                                     70074185.0 / 73733382};
+    struct flip_colours c = flip_colours();
+    for (int i = 0; i < 3; i++) {
+        near((double)c.to[i][i], to_xyz[i] * one_over_white[i], 1e-7, "XYZ of RGB");
+        for (int j = 0; j < 3; j++)
+            near((double)c.from[i][j], from_xyz[i][j] * white[j], 4e-7, "RGB of XYZ");
+    }
+    /* For 67 pixels to a degree their filters reach 10 pixels; the exposure of their HDR example is 14 steps from
+     * -12.5423 to 0.9427, which test_exposures() asks. */
+    assert_int_equal(flip_csf_radius(67), 10);
 }
 
 static const double primaries[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -500,15 +525,11 @@ static void test_hdr(void **state_)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matrix),
-        cmocka_unit_test(test_lab),
-        cmocka_unit_test(test_largest),
-        cmocka_unit_test(test_csf),
-        cmocka_unit_test(test_flat),
-        cmocka_unit_test(test_brute_force),
-        cmocka_unit_test(test_brute_force_sees),
-        cmocka_unit_test(test_exposures),
-        cmocka_unit_test(test_hdr),
+        cmocka_unit_test(test_published),   cmocka_unit_test(test_matrix),
+        cmocka_unit_test(test_lab),         cmocka_unit_test(test_largest),
+        cmocka_unit_test(test_csf),         cmocka_unit_test(test_flat),
+        cmocka_unit_test(test_brute_force), cmocka_unit_test(test_brute_force_sees),
+        cmocka_unit_test(test_exposures),   cmocka_unit_test(test_hdr),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

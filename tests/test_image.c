@@ -113,6 +113,36 @@ static void exr_round_trip(void **state)
     image_free(&got);
 }
 
+/* Chunks of sixteen rows, whole, cut short or of a single number, of noise in every bit, which no packing makes
+ * shorter, and of one value. */
+static void exr_of_any_shape(void **state)
+{
+    (void)state;
+    static const int shape[][3] = {{1, 1, 1}, {3, 16, 1}, {61, 17, 3}, {40, 33, 5}};
+    for (size_t k = 0; k < 2 * sizeof shape / sizeof shape[0]; k++) {
+        const int *s = shape[k / 2];
+        char path[256];
+        struct image im;
+        struct err e = {""};
+        assert_true(image_alloc(&im, s[0], s[1], s[2], channel, &e));
+        for (int i = 0; i < s[0] * s[1] * s[2]; i++) {
+            struct sample4 u = sampler_get(6, (uint32_t)i, 0, 0, 0);
+            uint32_t bits = (uint32_t)(u.u[0] * 65536) << 16 | (uint32_t)(u.u[1] * 65536);
+            if (k % 2 == 0)
+                bits &= ~(1u << 30); /* finite */
+            else
+                bits = 0x3f800000;
+            memcpy(&im.data[i], &bits, sizeof bits);
+        }
+        if (!image_write_exr(path_of(path, "shape.exr"), &im, &e))
+            fail_msg("%s", e.msg);
+        struct image got = read_both("shape.exr", false);
+        assert_same(&im, &got);
+        image_free(&im);
+        image_free(&got);
+    }
+}
+
 static void exr_as_others_write_it(void **state)
 {
     (void)state;
@@ -253,9 +283,9 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_round_trip),         cmocka_unit_test(exr_as_others_write_it),
-        cmocka_unit_test(hdr_as_others_write_it), cmocka_unit_test(png_round_trip),
-        cmocka_unit_test(damaged_files),
+        cmocka_unit_test(exr_round_trip),         cmocka_unit_test(exr_of_any_shape),
+        cmocka_unit_test(exr_as_others_write_it), cmocka_unit_test(hdr_as_others_write_it),
+        cmocka_unit_test(png_round_trip),         cmocka_unit_test(damaged_files),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -129,6 +129,7 @@ struct how {
     struct integrator_options opt;
     float lens;
     int spp, threads;
+    int width, height; /* 0: WIDTH, HEIGHT */
 };
 
 static struct moments picture(const struct scene *s, const struct how *how)
@@ -139,14 +140,16 @@ static struct moments picture(const struct scene *s, const struct how *how)
     struct progress p;
     struct render_stats stats;
     progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, s, WIDTH, HEIGHT, &e));
+    int width = how->width > 0 ? how->width : WIDTH,
+        height = how->height > 0 ? how->height : HEIGHT;
+    assert_true(camera_init(&c, s, width, height, &e));
     c.lens_radius = how->lens;
     c.focal_distance = 3;
     struct bvh *bvh = bvh_build(s, BVH_WIDE, &e);
     assert_non_null(bvh);
     struct render_options o = {.integrator = how->opt,
-                               .width = WIDTH,
-                               .height = HEIGHT,
+                               .width = width,
+                               .height = height,
                                .num_samples = (uint32_t)how->spp,
                                .threads = how->threads};
     if (!render(s, &c, bvh, &o, &p, &m, &stats, &e))
@@ -269,6 +272,24 @@ static void depths_and_threads_do_not_matter(void **state)
     scene_free(&s);
 }
 
+/* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the picture's edge. */
+static void small_pictures_with_several_light_samples(void **state)
+{
+    (void)state;
+    struct scene s = all_kinds();
+    complete(&s, false);
+    for (int lights = 2; lights <= 9; lights++)
+        compare(&s, (struct how){.opt = {.direct = DIRECT_MIS,
+                                         .max_bounces = 3,
+                                         .light_samples = lights,
+                                         .sampler = {SAMPLER_INDEPENDENT, 21}},
+                                 .spp = 3,
+                                 .threads = 1,
+                                 .width = 2 * lights - 1,
+                                 .height = 8});
+    scene_free(&s);
+}
+
 /* Triangles and spheres, smooth and flat, seen and missed. */
 static void normals_too(void **state)
 {
@@ -308,6 +329,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bits_are_those_of_the_scalar_stages),
         cmocka_unit_test(depths_and_threads_do_not_matter),
+        cmocka_unit_test(small_pictures_with_several_light_samples),
         cmocka_unit_test(normals_too),
         cmocka_unit_test(sine_and_cosine_are_near),
     };

@@ -31,6 +31,7 @@
 struct run {
     char dir[64], results[128], page[128];
     json_t *claims;
+    int left; /* to be judged; 0: the run has ended */
 };
 
 static struct run run_make(void)
@@ -41,6 +42,7 @@ static struct run run_make(void)
     snprintf(r.results, sizeof r.results, "%s/results.json", r.dir);
     snprintf(r.page, sizeof r.page, "%s/out/report.html", r.dir);
     r.claims = json_array();
+    r.left = 0;
     return r;
 }
 
@@ -59,6 +61,8 @@ static void run_write_results(const struct run *r)
                   "version", "0.1 (abc)", "date", "2026-01-02T03:04:05Z", "alpha", 1e-3, "machine",
                   "2 x CPU", "mode", "golden", "seconds", 98.0, "claims", r->claims);
     assert_non_null(root);
+    if (r->left > 0)
+        json_object_set_new(root, "unfinished", json_integer(r->left));
     if (!json_write(r->results, root, &e))
         fail_msg("%s", e.msg);
     json_decref(root);
@@ -554,6 +558,7 @@ static void pictures_have_the_values(void **state)
     run_report(&r);
     htmlDocPtr doc = parse_page(r.page);
     assert_text_has(doc, "//h1", 0, "The claim came out as expected.");
+    assert_text_has(doc, "//header/p", 1, "EQUIVALENT: All intervals lie");
     assert_text_has(doc, "//section[@class='scene']/@data-white", 0, "0.3125");
     assert_text_has(doc, "//section[@class='scene']/p[@class='caption']", 0, "radiance 0.312 and");
     static const double special[3] = {0.1, 0.05, 0.2};
@@ -584,6 +589,35 @@ static void pictures_have_the_values(void **state)
     assert_memory_equal(bytes + size - 3, c, 3);
     free(bytes);
     free(text);
+    xmlFreeDoc(doc);
+    run_free(&r);
+}
+
+/* Evidence is folded where there is much of it and it is as expected. */
+static void much_evidence_is_folded(void **state)
+{
+    (void)state;
+    struct run r = run_make();
+    write_small_files(&r);
+    for (int i = 0; i < 8; i++)
+        add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
+    run_report(&r);
+    htmlDocPtr doc = parse_page(r.page);
+    assert_int_equal(count_nodes(doc, "//details[@class='evidence' and @open]"), 8);
+    assert_int_equal(count_nodes(doc, "//a[@class='up']"), 0);
+    assert_int_equal(count_nodes(doc, "//p[@class='error-line']"), 1); /* without a script */
+    xmlFreeDoc(doc);
+
+    add_claim(&r, "91_wrong", "cycles", "EQUIVALENT", "DIFFERENT", small_files);
+    r.left = 31;
+    run_report(&r);
+    doc = parse_page(r.page);
+    assert_int_equal(count_nodes(doc, "//details[@class='evidence']"), 9);
+    assert_int_equal(count_nodes(doc, "//details[@class='evidence' and @open]"), 1);
+    assert_text_has(doc, "//details[@class='evidence' and @open]/../@id", 0, "claim-8");
+    assert_int_equal(count_nodes(doc, "//a[@class='up' and @href='#table']"), 2);
+    assert_text_has(doc, "//header/p[@class='error-line']", 0, "31 more are to be judged");
+    assert_text_has(doc, "//h1", 0, "So far 1 of 9 claims did not come out as expected.");
     xmlFreeDoc(doc);
     run_free(&r);
 }
@@ -638,7 +672,7 @@ static void names_cannot_inject_markup(void **state)
     assert_int_equal(count_nodes(doc, "//img[not(starts-with(@src, 'data:'))]"), 0);
     assert_int_equal(count_nodes(doc, "//@onerror"), 0);
     assert_text_has(doc, "//div[@class='viewer']//li/@data-name", 1, quote);
-    assert_text_has(doc, "//article[@id='claim-0']/ul[@class='notes']/li", 0, evil);
+    assert_text_has(doc, "//article[@id='claim-0']//ul[@class='notes']/li", 0, evil);
     assert_text_has(doc, "//table[@id='claims']/tbody/tr/th", 1, evil);
     assert_text_has(doc, "//article[@id='claim-1']/p", 0, evil);
     xmlFreeDoc(doc);
@@ -816,6 +850,7 @@ int main(void)
         cmocka_unit_test(page_files_are_safe_to_embed),
         cmocka_unit_test(page_is_whole),
         cmocka_unit_test(pictures_have_the_values),
+        cmocka_unit_test(much_evidence_is_folded),
         cmocka_unit_test(policy_admits_the_script),
         cmocka_unit_test(names_cannot_inject_markup),
         cmocka_unit_test(page_stays_small),

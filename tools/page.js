@@ -25,7 +25,9 @@ class Scene {
       pixel: { x: this.width >> 1, y: this.height >> 1 }, tile: null, grid: 0, ready: false });
     this.maps = new Map();
     this.buffers = new Map();
-    this.build();
+    buildControls(this);
+    this.claims.forEach((c) => buildMaps(this, c));
+    this.show(0, null);
   }
 
   load() {
@@ -42,7 +44,7 @@ class Scene {
       }
       this.shots.forEach((s, i) => (s.layer = all[i]));
       this.show(this.shown, this.kind);
-      this.readPixel();
+      readPixel(this);
     });
     return this.loading;
   }
@@ -75,7 +77,7 @@ class Scene {
   shotSource(shot) {
     if (!this.ready) return null;
     return { id: "picture " + shot.id, key: this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
-             paint: (rgba) => paintPicture(rgba, shot.layer, 2 ** this.stops / this.white, this.curve) };
+             layer: shot.layer, paint: (rgba, layer) => paintPicture(rgba, layer, 2 ** this.stops / this.white, this.curve) };
   }
 
   stageSource() {
@@ -93,118 +95,13 @@ class Scene {
     this.panes.forEach(redraw);
   }
 
-  build() {
-    const group = (label, ...children) => make("div", { className: "tabs", role: "group", "aria-label": label }, ...children);
-    const button = (key, text, action, title) => {
-      const b = make("button", { type: "button", title: title || "" }, ...(key ? [make("kbd", {}, key)] : []), text);
-      b.addEventListener("click", action);
-      return b;
-    };
-    this.shotButtons = ["Side by side", ...this.shots.map((s) => s.name)].map((name, i) => {
-      const b = button(String(i), name, () => this.show(i, null));
-      // Sweeping over the tabs swaps the pictures, but never changes the layout by surprise.
-      b.addEventListener("pointerenter", (e) => {
-        if (e.pointerType === "mouse" && this.shown > 0 && !this.kind && i > 0) this.show(i, null);
-      });
-      return b;
-    });
-    this.kindButtons = Object.entries(mapKinds).map(([kind, k]) =>
-      Object.assign(button(k.key, k.name, () => this.show(this.shown, kind)), { kind }));
-    const select = (label, name, names, index, action) => {
-      const s = make("select", { "aria-label": name }, ...names.map((n, i) => make("option", { value: String(i), selected: i === index }, n)));
-      s.addEventListener("change", () => action(+s.value));
-      return [make("label", {}, label, s), s];
-    };
-    const slider = (label, min, max, step, value, text, action) => {
-      const input = make("input", { type: "range", min, max, step, value });
-      const output = make("output", {}, text(value));
-      input.addEventListener("input", () => {
-        output.textContent = text(+input.value);
-        action(+input.value);
-      });
-      return [make("label", {}, label, input, output), input, output];
-    };
-
-    const stopsText = (v) => (v > 0 ? "+" : "") + digits(v) + " stops";
-    let exposure, curve, pair, against;
-    [exposure, this.stopsInput, this.stopsOutput] = slider("Exposure", "-8", "8", "0.25", 0, stopsText, (v) => this.expose(v));
-    [curve] = select("Curve", "Curve", Object.keys(curves), 0, (i) => { this.curve = Object.keys(curves)[i]; this.redraw(); });
-    [pair, this.pairSelect] = select("of", "Pictures of the map", this.claims.map((c) => c.name), 0, (i) => {
-      this.claim = this.claims[i];
-      this.show(this.shown, this.kind);
-    });
-    [against, this.againstSelect] = select("over", "Picture that is wiped in", this.shots.map((s) => s.name), this.against, (i) => {
-      this.against = i;
-      this.show(this.shown, null);
-    });
-    [this.wipeLabel, this.wipeInput] = slider("at", "0", "1", "0.005", 0.5,
-      (v) => Math.round(100 * v) + " %", (v) => this.setWipe(v));
-    this.wipeButton = button("w", "Wipe", () => this.toggleWipe(), "The shown picture left of a line, another one right of it");
-    this.gridButton = button("g", "Tiles", () => this.toggleGrid(), "Outlines the tiles that are judged");
-    this.zoomOutput = make("output", {}, "1 \u00d7");
-
-    const pictures = group("Which picture is shown", ...this.shotButtons);
-    const rows = [make("div", { className: "tools" }, pictures)];
-    if (this.claims.length > 0)
-      rows.push(make("div", { className: "tools" }, group("Which map of two pictures is shown", ...this.kindButtons), pair));
-    this.wipeRow = make("div", { className: "tools" }, against, this.wipeLabel);
-    rows.push(make("div", { className: "tools" }, exposure, curve,
-      group("Zoom", button("\u2212", "", () => this.zoom(this.view.zoom / 2), "Zoom out"),
-        button("+", "", () => this.zoom(this.view.zoom * 2), "Zoom in"),
-        button("f", "Fit", () => this.zoom(1), "The whole picture"), this.zoomOutput),
-      group("Overlays", ...(this.shots.length > 1 ? [this.wipeButton] : []), this.gridButton)), this.wipeRow);
-
-    this.side = make("div", { className: "side" });
-    for (const shot of this.shots) {
-      const pane = new Pane(this, () => (this.shown === 0 && !this.kind ? this.shotSource(shot) : null));
-      this.side.append(make("figure", {}, pane.frame,
-        make("figcaption", {}, make("b", {}, shot.name), " " + shot.about)));
-    }
-    this.stagePane = new Pane(this, () => this.stageSource());
-    this.stageLegend = make("div", {});
-    this.stageCaption = make("figcaption", {});
-    this.stage = make("figure", { className: "stage" }, this.stagePane.frame, this.stageLegend, this.stageCaption);
-    this.probe = make("div", { className: "probe" });
-    this.box.replaceChildren(...rows, this.side, this.stage, this.probe);
-    this.claims.forEach((c) => this.buildMaps(c));
-    this.show(0, null);
-  }
-
-  // The two maps beside a claim's numbers, and its list of tiles.
-  buildMaps(claim) {
-    const maps = claim.article.querySelector(".maps");
-    claim.figures = ["difference", "t"].map((kind) => {
-      const pane = new Pane(this, () => {
-        const source = this.mapSource(kind, claim);
-        return source && Object.assign(source, { prepare: () => this.captionMap(claim, kind, figure) });
-      });
-      pane.tile = claim.worst;
-      const figure = make("figure", { className: "map", "data-kind": kind }, pane.frame);
-      return figure;
-    });
-    maps.prepend(...claim.figures);
-    claim.tileReading = claim.article.querySelector(".tile-reading");
-    for (const b of claim.article.querySelectorAll("button[data-x]"))
-      b.addEventListener("click", () => {
-        this.setTile({ x: +b.dataset.x, y: +b.dataset.y, side: claim.tile }, claim);
-        this.zoomTo(this.tile);
-      });
-  }
-
-  // Legend and sentence, when the map is first drawn.
-  captionMap(claim, kind, figure) {
-    if (figure.querySelector("figcaption")) return;
-    const k = mapKinds[kind], m = this.map(kind, claim);
-    figure.append(legend(m.range, k), make("figcaption", {}, make("b", {}, k.name + ". "),
-      this.sentence(kind, claim)));
-  }
-
   show(shown, kind) {
     this.shown = shown;
     this.kind = kind;
     const alone = shown > 0 || kind !== null;
     this.side.hidden = alone;
     this.stage.hidden = !alone;
+    (alone ? this.stageText : this.box).append(this.probe);
     this.wipeRow.hidden = !(this.wiping && shown > 0 && !kind);
     const press = (b, on) => b.setAttribute("aria-pressed", String(on));
     this.shotButtons.forEach((b, i) => press(b, !kind && i === shown));
@@ -290,52 +187,14 @@ class Scene {
     const at = { x: Math.min(Math.max(x, 0), this.width - 1), y: Math.min(Math.max(y, 0), this.height - 1) };
     if (this.pixel && at.x === this.pixel.x && at.y === this.pixel.y) return;
     this.pixel = at;
-    this.readPixel();
+    readPixel(this);
     this.redraw();
-  }
-
-  // One row for each picture, then one for each pair.
-  readPixel() {
-    if (!this.ready) return;
-    const { x, y } = this.pixel, i = y * this.width + x;
-    const row = (head, cells, tag = "td") => make("tr", {}, make("th", { scope: tag === "th" ? "col" : "row" }, head),
-      ...cells.map((c) => make(tag, { className: "num" }, c)));
-    const pictures = this.shots.map(({ name, layer }) => row(name, [
-      ...[0, 1, 2].map((k) => withError(layer.value[k][i], layer.error[k][i])),
-      layer.unit === "exact" ? "exact" : digits(countAt(layer, i), 7)]));
-    const pairs = this.claims.map((c) => {
-      const p = greyOf(c.a.layer), q = greyOf(c.b.layer), unit = Math.max(q.value[i], 0.05 * q.mean);
-      const d = p.value[i] - q.value[i], e = Math.hypot(p.error[i], q.error[i]);
-      return row(c.name, [withError(100 * d / unit, 100 * e / unit) + " %", digits(studentT(d, e))]);
-    });
-    const table = (...rows) => make("table", {}, make("thead", {}, rows[0]), make("tbody", {}, ...rows[1]));
-    this.probe.replaceChildren(
-      table(row("Pixel " + x + ", " + y, ["red", "green", "blue", "n"], "th"), pictures),
-      ...(pairs.length ? [table(row("Luminance", ["difference", "t"], "th"), pairs)] : []));
   }
 
   setTile(tile, claim) {
     this.tile = tile;
-    if (claim.tileReading) {
-      const columns = this.width / tile.side, i = tile.y / tile.side * columns + tile.x / tile.side;
-      const p = claim.p[i], t = claim.t[i];
-      claim.tileReading.textContent = "Tile at x " + tile.x + ", y " + tile.y + ": " + this.tileDifference(tile, claim) +
-        (p === null || p === undefined ? "; it has no noise." : ", t " + digits(t) + ", p " + digits(10 ** p) + ".");
-    }
+    readTile(this, tile, claim);
     this.redraw();
-  }
-
-  tileDifference(tile, claim) {
-    if (!this.ready) return "";
-    const a = greyOf(claim.a.layer), b = greyOf(claim.b.layer);
-    let sa = 0, sb = 0;
-    for (let y = tile.y; y < tile.y + tile.side; y++)
-      for (let x = tile.x; x < tile.x + tile.side; x++) {
-        sa += a.value[y * this.width + x];
-        sb += b.value[y * this.width + x];
-      }
-    const pixels = tile.side * tile.side, d = (sa - sb) / pixels / Math.max(sb / pixels, 0.05 * b.mean);
-    return "difference " + (d > 0 ? "+" : "") + percent(d);
   }
 
   // The tile around a pixel becomes the marked one in all frames; the same again unmarks it.
@@ -351,38 +210,3 @@ class Scene {
     }
   }
 }
-
-const scenes = [...document.querySelectorAll("section.scene")].filter((s) => s.querySelector(".viewer")).map((s) => new Scene(s));
-
-// A key goes to the scene nearest to the middle of the window.
-function nearestScene() {
-  const middle = window.innerHeight / 2;
-  const distance = (s) => {
-    const r = s.section.getBoundingClientRect();
-    return Math.max(r.top - middle, middle - r.bottom, 0);
-  };
-  return scenes.reduce((a, b) => (distance(b) < distance(a) ? b : a));
-}
-
-document.addEventListener("keydown", (e) => {
-  if (e.ctrlKey || e.metaKey || e.altKey || scenes.length === 0) return;
-  if (/^(INPUT|SELECT|TEXTAREA)$/.test(e.target.tagName) && !/^[a-z0-9]$/.test(e.key)) return;
-  const s = nearestScene(), kind = Object.keys(mapKinds).find((k) => mapKinds[k].key === e.key);
-  if (/^[0-9]$/.test(e.key) && +e.key <= s.shots.length) s.show(+e.key, null);
-  else if (kind && s.claims.length > 0) s.show(s.shown, kind);
-  else if (e.key === "w" && s.shots.length > 1) s.toggleWipe();
-  else if (e.key === "g") s.toggleGrid();
-  else if (e.key === "+" || e.key === "=") s.zoom(s.view.zoom * 2);
-  else if (e.key === "-") s.zoom(s.view.zoom / 2);
-  else if (e.key === "f") s.zoom(1);
-  else if (e.key === "[") s.expose(s.stops - 0.25);
-  else if (e.key === "]") s.expose(s.stops + 0.25);
-});
-
-// Everything is on paper, also what has not been scrolled to.
-const loadAll = () => Promise.all(scenes.map((s) => s.load()));
-window.addEventListener("beforeprint", () => {
-  document.querySelectorAll("details").forEach((d) => { d.open = true; });
-  scenes.forEach((s) => s.panes.forEach((p) => p.draw(true)));
-});
-window.addEventListener("load", () => (window.requestIdleCallback || setTimeout)(loadAll));

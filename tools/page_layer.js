@@ -111,6 +111,9 @@ function loadLayer(id) {
   return layers.get(id);
 }
 
+// What a byte of a FLIP map stands for.
+const FLIP_VALUE = Float32Array.from({ length: 256 }, (_, i) => (i / 128) ** 2);
+
 // A promise of a claim's FLIP map, or of null where there is none (format: layer.h).
 function loadFlip(index) {
   const element = document.getElementById("flip-" + index);
@@ -118,7 +121,11 @@ function loadFlip(index) {
   const width = +element.dataset.width;
   return inflate(bytesOf(element.textContent)).then((raw) => {
     element.textContent = "";
-    for (let i = 0; i < raw.length; i++) if (i % width > 0) raw[i] += raw[i - 1];
-    return Float64Array.from(raw, (v) => (v / 128) ** 2);
+    const map = new Float32Array(raw.length);
+    for (let i = 0, x = 0, left = 0; i < raw.length; i++, x = x + 1 === width ? 0 : x + 1) {
+      left = (x > 0 ? left : 0) + raw[i] & 255;
+      map[i] = FLIP_VALUE[left];
+    }
+    return map;
   });
 }

@@ -45,6 +45,44 @@ function boxSum(value, width, height, r) {
   return out;
 }
 
+// How much of each of `from` pixels goes into each of `to`: [first, weights, ..] of every one, weights summing to 1.
+function shares(from, to) {
+  return Array.from({ length: to }, (_, i) => {
+    const begin = i * from / to, end = (i + 1) * from / to, first = Math.floor(begin);
+    const weights = [];
+    for (let k = first; k < Math.min(Math.ceil(end), from); k++)
+      weights.push((Math.min(k + 1, end) - Math.max(k, begin)) * to / from);
+    return [first, weights];
+  });
+}
+
+// The mean radiance of each of width x height parts of a layer's picture, {value}; kept for a few sizes.
+function reduceLayer(layer, width, height) {
+  layer.reduced = layer.reduced || new Map();
+  const known = layer.reduced.get(width);
+  if (known) return known;
+  const across = shares(layer.width, width), down = shares(layer.height, height);
+  const value = layer.value.map((v) => {
+    const rows = new Float32Array(width * layer.height), out = new Float32Array(width * height);
+    for (let y = 0; y < layer.height; y++)
+      for (let x = 0; x < width; x++) {
+        const [first, weights] = across[x], at = y * layer.width + first;
+        let sum = 0;
+        for (let k = 0; k < weights.length; k++) sum += weights[k] * v[at + k];
+        rows[y * width + x] = sum;
+      }
+    for (let y = 0; y < height; y++) {
+      const [first, weights] = down[y];
+      for (let k = 0; k < weights.length; k++)
+        for (let x = 0; x < width; x++) out[y * width + x] += weights[k] * rows[(first + k) * width + x];
+    }
+    return out;
+  });
+  if (layer.reduced.size > 3) layer.reduced.clear();
+  layer.reduced.set(width, { value });
+  return layer.reduced.get(width);
+}
+
 // Differences are in units of B, or of 5 % of its mean where it is darker than that.
 const makeMap = {
   difference(a, b) {

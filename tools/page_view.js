@@ -50,19 +50,30 @@ class Pane {
     resized.observe(this.frame);
   }
 
-  // A picture at one pixel a pixel, for all frames; painted again only when its key has changed.
-  buffer(source) {
-    const { width, height, buffers } = this.scene;
-    let b = buffers.get(source.id);
-    if (!b) buffers.set(source.id, b = { canvas: make("canvas", { width, height }) });
-    if (b.key !== source.key) {
-      const context = b.canvas.getContext("2d");
+  // A picture of so many pixels, for all frames; painted again only when its key has changed. Fewer than it has: a
+  // picture's radiance is averaged before the curve, a map is painted whole and made smaller.
+  buffer(source, width = this.scene.width, height = this.scene.height) {
+    const { buffers } = this.scene, id = source.id + " " + width, whole = width === this.scene.width;
+    let b = buffers.get(id);
+    if (!b) buffers.set(id, b = { width, canvas: make("canvas", { width, height }) });
+    if (b.key === source.key) return b.canvas;
+    const context = b.canvas.getContext("2d");
+    if (whole || source.layer) {
       b.image = b.image || context.createImageData(width, height);
-      source.paint(b.image.data);
+      source.paint(b.image.data, whole ? source.layer : reduceLayer(source.layer, width, height));
       context.putImageData(b.image, 0, 0);
-      b.key = source.key;
+    } else {
+      context.clearRect(0, 0, width, height);
+      context.drawImage(this.buffer(source), 0, 0, width, height);
     }
+    b.key = source.key;
     return b.canvas;
+  }
+
+  resize(width, height) {
+    const { buffers } = this.scene, old = this.canvas.width;
+    buffers.forEach((b, id) => { if (b.width === old && old !== this.scene.width) buffers.delete(id); });
+    Object.assign(this.canvas, { width, height });
   }
 
   draw(force) {
@@ -70,19 +81,19 @@ class Pane {
     if (!source) return;
     const s = this.scene, v = s.view, ratio = window.devicePixelRatio || 1;
     const width = Math.round(this.frame.clientWidth * ratio), height = Math.round(width * s.height / s.width);
-    if (this.canvas.width !== width || this.canvas.height !== height)
-      Object.assign(this.canvas, { width, height });
+    if (this.canvas.width !== width || this.canvas.height !== height) this.resize(width, height);
     if (source.prepare) source.prepare();
     this.canvas.setAttribute("aria-label", source.label);
     const c = this.canvas.getContext("2d"), scale = width / s.width * v.zoom;
+    const fits = v.zoom === 1 && scale < 1; // then a copy of the frame's size is kept, which nothing scales
     c.imageSmoothingEnabled = scale < 1;
     const put = (what, x0, x1) => {
       c.save();
       c.beginPath();
       c.rect(x0, 0, x1 - x0, height);
       c.clip();
-      c.setTransform(scale, 0, 0, scale, -v.x * scale, -v.y * scale);
-      c.drawImage(this.buffer(what), 0, 0);
+      if (!fits) c.setTransform(scale, 0, 0, scale, -v.x * scale, -v.y * scale);
+      c.drawImage(fits ? this.buffer(what, width, height) : this.buffer(what), 0, 0);
       c.restore();
     };
     const split = source.over ? Math.round(width * s.wipe) : width;

@@ -13,11 +13,17 @@
 #include <unistd.h>
 
 /* What every job says itself. */
-static const struct option_words not_of_a_job[] = {{"--only", 1},           {"--out", 1},
-                                                   {"--reference-seed", 1}, {"-t", 1},
-                                                   {"--threads", 1},        {"--of-claims", 1},
-                                                   {"--slurm", 0},          {"-q", 0},
-                                                   {"--quiet", 0},          {0}};
+static const struct option_words not_of_a_job[] = {{"--only", 1},
+                                                   {"--out", 1},
+                                                   {"--reference-seed", 1},
+                                                   {"-t", 1},
+                                                   {"--threads", 1},
+                                                   {"--of-claims", 1},
+                                                   {"--page-every", 1},
+                                                   {"--slurm", 0},
+                                                   {"-q", 0},
+                                                   {"--quiet", 0},
+                                                   {0}};
 
 static bool add_words(struct plan *p, int argc, char **argv, const struct validate_options *o,
                       const char *threads, int claims, struct err *e)
@@ -104,7 +110,7 @@ bool validate_plan(int argc, char **argv, int parts, struct plan *p, struct err 
 static bool add_results(const struct plan *p, int k, const char *out, json_t *results,
                         struct err *e)
 {
-    static const char *const lists[] = {"claims", "consistency", "not_expressible", "loader"};
+    static const char *const lists[] = {"claims", "not_expressible", "loader", "consistency"};
     char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
     json_t *part;
     plan_artefact(p, k, "results.json", path);

@@ -5,14 +5,12 @@
 #include "report_consistency.h"
 #include "report_cost.h"
 #include "report_converge.h"
-#include "report_csv.h"
 #include "report_html.h"
 #include "report_page.h"
 #include "report_parts.h"
-#include "report_plot.h"
 #include "report_rays.h"
+#include "report_table.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,8 +46,8 @@ static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
     fputs("</ul>\n", f);
 }
 
-/* claim is sorted: not judged, wrong, as expected. */
-static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num)
+/* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
+static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left)
 {
     size_t errors = 0, wrong = 0, must_differ = 0;
     for (size_t i = 0; i < num; i++) {
@@ -58,23 +56,33 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num)
         must_differ += claim[i].outcome == OUTCOME_AS_EXPECTED &&
                        strcmp(member_text(claim[i].json, "expected"), "DIFFERENT") == 0;
     }
+    if (left > 0)
+        fprintf(f,
+                "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
+                " more are to be judged.</p>\n",
+                left);
+    fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
+            left > 0 ? "So far " : "");
     const char *s = num == 1 ? "" : "s";
-    if (errors + wrong == 0 && num == 1)
-        fputs("<h1 class=\"good\">The claim came out as expected.</h1>\n", f);
-    else if (errors + wrong == 0)
-        fprintf(f, "<h1 class=\"good\">All %zu claims came out as expected.</h1>\n", num);
-    else if (errors > 0 && wrong > 0)
-        fprintf(
-            f,
-            "<h1 class=\"bad\">Of %zu claims, %zu could not be judged and %zu did not come out as "
-            "expected.</h1>\n",
-            num, errors, wrong);
+    if (errors > 0 && wrong > 0)
+        fprintf(f, "%s %zu claims, %zu could not be judged and %zu did not come out as expected.",
+                left > 0 ? "of" : "Of", num, errors, wrong);
     else if (errors > 0)
-        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s could not be judged.</h1>\n", errors, num,
-                s);
+        fprintf(f, "%zu of %zu claim%s could not be judged.", errors, num, s);
+    else if (wrong > 0)
+        fprintf(f, "%zu of %zu claim%s did not come out as expected.", wrong, num, s);
+    else if (num == 1)
+        fprintf(f, "%s claim came out as expected.", left > 0 ? "the" : "The");
     else
-        fprintf(f, "<h1 class=\"bad\">%zu of %zu claim%s did not come out as expected.</h1>\n",
-                wrong, num, s);
+        fprintf(f, "%s %zu claims came out as expected.", left > 0 ? "all" : "All", num);
+    fputs("</h1>\n", f);
+    if (num == 1 && errors == 0) {
+        fputs("<p class=\"lede\"><b>", f);
+        html_text(f, member_text(claim->json, "verdict"));
+        fputs("</b>: ", f);
+        html_text(f, member_text(claim->json, "reason"));
+        fputs("</p>\n", f);
+    }
     if (errors + wrong > 0)
         write_claim_list(f, claim, errors + wrong);
     if (must_differ == 1)
@@ -101,7 +109,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 {
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
-        write_verdict(f, claim, num);
+        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")));
     report_consistency_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
@@ -126,96 +134,6 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     fputs("</code></pre>\n</header>\n", f);
 }
 
-static void write_row(FILE *f, const struct claim_ref *claim)
-{
-    const json_t *c = claim->json;
-    fprintf(f, "<tr%s><td>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
-    report_badge(f, claim);
-    fprintf(f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
-    html_text(f, member_text(c, "scene"));
-    fputs("</a></th><td class=\"name\">", f);
-    html_text(f, member_text(c, "a"));
-    fputs("</td><td class=\"name\">", f);
-    report_reference(f, claim);
-    fputs("</td><td>", f);
-    html_text(f, member_text(c, "expected"));
-    if (claim->outcome == OUTCOME_NOT_JUDGED) {
-        fputs("</td><td colspan=\"6\" class=\"error-cell\">", f);
-        html_text(f, member_text(c, "error"));
-        fputs("</td></tr>\n", f);
-        return;
-    }
-    const json_t *ci = json_object_get(c, "ci");
-    fputs("</td><td>", f);
-    plot_interval(f, c);
-    fprintf(f,
-            "</td><td class=\"num\">%s</td><td class=\"num\">%s to %s</td><td class=\"num\">%s</td>"
-            "<td class=\"num\">%s</td>",
-            percent_column(member_number(c, "difference")).s,
-            percent_column(json_number_value(json_array_get(ci, 0))).s,
-            percent_column(json_number_value(json_array_get(ci, 1))).s,
-            plain_number(100 * member_number(c, "mdb_global")).s,
-            plain_number(100 * member_number(c, "margin_global")).s);
-    fputs("<td class=\"num\">", f);
-    if (json_object_get(c, "seconds_a") != NULL)
-        fputs(duration_text(member_number(c, "seconds_a")).s, f);
-    fputs("</td></tr>\n", f);
-}
-
-static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
-{
-    static const char *const text[] = {"scene", "a", "b", "verdict", "expected", "error"};
-    static const char *const number[] = {"difference", "mdb_global", "margin_global", "alpha",
-                                         "seconds_a"};
-    struct csv csv = csv_open(f, "claims.csv",
-                              "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
-                              "alpha,seconds,low,high");
-    for (size_t i = 0; i < num; i++) {
-        const json_t *c = claim[i].json, *ci = json_object_get(c, "ci");
-        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
-            csv_text(&csv, member_text(c, text[k]));
-        for (size_t k = 0; k < sizeof number / sizeof *number; k++)
-            csv_number(&csv, json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
-        for (size_t k = 0; k < 2; k++)
-            csv_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
-        csv_line(&csv);
-    }
-    csv_close(&csv);
-}
-
-static void write_table(FILE *f, const struct claim_ref *claim, size_t num)
-{
-    fputs(
-        "<section>\n"
-        "<h2>The claims</h2>\n"
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
-        "<table id=\"claims\"><thead><tr><th scope=\"col\">Verdict</th><th scope=\"col\">Scene</th>"
-        "<th scope=\"col\">Tested</th><th scope=\"col\">Against</th><th scope=\"col\">Expected</th>"
-        "<th scope=\"col\">In margin</th><th scope=\"col\" class=\"num\">Difference %</th><th "
-        "scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
-        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" class=\"num\">Time</th></tr>"
-        "</thead>\n"
-        "<tbody>\n",
-        f);
-    for (size_t i = 0; i < num; i++)
-        write_row(f, &claim[i]);
-    fputs("</tbody></table>\n</div>\n<p class=\"caption\">The table as a file: ", f);
-    write_csv(f, claim, num);
-    fputs("</p>\n"
-          "<p class=\"caption\"><b>Difference</b>: how much brighter (+) or darker (−) our image "
-          "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
-          "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
-          "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
-          "detectable bias: a true difference of this size would have come out DIFFERENT with a "
-          "probability of 95 %. In the drawing the band is the margin, the line is the interval "
-          "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
-          "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
-          "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
-          "samples to tell.</p>\n"
-          "</section>\n",
-          f);
-}
-
 /* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
  * keep the order in which the sorted claims first name them. */
 static size_t gather_scene(struct claim_ref *claim, size_t num)
@@ -235,11 +153,23 @@ static size_t gather_scene(struct claim_ref *claim, size_t num)
 static void write_keys(FILE *f)
 {
     fputs(
-        "<section>\n<h2>How to look</h2>\n<p class=\"caption\">Each scene below has its pictures "
+        "<section class=\"how\">\n<h2>How to look</h2>\n<dl class=\"purpose\">\n"
+        "<div><dt>Why two right pictures differ</dt><dd>A path tracer guesses each pixel from random paths. What is left of "
+        "that is noise: grain that another seed would put elsewhere. A difference means something only where it is larger "
+        "than the noise of both pictures explains.</dd></div>\n"
+        "<div><dt>±, n and t</dt><dd>The standard error ± says how far noise moves a mean, n how often the pixel was "
+        "observed. t is a difference divided by its ±: within 2 in 95 of 100 places where nothing is wrong, beyond 4 hardly "
+        "ever.</dd></div>\n"
+        "<div><dt>p</dt><dd>How often noise alone would make a difference at least as large. Of many places some are small "
+        "by chance, so that they are counted together, and a small p may still belong to a difference far inside the "
+        "margin.</dd></div>\n"
+        "<div><dt>Tiles</dt><dd>Squares of the picture, each judged by its own mean: an error that cancels over the whole "
+        "picture shows there.</dd></div>\n</dl>\n"
+        "<p class=\"caption keys\">Each scene has its pictures "
         "(keys <kbd>1</kbd> to <kbd>9</kbd>; <kbd>0</kbd> side by side), maps of two of them "
         "(<kbd>d</kbd> difference, <kbd>t</kbd> difference over its noise, <kbd>e</kbd> error without "
-        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe (<kbd>w</kbd>), tiles "
-        "(<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
+        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe "
+        "(<kbd>w</kbd>), tiles (<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
         "<kbd>-</kbd>, <kbd>f</kbd> the whole picture, double click, Ctrl and the wheel, two "
         "fingers); drag to pan. All frames of a scene move together. Point at a pixel, or focus a "
         "picture and use the arrow keys, to read its values. A key goes to the scene in the middle "
@@ -249,10 +179,14 @@ static void write_keys(FILE *f)
         f);
 }
 
+/* On a page of more claims the evidence of those as expected is folded. */
+enum { FOLD_FROM = 8 };
+
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
                        struct err *e)
 {
     FILE *f = p->f;
+    p->folded = num > FOLD_FROM;
     fprintf(f,
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
             "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
@@ -264,7 +198,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
     write_header(f, root, claim, num);
     if (num > 0)
-        write_table(f, claim, num);
+        report_table(f, claim, num);
     if (num > 0)
         write_keys(f);
     for (size_t done = 0; done < num;) {

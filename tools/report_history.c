@@ -129,7 +129,9 @@ static void write_series(FILE *f, const struct history *h, const struct history_
         fputs(", ", f);
         html_text(f, s->quantity);
     }
-    fprintf(f, "</td><td class=\"num\">%s</td>", s->num > 1 ? plain_number(s->z).s : "");
+    /* To a hundredth, as rounding alone is no move; + 0.0: no minus sign at 0. */
+    double z = rint(100 * s->z) / 100 + 0.0;
+    fprintf(f, "</td><td class=\"num\">%s</td>", s->num > 1 ? plain_number(z).s : "");
     for (enum quantity q = 0; q < NUM_QUANTITIES; q++)
         write_plot(f, h, s, q);
     fputs("</tr>\n", f);

@@ -43,6 +43,7 @@ struct page {
     struct page_layer *layer;
     struct page_alike *alike;
     size_t num_layers, num_alike, num_scenes;
+    bool folded; /* many claims: the evidence of those that came out as expected is folded */
 };
 
 /* The number on the page of the layer of m, which was read from path; the same path has one. */

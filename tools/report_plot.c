@@ -106,7 +106,7 @@ void plot_p_values(FILE *f, const struct p_histogram *h, const int count[20])
 
     fprintf(
         f,
-        "<svg class=\"plot\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Histogram of %d tile "
+        "<svg class=\"plot\" text-anchor=\"middle\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Histogram of %d tile "
         "p-values in %d bins; %d tiles are below 0.05, %.1f would be expected\">",
         LEFT + PLOT_WIDTH + 14, BOTTOM + 40, h->num_tiles, h->bins, h->below_5_percent,
         0.05 * h->num_tiles);
@@ -123,15 +123,15 @@ void plot_p_values(FILE *f, const struct p_histogram *h, const int count[20])
             PLOT_WIDTH);
     fprintf(f, "<path class=\"axis\" d=\"M%d %dV%dH%d\"/>", LEFT, TOP, BOTTOM, LEFT + PLOT_WIDTH);
     int step = tick_step(top);
+    fputs("<g text-anchor=\"end\">", f);
     for (int v = 0; v <= top; v += step)
-        fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%d</text>", LEFT - 6,
-                BOTTOM - unit * v + 4, v);
+        fprintf(f, "<text x=\"%d\" y=\"%.0f\">%d</text>", LEFT - 6, BOTTOM - unit * v + 4, v);
+    fputs("</g>", f);
     for (int i = 0; i <= 4; i++)
-        fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%g</text>",
-                LEFT + PLOT_WIDTH * i / 4, BOTTOM + 16, i / 4.0);
+        fprintf(f, "<text x=\"%d\" y=\"%d\">%g</text>", LEFT + PLOT_WIDTH * i / 4, BOTTOM + 16,
+                i / 4.0);
     fprintf(f,
-            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">p-value of a tile</text>"
-            "<text transform=\"translate(11 %d) rotate(-90)\" text-anchor=\"middle\">number of "
-            "tiles</text></svg>",
+            "<text x=\"%d\" y=\"%d\">p-value of a tile</text>"
+            "<text transform=\"translate(11 %d) rotate(-90)\">number of tiles</text></svg>",
             LEFT + PLOT_WIDTH / 2, BOTTOM + 34, TOP + PLOT_HEIGHT / 2);
 }

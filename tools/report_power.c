@@ -14,12 +14,13 @@ enum { LEFT = 44, TOP = 8, WIDTH = 300, HEIGHT = 200, BOTTOM = TOP + HEIGHT };
 
 static void write_frame(FILE *f, const char *label, const char *x, const char *y)
 {
-    fprintf(f,
-            "<figure class=\"map\"><svg class=\"plot\" viewBox=\"0 0 %d %d\" role=\"img\" "
-            "aria-label=\"%s\"><text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>"
-            "<text transform=\"translate(11 %d) rotate(-90)\" text-anchor=\"middle\">%s</text>",
-            LEFT + WIDTH + 14, BOTTOM + 40, label, LEFT + WIDTH / 2, BOTTOM + 34, x,
-            TOP + HEIGHT / 2, y);
+    fprintf(
+        f,
+        "<figure class=\"map\"><svg class=\"plot\" text-anchor=\"middle\" viewBox=\"0 0 %d %d\" role=\"img\" "
+        "aria-label=\"%s\"><text x=\"%d\" y=\"%d\">%s</text><text transform=\"translate(11 %d) "
+        "rotate(-90)\">%s</text>",
+        LEFT + WIDTH + 14, BOTTOM + 40, label, LEFT + WIDTH / 2, BOTTOM + 34, x, TOP + HEIGHT / 2,
+        y);
 }
 
 static void write_axes(FILE *f)
@@ -142,17 +143,16 @@ void report_qq(FILE *f, const json_t *claim)
             outside += gsl_cdf_beta_P(pow(10, v[i - 1]), i, n + 1 - i) < 0.025;
         write_axes(f);
         for (int i = 0; i * tick(a.right) <= a.right; i++)
-            fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>",
+            fprintf(f, "<text x=\"%.0f\" y=\"%d\">%g</text>",
                     LEFT + WIDTH * (i * tick(a.right)) / a.right, BOTTOM + 16, i * tick(a.right));
+        fputs("<g text-anchor=\"end\">", f);
         for (int i = 0; i * tick(a.top) <= a.top; i++)
-            fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%g</text>", LEFT - 6,
+            fprintf(f, "<text x=\"%d\" y=\"%.0f\">%g</text>", LEFT - 6,
                     qq_y(&a, i * tick(a.top)) + 4, i * tick(a.top));
         fprintf(
             f,
-            "</svg><figcaption><b>The same p-values against those that chance gives.</b> If both "
-            "have the same mean the points follow the dashed line and stay in the band, each 95 "
-            "times of 100. Points above the band at the right are tiles that chance does not "
-            "explain; here %d of %d are above it.%s ",
+            "</g></svg><figcaption><b>The same p-values, one by one.</b> If both have the same mean the points follow "
+            "the dashed line, each in the band 95 times of 100; here %d of %d are above it.%s ",
             outside, n, -v[0] > a.top ? " What lies on the upper edge is further out." : "");
         write_tile_csv(f, claim);
         fputs("</figcaption></figure>\n", f);
@@ -197,45 +197,60 @@ static void write_mark(FILE *f, double x, double top, bool left, const char *tex
             at, TOP, BOTTOM, left ? at - 5 : at + 5, y, left ? "end" : "start", text);
 }
 
+/* Where the curve is drawn: the ends, and between them 4 standard errors around where it rises. */
+enum { RISE = 24, POINTS = RISE + 3 };
+static int curve_points(const struct power *p, double top, double bias[POINTS])
+{
+    int num = 0;
+    bias[num++] = 0;
+    for (int i = 0; i <= RISE; i++) {
+        double b = p->margin + p->error * (p->critical + 8.0 * i / RISE - 4);
+        if (b > 0 && b < top)
+            bias[num++] = b;
+    }
+    bias[num++] = top;
+    return num;
+}
+
 void report_power(FILE *f, const json_t *claim)
 {
-    enum { STEPS = 60 };
     struct power p = power_of(claim);
-    double mdb = member_number(claim, "mdb_global"), top = 1.3 * mdb;
+    double mdb = member_number(claim, "mdb_global"), top = 1.3 * mdb, bias[POINTS];
     if (!(p.error > 0))
         return;
+    int num = curve_points(&p, top, bias);
     write_frame(f, "Chance to find a bias of the image, against its size",
                 "true bias of the image, %", "chance of DIFFERENT, %");
     if (p.margin > 0)
         fprintf(f, "<rect class=\"band\" x=\"%d\" y=\"%d\" width=\"%.1f\" height=\"%d\"/>", LEFT,
                 TOP, WIDTH * p.margin / top, HEIGHT);
     fputs("<path class=\"curve\" d=\"", f);
-    for (int i = 0; i <= STEPS; i++)
-        fprintf(f, "%s%.1f %.1f", i == 0 ? "M" : "L", LEFT + (double)WIDTH * i / STEPS,
-                power_y(power_at(&p, top * i / STEPS)));
+    for (int i = 0; i < num; i++)
+        fprintf(f, "%s%.1f %.1f", i == 0 ? "M" : "L", LEFT + WIDTH * bias[i] / top,
+                power_y(power_at(&p, bias[i])));
     fputs("\"/>", f);
     write_mark(f, mdb, top, false, "MDB", power_y(0.45));
     if (p.margin > 0)
         write_mark(f, p.margin, top, true, "margin", power_y(0.8));
     write_axes(f);
+    fputs("<g text-anchor=\"end\">", f);
     for (int i = 0; i <= 4; i++)
-        fprintf(f, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%d</text>", LEFT - 6,
-                power_y(i / 4.0) + 4, 25 * i);
+        fprintf(f, "<text x=\"%d\" y=\"%.0f\">%d</text>", LEFT - 6, power_y(i / 4.0) + 4, 25 * i);
+    fputs("</g>", f);
     for (int i = 0; i * tick(100 * top) <= 100 * top; i++)
-        fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>",
+        fprintf(f, "<text x=\"%.0f\" y=\"%d\">%s</text>",
                 LEFT + WIDTH * (i * tick(100 * top)) / (100 * top), BOTTOM + 16,
                 plain_number(i * tick(100 * top)).s);
     fprintf(
         f,
-        "</svg><figcaption><b>What this claim could have found.</b> If the image were too bright "
-        "or too dark by what is on the axis, this is the chance that its mean alone made the claim "
-        "DIFFERENT. Inside the margin (shaded) that would be wrong and is rare; at the MDB, %s, it "
-        "is 95\u00a0%%. ",
+        "</svg><figcaption><b>What this claim could have found.</b> How likely a true bias of that size makes "
+        "the image's mean DIFFERENT: hardly ever inside the margin (shaded), where it would be wrong, and 95\u00a0%% "
+        "of the time at the MDB, %s. ",
         percent_plain(mdb).s);
     struct csv csv = csv_open(f, "power.csv", "bias,power");
-    for (int i = 0; i <= STEPS; i += 3) {
-        csv_number(&csv, top * i / STEPS);
-        csv_number(&csv, power_at(&p, top * i / STEPS));
+    for (int i = 0; i < num; i++) {
+        csv_number(&csv, bias[i]);
+        csv_number(&csv, power_at(&p, bias[i]));
         csv_line(&csv);
     }
     csv_close(&csv);

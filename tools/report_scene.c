@@ -165,9 +165,10 @@ static void write_images(struct page *p, const struct scene *s)
     fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the picture)"
                           : " is shown at 80 % of white)",
           p->f);
-    fputs(", then the sRGB curve. Each square is one pixel. Values are exact to 1/16 of their own "
-          "standard error or a millionth of themselves.</p>\n",
-          p->f);
+    fputs(
+        ", then the sRGB curve. A frame smaller than its picture shows means. Values are exact to 1/16 of their own "
+        "standard error or a millionth of themselves.</p>\n",
+        p->f);
 }
 
 static void write_purpose(FILE *f, const json_t *claim)
@@ -208,7 +209,8 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
     html_text(p->f, title != NULL ? title : name);
     fputs(" <code>", p->f);
     html_text(p->f, name);
-    fputs("</code></h2>\n", p->f);
+    fputs("</code>", p->f);
+    fputs(p->folded ? "<a class=\"up\" href=\"#table\">↑ all claims</a></h2>\n" : "</h2>\n", p->f);
     write_purpose(p->f, purpose);
 
     for (size_t i = 0; i < num; i++)

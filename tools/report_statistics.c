@@ -32,10 +32,9 @@ static void write_row(FILE *f, const json_t *s, double alpha)
     }
     fputs("<td class=\"num\">", f);
     write_p(f, log10_p);
-    fputs("</td><td>", f);
-    fputs(rejects ? "<strong>DIFFERENT</strong>" : "nothing", f);
-    fputs("</td><td>", f);
-    html_text(f, member_text(s, "what"));
+    fprintf(f, "</td><td>%s</td><td>", rejects ? "<strong>DIFFERENT</strong>" : "nothing");
+    if (log10_p < 0) /* else nothing stands out, and its place is none */
+        html_text(f, member_text(s, "what"));
     fputs("</td></tr>\n", f);
 }
 
@@ -72,7 +71,10 @@ void report_statistics(FILE *f, const json_t *claim)
           f);
     for (size_t i = 0; i < json_array_size(all); i++)
         write_row(f, json_array_get(all, i), member_number(claim, "alpha"));
-    fputs("</tbody></table>\n</div>\n<p class=\"caption\">", f);
+    fputs("</tbody></table>\n</div>\n", f);
+    if (direction == NULL && ratio == NULL)
+        return;
+    fputs("<p class=\"caption\">", f);
     if (direction != NULL)
         write_direction(f, direction);
     if (ratio != NULL)

@@ -7,6 +7,8 @@
  *     "seconds": 98.1,
  *     "consistency": [ ... ],             consistency_run.h; absent where `assay validate` has not run
  *     "convergence": [ ... ],             convergence.h; absent where `assay converge` has not run
+ *     "unfinished": 87,               only in what `assay validate --page-every` shows while it runs: how many
+ *                                     claims and scenes of "consistency" are still to be judged
  *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
  *         "scene": "41_cornell", "title": "...", "detects": "...", "blind_to": "...",

@@ -85,15 +85,52 @@ static void tell_round(const struct validation *v, const struct task *t)
     say(v, t->scene->name, note);
 }
 
+/* Claims that --until-different did not look at are not in the results. */
+static void collect(const struct validation *v, json_t *root)
+{
+    json_t *consistency = json_array();
+    json_object_set_new(root, "consistency", consistency);
+    for (int i = 0; i < v->num_tasks; i++)
+        if (v->task[i].result != NULL)
+            json_array_append(v->task[i].a != NULL ? json_object_get(root, "claims") : consistency,
+                              v->task[i].result);
+    json_object_set_new(root, "seconds", json_real(now_seconds() - v->start));
+}
+
+/* If it is time again. */
+static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
+{
+    if (!(v->opt->show_every_s > 0) || now_seconds() < v->shown + v->opt->show_every_s)
+        return true;
+    json_t *copy = json_copy((json_t *)root), *claims = json_array();
+    bool ok = copy != NULL && claims != NULL && json_object_set(copy, "claims", claims) == 0;
+    if (!ok)
+        err_set(e, "out of memory");
+    if (ok)
+        collect(v, copy);
+    int left = v->num_tasks;
+    for (int i = 0; i < v->num_tasks; i++)
+        left -= v->task[i].result != NULL;
+    if (ok && json_array_size(claims) > 0) {
+        json_object_set_new(copy, "unfinished", json_integer(left));
+        ok = v->opt->show(copy, v->opt, e);
+    }
+    json_decref(claims);
+    json_decref(copy);
+    v->shown = now_seconds();
+    return ok;
+}
+
 /* Until all is decided, or the time is over, or, for --until-different, one differs: what was not looked
  * at by then stays without a result. */
-static void take_looks(struct validation *v)
+static bool take_looks(struct validation *v, const json_t *root, struct err *e)
 {
-    bool found = false;
-    for (struct task *t; !found && (t = choose(v)) != NULL && time_left(v) > 0;) {
+    bool found = false, ok = true;
+    for (struct task *t; ok && !found && (t = choose(v)) != NULL && time_left(v) > 0;) {
         tell_round(v, t);
         task_look(v, t);
         found = v->opt->until_different && task_differs(t);
+        ok = show_so_far(v, root, e);
     }
     for (int i = 0; i < v->num_tasks; i++) {
         struct task *t = &v->task[i];
@@ -101,6 +138,7 @@ static void take_looks(struct validation *v)
             task_give_up(v, t,
                          found ? "stopped at the difference of another claim" : "budget spent");
     }
+    return ok;
 }
 
 static const double small_alpha = 1e-5; /* of a run: below, no tail is known well enough */
@@ -129,19 +167,8 @@ bool validate_start(const struct validate_options *o, int argc, char **argv, jso
     json_object_set_new(root, "stages", json_integer(stages_of(o)));
     if (o->budget_s > 0)
         json_object_set_new(root, "budget_s", json_real(o->budget_s));
-    json_object_set_new(root, "consistency", json_array());
     *results = root;
     return true;
-}
-
-/* Claims that --until-different did not look at are not in the results. */
-static void collect(const struct validation *v, json_t *root)
-{
-    for (int i = 0; i < v->num_tasks; i++)
-        if (v->task[i].result != NULL)
-            json_array_append(
-                json_object_get(root, v->task[i].a != NULL ? "claims" : "consistency"),
-                v->task[i].result);
 }
 
 static void validation_free(struct validation *v)
@@ -165,7 +192,8 @@ static void validation_free(struct validation *v)
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
-    struct validation v = {.opt = opt, .start = now_seconds(), .sequence = sequence_of(opt)};
+    struct validation v = {
+        .opt = opt, .start = now_seconds(), .shown = now_seconds(), .sequence = sequence_of(opt)};
     json_t *root = NULL, *cannot = json_array();
     v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
     v.stages = stages_of(opt);
@@ -193,9 +221,10 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
             goto done;
         json_object_set_new(root, "loader", loader);
     }
-    take_looks(&v);
+    ok = take_looks(&v, root, e);
+    if (!ok)
+        goto done;
     collect(&v, root);
-    json_object_set_new(root, "seconds", json_real(now_seconds() - v.start));
     *results = root;
     root = NULL;
 done:

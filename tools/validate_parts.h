@@ -75,6 +75,7 @@ struct validation {
     const struct sequence *sequence;
     int stages;
     double start, deadline; /* of now_seconds(); deadline INFINITY: none */
+    double shown;           /* when the last look so far was shown, or the start */
     double alpha;           /* of one claim */
 };
 

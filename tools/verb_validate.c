@@ -34,6 +34,7 @@ enum option {
     OPT_UNTIL_DIFFERENT,
     OPT_OF_CLAIMS,
     OPT_SLURM,
+    OPT_PAGE_EVERY,
     OPT_QUIET,
     OPT_HELP
 };
@@ -73,6 +74,9 @@ static const struct cli_option options[] = {
     [OPT_OF_CLAIMS] = {0, "of-claims", 1, "N",
                        "judge some of the N claims of a larger run, whose alpha it is (all)"},
     [OPT_SLURM] = {0, "slurm", 0, "", "a job for each scene on a Slurm cluster"},
+    [OPT_PAGE_EVERY] = {0, "page-every", 1, "S",
+                        "seconds after which the page of what is judged so far is\n"
+                        "written, again and again, for assay watch (off)"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
@@ -132,6 +136,9 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct vali
         case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
         case OPT_OF_CLAIMS: ok = cli_int("--of-claims", v, 1, 100000000, &o->of_claims, e); break;
         case OPT_SLURM: w->slurm = true; break;
+        case OPT_PAGE_EVERY:
+            ok = cli_double("--page-every", v, 0.1, 1e6, &o->show_every_s, e);
+            break;
         case OPT_QUIET: o->quiet = true; break;
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
@@ -161,6 +168,17 @@ static void print_not_expressible(const json_t *results)
     json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
         printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
                member_text(entry, "scene"), member_text(entry, "reason"));
+}
+
+/* index.html from results that are there only as long as that takes, so that nothing takes them for a run's. */
+static bool write_page_so_far(const json_t *so_far, const struct validate_options *o, struct err *e)
+{
+    char json[4096], html[4096];
+    snprintf(json, sizeof json, "%s/so_far.json", o->out_dir);
+    snprintf(html, sizeof html, "%s/index.html", o->out_dir);
+    bool ok = json_write(json, so_far, e) && report_write(json, html, e);
+    remove(json);
+    return ok;
 }
 
 static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
@@ -238,7 +256,8 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
         .suite_dir =
             find_dir(c->suite, sizeof c->suite, "reference/scenes", "../share/assay/scenes"),
         .golden_dir = find_dir(c->golden, sizeof c->golden, "golden", "../share/assay/golden"),
-        .share_dir = find_dir(c->share, sizeof c->share, "reference", "../share/assay")};
+        .share_dir = find_dir(c->share, sizeof c->share, "reference", "../share/assay"),
+        .show = write_page_so_far};
     if (!parse(argc, argv, &c->opt, c, &engine, e))
         return false;
     if (engine != NULL) {

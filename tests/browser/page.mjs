@@ -1,7 +1,7 @@
 // node page.mjs MODULES PAGE RESULTS SHOTS [--values-only]: the page of one scene of four pictures, in Debian's chromium.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
-import { readFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { readExr, pixelOf, grey, srgb } from "./files.mjs";
 
@@ -206,6 +206,32 @@ await page.keyboard.press("Shift+ArrowDown");
 const after = await page.evaluate("({...scenes[0].pixel})");
 check("arrow keys move the pixel", after.x === at.x && after.y === Math.min(at.y + 8, size.height - 1));
 
+// A frame smaller than the picture: each of its pixels shows the mean radiance of what it covers, here 40 of 64.
+const SMALL = 40;
+await page.evaluate((width) => {
+  scenes[0].show(4, null);
+  scenes[0].stagePane.frame.style.cssText += "; flex: none; width: " + width + "px";
+}, SMALL);
+await frames(page);
+await frames(page);
+const covered = (x, y, k) => {
+  let sum = 0;
+  const share = (i, n, at) => Math.max(0, Math.min(i + 1, (at + 1) * n / SMALL) - Math.max(i, at * n / SMALL)) * SMALL / n;
+  for (let j = 0; j < size.height; j++)
+    for (let i = 0; i < size.width; i++) {
+      const weight = share(i, size.width, x) * share(j, size.height, y);
+      if (weight > 0) sum += weight * pixelOf(pictures[names[3]], i, j).value[k];
+    }
+  return sum;
+};
+const reduced = await page.evaluate(() => {
+  const c = scenes[0].stagePane.canvas;
+  return { size: [c.width, c.height], at: [[5, 7], [19, 30], [31, 12], [36, 38]].map((p) => [p, [...c.getContext("2d").getImageData(...p, 1, 1).data]]) };
+});
+const far = reduced.at.filter(([[x, y], rgb]) => [0, 1, 2].some((k) => Math.abs(rgb[k] - srgb(covered(x, y, k) / white)) > 1));
+check("a picture larger than its frame is averaged", reduced.size.join() === SMALL + "," + SMALL && far.length === 0, JSON.stringify(reduced));
+await page.evaluate(`scenes[0].stagePane.frame.style.cssText = "aspect-ratio: 1"; scenes[0].show(0, null)`);
+
 // Tiles: sorted by p, one press marks and reads.
 const article = page.locator("article.claim").first(), tiles = claims[0].tile_log10_p;
 const first = tiles.indexOf(Math.min(...tiles.filter((p) => p !== null))), columns = claims[0].tiles_x, side = claims[0].tile;
@@ -226,8 +252,40 @@ check("a figure's numbers are saved as CSV", download.suggestedFilename() === "t
 const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
   !(f.querySelector("figcaption a.csv") && f.querySelector("figcaption b") && f.querySelectorAll("svg text").length > 3)).length`);
 check("every plot has a caption, labels and its numbers", bare === 0, bare + " have not");
-await article.locator("summary").click();
+await article.getByText("Everything needed to doubt it").click();
 check("the facts unfold", await article.locator("dl.facts").isVisible());
+
+// The table: found, sorted by each kind of column, and its links unfold what is folded.
+const rowsShown = () => page.locator("#claims tbody tr:visible").count(), total = await rowsShown();
+const find = page.getByRole("searchbox", { name: "Find" });
+await find.fill("pathtracer CYCLES");
+const found = await page.locator("#claims tbody tr:visible td:nth-child(4)").allTextContents();
+check("rows are found by their words", found.length > 0 && found.length < total && found.every((t) => t === "cycles"), found.join());
+await find.fill("");
+check("all rows are back", await rowsShown() === total);
+await page.evaluate("scenes[0].show(1, null)");
+await find.press("2");
+check("what is typed there shows no picture", await page.evaluate("scenes[0].shown") === 1);
+await find.fill("");
+await page.evaluate("scenes[0].show(0, null)");
+const column = async (name, n, read, order) => {
+  const values = () => page.locator("#claims tbody tr td:nth-child(" + n + ")").allTextContents();
+  const before = await values(), sorted = [...before].sort((a, b) => order(read(a), read(b))), got = [];
+  for (let i = 0; i < 3; i++) {
+    await page.locator("#claims").getByRole("button", { name, exact: true }).click();
+    got.push((await values()).map(read).join());
+  }
+  check("rows are sorted by " + name, got[0] === sorted.map(read).join() && got[1] === sorted.reverse().map(read).join() &&
+    got[2] === before.map(read).join(), got.join(" | "));
+};
+await column("Difference %", 7, number, (a, b) => a - b);
+await column("Against", 4, String, (a, b) => (a < b ? -1 : a > b ? 1 : 0));
+await page.getByRole("button", { name: "Fold all", exact: true }).click();
+check("evidence is folded", !await article.locator(".maps").isVisible());
+await page.locator("#claims a[href='#" + await article.getAttribute("id") + "']").click();
+check("a row's link unfolds its evidence", await article.locator(".maps").isVisible());
+await page.getByRole("button", { name: "Unfold all evidence" }).click();
+check("all evidence is unfolded", await page.locator(".evidence:not([open])").count() === 0);
 
 // Widths, colours, paper.
 for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
@@ -248,6 +306,16 @@ for (const [width, height] of [[1280, 900], [820, 1100], [390, 844]]) {
     await other.context().close();
   }
 }
+// So far out of sight that chromium does not lay the scene out.
+writeFileSync(shots + "/far.html", readFileSync(pagePath, "utf8").replace('<section class="scene"', '<div style="height: 20000px"></div>$&'));
+const paper = await open(shots + "/far.html", 1280, 300);
+const blank = () => paper.evaluate(() => [...document.querySelectorAll(".side canvas, .maps .frame canvas")].filter((c) =>
+  c.getContext("2d").getImageData(c.width >> 1, c.height >> 1, 1, 1).data[3] !== 255).length);
+const unseen = await blank();
+await paper.evaluate(`window.dispatchEvent(new Event("beforeprint"))`);
+const printed = await blank();
+check("pictures out of sight are drawn for paper, and only then", unseen > 0 && printed === 0, unseen + " and " + printed + " are blank");
+await paper.context().close();
 const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true });
 check("it prints", pdf.length > 20000, pdf.length + " bytes");
 const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>

@@ -31,6 +31,7 @@ await page.evaluate(() => scenes[0].box.scrollIntoView());
 
 // Frames: the time from one to the next while something changes in each; draws: the script's own part of it.
 async function frames(name, step) {
+  const begun = await cpu();
   const [gaps, draws] = await page.evaluate(async (body) => {
     const act = new Function("i", body), gaps = [], draws = [];
     const frame = () => new Promise(requestAnimationFrame);
@@ -48,7 +49,8 @@ async function frames(name, step) {
     return [gaps, draws].map((v) => v.sort((a, b) => a - b));
   }, step);
   const at = (v, share) => v[Math.floor(share * (v.length - 1))].toFixed(1);
-  console.log("%s: median frame %s ms, 9 of 10 below %s ms; drawing %s and %s ms", name, at(gaps, 0.5), at(gaps, 0.9), at(draws, 0.5), at(draws, 0.9));
+  console.log("%s: median frame %s ms, 9 of 10 below %s ms; drawing %s and %s ms; CPU of the page's process %s ms a frame", name,
+    at(gaps, 0.5), at(gaps, 0.9), at(draws, 0.5), at(draws, 0.9), ((await cpu() - begun) / 94).toFixed(1));
 }
 await frames("switch pictures", "scenes[0].show(1 + i % scenes[0].shots.length, null)");
 await frames("switch maps", "scenes[0].show(1, ['difference', 't', 'flip'][i % 3])");

@@ -1,0 +1,44 @@
+// What is read off: the marked pixel and the marked tile, in words and tables.
+
+// One row for each picture, then one for each pair.
+function readPixel(scene) {
+  if (!scene.ready) return;
+  const { x, y } = scene.pixel, i = y * scene.width + x;
+  const row = (head, cells, tag = "td") => make("tr", {}, make("th", { scope: tag === "th" ? "col" : "row" }, head),
+    ...cells.map((c) => make(tag, { className: "num" }, c)));
+  const pictures = scene.shots.map(({ name, layer }) => row(name, [
+    ...[0, 1, 2].map((k) => withError(layer.value[k][i], layer.error[k][i])),
+    layer.unit === "exact" ? "exact" : digits(countAt(layer, i), 7)]));
+  const pairs = scene.claims.map((c) => {
+    const p = greyOf(c.a.layer), q = greyOf(c.b.layer), unit = Math.max(q.value[i], 0.05 * q.mean);
+    const d = p.value[i] - q.value[i], e = Math.hypot(p.error[i], q.error[i]);
+    return row(c.name, [withError(100 * d / unit, 100 * e / unit) + " %", digits(studentT(d, e))]);
+  });
+  const table = (...rows) => make("table", {}, make("thead", {}, rows[0]), make("tbody", {}, ...rows[1]));
+  scene.probe.replaceChildren(
+    table(row("Pixel " + x + ", " + y, ["red", "green", "blue", "n"], "th"), pictures),
+    ...(pairs.length ? [table(row("Luminance", ["difference", "t"], "th"), pairs)] : []));
+}
+
+// Says what is known of a tile below the claim's list of tiles.
+function readTile(scene, tile, claim) {
+  if (!claim.tileReading) return;
+  const columns = Math.ceil(scene.width / tile.side), i = tile.y / tile.side * columns + tile.x / tile.side;
+  const p = claim.p[i], t = claim.t[i];
+  claim.tileReading.textContent = "Tile at x " + tile.x + ", y " + tile.y + ": " + tileDifference(scene, tile, claim) +
+    (p === null || p === undefined ? "; it has no noise." : ", t " + digits(t) + ", p " + digits(10 ** p) + ".");
+}
+
+function tileDifference(scene, tile, claim) {
+  if (!scene.ready) return "";
+  const a = greyOf(claim.a.layer), b = greyOf(claim.b.layer);
+  const right = Math.min(tile.x + tile.side, scene.width), bottom = Math.min(tile.y + tile.side, scene.height);
+  let sa = 0, sb = 0;
+  for (let y = tile.y; y < bottom; y++)
+    for (let x = tile.x; x < right; x++) {
+      sa += a.value[y * scene.width + x];
+      sb += b.value[y * scene.width + x];
+    }
+  const pixels = (right - tile.x) * (bottom - tile.y), d = (sa - sb) / pixels / Math.max(sb / pixels, 0.05 * b.mean);
+  return "difference " + (d > 0 ? "+" : "") + percent(d);
+}
