@@ -19,6 +19,7 @@ DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch ope
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_LIVE := blender povray python3-numpy
+DEPS_SLURM := slurm-wlm munge
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
@@ -80,6 +81,18 @@ tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/te
 # failed in turn (an hour; ONLY="kill_golden ...": parts of it).
 faults: $(BUILD)/pathtracer $(BUILD)/assay
 	tests/faults.sh $(BUILD) 200 1 $(ONLY)
+
+# A render, a grading batch and a validation on a Slurm cluster of four nodes on this machine, one killed in the middle. As root.
+slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
+	tests/slurm.sh $(BUILD)
+
+# A picture of 16384 x 16384 in 64 jobs, each program within 2 GiB (SIDE=16384; 30 GB of disk).
+large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
+	tests/large.sh $(BUILD) $(or $(SIDE),16384)
+
+# What a thousand nodes would do, simulated (tools/SCALE.md).
+scale: $(BUILD)/tests/make_scale
+	$(BUILD)/tests/make_scale
 
 # Lines of renderer/, reference/ and tools/ that the tests and the end-to-end runs reach.
 coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
@@ -169,6 +182,9 @@ help:
 	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes)'
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
+	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'
+	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
+	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
 	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (half an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
@@ -287,6 +303,8 @@ $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c te
 $(BUILD)/tests/make_catalogue $(BUILD)/tests/make_rubric_bugs $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
+$(BUILD)/tests/make_scale: $(call obj,$(BUILD),tests/make_scale.c) $(BUILD)/libassay.a
+	$(link)
 $(BUILD)/tests/make_sky: $(call obj,$(BUILD),tests/make_sky.c) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_anchors: $(call obj,$(BUILD),tests/make_anchors.c tests/anchors.c tests/anchors_page.c \
@@ -392,7 +410,10 @@ $(BUILD)/deps-lint: | $(BUILD)/deps-test
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
-.PHONY: all validate check lint threads tsan faults coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
+$(BUILD)/deps-slurm: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_SLURM))
+
+.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -338,6 +338,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     if (usage != NULL)
         *usage = (struct process_usage){
             .wall_s = wall,
+            .exit_status = late || WIFSIGNALED(status) ? -1 : WEXITSTATUS(status),
             .cpu_s = (double)(ru.ru_utime.tv_sec + ru.ru_stime.tv_sec) +
                      1e-6 * (double)(ru.ru_utime.tv_usec + ru.ru_stime.tv_usec)};
 

@@ -18,6 +18,7 @@ struct process {
 
 struct process_usage {
     double wall_s, cpu_s; /* of the child and of those of its descendants that were waited for */
+    int exit_status;      /* -1: it did not end by itself */
 };
 
 /* Runs to the end. True if it exited with status 0. Otherwise the line says: not found / killed by

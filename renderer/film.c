@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 const char *const layer_names[NUM_LAYERS] = {"variance.R", "variance.G", "variance.B", "stderr.R",
                                              "stderr.G",   "stderr.B",   "depth.Z",    "depth.hits",
@@ -38,6 +39,11 @@ void film_free(struct film *f)
     free(f->first);
     free(f->target);
     *f = (struct film){0};
+}
+
+void film_set_sampler(struct film *f, enum sampler_kind kind)
+{
+    strcpy(f->m.unit, kind == SAMPLER_INDEPENDENT ? "sample" : "stratified");
 }
 
 static void add_first_hit(struct first_hit_sums *s, bool is_first_sample,

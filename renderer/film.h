@@ -32,6 +32,8 @@ bool film_alloc(struct film *f, int width, int height, bool first_hits, struct e
     __attribute__((warn_unused_result));
 void film_free(struct film *f);
 
+/* The unit of its moments: samples of any but the independent sampler are stratified. */
+void film_set_sampler(struct film *f, enum sampler_kind kind);
 /* Adds lane i of a batch to a pixel. */
 void film_add(struct film *f, size_t pixel, const struct batch *b, int i);
 

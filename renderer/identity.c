@@ -36,9 +36,13 @@ bool identity_make(const struct options *o, struct identity *id, struct err *e)
     else
         snprintf(id->adaptive, sizeof id->adaptive, "off");
     snprintf(id->seed, sizeof id->seed, "%llu", (unsigned long long)o->seed);
-    snprintf(id->cell, sizeof id->cell, "%d %d %d %d of %d %d", o->cell[0], o->cell[1], o->cell[2],
-             o->cell[3], o->width, o->height);
+    identity_cell(o->cell, o->width, o->height, id->cell);
     return true;
+}
+
+void identity_cell(const int cell[4], int width, int height, char text[64])
+{
+    snprintf(text, 64, "%d %d %d %d of %d %d", cell[0], cell[1], cell[2], cell[3], width, height);
 }
 
 bool identity_parse_cell(const char *text, int c[6])

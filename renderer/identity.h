@@ -18,6 +18,8 @@ struct identity {
 bool identity_make(const struct options *o, struct identity *id, struct err *e)
     __attribute__((warn_unused_result));
 
+/* X Y DX DY and the W and H of the whole -> "X Y DX DY of W H". */
+void identity_cell(const int cell[4], int width, int height, char text[64]);
 /* "X Y DX DY of W H" -> six numbers; false on anything else or a cell that is not inside. */
 bool identity_parse_cell(const char *text, int cell[6]) __attribute__((warn_unused_result));
 

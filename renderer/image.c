@@ -3,24 +3,33 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool image_alloc(struct image *im, int width, int height, int channels, const char *const *names,
-                 struct err *e)
+bool image_head(struct image *im, int width, int height, int channels, const char *const *names,
+                struct err *e)
 {
     *im = (struct image){0};
     if (width < 1 || height < 1 || channels < 1)
         return err_set(e, "cannot make an image of %d x %d x %d", width, height, channels);
+    im->names = calloc((size_t)channels, sizeof *im->names);
+    if (im->names == NULL)
+        return err_set(e, "out of memory for an image of %d x %d x %d", width, height, channels);
     im->width = width;
     im->height = height;
     im->channels = channels;
-    im->data = calloc((size_t)width * (size_t)height, (size_t)channels * sizeof *im->data);
-    im->names = calloc((size_t)channels, sizeof *im->names);
-    if (im->data == NULL || im->names == NULL) {
-        image_free(im);
-        return err_set(e, "out of memory for an image of %d x %d x %d", width, height, channels);
-    }
     for (int c = 0; c < channels; c++)
         strncpy(im->names[c], names[c], sizeof im->names[c] - 1);
     return true;
+}
+
+bool image_alloc(struct image *im, int width, int height, int channels, const char *const *names,
+                 struct err *e)
+{
+    if (!image_head(im, width, height, channels, names, e))
+        return false;
+    im->data = calloc((size_t)width * (size_t)height, (size_t)channels * sizeof *im->data);
+    if (im->data != NULL)
+        return true;
+    image_free(im);
+    return err_set(e, "out of memory for an image of %d x %d x %d", width, height, channels);
 }
 
 void image_free(struct image *im)

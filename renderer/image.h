@@ -22,6 +22,9 @@ struct image {
     int num_attrs;
 };
 
+/* Shape and names alone, data NULL: what a file that is written by rows starts from. */
+bool image_head(struct image *im, int width, int height, int channels, const char *const *names,
+                struct err *e) __attribute__((warn_unused_result));
 /* A zeroed image of that shape; names are copied. Fails on sizes below 1 or out of memory. */
 bool image_alloc(struct image *im, int width, int height, int channels, const char *const *names,
                  struct err *e) __attribute__((warn_unused_result));
@@ -55,6 +58,19 @@ bool image_read_hdr(const char *path, struct image *out, struct err *e)
  * appears whole, by rename, or not at all. */
 bool image_write_exr(const char *path, const struct image *im, struct err *e)
     __attribute__((warn_unused_result));
+
+/* The same for a picture that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
+ * the rest last, and the file appears when it is closed. */
+enum { IMAGE_BAND = 16 };
+struct image_writer;
+/* head: shape, names and attributes; has to stay as it is until the end. NULL with a line on failure. */
+struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
+    __attribute__((warn_unused_result));
+bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
+    __attribute__((warn_unused_result));
+/* Both free the writer. Without close there is no file; after a failure there is only abandon. */
+bool image_writer_close(struct image_writer *w, struct err *e) __attribute__((warn_unused_result));
+void image_writer_abandon(struct image_writer *w);
 
 /* Writes or encodes 8-bit RGB (3 bytes a pixel, row 0 at the top) as PNG. The encoded bytes belong
  * to the caller (free()). The file appears by rename. */

@@ -4,6 +4,7 @@
 #include "fs.h"
 #include "image.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -125,55 +126,112 @@ static exr_result_t write_header(exr_context_t f, const struct image *im)
     return r == EXR_ERR_SUCCESS ? exr_write_header(f) : r;
 }
 
-static exr_result_t write_rows(exr_context_t f, const struct image *im)
+struct image_writer {
+    const struct image *head;
+    struct out_file file;
+    struct stream s;
+    exr_context_t f;
+    struct exr_zip *zip;
+    int y; /* the next row */
+};
+
+/* What packs the rows: by the order of channels in the file. */
+static exr_result_t start_rows(struct image_writer *w)
 {
     const exr_attr_chlist_t *list;
     int32_t rows;
-    exr_result_t r = exr_get_scanlines_per_chunk(f, 0, &rows);
+    exr_result_t r = exr_get_scanlines_per_chunk(w->f, 0, &rows);
     if (r == EXR_ERR_SUCCESS)
-        r = exr_get_channels(f, 0, &list);
-    int *from = malloc((size_t)im->channels * sizeof *from);
-    struct exr_zip *z = NULL;
+        r = exr_get_channels(w->f, 0, &list);
+    int *from = malloc((size_t)w->head->channels * sizeof *from);
     if (r == EXR_ERR_SUCCESS && from != NULL) {
-        for (int k = 0; k < im->channels; k++)
-            from[k] = image_channel(im, list->entries[k].name.str);
-        z = exr_zip_new(im->width, im->channels, from, rows);
+        assert(rows == IMAGE_BAND);
+        for (int k = 0; k < w->head->channels; k++)
+            from[k] = image_channel(w->head, list->entries[k].name.str);
+        w->zip = exr_zip_new(w->head->width, w->head->channels, from, rows);
     }
     free(from);
-    if (r == EXR_ERR_SUCCESS && z == NULL)
-        r = EXR_ERR_OUT_OF_MEMORY;
-    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
-        size_t size;
-        const void *bytes =
-            exr_zip_rows(z, im->data + (size_t)y * (size_t)im->width * (size_t)im->channels,
-                         rows < im->height - y ? rows : im->height - y, &size);
-        r = exr_write_scanline_chunk(f, 0, y, bytes, size);
+    return r == EXR_ERR_SUCCESS && w->zip == NULL ? EXR_ERR_OUT_OF_MEMORY : r;
+}
+
+struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
+{
+    struct image_writer *w = calloc(1, sizeof *w);
+    if (w == NULL) {
+        err_set(e, "%s: out of memory", path);
+        return NULL;
     }
-    exr_zip_free(z);
-    return r;
+    if (!out_open(&w->file, path, e)) {
+        free(w);
+        return NULL;
+    }
+    w->head = head;
+    w->s.fd = fileno(w->file.f);
+    exr_context_initializer_t init = initializer(&w->s);
+    init.error_handler_fn = drop_complaint;
+    exr_result_t r = exr_start_write(&w->f, path, EXR_WRITE_FILE_DIRECTLY, &init);
+    if (r == EXR_ERR_SUCCESS)
+        r = write_header(w->f, head);
+    if (r == EXR_ERR_SUCCESS)
+        r = start_rows(w);
+    if (r == EXR_ERR_SUCCESS)
+        return w;
+    failed(path, "write", &w->s, r, e);
+    image_writer_abandon(w);
+    return NULL;
+}
+
+bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
+{
+    size_t size;
+    assert(w->y + num <= w->head->height);
+    assert(num == IMAGE_BAND || w->y + num == w->head->height);
+    const void *bytes = exr_zip_rows(w->zip, rows, num, &size);
+    exr_result_t r = exr_write_scanline_chunk(w->f, 0, w->y, bytes, size);
+    w->y += num;
+    return r == EXR_ERR_SUCCESS || failed(w->file.path, "write", &w->s, r, e);
+}
+
+bool image_writer_close(struct image_writer *w, struct err *e)
+{
+    assert(w->y == w->head->height);
+    exr_result_t r = exr_finish(&w->f); /* writes the table of rows */
+    bool ok = r == EXR_ERR_SUCCESS;
+    if (ok) {
+        ok = out_commit(&w->file, e);
+    } else {
+        failed(w->file.path, "write", &w->s, r, e);
+        out_abandon(&w->file);
+    }
+    exr_zip_free(w->zip);
+    free(w);
+    return ok;
+}
+
+void image_writer_abandon(struct image_writer *w)
+{
+    if (w == NULL)
+        return;
+    exr_finish(&w->f);
+    out_abandon(&w->file);
+    exr_zip_free(w->zip);
+    free(w);
 }
 
 bool image_write_exr(const char *path, const struct image *im, struct err *e)
 {
-    struct out_file file;
-    if (!out_open(&file, path, e))
+    struct image_writer *w = image_writer_open(path, im, e);
+    if (w == NULL)
         return false;
-    struct stream s = {.fd = fileno(file.f)};
-    exr_context_initializer_t init = initializer(&s);
-    init.error_handler_fn = drop_complaint;
-    exr_context_t f = NULL;
-    exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
-    if (r == EXR_ERR_SUCCESS)
-        r = write_header(f, im);
-    if (r == EXR_ERR_SUCCESS)
-        r = write_rows(f, im);
-    exr_result_t end = exr_finish(&f); /* writes the table of rows */
-    if (r == EXR_ERR_SUCCESS)
-        r = end;
-    if (r == EXR_ERR_SUCCESS)
-        return out_commit(&file, e);
-    out_abandon(&file);
-    return failed(path, "write", &s, r, e);
+    for (int y = 0; y < im->height; y += IMAGE_BAND) {
+        int num = im->height - y < IMAGE_BAND ? im->height - y : IMAGE_BAND;
+        const float *rows = im->data + (size_t)y * (size_t)im->width * (size_t)im->channels;
+        if (!image_writer_rows(w, rows, num, e)) {
+            image_writer_abandon(w);
+            return false;
+        }
+    }
+    return image_writer_close(w, e);
 }
 
 /* An image of the shape that the header says, and its texts. */
@@ -219,10 +277,12 @@ static bool read_header(exr_context_t f, const char *path, const struct stream *
                        (long long)width, (long long)height, channels, (long long)size);
     if (!image_alloc(im, (int)width, (int)height, channels, names, e))
         return err_prefix(e, "%s", path);
+    /* "type" says how the file is made, not what of, and a writer has its own. */
     for (int i = 0; i < num_attrs; i++) {
         const exr_attribute_t *a;
         if (exr_get_attribute_by_index(f, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a) == EXR_ERR_SUCCESS &&
-            a->type == EXR_ATTR_STRING && !image_set_attr(im, a->name, a->string->str, e))
+            a->type == EXR_ATTR_STRING && strcmp(a->name, "type") != 0 &&
+            !image_set_attr(im, a->name, a->string->str, e))
             return err_prefix(e, "%s", path);
     }
     return true;

@@ -6,8 +6,10 @@
 #include "starter.h"
 #include "state.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -213,6 +215,31 @@ done:
     return ok;
 }
 
+/* assay plans, submits and gathers; it calls us again for each part. Returns only if it cannot be run. */
+static bool hand_over(int argc, char **argv, struct err *e)
+{
+    char path[4096];
+    ssize_t n = readlink("/proc/self/exe", path, sizeof path - sizeof "assay");
+    char *slash = NULL;
+    if (n > 0) {
+        path[n] = '\0';
+        slash = strrchr(path, '/');
+    }
+    char **words = calloc((size_t)argc + 3, sizeof *words);
+    if (slash == NULL || words == NULL) {
+        free(words);
+        return err_set(e, "--slurm: cannot find the assay beside this program");
+    }
+    strcpy(slash + 1, "assay");
+    words[0] = path;
+    words[1] = (char[]){"slurm"};
+    words[2] = (char[]){"pathtracer"};
+    memcpy(words + 3, argv + 1, (size_t)(argc - 1) * sizeof *words);
+    execv(path, words);
+    free(words);
+    return err_set(e, "--slurm: cannot run %s: %s", path, strerror(errno));
+}
+
 int main(int argc, char **argv)
 {
     struct options o;
@@ -221,6 +248,8 @@ int main(int argc, char **argv)
     bool ok = options_parse(argc, argv, &o, &e);
     if (ok && o.action != ACTION_RENDER)
         options_print(&o);
+    else if (ok && o.slurm > 0)
+        ok = hand_over(argc, argv, &e);
     else
         ok = ok && run(&s, &e);
     if (ok && fflush(stdout) != 0)

@@ -96,40 +96,115 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 static const char *const channel_names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                               "M2.B", "M3.R", "M3.G", "M3.B", "n"};
 
-bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
-                          const struct image_attr *attrs, int num_attrs, struct err *e)
+struct moments_writer {
+    struct image head;
+    struct image_writer *file;
+    float *band; /* IMAGE_BAND rows */
+};
+
+static bool writer_head(struct moments_writer *w, const struct moments *m, int height,
+                        const struct image *layers, const struct image_attr *attrs, int num_attrs,
+                        struct err *e)
 {
-    enum { MAX_LAYERS = 64 };
-    const char *names[10 + MAX_LAYERS];
-    size_t more = layers != NULL ? (size_t)layers->channels : 0, channels = 10 + more;
-    assert(more <= MAX_LAYERS);
+    const char *names[IMAGE_MAX_CHANNELS];
+    char spp[32];
+    int more = layers != NULL ? layers->channels : 0;
+    assert(10 + more <= IMAGE_MAX_CHANNELS);
     memcpy(names, channel_names, sizeof channel_names);
-    for (size_t c = 0; c < more; c++)
+    for (int c = 0; c < more; c++)
         names[10 + c] = layers->names[c];
-    struct image im;
-    if (!image_alloc(&im, m->width, m->height, (int)channels, names, e))
-        return false;
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    for (size_t p = 0; p < pixels; p++) {
-        float *px = im.data + channels * p;
+    snprintf(spp, sizeof spp, "%.17g", m->spp);
+    bool ok = image_head(&w->head, m->width, height, 10 + more, names, e) &&
+              image_set_attr(&w->head, "assay:unit", m->unit, e) &&
+              image_set_attr(&w->head, "assay:spp", spp, e);
+    for (int i = 0; ok && i < num_attrs; i++)
+        ok = image_set_attr(&w->head, attrs[i].name, attrs[i].value, e);
+    return ok;
+}
+
+struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
+                                           int height, const struct image *layers,
+                                           const struct image_attr *attrs, int num_attrs,
+                                           struct err *e)
+{
+    struct moments_writer *w = calloc(1, sizeof *w);
+    if (w == NULL) {
+        err_set(e, "%s: out of memory", path);
+        return NULL;
+    }
+    if (writer_head(w, first, height, layers, attrs, num_attrs, e)) {
+        w->band =
+            malloc(IMAGE_BAND * (size_t)first->width * (size_t)w->head.channels * sizeof *w->band);
+        if (w->band == NULL)
+            err_set(e, "%s: out of memory", path);
+        else if ((w->file = image_writer_open(path, &w->head, e)) != NULL)
+            return w;
+    }
+    moments_writer_abandon(w);
+    return NULL;
+}
+
+/* Pixels first .. end-1 as floats of all channels. */
+static void interleave(const struct moments *m, const struct image *layers, size_t first,
+                       size_t end, size_t channels, float *out)
+{
+    size_t more = channels - 10;
+    for (size_t p = first; p < end; p++) {
+        float *px = out + channels * (p - first);
         for (size_t c = 0; c < 3; c++) {
             px[c] = (float)m->mean[3 * p + c];
             px[3 + c] = (float)m->m2[3 * p + c];
             px[6 + c] = (float)m->m3[3 * p + c];
         }
         px[9] = (float)m->n[p];
-        for (size_t c = 0; c < more; c++)
+        for (size_t c = 0; layers != NULL && c < more; c++)
             px[10 + c] = layers->data[more * p + c];
     }
-    char spp[32];
-    snprintf(spp, sizeof spp, "%.17g", m->spp);
-    bool ok =
-        image_set_attr(&im, "assay:unit", m->unit, e) && image_set_attr(&im, "assay:spp", spp, e);
-    for (int i = 0; ok && i < num_attrs; i++)
-        ok = image_set_attr(&im, attrs[i].name, attrs[i].value, e);
-    ok = ok && image_write_exr(path, &im, e);
-    image_free(&im);
+}
+
+bool moments_writer_rows(struct moments_writer *w, const struct moments *m,
+                         const struct image *layers, struct err *e)
+{
+    assert(m->width == w->head.width);
+    for (int y = 0; y < m->height; y += IMAGE_BAND) {
+        int rows = m->height - y < IMAGE_BAND ? m->height - y : IMAGE_BAND;
+        size_t first = (size_t)y * (size_t)m->width;
+        interleave(m, layers, first, first + (size_t)rows * (size_t)m->width,
+                   (size_t)w->head.channels, w->band);
+        if (!image_writer_rows(w->file, w->band, rows, e))
+            return false;
+    }
+    return true;
+}
+
+bool moments_writer_close(struct moments_writer *w, struct err *e)
+{
+    bool ok = image_writer_close(w->file, e);
+    w->file = NULL;
+    moments_writer_abandon(w);
     return ok;
+}
+
+void moments_writer_abandon(struct moments_writer *w)
+{
+    if (w == NULL)
+        return;
+    image_writer_abandon(w->file);
+    image_free(&w->head);
+    free(w->band);
+    free(w);
+}
+
+bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
+                          const struct image_attr *attrs, int num_attrs, struct err *e)
+{
+    struct moments_writer *w = moments_writer_open(path, m, m->height, layers, attrs, num_attrs, e);
+    if (w == NULL)
+        return false;
+    if (moments_writer_rows(w, m, layers, e))
+        return moments_writer_close(w, e);
+    moments_writer_abandon(w);
+    return false;
 }
 
 bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,

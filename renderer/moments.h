@@ -51,6 +51,21 @@ bool moments_write(const char *path, const struct moments *m, const struct image
 bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
                           const struct image_attr *attrs, int num_attrs, struct err *e)
     __attribute__((warn_unused_result));
+/* The same for a picture that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
+ * multiple of that at a time and the rest last. */
+struct moments_writer;
+/* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */
+struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
+                                           int height, const struct image *layers,
+                                           const struct image_attr *attrs, int num_attrs,
+                                           struct err *e) __attribute__((warn_unused_result));
+bool moments_writer_rows(struct moments_writer *w, const struct moments *m,
+                         const struct image *layers, struct err *e)
+    __attribute__((warn_unused_result));
+/* Both free the writer; the file appears with close. */
+bool moments_writer_close(struct moments_writer *w, struct err *e)
+    __attribute__((warn_unused_result));
+void moments_writer_abandon(struct moments_writer *w);
 /* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
  * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
  * n, n not a whole number, or no pixel. */

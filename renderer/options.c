@@ -35,6 +35,7 @@ enum option {
     OPT_ENVIRONMENT,
     OPT_LENS,
     OPT_FOCUS,
+    OPT_SLURM,
     OPT_OUT,
     OPT_AOV,
     OPT_HEATMAP,
@@ -96,6 +97,9 @@ static const struct cli_option options[] = {
                          "environment map in latitude and longitude, .exr or .hdr"},
     [OPT_LENS] = {'b', "lens-radius", 1, "R", "thin lens, scene units; 0: pinhole (0)"},
     [OPT_FOCUS] = {'d', "focal-distance", 1, "D", "distance in focus, scene units (4.7)"},
+    [OPT_SLURM] = {0, "slurm", 1, "N",
+                   "in N jobs on a Slurm cluster, by the assay beside this program;\n"
+                   "the same bits (off)"},
     [OPT_OUT] = {'f', "out", 1, "FILE",
                  "picture; may be given again. .exr: float32 with moments,\n"
                  ".png: 8 bits by the dialect's tone curve"},
@@ -257,6 +261,7 @@ static bool parse_option(struct options *s, enum option o, const struct cli *c, 
     case OPT_ENVIRONMENT: s->environment_file = v; return true;
     case OPT_LENS: return cli_double("--lens-radius", v, 0, 1e6, &s->lens_radius, e);
     case OPT_FOCUS: return cli_double("--focal-distance", v, 1e-6, 1e9, &s->focal_distance, e);
+    case OPT_SLURM: return cli_int("--slurm", v, 1, 1000000, &s->slurm, e);
     case OPT_OUT: return add_output(s, v, e);
     case OPT_AOV: s->aov = true; return true;
     case OPT_HEATMAP:

@@ -8,20 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool write_png(const char *path, const struct moments *m, enum tone_curve curve,
-                      struct err *e)
-{
-    size_t n = 3 * (size_t)m->width * (size_t)m->height;
-    uint8_t *bytes = malloc(n);
-    if (bytes == NULL)
-        return err_set(e, "%s: out of memory", path);
-    for (size_t i = 0; i < n; i++)
-        bytes[i] = tone_map(curve, m->mean[i]);
-    bool ok = image_write_png(path, m->width, m->height, bytes, e);
-    free(bytes);
-    return ok;
-}
-
 void rate_colour(double rate, uint8_t rgb8[3])
 {
     double green = rate <= 0.5 ? 2 * rate : 2 - 2 * rate;
@@ -30,74 +16,168 @@ void rate_colour(double rate, uint8_t rgb8[3])
     rgb8[2] = (uint8_t)(rate <= 0.5 ? 255 * (1 - 2 * rate) : 0);
 }
 
-static bool write_rates(const char *png, const struct film *f, int most, struct err *e)
-{
-    char path[4096];
-    size_t pixels = (size_t)f->m.width * (size_t)f->m.height;
-    if (strlen(png) + sizeof "_rate" > sizeof path)
-        return err_set(e, "%.64s...: path too long", png);
-    snprintf(path, sizeof path, "%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
-    uint8_t *bytes = malloc(3 * pixels);
-    if (bytes == NULL)
-        return err_set(e, "%s: out of memory", path);
-    for (size_t p = 0; p < pixels; p++)
-        rate_colour(f->m.n[p] / most, bytes + 3 * p);
-    bool ok = image_write_png(path, f->m.width, f->m.height, bytes, e);
-    free(bytes);
-    return ok;
-}
+enum { NUM_TEXTS = 12 };
 
-static bool write_exr(const struct output *o, const char *path, const struct film *f,
-                      const struct render_stats *stats, struct err *e)
+/* The metadata of an EXR. command is its own, to free(). */
+struct texts {
+    char *command, samples[64], seconds[64], rays[128];
+    struct image_attr attr[NUM_TEXTS];
+    int num;
+};
+
+static bool make_texts(const struct output *o, uint32_t num_samples,
+                       const struct render_stats *stats, struct texts *t)
 {
-    char samples[64], seconds[64] = "", rays[128] = "";
-    char *command = shell_join(NULL, (const char *const *)o->argv);
-    if (command == NULL)
-        return err_set(e, "%s: out of memory", path);
-    snprintf(samples, sizeof samples, "%d:%lld", o->opt->first,
-             (long long)o->opt->first + f->num_samples);
+    t->command = shell_join(NULL, (const char *const *)o->argv);
+    if (t->command == NULL)
+        return false;
+    snprintf(t->samples, sizeof t->samples, "%d:%lld", o->opt->first,
+             (long long)o->opt->first + num_samples);
     if (stats != NULL) {
-        snprintf(seconds, sizeof seconds, "%.3f wall, %.3f cpu", stats->wall_seconds,
+        snprintf(t->seconds, sizeof t->seconds, "%.3f wall, %.3f cpu", stats->wall_seconds,
                  stats->cpu_seconds);
-        snprintf(rays, sizeof rays, "%llu rays, %llu box tests, %llu primitive tests",
+        snprintf(t->rays, sizeof t->rays, "%llu rays, %llu box tests, %llu primitive tests",
                  (unsigned long long)stats->rays.rays, (unsigned long long)stats->rays.box_tests,
                  (unsigned long long)stats->rays.primitive_tests);
     }
-    const struct image_attr attrs[] = {{"assay:version", assay_version},
-                                       {"assay:command", command},
-                                       {"assay:scene", o->id->scene},
-                                       {"assay:settings", o->id->settings},
-                                       {"assay:adaptive", o->id->adaptive},
-                                       {"assay:seed", o->id->seed},
-                                       {"assay:cell", o->id->cell},
-                                       {"assay:samples", samples},
-                                       {"assay:sampler", sampler_kind_names[o->opt->sampler]},
-                                       {"assay:accel", o->accel},
-                                       {"assay:seconds", seconds},
-                                       {"assay:rays", rays}};
-    int num_attrs = (int)(sizeof attrs / sizeof attrs[0]) - (stats == NULL ? 2 : 0);
+    const struct image_attr attrs[NUM_TEXTS] = {
+        {"assay:version", assay_version},
+        {"assay:command", t->command},
+        {"assay:scene", o->id->scene},
+        {"assay:settings", o->id->settings},
+        {"assay:adaptive", o->id->adaptive},
+        {"assay:seed", o->id->seed},
+        {"assay:cell", o->id->cell},
+        {"assay:samples", t->samples},
+        {"assay:sampler", sampler_kind_names[o->opt->sampler]},
+        {"assay:accel", o->accel},
+        {"assay:seconds", t->seconds},
+        {"assay:rays", t->rays}};
+    memcpy(t->attr, attrs, sizeof attrs);
+    t->num = NUM_TEXTS - (stats == NULL ? 2 : 0);
+    return true;
+}
+
+struct output_writer {
+    const struct output *o;
+    const struct render_stats *stats;
+    int width, height, y; /* y: the next row */
+    uint32_t num_samples;
+    struct moments_writer *exr[MAX_OUTPUTS]; /* NULL: a PNG, or not begun */
+    uint8_t *rgb8, *rates;                   /* NULL: no PNG, not adaptive */
+};
+
+struct output_writer *output_open(const struct output *o, int width, int height,
+                                  uint32_t num_samples, const struct render_stats *stats,
+                                  struct err *e)
+{
+    struct output_writer *w = calloc(1, sizeof *w);
+    bool adaptive = o->opt->adaptive_batch > 0 || o->opt->pilot_tolerance >= 0, png = false;
+    size_t bytes = 3 * (size_t)width * (size_t)height;
+    if (w == NULL) {
+        err_set(e, "out of memory");
+        return NULL;
+    }
+    *w = (struct output_writer){
+        .o = o, .stats = stats, .width = width, .height = height, .num_samples = num_samples};
+    for (int i = 0; i < o->opt->num_outputs; i++)
+        png = png || !is_exr(o->opt->output[i]);
+    w->rgb8 = png ? malloc(bytes) : NULL;
+    w->rates = png && adaptive ? malloc(bytes) : NULL;
+    if (!png || (w->rgb8 != NULL && (w->rates != NULL || !adaptive)))
+        return w;
+    err_set(e, "%s: out of memory", o->opt->output[0]);
+    output_abandon(w);
+    return NULL;
+}
+
+static bool exr_rows(struct output_writer *w, const struct film *band, struct err *e)
+{
+    const struct options *opt = w->o->opt;
     struct image layers = {0};
-    bool ok =
-        (f->first == NULL || film_layers(f, &layers, e)) &&
-        moments_write_layers(path, &f->m, f->first != NULL ? &layers : NULL, attrs, num_attrs, e);
+    bool ok = true;
+    for (int i = 0; ok && i < opt->num_outputs; i++) {
+        if (!is_exr(opt->output[i]))
+            continue;
+        if (band->first != NULL && layers.data == NULL)
+            ok = film_layers(band, &layers, e);
+        const struct image *more = band->first != NULL ? &layers : NULL;
+        if (ok && w->y == 0) {
+            struct texts t;
+            ok = make_texts(w->o, w->num_samples, w->stats, &t) ||
+                 err_set(e, "%s: out of memory", opt->output[i]);
+            if (!ok)
+                break;
+            w->exr[i] =
+                moments_writer_open(opt->output[i], &band->m, w->height, more, t.attr, t.num, e);
+            free(t.command);
+        }
+        ok = ok && w->exr[i] != NULL && moments_writer_rows(w->exr[i], &band->m, more, e);
+    }
     image_free(&layers);
-    free(command);
     return ok;
+}
+
+bool output_rows(struct output_writer *w, const struct film *band, struct err *e)
+{
+    enum tone_curve curve = w->o->scene->dialect == DIALECT_CGL ? TONE_CGL : TONE_SRGB;
+    size_t pixels = (size_t)band->m.width * (size_t)band->m.height,
+           at = 3 * (size_t)w->y * (size_t)w->width;
+    if (!exr_rows(w, band, e))
+        return false;
+    for (size_t i = 0; w->rgb8 != NULL && i < 3 * pixels; i++)
+        w->rgb8[at + i] = tone_map(curve, band->m.mean[i]);
+    for (size_t p = 0; w->rates != NULL && p < pixels; p++)
+        rate_colour(band->m.n[p] / (w->o->opt->last - w->o->opt->first), w->rates + at + 3 * p);
+    w->y += band->m.height;
+    return true;
+}
+
+static bool write_rates(const struct output_writer *w, const char *png, struct err *e)
+{
+    char path[4096];
+    if (strlen(png) + sizeof "_rate" > sizeof path)
+        return err_set(e, "%.64s...: path too long", png);
+    snprintf(path, sizeof path, "%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
+    return image_write_png(path, w->width, w->height, w->rates, e);
+}
+
+bool output_close(struct output_writer *w, struct err *e)
+{
+    const struct options *opt = w->o->opt;
+    bool ok = true;
+    for (int i = 0; ok && i < opt->num_outputs; i++) {
+        if (is_exr(opt->output[i])) {
+            ok = moments_writer_close(w->exr[i], e);
+            w->exr[i] = NULL;
+            continue;
+        }
+        ok = image_write_png(opt->output[i], w->width, w->height, w->rgb8, e) &&
+             (w->rates == NULL || write_rates(w, opt->output[i], e));
+    }
+    output_abandon(w);
+    return ok;
+}
+
+void output_abandon(struct output_writer *w)
+{
+    for (int i = 0; i < MAX_OUTPUTS; i++)
+        moments_writer_abandon(w->exr[i]);
+    free(w->rgb8);
+    free(w->rates);
+    free(w);
 }
 
 bool output_pictures(const struct output *o, const struct film *f, const struct render_stats *stats,
                      struct err *e)
 {
-    bool adaptive = o->opt->adaptive_batch > 0 || o->opt->pilot_tolerance >= 0;
-    for (int i = 0; i < o->opt->num_outputs; i++) {
-        const char *path = o->opt->output[i];
-        enum tone_curve curve = o->scene->dialect == DIALECT_CGL ? TONE_CGL : TONE_SRGB;
-        if (is_exr(path) ? !write_exr(o, path, f, stats, e) : !write_png(path, &f->m, curve, e))
-            return false;
-        if (adaptive && !is_exr(path) && !write_rates(path, f, o->opt->last - o->opt->first, e))
-            return false;
-    }
-    return true;
+    struct output_writer *w = output_open(o, f->m.width, f->m.height, f->num_samples, stats, e);
+    if (w == NULL)
+        return false;
+    if (output_rows(w, f, e))
+        return output_close(w, e);
+    output_abandon(w);
+    return false;
 }
 
 bool output_state_path(const struct output *o, const char *picture, char path[STATE_PATH],

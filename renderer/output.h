@@ -18,6 +18,19 @@ struct output {
 bool output_pictures(const struct output *o, const struct film *f, const struct render_stats *stats,
                      struct err *e) __attribute__((warn_unused_result));
 
+/* The same for a film that is never in memory as a whole: its rows come from the top as films of whole rows, IMAGE_BAND
+ * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the pictures of the whole film. */
+struct output_writer;
+/* num_samples: film.num_samples of the whole. NULL with a line on failure. */
+struct output_writer *output_open(const struct output *o, int width, int height,
+                                  uint32_t num_samples, const struct render_stats *stats,
+                                  struct err *e) __attribute__((warn_unused_result));
+bool output_rows(struct output_writer *w, const struct film *band, struct err *e)
+    __attribute__((warn_unused_result));
+/* Both free the writer; the pictures appear with close. */
+bool output_close(struct output_writer *w, struct err *e) __attribute__((warn_unused_result));
+void output_abandon(struct output_writer *w);
+
 /* PICTURE.state beside the first picture, or beside `picture` if that is not NULL. */
 enum { STATE_PATH = 4096 };
 bool output_state_path(const struct output *o, const char *picture, char path[STATE_PATH],

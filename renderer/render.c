@@ -315,8 +315,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     struct integrator it = {
         .opt = opt->integrator, .scene = s, .camera = c, .bvh = bvh, .lights = lights};
     it.opt.first_hits = film->first != NULL;
-    if (opt->integrator.sampler.kind != SAMPLER_INDEPENDENT)
-        strcpy(film->m.unit, "stratified");
+    film_set_sampler(film, opt->integrator.sampler.kind);
     if (!integrator_prepare(&it, e)) {
         integrator_free(&it);
         light_table_free(lights);

@@ -7,6 +7,8 @@
 #include "film.h"
 #include "identity.h"
 
+#include <stdio.h>
+
 /* Appears by rename. */
 bool state_write(const char *path, const struct identity *id, const struct film *f, struct err *e)
     __attribute__((warn_unused_result));
@@ -15,5 +17,23 @@ bool state_write(const char *path, const struct identity *id, const struct film 
  * another render, naming the first thing that differs. */
 bool state_read(const char *path, const struct identity *id, struct film *f, struct err *e)
     __attribute__((warn_unused_result));
+
+/* A state read by rows, for putting together a picture that is larger than memory. */
+struct state_file {
+    FILE *f;
+    char path[4096];
+    int width, height;
+    bool first_hits, has_target;
+    uint32_t num_samples; /* film.num_samples */
+    long body;            /* where it begins */
+};
+/* Reads all of it once, to see that it is whole and of that render. */
+bool state_open(struct state_file *s, const char *path, const struct identity *id, int width,
+                int height, bool first_hits, struct err *e) __attribute__((warn_unused_result));
+/* Rows y .. y+num-1 into a film that is at least as wide, from its pixel (at_x, at_y) on; the target too if the
+ * film has one. Not film.num_samples. */
+bool state_rows(const struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
+                struct err *e) __attribute__((warn_unused_result));
+void state_close(struct state_file *s);
 
 #endif

@@ -665,6 +665,11 @@ tests/verbs.sh "$build" >"$tmp/verbs"
 cat "$tmp/verbs"
 failures=$((failures + $(grep -c '^not ok' "$tmp/verbs")))
 
+# The same work in jobs.
+tests/scale.sh "$build" >"$tmp/scale"
+cat "$tmp/scale"
+failures=$((failures + $(grep -c '^not ok' "$tmp/scale")))
+
 # Kills, full disks and missing memory.
 tests/faults.sh "$build" 2 499 >"$tmp/faults"
 cat "$tmp/faults"

@@ -50,7 +50,7 @@ render "$tmp/a.exr" --samples 0:4 $scene
 render "$tmp/b.exr" --samples 4:9 $scene
 render "$tmp/c.exr" --samples 9:11 $scene
 "$assay" merge "$tmp/ab.exr" "$tmp/a.exr" "$tmp/b.exr" >/dev/null && "$assay" merge "$tmp/abc.exr" "$tmp/c.exr" "$tmp/ab.exr" >/dev/null
-expect "a merge of a merge" 0 "the same bits in all" "$tmp/abc.exr"
+expect "a merge of a merge" 0 "the same bits in all" --keep "$tmp/kept.exr" "$tmp/abc.exr"
 
 # What is not the same.
 if command -v oiiotool >/dev/null; then

@@ -85,7 +85,7 @@ static void success_leaves_the_error_untouched(void **state)
 {
     (void)state;
     struct err e = {"untouched"};
-    struct process_usage u = {-1, -1};
+    struct process_usage u = {-1, -1, -1};
     assert_true(sh("echo hello", NULL, 60, &u, &e));
     assert_string_equal(e.msg, "untouched");
     assert_true(u.wall_s > 0 && u.wall_s < 60);

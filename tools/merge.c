@@ -1,79 +1,11 @@
 #include "merge.h"
 
-#include "../renderer/film.h"
-#include "../renderer/identity.h"
+#include "share_priv.h"
 
-#include <ctype.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* What shares have to agree on, by metadata, and what that is to a reader. */
-static const char *const common[][2] = {{"assay:version", "version of the program"},
-                                        {"assay:scene", "scene (SHA-256)"},
-                                        {"assay:settings", "settings"},
-                                        {"assay:adaptive", "adaptive mode"},
-                                        {"assay:seed", "seed"}};
-enum { NUM_COMMON = sizeof common / sizeof common[0] };
-
-/* "A:B,C:D" in order and apart. */
-static bool parse_ranges(struct share *s, const char *text, struct err *e)
-{
-    size_t most = 1;
-    for (const char *c = text; *c != '\0'; c++)
-        most += *c == ',';
-    s->range = calloc(most, sizeof *s->range);
-    if (s->range == NULL)
-        return err_set(e, "%s: out of memory", s->path);
-    const char *at = text;
-    for (long long after = 0; (size_t)s->num_ranges < most; at++) {
-        char *colon, *end;
-        long long a = strtoll(at, &colon, 10), b = -1;
-        bool ok = isdigit((unsigned char)*at) && *colon == ':' && isdigit((unsigned char)colon[1]);
-        if (ok)
-            b = strtoll(colon + 1, &end, 10);
-        if (!ok || a < after || b < a || b > UINT32_MAX || (*end != ',' && *end != '\0'))
-            return err_set(e, "%s: assay:samples '%.64s' are not sample ranges", s->path, text);
-        s->range[s->num_ranges][0] = (uint32_t)a;
-        s->range[s->num_ranges++][1] = (uint32_t)b;
-        after = b;
-        at = end;
-        if (*end == '\0')
-            break;
-    }
-    return true;
-}
-
-bool share_read(const char *path, struct share *s, struct err *e)
-{
-    *s = (struct share){.path = path};
-    if (!moments_read(path, &s->m, &s->im, e))
-        return false;
-    const char *cell = image_get_attr(&s->im, "assay:cell");
-    const char *samples = image_get_attr(&s->im, "assay:samples");
-    bool ok = cell != NULL && samples != NULL && identity_parse_cell(cell, s->cell) &&
-              s->cell[2] == s->m.width && s->cell[3] == s->m.height;
-    for (int i = 0; i < NUM_COMMON; i++)
-        ok = ok && image_get_attr(&s->im, common[i][0]) != NULL;
-    if (!ok)
-        err_set(e,
-                "%s: does not say which part of which picture it is (attributes assay:cell, "
-                "assay:samples, assay:scene, ...)",
-                path);
-    ok = ok && parse_ranges(s, samples, e);
-    if (!ok)
-        share_free(s);
-    return ok;
-}
-
-void share_free(struct share *s)
-{
-    moments_free(&s->m);
-    image_free(&s->im);
-    free(s->range);
-    *s = (struct share){0};
-}
 
 static bool same_cell(const struct share *a, const struct share *b)
 {
@@ -92,11 +24,11 @@ static int by_cell_then_sample(const void *pa, const void *pb)
 static bool check_pair(const struct share *a, const struct share *b, struct err *e)
 {
     for (int i = 0; i < NUM_COMMON; i++) {
-        const char *va = image_get_attr(&a->im, common[i][0]);
-        const char *vb = image_get_attr(&b->im, common[i][0]);
+        const char *va = image_get_attr(&a->im, share_common[i][0]);
+        const char *vb = image_get_attr(&b->im, share_common[i][0]);
         if (strcmp(va, vb) != 0)
             return err_set(e, "%s and %s: different %s: '%.300s' and '%.300s'", a->path, b->path,
-                           common[i][1], va, vb);
+                           share_common[i][1], va, vb);
     }
     if (a->cell[4] != b->cell[4] || a->cell[5] != b->cell[5])
         return err_set(e, "%s and %s: of pictures of %d x %d and %d x %d pixels", a->path, b->path,
@@ -125,39 +57,24 @@ static bool check_pair(const struct share *a, const struct share *b, struct err 
     return true;
 }
 
-static int layer_at(const struct share *s, int layer)
-{
-    return image_channel(&s->im, layer_names[layer]);
-}
-
 static bool has_layers(const struct share *s)
 {
     for (int i = 0; i < NUM_LAYERS; i++)
-        if (layer_at(s, i) < 0)
+        if (image_channel(&s->im, layer_names[i]) < 0)
             return false;
     return true;
 }
 
-/* Adds pixel q of src, with ns samples, to the layers of a pixel of nd samples. Layers 0..5 follow from
- * the moments afterwards. */
-static void add_layers(float *dst, double nd, const struct share *src, size_t q, double ns)
+/* Adds the layers of a part of a pixel, with ns samples, to those of nd > 0. Layers 0..5 follow from the moments afterwards. */
+static void add_layers(float *dst, double nd, const float *src, double ns)
 {
     enum { DEPTH = 6, HITS = 7, NORMAL = 8, OBJECT = 14 };
-    float value[NUM_LAYERS];
-    for (int i = 0; i < NUM_LAYERS; i++)
-        value[i] = src->im.data[q * (size_t)src->im.channels + (size_t)layer_at(src, i)];
-    if (nd == 0) {
-        memcpy(dst, value, sizeof value);
-        return;
-    }
-    if (ns == 0)
-        return;
-    double hd = dst[HITS], hs = value[HITS];
+    double hd = dst[HITS], hs = src[HITS];
     if (hs > 0)
-        dst[DEPTH] = (float)((hd * dst[DEPTH] + hs * value[DEPTH]) / (hd + hs));
+        dst[DEPTH] = (float)((hd * dst[DEPTH] + hs * src[DEPTH]) / (hd + hs));
     dst[HITS] = (float)(hd + hs);
     for (int i = NORMAL; i < OBJECT; i++)
-        dst[i] = (float)((nd * dst[i] + ns * value[i]) / (nd + ns));
+        dst[i] = (float)((nd * dst[i] + ns * src[i]) / (nd + ns));
 }
 
 /* A view of one pixel as moments of its own. */
@@ -172,26 +89,136 @@ static struct moments pixel_of(const struct moments *m, size_t p)
     return one;
 }
 
-/* Adds a share to its place in the whole. */
-static bool add_share(struct share *whole, const struct share *s, bool layers, struct err *e)
+/* A part of one of the shares. */
+struct piece {
+    const struct share *share;
+    const struct share_part *part;
+    int kept; /* number of the whole's part that it goes to; -1: those are not kept */
+};
+
+static int by_samples(const void *pa, const void *pb)
 {
+    const struct share_part *a = ((const struct piece *)pa)->part,
+                            *b = ((const struct piece *)pb)->part;
+    if (a->first != b->first)
+        return a->first < b->first ? -1 : 1;
+    return (a->last > b->last) - (a->last < b->last);
+}
+
+static bool add_moments(struct share *whole, size_t p, const struct share *s, const float *v,
+                        struct err *e)
+{
+    double n = v[9], mean[3] = {v[0], v[1], v[2]}, m2[3] = {v[3], v[4], v[5]},
+           m3[3] = {v[6], v[7], v[8]};
+    struct moments to = pixel_of(&whole->m, p);
+    struct moments from = {
+        .width = 1, .height = 1, .n = &n, .mean = mean, .m2 = m2, .m3 = m3, .spp = s->m.spp};
+    strcpy(from.unit, s->m.unit);
+    return moments_merge(&to, &from, e) || err_prefix(e, "%s", s->path);
+}
+
+/* Adds a piece to its place in the whole. */
+static bool add_piece(struct share *whole, const struct piece *piece, bool layers, struct err *e)
+{
+    const struct share *s = piece->share;
     int x0 = s->cell[0] - whole->cell[0];
     int y0 = whole->cell[1] + whole->cell[3] - s->cell[1] - s->cell[3];
+    int values = layers ? PART_VALUES : 10;
     for (int y = 0; y < s->m.height; y++)
         for (int x = 0; x < s->m.width; x++) {
             size_t q = (size_t)y * (size_t)s->m.width + (size_t)x;
             size_t p = (size_t)(y + y0) * (size_t)whole->m.width + (size_t)(x + x0);
-            struct moments to = pixel_of(&whole->m, p), from = pixel_of(&s->m, q);
-            float *px = whole->im.data + NUM_LAYERS * p;
-            bool adds = to.n[0] > 0 && from.n[0] > 0;
-            if (layers)
-                add_layers(px, to.n[0], s, q, from.n[0]);
-            if (!moments_merge(&to, &from, e))
-                return err_prefix(e, "%s", s->path);
-            if (layers && adds)
+            const float *from = s->im.data + q * (size_t)s->im.channels;
+            float *px = whole->im.data + p * (size_t)whole->im.channels, v[PART_VALUES];
+            for (int i = 0; i < values; i++)
+                v[i] = from[piece->part->channel[i]];
+            double n = v[9], before = whole->m.n[p];
+            /* Nobody's pixel, in a part of other cells: even one without a sample has an infinite variance. */
+            if (n == 0 && (!layers || v[10] == 0))
+                continue;
+            if (layers && before == 0)
+                memcpy(px, v + 10, NUM_LAYERS * sizeof *px);
+            else if (layers && n > 0)
+                add_layers(px, before, v + 10, n);
+            if (n > 0 && !add_moments(whole, p, s, v, e))
+                return false;
+            if (layers && before > 0 && n > 0)
                 layers_of_moments(&whole->m, p, px);
+            if (piece->kept >= 0)
+                for (int i = 0; i < values; i++)
+                    px[whole->part[piece->kept].channel[i]] = v[i];
         }
     return true;
+}
+
+/* The pieces of all shares in the order of their samples, whichever files they come from. */
+static struct piece *list_pieces(const struct share *share, int num, int *num_pieces, struct err *e)
+{
+    int most = 0;
+    for (int i = 0; i < num; i++)
+        most += share[i].num_parts;
+    struct piece *piece = calloc((size_t)most + 1, sizeof *piece);
+    *num_pieces = 0;
+    if (piece == NULL) {
+        err_set(e, "out of memory");
+        return NULL;
+    }
+    for (int i = 0; i < num; i++)
+        for (int k = 0; k < share[i].num_parts; k++)
+            if (share[i].part[k].last > share[i].part[k].first)
+                piece[(*num_pieces)++] =
+                    (struct piece){.share = &share[i], .part = &share[i].part[k], .kept = -1};
+    qsort(piece, (size_t)*num_pieces, sizeof *piece, by_samples);
+    return piece;
+}
+
+/* The whole's own parts, where it has several, and channels for these and the layers. */
+static bool shape_whole(struct share *whole, struct piece *piece, int num, bool layers,
+                        struct err *e)
+{
+    int values = layers ? PART_VALUES : 10, channels = layers ? NUM_LAYERS : 0;
+    whole->part = calloc((size_t)num + 1, sizeof *whole->part);
+    if (whole->part == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < num; i++) {
+        if (i == 0 || by_samples(&piece[i - 1], &piece[i]) != 0) {
+            struct share_part *p = &whole->part[whole->num_parts++];
+            p->first = piece[i].part->first;
+            p->last = piece[i].part->last;
+        }
+        piece[i].kept = whole->num_parts - 1;
+    }
+    bool keeps = whole->num_parts > 1;
+    int most = (IMAGE_MAX_CHANNELS - 10 - channels) / values;
+    if (keeps && whole->num_parts > most)
+        return err_set(e, "%d different sample ranges: at most %d can be merged", whole->num_parts,
+                       most);
+    size_t all = (size_t)channels + (keeps ? (size_t)(whole->num_parts * values) : 0);
+    char(*text)[64] = calloc(all + 1, sizeof *text);
+    const char **name = calloc(all + 1, sizeof *name);
+    bool ok = (text != NULL && name != NULL) || err_set(e, "out of memory");
+    for (int i = 0; ok && i < channels; i++)
+        name[i] = layer_names[i];
+    for (int k = 0; ok && keeps && k < whole->num_parts; k++)
+        for (int i = 0; i < values; i++) {
+            struct share_part *p = &whole->part[k];
+            p->channel[i] = channels + k * values + i;
+            part_name(p->first, p->last, i, text[p->channel[i]]);
+            name[p->channel[i]] = text[p->channel[i]];
+        }
+    for (int i = 0; !keeps && i < num; i++)
+        piece[i].kept = -1;
+    if (ok) {
+        /* Without any channel it is there for its attributes. */
+        name[all] = "none";
+        ok = image_alloc(&whole->im, whole->cell[2], whole->cell[3], all > 0 ? (int)all : 1, name,
+                         e);
+    }
+    if (ok && all == 0)
+        whole->im.channels = 0;
+    free(text);
+    free(name);
+    return ok;
 }
 
 /* The ranges of share first .. last-1, which are of one cell and sorted; neighbours joined. */
@@ -272,44 +299,26 @@ bool merge_shares(struct share *share, int num, struct share *out, struct err *e
             if (!check_pair(&share[j], &share[i], e))
                 return false;
     }
-    if (!find_whole(share, num, &whole, e) ||
+    int pieces = 0;
+    struct piece *piece = list_pieces(share, num, &pieces, e);
+    if (piece == NULL || !find_whole(share, num, &whole, e) ||
         !moments_alloc(&whole.m, whole.cell[2], whole.cell[3], e) ||
-        !image_alloc(&whole.im, whole.cell[2], whole.cell[3], NUM_LAYERS, layer_names, e))
+        !shape_whole(&whole, piece, pieces, layers, e))
         goto fail;
+    strcpy(whole.m.unit, share[0].m.unit);
+    whole.m.spp = share[0].m.spp;
     for (int i = 0; i < NUM_COMMON; i++)
-        if (!image_set_attr(&whole.im, common[i][0], image_get_attr(&share[0].im, common[i][0]), e))
+        if (!image_set_attr(&whole.im, share_common[i][0],
+                            image_get_attr(&share[0].im, share_common[i][0]), e))
             goto fail;
-    for (int i = 0; i < num; i++)
-        if (!add_share(&whole, &share[i], layers, e))
+    for (int i = 0; i < pieces; i++)
+        if (!add_piece(&whole, &piece[i], layers, e))
             goto fail;
-    if (!layers)
-        whole.im.channels = 0;
+    free(piece);
     *out = whole;
     return true;
 fail:
+    free(piece);
     share_free(&whole);
     return false;
-}
-
-bool share_write(const char *path, const struct share *s, const char *command, struct err *e)
-{
-    enum { RANGE = 24 };
-    char cell[64];
-    size_t size = (size_t)s->num_ranges * RANGE + 1, n = 0;
-    char *samples = malloc(size);
-    if (samples == NULL)
-        return err_set(e, "%s: out of memory", path);
-    for (int i = 0; i < s->num_ranges; i++)
-        n += (size_t)snprintf(samples + n, size - n, "%s%lu:%lu", i > 0 ? "," : "",
-                              (unsigned long)s->range[i][0], (unsigned long)s->range[i][1]);
-    snprintf(cell, sizeof cell, "%d %d %d %d of %d %d", s->cell[0], s->cell[1], s->cell[2],
-             s->cell[3], s->cell[4], s->cell[5]);
-    struct image_attr attrs[NUM_COMMON + 3] = {
-        {"assay:command", command}, {"assay:cell", cell}, {"assay:samples", samples}};
-    for (int i = 0; i < NUM_COMMON; i++)
-        attrs[3 + i] = (struct image_attr){common[i][0], image_get_attr(&s->im, common[i][0])};
-    bool ok = moments_write_layers(path, &s->m, s->im.channels > 0 ? &s->im : NULL, attrs,
-                                   NUM_COMMON + 3, e);
-    free(samples);
-    return ok;
 }

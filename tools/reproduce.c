@@ -5,6 +5,7 @@
 #include "../renderer/options.h"
 #include "../renderer/sha256.h"
 #include "../renderer/shell_words.h"
+#include "command_words.h"
 #include "merge.h"
 
 #include <assert.h>
@@ -14,28 +15,6 @@
 #include <unistd.h>
 
 enum { MAX_PATH = 4096 };
-
-/* What says how far, where to or how a render goes on, not what it is of: its samples are known by number now. */
-static const struct {
-    const char *name;
-    int args;
-} not_of_the_picture[] = {
-    {"-f", 1},           {"--out", 1},   {"--samples", 1},     {"-t", 1},       {"--threads", 1},
-    {"--time", 1},       {"--error", 1}, {"--write-every", 1}, {"--resume", 1}, {"--heatmap", 1},
-    {"--keep-state", 0}, {"-q", 0},      {"--quiet", 0},       {NULL, 0}};
-
-/* How many words of a command to leave out here. */
-static int words_to_drop(char *const *word, int left)
-{
-    for (int i = 0; not_of_the_picture[i].name != NULL; i++) {
-        size_t n = strlen(not_of_the_picture[i].name);
-        if (strcmp(word[0], not_of_the_picture[i].name) == 0)
-            return 1 + not_of_the_picture[i].args < left ? 1 + not_of_the_picture[i].args : left;
-        if (n > 2 && strncmp(word[0], not_of_the_picture[i].name, n) == 0 && word[0][n] == '=')
-            return 1;
-    }
-    return 0;
-}
 
 static const char *attr(const struct image *im, const char *name)
 {
@@ -73,7 +52,7 @@ static bool command_of(const char *path, const struct image *im,
     int n = 0;
     argv[n++] = opt->pathtracer;
     for (int i = 1; i < num;) {
-        int drop = words_to_drop(&word[i], num - i);
+        int drop = words_to_drop(render_how, &word[i], num - i);
         if (drop == 0)
             argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
         i += drop > 0 ? drop : 1;

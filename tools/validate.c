@@ -150,15 +150,43 @@ static const struct sequence *sequence_of(const struct validate_options *o)
     return o->until_different ? &sequence_declared : &sequence_single;
 }
 
-static void describe_run(const struct validation *v, json_t *root)
+static int stages_of(const struct validate_options *o)
 {
-    const struct validate_options *o = v->opt;
+    return o->stages > 0 ? o->stages : o->alpha < small_alpha ? 2 : 1;
+}
+
+bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
+                    struct err *e)
+{
+    json_t *root = results_new(argc, argv, o->alpha);
+    if (root == NULL)
+        return err_set(e, "out of memory");
     json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));
     if (o->live)
         json_object_set_new(root, "reference_seed", json_integer(o->reference_seed));
-    json_object_set_new(root, "stages", json_integer(v->stages));
+    json_object_set_new(root, "stages", json_integer(stages_of(o)));
     if (o->budget_s > 0)
         json_object_set_new(root, "budget_s", json_real(o->budget_s));
+    *results = root;
+    return true;
+}
+
+static void validation_free(struct validation *v)
+{
+    for (int i = 0; i < v->num_tasks; i++)
+        task_free(&v->task[i]);
+    for (int i = 0; v->sides != NULL && i < v->suite.num_scenes; i++) {
+        struct scene_sides *s = &v->sides[i];
+        side_free(&s->ours);
+        side_free(&s->engine);
+        for (int k = 0; k < MAX_VARIANTS; k++)
+            side_free(&s->variant[k]);
+        for (int k = 0; k < MAX_REFERENCES; k++)
+            side_free(&s->reference[k]);
+    }
+    free(v->task);
+    free(v->sides);
+    suite_free(&v->suite);
 }
 
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
@@ -168,7 +196,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         .opt = opt, .start = now_seconds(), .shown = now_seconds(), .sequence = sequence_of(opt)};
     json_t *root = NULL, *cannot = json_array();
     v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
-    v.stages = opt->stages > 0 ? opt->stages : opt->alpha < small_alpha ? 2 : 1;
+    v.stages = stages_of(opt);
     if (!suite_load(opt->suite_dir, &v.suite, e)) {
         json_decref(cannot);
         return false;
@@ -177,13 +205,10 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     if (!ok)
         goto done;
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
-    v.alpha = opt->alpha / v.num_tasks;
-    root = results_new(argc, argv, opt->alpha);
-    if (root == NULL) {
-        ok = err_set(e, "out of memory");
+    v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
+    ok = validate_start(opt, argc, argv, &root, e);
+    if (!ok)
         goto done;
-    }
-    describe_run(&v, root);
     if (opt->engine != NULL)
         json_object_set(root, "not_expressible", cannot);
     if (opt->live) {
@@ -205,19 +230,23 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
 done:
     json_decref(root);
     json_decref(cannot);
-    for (int i = 0; i < v.num_tasks; i++)
-        task_free(&v.task[i]);
-    for (int i = 0; v.sides != NULL && i < v.suite.num_scenes; i++) {
-        struct scene_sides *s = &v.sides[i];
-        side_free(&s->ours);
-        side_free(&s->engine);
-        for (int k = 0; k < MAX_VARIANTS; k++)
-            side_free(&s->variant[k]);
-        for (int k = 0; k < MAX_REFERENCES; k++)
-            side_free(&s->reference[k]);
-    }
-    free(v.task);
-    free(v.sides);
-    suite_free(&v.suite);
+    validation_free(&v);
+    return ok;
+}
+
+bool validate_parts(const struct validate_options *opt,
+                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
+                                 struct err *e),
+                    void *ctx, struct err *e)
+{
+    struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
+    json_t *cannot = json_array();
+    bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
+              plan_tasks(&v, cannot, e);
+    for (int i = 0; ok && i < v.num_tasks; i++)
+        if (i == 0 || v.task[i].scene != v.task[i - 1].scene)
+            ok = part(ctx, v.task[i].scene, v.num_tasks, e);
+    json_decref(cannot);
+    validation_free(&v);
     return ok;
 }

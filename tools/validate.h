@@ -15,9 +15,10 @@ struct validate_options {
     const char *pathtracer;     /* the program under test */
     const char *only[MAX_ONLY]; /* scene names; none: all */
     int num_only;
-    bool live;                   /* render the references now instead of reading the goldens */
-    double alpha;                /* of the whole family of claims */
-    uint64_t seed;               /* of our render */
+    bool live;     /* render the references now instead of reading the goldens */
+    double alpha;  /* of the whole family of claims */
+    int of_claims; /* how many that has, where this run judges only some; 0: those that it judges */
+    uint64_t seed; /* of our render */
     uint32_t reference_seed;     /* live: of the references */
     const struct engine *engine; /* a further one, judged against references and ours; NULL: none */
     int engine_spp, engine_replicates; /* 0: its own */
@@ -58,5 +59,16 @@ struct validate_options {
  * (no suite, no output directory, a further engine that can express none of the scenes). */
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e) __attribute__((warn_unused_result));
+
+/* The same in parts, a scene each, which together judge what one run does, with the same bits. Calls for each scene that
+ * has claims, in the order of the results, with the number of all claims; stops where that returns false, and returns it.
+ * Fails where validate() would before it judges. */
+bool validate_parts(const struct validate_options *opt,
+                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
+                                 struct err *e),
+                    void *ctx, struct err *e) __attribute__((warn_unused_result));
+/* *results as validate() on the whole, with all lists empty. */
+bool validate_start(const struct validate_options *opt, int argc, char **argv, json_t **results,
+                    struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -2,7 +2,7 @@
 #include "../renderer/fs.h"
 #include "grade.h"
 #include "grade_alike.h"
-#include "places.h"
+#include "grade_options.h"
 #include "results.h"
 #include "verbs.h"
 
@@ -10,113 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum option {
-    OPT_CHECK_RUBRIC,
-    OPT_PREPARE,
-    OPT_OUT,
-    OPT_JOBS,
-    OPT_THREADS,
-    OPT_SEED,
-    OPT_ALPHA,
-    OPT_AGAIN,
-    OPT_UNSAFE,
-    OPT_PATHTRACER,
-    OPT_GOLDEN,
-    OPT_SUITE,
-    OPT_CATALOGUE,
-    OPT_QUIET,
-    OPT_HELP
-};
-
-static const struct cli_option options[] = {
-    [OPT_CHECK_RUBRIC] = {0, "check-rubric", 0, "",
-                          "name every mistake of the rubric with its line, and that is all"},
-    [OPT_PREPARE] = {0, "prepare", 0, "", "make the references in DIR, and that is all"},
-    [OPT_OUT] = {'o', "out", 1, "DIR",
-                 "where grades and pages go (grades); what is there already is not done again"},
-    [OPT_JOBS] = {'j', "jobs", 1, "N", "submissions at a time; 0: as many as processors (1)"},
-    [OPT_THREADS] = {'t', "threads", 1, "N", "{threads} of a program (1)"},
-    [OPT_SEED] = {0, "seed", 1, "N", "from which {seed} of each picture is made (1)"},
-    [OPT_ALPHA] = {0, "alpha", 1, "A",
-                   "chance of a check that a right program loses points (1e-5)"},
-    [OPT_AGAIN] = {0, "again", 0, "", "grade also what has been graded"},
-    [OPT_UNSAFE] = {0, "unsafe-no-sandbox", 0, "",
-                    "run programs without a sandbox: they can read and write all that you can\n"
-                    "(as root: that nobody can)"},
-    [OPT_PATHTRACER] = {0, "pathtracer", 1, "PROGRAM",
-                        "our renderer, for references (the one beside this program)"},
-    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
-    [OPT_SUITE] = {0, "suite", 1, "DIR", "scenes (reference/scenes)"},
-    [OPT_CATALOGUE] = {0, "catalogue", 1, "DIR", "the stored effects of bugs (golden/diagnose)"},
-    [OPT_QUIET] = {'q', "quiet", 0, "", "no lines on submissions"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
-
-struct settings {
-    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue;
-    const char **submission;
-    int num, jobs, threads;
-    uint64_t seed;
-    double alpha;
-    bool only_check, prepare, again, unsafe, quiet, help;
-};
-
-static bool parse(int argc, char **argv, struct settings *s, struct err *e)
-{
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool ok = true;
-    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        const char *v = c.value[0];
-        if (i == CLI_POSITIONAL) {
-            if (s->rubric == NULL)
-                s->rubric = v;
-            else
-                s->submission[s->num++] = v;
-            continue;
-        }
-        switch ((enum option)i) {
-        case OPT_CHECK_RUBRIC: s->only_check = true; break;
-        case OPT_PREPARE: s->prepare = true; break;
-        case OPT_OUT: s->out = v; break;
-        case OPT_JOBS: ok = cli_int("--jobs", v, 0, 64, &s->jobs, e); break;
-        case OPT_THREADS: ok = cli_int("--threads", v, 1, 1024, &s->threads, e); break;
-        case OPT_SEED: ok = cli_uint64("--seed", v, &s->seed, e); break;
-        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.1, &s->alpha, e); break;
-        case OPT_AGAIN: s->again = true; break;
-        case OPT_UNSAFE: s->unsafe = true; break;
-        case OPT_PATHTRACER: s->pathtracer = v; break;
-        case OPT_GOLDEN: s->golden = v; break;
-        case OPT_SUITE: s->suite = v; break;
-        case OPT_CATALOGUE: s->catalogue = v; break;
-        case OPT_QUIET: s->quiet = true; break;
-        case OPT_HELP: s->help = true; break;
-        }
-    }
-    if (!ok || s->help)
-        return ok;
-    if (s->rubric == NULL)
-        return err_set(e, "no rubric given (see --help)");
-    if ((s->only_check || s->prepare) && s->num > 0)
-        return err_set(e, "--%s takes no submissions", s->only_check ? "check-rubric" : "prepare");
-    return s->only_check || s->prepare || s->num > 0 ||
-           err_set(e, "no submission given (see --help)");
-}
-
-static void print_help(void)
-{
-    puts(
-        "usage: assay grade [options] RUBRIC SUBMISSION...\n"
-        "       assay grade --check-rubric RUBRIC\n"
-        "       assay grade --prepare [-o DIR] RUBRIC\n\n"
-        "A submission is a directory of pictures, a program, or a source tree that the rubric says how to build.\n"
-        "Programs run in a sandbox, without which nothing is graded.\n");
-    cli_print_options(stdout, options);
-    puts(
-        "\nExit code: 0 all graded, 2 staff have to look at some, 3 could not grade (one line on stderr).");
-}
 
 static bool print_mistakes(const struct rubric *r, const struct rubric_mistakes *m, struct err *e)
 {
@@ -168,8 +61,9 @@ static bool needs_staff(const json_t *grades)
     return false;
 }
 
-static int run_batch(const struct settings *s, const struct rubric *r, const struct suite *suite,
-                     const struct answers *answers, const struct sandbox *box, struct err *e)
+static int run_batch(const struct grade_settings *s, const struct rubric *r,
+                     const struct suite *suite, const struct answers *answers,
+                     const struct sandbox *box, struct err *e)
 {
     char stage[512], views[512];
     struct progress p = {s->num, s->quiet};
@@ -213,7 +107,7 @@ static int run_batch(const struct settings *s, const struct rubric *r, const str
     return code;
 }
 
-static int grade(const struct settings *s, const struct rubric *r, const struct suite *suite,
+static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
                  struct err *e)
 {
     char cache[4400], pathtracer[PATH_MAX];
@@ -226,7 +120,8 @@ static int grade(const struct settings *s, const struct rubric *r, const struct 
     }
     if (realpath(s->pathtracer, pathtracer) == NULL)
         snprintf(pathtracer, sizeof pathtracer, "%s", s->pathtracer);
-    snprintf(cache, sizeof cache, "%.4000s/.references", s->out);
+    snprintf(cache, sizeof cache, "%.4000s%s", s->references != NULL ? s->references : s->out,
+             s->references != NULL ? "" : "/.references");
     const struct answer_options opt = {.golden_dir = s->golden,
                                        .pathtracer = pathtracer,
                                        .cache = cache,
@@ -234,7 +129,7 @@ static int grade(const struct settings *s, const struct rubric *r, const struct 
                                        .timeout_s = 3600};
     if (s->prepare) {
         code = make_dirs(cache, e) && answers_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
-        if (code == 0)
+        if (code == 0 && !s->quiet)
             printf("references of %s: %s\n", r->path, cache);
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
                             &box, e)) {
@@ -251,30 +146,20 @@ static int grade(const struct settings *s, const struct rubric *r, const struct 
 
 int verb_grade(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite_dir[4096], golden[4096], catalogue[4096];
-    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
-    struct settings s = {
-        .out = "grades",
-        .pathtracer = pathtracer,
-        .jobs = 1,
-        .threads = 1,
-        .seed = 1,
-        .alpha = 1e-5,
-        .suite = find_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes"),
-        .golden = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .catalogue = find_dir(catalogue, sizeof catalogue, "golden/diagnose",
-                              "../share/assay/golden/diagnose"),
-        .submission = calloc((size_t)argc + 1, sizeof *s.submission)};
+    struct grade_paths at;
+    struct grade_settings s = grade_defaults(argc, &at);
     struct suite suite = {0};
     struct rubric *r = calloc(1, sizeof *r);
     struct rubric_mistakes m;
     int code = EXIT_NOT_JUDGED;
     if (r == NULL || s.submission == NULL) {
         err_set(e, "out of memory");
-    } else if (parse(argc, argv, &s, e)) {
+    } else if (grade_parse(argc, argv, &s, e)) {
         if (s.help) {
-            print_help();
+            grade_print_help();
             code = 0;
+        } else if (s.slurm) {
+            code = slurm_command(NULL, argc, argv, 1, e);
         } else if (suite_load(s.suite, &suite, e) && rubric_read(s.rubric, &suite, r, &m, e) &&
                    print_mistakes(r, &m, e)) {
             if (s.only_check)

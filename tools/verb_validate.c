@@ -6,7 +6,7 @@
 #include "import_lines.h"
 #include "report.h"
 #include "results.h"
-#include "validate.h"
+#include "validate_command.h"
 #include "verbs.h"
 
 #include <stdlib.h>
@@ -32,6 +32,8 @@ enum option {
     OPT_BUDGET,
     OPT_STAGES,
     OPT_UNTIL_DIFFERENT,
+    OPT_OF_CLAIMS,
+    OPT_SLURM,
     OPT_PAGE_EVERY,
     OPT_QUIET,
     OPT_HELP
@@ -69,6 +71,9 @@ static const struct cli_option options[] = {
     [OPT_UNTIL_DIFFERENT] = {0, "until-different", 0, "",
                              "few samples first, then more, up to the declared; stop at the\n"
                              "first claim that differs where it should not"},
+    [OPT_OF_CLAIMS] = {0, "of-claims", 1, "N",
+                       "judge some of the N claims of a larger run, whose alpha it is (all)"},
+    [OPT_SLURM] = {0, "slurm", 0, "", "a job for each scene on a Slurm cluster"},
     [OPT_PAGE_EVERY] = {0, "page-every", 1, "S",
                         "seconds after which the page of what is judged so far is\n"
                         "written, again and again, for assay watch (off)"},
@@ -83,14 +88,9 @@ static bool fresh_seed(uint32_t *seed, struct err *e)
     return true;
 }
 
-/* What the options say beyond validate_options. */
-struct wishes {
-    const char *engine; /* file or name; NULL: none */
-    bool done;          /* only the help was asked for */
-};
-
-static bool parse(int argc, char **argv, struct validate_options *o, struct wishes *w,
-                  struct err *e)
+/* engine: file or name; NULL: none. */
+static bool parse(int argc, char **argv, struct validate_options *o, struct validate_command *w,
+                  const char **engine, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true, has_seed = false;
@@ -114,7 +114,7 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
         case OPT_GOLDEN: o->golden_dir = v; break;
         case OPT_SHARE: o->share_dir = v; break;
         case OPT_PATHTRACER: o->pathtracer = v; break;
-        case OPT_ENGINE: w->engine = v; break;
+        case OPT_ENGINE: *engine = v; break;
         case OPT_ENGINE_SPP: ok = cli_int("--engine-spp", v, 1, 1 << 24, &o->engine_spp, e); break;
         case OPT_ENGINE_REPLICATES:
             ok = cli_int("--engine-replicates", v, 3, 4096, &o->engine_replicates, e);
@@ -134,6 +134,8 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
             break;
         case OPT_STAGES: ok = cli_int("--stages", v, 1, 2, &o->stages, e); break;
         case OPT_UNTIL_DIFFERENT: o->until_different = true; break;
+        case OPT_OF_CLAIMS: ok = cli_int("--of-claims", v, 1, 100000000, &o->of_claims, e); break;
+        case OPT_SLURM: w->slurm = true; break;
         case OPT_PAGE_EVERY:
             ok = cli_double("--page-every", v, 0.1, 1e6, &o->show_every_s, e);
             break;
@@ -141,8 +143,7 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct wish
         case OPT_HELP:
             puts("usage: assay validate [options]\n");
             cli_print_options(stdout, options);
-            w->done = true;
-            return true;
+            return w->help = true;
         }
     }
     return ok && (has_seed || !o->live || fresh_seed(&o->reference_seed, e));
@@ -241,40 +242,58 @@ static int with_loader(int code, const json_t *results, struct err *e)
                : code;
 }
 
-int verb_validate(int argc, char **argv, struct err *e)
+bool validate_command_read(int argc, char **argv, struct validate_command *c, struct err *e)
 {
-    char pathtracer[4096], suite[4096], golden[4096], share[4096];
-    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
-    struct validate_options o = {
+    const char *engine = NULL;
+    *c = (struct validate_command){.help = false};
+    beside_program(c->pathtracer, sizeof c->pathtracer, "pathtracer");
+    c->opt = (struct validate_options){
         .out_dir = "build/report",
-        .pathtracer = pathtracer,
+        .pathtracer = c->pathtracer,
         .alpha = 1e-3,
         .seed = 1,
         .timeout_s = 3600,
-        .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay"),
+        .suite_dir =
+            find_dir(c->suite, sizeof c->suite, "reference/scenes", "../share/assay/scenes"),
+        .golden_dir = find_dir(c->golden, sizeof c->golden, "golden", "../share/assay/golden"),
+        .share_dir = find_dir(c->share, sizeof c->share, "reference", "../share/assay"),
         .show = write_page_so_far};
-    struct wishes wish = {0};
-    struct engine engine = {0};
-    json_t *results = NULL;
-    if (!parse(argc, argv, &o, &wish, e))
-        return EXIT_NOT_JUDGED;
-    if (wish.done)
-        return 0;
-    if (wish.engine != NULL) {
-        if (!load_engine(wish.engine, o.share_dir, &engine, e))
-            return EXIT_NOT_JUDGED;
-        o.engine = &engine;
+    if (!parse(argc, argv, &c->opt, c, &engine, e))
+        return false;
+    if (engine != NULL) {
+        if (!load_engine(engine, c->opt.share_dir, &c->engine, e))
+            return false;
+        c->opt.engine = &c->engine;
     }
-    if (o.threads == 0)
-        o.threads = cli_processors();
+    if (c->opt.threads == 0)
+        c->opt.threads = cli_processors();
+    return true;
+}
+
+int validate_command_finish(const struct validate_command *c, const json_t *results, struct err *e)
+{
     int code = EXIT_NOT_JUDGED;
-    if (validate(&o, argc, argv, &results, e) && write_all(results, o.out_dir, o.quiet, e))
+    if (write_all(results, c->opt.out_dir, c->opt.quiet, e))
         code = with_loader(results_exit_code(results), results, e);
-    if (code == EXIT_NOT_JUDGED && results != NULL && e->msg[0] == '\0')
+    if (code == EXIT_NOT_JUDGED && e->msg[0] == '\0')
         tell_not_judged(results, e);
+    return code;
+}
+
+int verb_validate(int argc, char **argv, struct err *e)
+{
+    struct validate_command c;
+    json_t *results = NULL;
+    int code = EXIT_NOT_JUDGED;
+    if (!validate_command_read(argc, argv, &c, e))
+        return EXIT_NOT_JUDGED;
+    if (c.help)
+        code = 0;
+    else if (c.slurm)
+        code = slurm_command(NULL, argc, argv, 1, e);
+    else if (validate(&c.opt, argc, argv, &results, e))
+        code = validate_command_finish(&c, results, e);
     json_decref(results);
-    engine_free(&engine);
+    engine_free(&c.engine);
     return code;
 }

@@ -18,5 +18,13 @@ int verb_watch(int argc, char **argv, struct err *e);
 int verb_grade(int argc, char **argv, struct err *e);
 int verb_reproduce(int argc, char **argv, struct err *e);
 int verb_report(int argc, char **argv, struct err *e);
+int verb_plan(int argc, char **argv, struct err *e);
+int verb_run_job(int argc, char **argv, struct err *e);
+int verb_gather(int argc, char **argv, struct err *e);
+int verb_slurm(int argc, char **argv, struct err *e);
+
+/* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
+ * jobs on the cluster, gathers. parts: of a render. */
+int slurm_command(const char *dir, int argc, char **argv, int parts, struct err *e);
 
 #endif

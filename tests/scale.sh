@@ -1,0 +1,125 @@
+#!/bin/bash
+# tests/scale.sh BUILD: renders, a grading batch and a validation in jobs (`assay plan`, `run-job`, `gather`) have the bits of the same
+# commands without; what must not be taken for done is not. Slurm: tests/slurm.sh. Prints "ok NAME" or "not ok NAME: why".
+set -u
+build=$(realpath "${1:?usage: tests/scale.sh BUILD}")
+pathtracer=$build/pathtracer assay=$build/assay san_assay=$build/san/assay
+scene=$PWD/reference/scenes/41_cornell.dae
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+
+tell() { # NAME WHY: not ok where WHY says something
+    if [ -z "$2" ]; then echo "ok jobs: $1"; else
+        echo "not ok jobs: $1: $2"
+        failures=$((failures + 1))
+    fi
+}
+expect() { # NAME STATUS PATTERN COMMAND...: a status of 3 comes with one line on stderr
+    local name=$1 status=$2 pattern=$3 why=""
+    shift 3
+    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+    local got=$?
+    [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ "$status" -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; } ||
+        why="status $got, no '$pattern' or more than a line: $(head -c 1000 "$tmp/out" "$tmp/err")"
+    tell "$name" "$why"
+}
+# in_jobs NAME PARTS again|once ARGUMENT...: the pictures of the arguments, l.exr and l.png whole, x.exr and x.png from jobs, the last first.
+in_jobs() {
+    local name=$1 parts=$2 again=$3 why="" num
+    shift 3
+    rm -rf "$tmp/plan" "$tmp"/[lx].*
+    local words=(-q -r 37 29 --seed 3 --keep-state)
+    "$pathtracer" "${words[@]}" -f "$tmp/l.exr" -f "$tmp/l.png" "$@" >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    "$assay" plan --plan "$tmp/plan" --parts "$parts" pathtracer "${words[@]}" -f "$tmp/x.exr" -f "$tmp/x.png" "$@" >"$tmp/jobs" 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    num=$(grep -c '^{"job"' "$tmp/jobs")
+    { [ "$num" -ge "$parts" ] && [ "$num" -le $((2 * parts)) ]; } || why="$num jobs for $parts: $why"
+    "$assay" run-job "$tmp/plan" $(seq $((num - 1)) -1 0) >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    "$assay" gather "$tmp/plan" >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    [ -z "$why" ] && { cmp "$tmp/l.png" "$tmp/x.png" >"$tmp/out" 2>&1 || why="$(cat "$tmp/out")"; }
+    # How far an adaptive render counts depends on its passes, and stands in the state's head and hash; its pixels do not.
+    case " $* " in
+    *adaptive* | *' -a '*)
+        cmp "$tmp/l_rate.png" "$tmp/x_rate.png" >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")"
+        [ "$(cmp -l "$tmp/l.exr.state" "$tmp/x.exr.state" | wc -l)" -le 36 ] || why="$why other sums"
+        ;;
+    *) cmp "$tmp/l.exr.state" "$tmp/x.exr.state" >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")" ;;
+    esac
+    # The picture by another way: made again at once, and compared value by value.
+    [ -z "$why" ] && [ "$again" = again ] && { "$assay" reproduce "$tmp/x.exr" >"$tmp/out" 2>&1 || why="$(cat "$tmp/out")"; }
+    tell "$name" "$why"
+}
+in_jobs "cells beside each other" 6 again -s 5 --aov "$scene"
+in_jobs "more jobs than sixteens of rows" 23 again -s 3 --sampler sobol "$scene"
+in_jobs "the assignment's adaptive rule" 2 once -s 24 -a 4 0.3 "$scene"
+in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 \
+    -e reference/scenes/46_sky.exr -- reference/scenes/46_sky.dae
+
+# A plan, its jobs, and what is not done. Of 4 x 40 rows the third job's file is looked into.
+cp "$scene" "$tmp/s.dae"
+plan=$tmp/plan4 why=""
+"$assay" plan --plan "$plan" --parts 4 pathtracer -q -r 48 160 -s 2 -f "$tmp/y.exr" "$tmp/s.dae" >"$tmp/jobs"
+key() { sed -n "s/^{\"job\":$1,\"key\":\"\([0-9a-f]*\)\".*/\1/p" "$tmp/jobs"; }
+hash=$(sha256sum "$scene" | cut -c1-64)
+grep -q "\"$tmp/s.dae\":\"$hash\"" "$tmp/jobs" || why="no hash of the scene in $(head -n 1 "$tmp/jobs")"
+tell "inputs are known by hash" "$why"
+expect "a job that is not made" 3 "job 0 of 4 is not made" "$san_assay" gather "$plan"
+expect "a job is made" 0 "job 2: made" "$san_assay" run-job "$plan" 2
+expect "and is not made twice" 0 "job 2: was there" "$san_assay" run-job "$plan" 2
+state=$plan/jobs/$(key 2)/cell.png.state
+cp "$state" "$tmp/state" && printf 'x' | dd of="$state" bs=1 seek=5000 conv=notrunc 2>/dev/null
+expect "one that was damaged is made again" 0 "job 2: made" "$assay" run-job "$plan" 2
+why=$(cmp "$state" "$tmp/state" 2>&1)
+tell "with the same bits" "$why"
+printf 'x' | dd of="$state" bs=1 seek=5000 conv=notrunc 2>/dev/null
+"$assay" run-job "$plan" 0 1 3 >/dev/null
+expect "one that was damaged is not gathered" 3 "cell.png.state: damaged" "$san_assay" gather "$plan"
+rm -rf "$plan/jobs/$(key 1)"
+mv "$tmp/s.dae" "$tmp/t.dae"
+sed 's/0\.8/0.7/' "$tmp/t.dae" >"$tmp/s.dae"
+expect "an input was changed" 3 "s.dae is not what was planned with" "$san_assay" run-job "$plan" 1
+rm "$tmp/s.dae"
+expect "an input is gone" 3 "s.dae: No such file" "$san_assay" run-job "$plan" 1
+mv "$tmp/t.dae" "$tmp/s.dae"
+expect "no such job" 3 "is not a whole number from 0 to 3" "$san_assay" run-job "$plan" 4
+head -n 3 "$plan/plan.jsonl" >"$tmp/p" && mkdir "$tmp/half" && cp "$tmp/p" "$tmp/half/plan.jsonl"
+expect "a plan cut short" 3 "not a whole plan" "$san_assay" run-job "$tmp/half" 0
+expect "a render that looks at all of its picture" 3 "cannot be cut into jobs" "$san_assay" plan --plan "$tmp/p1" pathtracer --error 1% -f "$tmp/y.exr" "$scene"
+expect "what cannot be planned" 3 "begins with pathtracer, grade or validate" "$san_assay" plan report x.json
+expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay" plan --plan "$tmp/p1" pathtracer -f x.exr -e "{out}" -s 1 "{job}"
+
+# The class: what is right, what is dead, what is no program.
+mkdir "$tmp/class"
+cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && mkdir "$tmp/class/empty" && echo later >"$tmp/class/empty/note"
+no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date|key)":/d' "$1"; }
+"$assay" grade -o "$tmp/g1" tests/quick.rubric "$tmp"/class/* >/dev/null 2>"$tmp/err"
+one=$?
+why=$("$assay" plan --plan "$tmp/gplan" grade -o "$tmp/g2" tests/quick.rubric "$tmp"/class/* 2>&1 >"$tmp/jobs") &&
+    "$assay" run-job "$tmp/gplan" 2 0 1 >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")"
+"$assay" gather "$tmp/gplan" >/dev/null 2>"$tmp/err"
+two=$?
+[ $one -eq $two ] || why="exit codes $one and $two: $(cat "$tmp/err") $why"
+for f in grades.json right/grade.json dead/grade.json empty/grade.json; do
+    cmp -s <(no_times "$tmp/g1/$f") <(no_times "$tmp/g2/$f") || why="$why $f: $(diff <(no_times "$tmp/g1/$f") <(no_times "$tmp/g2/$f") | head -n 4)"
+done
+for f in grades.csv right/point.png; do cmp -s "$tmp/g1/$f" "$tmp/g2/$f" || why="$why $f differs"; done
+[ -e "$tmp/g2/index.html" ] || why="$why no page"
+# tree_hash.h, by other means.
+hash=$(printf 'f %s note\n' "$(sha256sum "$tmp/class/empty/note" | cut -c1-64)" | sha256sum | cut -c1-64)
+grep -q "\"$tmp/class/empty\":\"$hash\"" "$tmp/jobs" || why="$why no hash of a directory"
+tell "a grading batch" "$why"
+
+# The suite: two scenes that take no time, one with a claim of consistency.
+"$assay" validate -q --only 12_point_plane --only 31_spot_plane --out "$tmp/v1" >"$tmp/table1" 2>"$tmp/err"
+one=$?
+why=$("$assay" plan --plan "$tmp/vplan" validate -q --only 12_point_plane --only 31_spot_plane --out "$tmp/v2" 2>&1 >"$tmp/jobs") &&
+    "$assay" run-job "$tmp/vplan" 1 0 >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")"
+"$assay" gather "$tmp/vplan" >"$tmp/table2" 2>"$tmp/err"
+two=$?
+[ $one -eq $two ] || why="exit codes $one and $two: $(cat "$tmp/err") $why"
+cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") || why="$why $(diff <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") | head -n 6)"
+cmp -s <(grep -v index.html "$tmp/table1") <(grep -v index.html "$tmp/table2") || why="$why another table"
+[ -e "$tmp/v2/data/12_point_plane/pathtracer.exr" ] && [ -e "$tmp/v2/junit.xml" ] || why="$why files are missing"
+tell "a validation" "$why"
+expect "a validation whose next look depends on the last" 3 "cannot be cut into jobs" "$san_assay" plan --plan "$tmp/p1" validate --budget 5s --out "$tmp/v3"
+[ $failures -eq 0 ]

@@ -1,0 +1,303 @@
+#include "plan.h"
+
+#include "../renderer/fs.h"
+#include "../renderer/sha256.h"
+#include "../renderer/version.h"
+#include "plan_kinds.h"
+#include "results.h"
+#include "tree_hash.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const struct {
+    const char *name;
+    bool (*plan)(int argc, char **argv, int parts, struct plan *p, struct err *e);
+    int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
+} kinds[] = {{"pathtracer", render_plan, render_gather},
+             {"grade", grade_plan, grade_gather},
+             {"validate", validate_plan, validate_gather}};
+enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
+
+const char *plan_text(const struct plan *p, const char *name)
+{
+    return json_string_value(json_object_get(p->head, name));
+}
+
+char **plan_words(const json_t *array, int *num)
+{
+    size_t n = json_array_size(array), room = (n + 1) * sizeof(char *);
+    for (size_t i = 0; i < n; i++)
+        room += json_string_length(json_array_get(array, i)) + 1;
+    char **words = malloc(room);
+    if (words == NULL)
+        return NULL;
+    char *at = (char *)(words + n + 1);
+    for (size_t i = 0; i < n; i++) {
+        words[i] = at;
+        strcpy(at, json_string_value(json_array_get(array, i)));
+        at += strlen(at) + 1;
+    }
+    words[n] = NULL;
+    *num = (int)n;
+    return words;
+}
+
+static bool add_words(json_t *array, const char *const *word, int num, struct err *e)
+{
+    for (int i = 0; i < num; i++)
+        if (json_array_append_new(array, json_string(word[i])) != 0)
+            return err_set(e, "'%s' is no UTF-8 and cannot be planned", word[i]);
+    return true;
+}
+
+static bool add_input(json_t *inputs, const char *path, struct err *e)
+{
+    char hex[65];
+    if (!tree_hash(path, NULL, hex, e))
+        return false;
+    return json_object_set_new(inputs, path, json_string(hex)) == 0 ||
+           err_set(e, "'%s' is no UTF-8 and cannot be planned", path);
+}
+
+bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
+{
+    char dir[PLAN_PATH], full[PATH_MAX];
+    int n = snprintf(dir, sizeof dir, p->dir[0] != '\0' ? "%s" : "%s.plan",
+                     p->dir[0] != '\0' ? p->dir : output);
+    if (n < 0 || (size_t)n >= sizeof dir)
+        return err_set(e, "%.64s...: path too long", output);
+    if (!make_dirs(dir, e))
+        return false;
+    if (realpath(dir, full) == NULL || strlen(full) >= sizeof p->dir)
+        return err_set(e, "%s: %s", dir, strerror(errno));
+    strcpy(p->dir, full);
+    json_object_set_new(p->head, "output", json_string(output));
+    json_object_set_new(p->head, "product", json_string(product));
+    json_object_set_new(p->head, "cpus", json_integer(cpus));
+    return true;
+}
+
+bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)
+{
+    json_t *run = json_object_get(p->head, "run");
+    for (int i = 0; user && i < num; i++)
+        if (strcmp(word[i], "{job}") == 0 || strncmp(word[i], "{out}", 5) == 0)
+            return err_set(e, "'%s' means something else in a plan", word[i]);
+    if (json_array_size(run) == 0 && !plan_input(p, word[0], e))
+        return false;
+    return add_words(run, word, num, e);
+}
+
+void plan_may_end(struct plan *p, int code)
+{
+    json_array_append_new(json_object_get(p->head, "ends"), json_integer(code));
+}
+
+bool plan_input(struct plan *p, const char *path, struct err *e)
+{
+    return add_input(json_object_get(p->head, "inputs"), path, e);
+}
+
+/* What all jobs have in common and their bits depend on. */
+static void hash_common(const struct plan *p, char hex[65])
+{
+    json_t *common = json_pack(
+        "{ss, sO, sO, sO}", "version", assay_version, "run", json_object_get(p->head, "run"),
+        "inputs", json_object_get(p->head, "inputs"), "cwd", json_object_get(p->head, "cwd"));
+    char *text = json_dumps(common, JSON_COMPACT | JSON_SORT_KEYS);
+    sha256_text(text, hex);
+    free(text);
+    json_decref(common);
+}
+
+bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
+              struct err *e)
+{
+    json_t *words = json_array(), *inputs = json_object();
+    char *text = NULL, common[65], key[65];
+    char **line = realloc(p->line, ((size_t)p->num + 1) * sizeof *line);
+    bool ok = line != NULL || err_set(e, "out of memory");
+    if (line != NULL)
+        p->line = line;
+    ok = ok && add_words(words, word, num, e);
+    for (; ok && *input != NULL; input++)
+        ok = add_input(inputs, *input, e);
+    if (ok) {
+        hash_common(p, common);
+        json_t *job = json_pack("{ss, sO, sO}", "common", common, "words", words, "inputs", inputs);
+        text = json_dumps(job, JSON_COMPACT | JSON_SORT_KEYS);
+        sha256_text(text, key);
+        free(text);
+        json_decref(job);
+        job = json_pack("{si, ss, sO, sO}", "job", p->num, "key", key, "words", words, "inputs",
+                        inputs);
+        p->line[p->num++] = json_dumps(job, JSON_COMPACT);
+        json_decref(job);
+    }
+    json_decref(words);
+    json_decref(inputs);
+    return ok;
+}
+
+static bool write_plan(const struct plan *p, struct err *e)
+{
+    char path[PLAN_PATH + 32];
+    struct out_file out;
+    snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
+    if (!out_open(&out, path, e))
+        return false;
+    json_dumpf(p->head, out.f, JSON_COMPACT);
+    for (int k = 0; k < p->num; k++)
+        fprintf(out.f, "\n%s", p->line[k]);
+    fputc('\n', out.f); /* out_commit() looks at the error flag */
+    return out_commit(&out, e);
+}
+
+static int kind_of(const char *name)
+{
+    int i = 0;
+    while (i < NUM_KINDS && strcmp(name, kinds[i].name) != 0)
+        i++;
+    return i;
+}
+
+bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *out, struct err *e)
+{
+    char cwd[PATH_MAX];
+    struct plan p = {.dir = ""};
+    int kind = argc > 0 ? kind_of(argv[0]) : NUM_KINDS;
+    if (kind == NUM_KINDS)
+        return err_set(e, "what to plan begins with pathtracer, grade or validate, not '%s'",
+                       argc > 0 ? argv[0] : "");
+    if (getcwd(cwd, sizeof cwd) == NULL)
+        return err_set(e, "no current directory: %s", strerror(errno));
+    if (dir != NULL && strlen(dir) >= sizeof p.dir)
+        return err_set(e, "%.64s...: path too long", dir);
+    strcpy(p.dir, dir != NULL ? dir : "");
+    p.head = json_pack("{si, ss, ss, ss?, s[], s[i], s[], s{}}", "assay_plan", 1, "kind",
+                       kinds[kind].name, "version", assay_version, "cwd", cwd, "command", "ends", 0,
+                       "run", "inputs");
+    bool ok = (p.head != NULL || err_set(e, "%s: cannot be written into a plan", cwd)) &&
+              add_words(json_object_get(p.head, "command"), (const char *const *)argv, argc, e) &&
+              kinds[kind].plan(argc, argv, parts, &p, e);
+    if (ok) {
+        json_object_set_new(p.head, "jobs", json_integer(p.num));
+        ok = write_plan(&p, e);
+    }
+    if (ok)
+        *out = p;
+    else
+        plan_free(&p);
+    return ok;
+}
+
+void plan_free(struct plan *p)
+{
+    json_decref(p->head);
+    for (int k = 0; k < p->num; k++)
+        free(p->line[k]);
+    free(p->line);
+    *p = (struct plan){.dir = ""};
+}
+
+bool plan_are_texts(const json_t *array)
+{
+    size_t i;
+    json_t *v;
+    json_array_foreach(array, i, v)
+    {
+        if (!json_is_string(v))
+            return false;
+    }
+    return json_is_array(array);
+}
+
+static bool check_head(const struct plan *p)
+{
+    static const char *const texts[] = {"kind", "version", "cwd", "output", "product"};
+    bool ok = json_integer_value(json_object_get(p->head, "assay_plan")) == 1;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        ok = ok && plan_text(p, texts[i]) != NULL;
+    return ok && kind_of(plan_text(p, "kind")) < NUM_KINDS &&
+           plan_are_texts(json_object_get(p->head, "command")) &&
+           plan_are_texts(json_object_get(p->head, "run")) &&
+           json_is_object(json_object_get(p->head, "inputs"));
+}
+
+/* Lines are kept as texts: a job needs the first and its own. */
+static bool read_lines(FILE *f, struct plan *p, struct err *e)
+{
+    char *line = NULL;
+    size_t room = 0;
+    ssize_t n;
+    bool ok = true;
+    while (ok && (n = getline(&line, &room, f)) > 0) {
+        if (line[n - 1] == '\n')
+            line[n - 1] = '\0';
+        if (p->head == NULL) {
+            p->head = json_loads(line, 0, NULL);
+            ok = check_head(p);
+            continue;
+        }
+        char **more = realloc(p->line, ((size_t)p->num + 1) * sizeof *more);
+        p->line = more != NULL ? more : p->line;
+        char *copy = more != NULL ? strdup(line) : NULL;
+        ok = copy != NULL;
+        if (ok)
+            p->line[p->num++] = copy;
+    }
+    free(line);
+    return (ok && p->head != NULL && p->num > 0 &&
+            json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
+           err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);
+}
+
+bool plan_read(const char *dir, struct plan *out, struct err *e)
+{
+    char path[PLAN_PATH + 32], full[PATH_MAX];
+    struct plan p = {.dir = ""};
+    if (realpath(dir, full) == NULL || strlen(full) >= sizeof p.dir)
+        return err_set(e, "%s: %s", dir, strerror(errno));
+    strcpy(p.dir, full);
+    snprintf(path, sizeof path, "%s/plan.jsonl", p.dir);
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    bool ok = read_lines(f, &p, e);
+    fclose(f);
+    if (ok && strcmp(plan_text(&p, "version"), assay_version) != 0)
+        ok = err_set(e, "%s: of version %s, this is %s", path, plan_text(&p, "version"),
+                     assay_version);
+    if (ok)
+        *out = p;
+    else
+        plan_free(&p);
+    return ok;
+}
+
+bool plan_enter(const struct plan *p, struct err *e)
+{
+    const char *cwd = plan_text(p, "cwd");
+    return chdir(cwd) == 0 || err_set(e, "%s: cannot go there: %s", cwd, strerror(errno));
+}
+
+int plan_gather(const struct plan *p, struct err *e)
+{
+    int argc = 0, code = EXIT_NOT_JUDGED;
+    char **argv = plan_words(json_object_get(p->head, "command"), &argc);
+    if (argv == NULL)
+        err_set(e, "out of memory");
+    for (int k = 0; k < p->num && e->msg[0] == '\0'; k++)
+        if (!plan_is_made(p, k))
+            err_set(e, "%s: job %d of %d is not made", p->dir, k, p->num);
+    if (e->msg[0] == '\0')
+        code = kinds[kind_of(plan_text(p, "kind"))].gather(p, argc, argv, e);
+    free(argv);
+    return code;
+}

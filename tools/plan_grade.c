@@ -1,0 +1,146 @@
+/* A grading batch as jobs: one for each submission. */
+#define _GNU_SOURCE
+#include "../reference/process.h"
+#include "../renderer/fs.h"
+#include "command_words.h"
+#include "grade_options.h"
+#include "places.h"
+#include "plan_kinds.h"
+#include "results.h"
+#include "verbs.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* What every job says itself, or nobody needs in a job. */
+static const struct option_words not_of_a_job[] = {
+    {"-o", 1}, {"--out", 1},   {"-j", 1}, {"--jobs", 1}, {"--references", 1}, {"--slurm", 0},
+    {"-q", 0}, {"--quiet", 0}, {0}};
+
+/* Into to[], with room for argc, the words that every job has of the command: its options and the rubric. */
+static int words_of_a_job(int argc, char **argv, const struct grade_settings *s, const char **to)
+{
+    int num = 0;
+    for (int i = 1; i < argc;) {
+        int drop = words_to_drop(not_of_a_job, &argv[i], argc - i);
+        bool is_submission = false;
+        for (int k = 0; k < s->num; k++)
+            is_submission = is_submission || s->submission[k] == argv[i];
+        if (drop == 0 && !is_submission)
+            to[num++] = argv[i];
+        i += drop > 0 ? drop : 1;
+    }
+    return num;
+}
+
+/* The references are made here and now: all jobs need the same. */
+static bool prepare(const char *references, const char **words, int num, struct err *e)
+{
+    enum { MOST = 64 };
+    const char *argv[MOST + 5] = {"grade", "-q", "--prepare", "--references", references};
+    if (num > MOST - 1)
+        return err_set(e, "too many options for a plan");
+    memcpy(argv + 5, words, (size_t)num * sizeof *words);
+    return verb_grade(5 + num, (char **)argv, e) == 0;
+}
+
+static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, struct plan *p,
+                      struct err *e)
+{
+    char assay[4096], references[PLAN_PATH + 16];
+    const char **words = calloc((size_t)argc, sizeof *words);
+    bool ok = words != NULL || err_set(e, "out of memory");
+    int num = ok ? words_of_a_job(argc, argv, s, words) : 0;
+    beside_program(assay, sizeof assay, "assay");
+    ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
+    snprintf(references, sizeof references, "%s/references", p->dir);
+    const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
+    ok = ok && prepare(references, words, num, e) &&
+         plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+         plan_run_words(p, words, num, true, e) &&
+         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, s->rubric, e) &&
+         plan_input(p, references, e) && plan_input(p, s->pathtracer, e) &&
+         plan_input(p, s->suite, e);
+    plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
+    for (int k = 0; ok && k < s->num; k++)
+        ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
+    free(words);
+    return ok;
+}
+
+bool grade_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+{
+    struct grade_paths at;
+    struct grade_settings s = grade_defaults(argc, &at);
+    (void)parts; /* a job for each submission */
+    bool ok = s.submission != NULL || err_set(e, "out of memory");
+    ok = ok && grade_parse(argc, argv, &s, e);
+    if (ok && (s.help || s.only_check || s.prepare || s.again))
+        ok = err_set(e, "--help, --check-rubric, --prepare and --again cannot be planned");
+    ok = ok && plan_jobs(&s, argc, argv, p, e);
+    free(s.submission);
+    return ok;
+}
+
+/* The last part of a path, as grading names what is handed in. */
+static void id_of(const char *path, char id[128])
+{
+    size_t n = strlen(path);
+    while (n > 1 && path[n - 1] == '/')
+        n--;
+    const char *at = path + n;
+    while (at > path && at[-1] != '/')
+        at--;
+    snprintf(id, 128, "%.*s", (int)(path + n - at < 127 ? path + n - at : 127), at);
+}
+
+/* OUT/ID as the job left it, by rename. What a node had trouble with left nothing, and the batch tries it again. */
+static bool place(const struct plan *p, int k, const char *out, const char *submission,
+                  struct err *e)
+{
+    char from[PLAN_PATH + 512], to[PLAN_PATH + 512], temp[PLAN_PATH + 512], id[128],
+        artefact[PLAN_PATH + 256];
+    id_of(submission, id);
+    plan_artefact(p, k, NULL, artefact);
+    snprintf(from, sizeof from, "%s/%s", artefact, id);
+    snprintf(to, sizeof to, "%.4000s/%s", out, id);
+    snprintf(temp, sizeof temp, "%.4000s/.%s.tmp%ld", out, id, (long)getpid());
+    if (!plan_verify(p, k, e))
+        return false;
+    if (access(from, F_OK) != 0)
+        return true;
+    const char *const copy[] = {"cp", "-a", "--", from, temp, NULL};
+    const struct process process = {.argv = copy};
+    return remove_tree(temp, e) && process_run(&process, NULL, e) && remove_tree(to, e) &&
+           (rename(temp, to) == 0 || err_set(e, "%s: cannot appear: %s", to, strerror(errno)));
+}
+
+/* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
+int grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
+{
+    struct grade_paths at;
+    struct grade_settings s = grade_defaults(argc, &at);
+    char references[PLAN_PATH + 16];
+    int num = 0;
+    const char **words = calloc((size_t)argc + 4, sizeof *words);
+    bool ok = (s.submission != NULL && words != NULL) || err_set(e, "out of memory");
+    ok = ok && grade_parse(argc, argv, &s, e) && make_dirs(s.out, e);
+    for (int k = 0; ok && k < p->num; k++)
+        ok = place(p, k, s.out, s.submission[k], e);
+    if (ok) {
+        snprintf(references, sizeof references, "%s/references", p->dir);
+        words[num++] = "grade";
+        words[num++] = "--references";
+        words[num++] = references;
+        for (int i = 1; i < argc; i++)
+            if (strcmp(argv[i], "--slurm") != 0)
+                words[num++] = argv[i];
+    }
+    int code = ok ? verb_grade(num, (char **)words, e) : EXIT_NOT_JUDGED;
+    free(s.submission);
+    free(words);
+    return code;
+}

@@ -1,0 +1,21 @@
+/* The command line of `assay validate`, and what it does with results. */
+#ifndef ASSAY_VALIDATE_COMMAND_H
+#define ASSAY_VALIDATE_COMMAND_H
+
+#include "validate.h"
+
+struct validate_command {
+    struct validate_options opt;
+    struct engine engine; /* opt.engine, where there is one; the caller calls engine_free() */
+    bool slurm, help;     /* help: it was printed, and opt is not complete */
+    /* Where the paths are kept that the options do not give. */
+    char pathtracer[4096], suite[4096], golden[4096], share[4096];
+};
+
+/* *c has to stay where it is. */
+bool validate_command_read(int argc, char **argv, struct validate_command *c, struct err *e)
+    __attribute__((warn_unused_result));
+/* Writes results.json, junit.xml and the page, prints the table; the exit code. */
+int validate_command_finish(const struct validate_command *c, const json_t *results, struct err *e);
+
+#endif
