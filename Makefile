@@ -78,9 +78,9 @@ tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/te
 	tests/tsan.sh $(BUILD)/tsan $(THREADED)
 
 # kill -9 at 200 moments each of a render, a golden update, a grading batch, a report and a validation; every allocation
-# failed in turn (an hour).
+# failed in turn (an hour; ONLY="kill_golden ...": parts of it).
 faults: $(BUILD)/pathtracer $(BUILD)/assay
-	tests/faults.sh $(BUILD) 200 1
+	tests/faults.sh $(BUILD) 200 1 $(ONLY)
 
 # A render, a grading batch and a validation on a Slurm cluster of four nodes on this machine, one killed in the middle. As root.
 slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
@@ -94,8 +94,8 @@ large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 scale: $(BUILD)/tests/make_scale
 	$(BUILD)/tests/make_scale
 
-# Lines of renderer/ and tools/ that the tests and the end-to-end runs reach.
-coverage: $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
+# Lines of renderer/, reference/ and tools/ that the tests and the end-to-end runs reach.
+coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
 	tests/coverage.sh $(BUILD) $(patsubst %,$(BUILD)/cov/%,$(TESTS))
 
@@ -124,6 +124,11 @@ bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 # Fifty submissions, known bugs most of them, graded by the rubric of the course: tests/grading.
 grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
 	tests/grade_show.sh $(BUILD)
+
+# What known bugs do to the pictures of a rubric, by which they are named.
+rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
+	tests/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRIC)
 
 bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
@@ -180,7 +185,7 @@ help:
 	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'
 	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
 	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
-	@echo 'make coverage   lines of renderer/ and tools/ that the tests reach (an hour)'
+	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (half an hour)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
@@ -189,6 +194,7 @@ help:
 	@echo 'make calibrate   measure error rates and power, write tests/calibration/ (SHARE=0.01: a part of it)'
 	@echo 'make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)'
 	@echo 'make grade-show  grade a class of fifty, write tests/grading/'
+	@echo 'make rubric-bugs what known bugs do to the pictures of a rubric (RUBRIC=tools/rubrics/cs184.rubric)'
 	@echo 'make bvh-table   time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)'
 	@echo 'make bench       speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
@@ -210,7 +216,7 @@ $(BUILD)/clang/%: WERROR := 1
 $(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
 $(BUILD)/cov/%: CC := clang
 $(BUILD)/cov/%: CXX := clang++
-$(BUILD)/cov/%: OPT := -O1 -g -fprofile-instr-generate -fcoverage-mapping
+$(BUILD)/cov/%: OPT := -O2 -g -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: WERROR := 1
 
 define compile_c
@@ -294,7 +300,7 @@ $(BUILD)/tests/make_mesh: $(call obj,$(BUILD),tests/make_mesh.c tests/mesh.c) $(
 	$(link)
 $(BUILD)/tests/make_suite_files: $(call obj,$(BUILD),tests/make_suite_files.c tests/suite_files.c) $(BUILD)/libassay.a
 	$(link)
-$(BUILD)/tests/make_catalogue $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
+$(BUILD)/tests/make_catalogue $(BUILD)/tests/make_rubric_bugs $(BUILD)/tests/diagnose_rates $(BUILD)/tests/grade_table: \
   $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/tests/make_scale: $(call obj,$(BUILD),tests/make_scale.c) $(BUILD)/libassay.a
@@ -407,7 +413,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 $(BUILD)/deps-slurm: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_SLURM))
 
-.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -6,6 +6,7 @@
 #include "process.h"
 
 #include "../renderer/sha256.h"
+#include "../renderer/shell_words.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -102,20 +103,30 @@ static json_t *seeds_of(const struct engine_job *j)
     return seeds;
 }
 
+/* In words that shell_split() reads back. */
+static char *command_line(const json_t *args)
+{
+    size_t num = json_array_size(args);
+    const char **word = calloc(num + 1, sizeof *word);
+    for (size_t i = 0; word != NULL && i < num; i++)
+        word[i] = json_string_value(json_array_get(args, i));
+    char *text = word != NULL ? shell_join(NULL, word) : NULL;
+    free(word);
+    return text;
+}
+
 bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
                      json_t **manifest, struct err *e)
 {
-    char version[256], binary[65], description[65], date[32], command[1024] = "";
+    char version[256], binary[65], description[65], date[32];
     json_t *files = json_object();
     time_t now = time(NULL);
     struct tm tm;
     strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
-    const json_t *args = json_object_get(j->en->json, "command");
-    for (size_t i = 0; i < json_array_size(args) && strlen(command) < sizeof command - 1; i++)
-        snprintf(command + strlen(command), sizeof command - strlen(command), "%s%s",
-                 i > 0 ? " " : "", json_string_value(json_array_get(args, i)));
-    bool ok = read_version(j, version, e) && sha256_file(j->program, binary, e) &&
-              sha256_file(j->en->file, description, e) && hash_files(j->en, files, e);
+    char *command = command_line(json_object_get(j->en->json, "command"));
+    bool ok = (command != NULL || err_set(e, "out of memory")) && read_version(j, version, e) &&
+              sha256_file(j->program, binary, e) && sha256_file(j->en->file, description, e) &&
+              hash_files(j->en, files, e);
     *manifest =
         !ok ? NULL
             : json_pack("{ss,ss,ss,ss,ss,sf,si,si,si,si,si,sf,sf,ss,ss,ss,ss,sO,s{sO,sb},so}",
@@ -127,6 +138,7 @@ bool engine_describe(const struct engine_job *j, const struct moments *m, double
                         description, "command", command, "files", files, "settings", "description",
                         j->en->json, "half_floats", j->half, "seeds", seeds_of(j));
     json_decref(files);
+    free(command);
     if (ok && *manifest == NULL)
         ok = err_set(e, "out of memory");
     return ok;

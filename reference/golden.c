@@ -74,6 +74,34 @@ static const char *image_of(const json_t *entry, const char *exr, const char *ne
     return !has_hash(exr, entry) && has_hash(next, entry) ? next : exr;
 }
 
+/* Under the lock nobody writes: an image that waits is what a kill left. That of the manifest takes its place, another goes. */
+static bool settle(const json_t *entry, const char *exr, const char *next, struct err *e)
+{
+    if (access(next, F_OK) != 0)
+        return true;
+    int r = image_of(entry, exr, next) == next ? rename(next, exr) : unlink(next);
+    return r == 0 || err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+}
+
+bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+{
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    if (access(next, F_OK) != 0)
+        return true;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
 /* The new image waits beside the old one until the manifest names it by its hash; the manifest's rename decides.
  * Whatever a kill leaves, image_of() finds the image that the manifest describes. */
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
@@ -89,9 +117,7 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
         return false;
     json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
-    bool ok = all != NULL;
-    if (ok && image_of(json_object_get(all, engine), exr, next) == next && rename(next, exr) != 0)
-        ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
     ok = ok && moments_write(next, m, attrs, 2, e) && sha256_file(next, sha256, e);
     if (ok) {
         ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&

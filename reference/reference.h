@@ -42,6 +42,9 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
+/* Ends what a killed golden_write() began: an image beside its place that the manifest describes takes it, another is removed. */
+bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+    __attribute__((warn_unused_result));
 /* The entry first, then the image. True also where there is none. */
 bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
     __attribute__((warn_unused_result));

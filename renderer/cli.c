@@ -23,8 +23,72 @@ static int find_short(const struct cli_option *options, char name)
     return CLI_ERROR;
 }
 
+static int unknown(const char *arg, struct err *e)
+{
+    err_set(e, "unknown option '%s' (see --help)", arg);
+    return CLI_ERROR;
+}
+
+/* The option's arguments are the words that follow. */
+static int take_words(struct cli *c, int i, const char *arg, struct err *e)
+{
+    const struct cli_option *o = &c->options[i];
+    if (c->argc - c->next < o->num_args) {
+        err_set(e, "option '%s' needs %s", arg, o->args);
+        return CLI_ERROR;
+    }
+    for (int k = 0; k < o->num_args; k++)
+        c->value[k] = c->argv[c->next++];
+    return i;
+}
+
+static int next_long(struct cli *c, const char *arg, struct err *e)
+{
+    const char *equals = strchr(arg, '=');
+    int i = find_long(c->options, arg + 2, equals ? (size_t)(equals - arg - 2) : strlen(arg + 2));
+    if (i == CLI_ERROR)
+        return unknown(arg, e);
+    const struct cli_option *o = &c->options[i];
+    if (equals == NULL)
+        return take_words(c, i, arg, e);
+    if (o->num_args != 1) {
+        err_set(e, "option --%s takes %d arguments, not '='", o->long_name, o->num_args);
+        return CLI_ERROR;
+    }
+    c->value[0] = equals + 1;
+    return i;
+}
+
+/* `at`: the letter in arg that is next; others may stand behind it, or its argument. */
+static int next_short(struct cli *c, const char *arg, const char *at, struct err *e)
+{
+    int i = find_short(c->options, *at);
+    c->letters = NULL;
+    if (at == arg + 1 && at[1] != '\0' &&
+        find_long(c->options, at, strcspn(at, "=")) != CLI_ERROR) {
+        err_set(e, "unknown option '%s': long options have two dashes, -%s", arg, arg);
+        return CLI_ERROR;
+    }
+    if (i == CLI_ERROR)
+        return unknown(arg, e);
+    const struct cli_option *o = &c->options[i];
+    if (at[1] == '\0')
+        return take_words(c, i, arg, e);
+    if (o->num_args > 1) {
+        err_set(e, "option '-%c' takes %s, each a word of its own, not '%s'", *at, o->args, arg);
+        return CLI_ERROR;
+    }
+    if (o->num_args == 1)
+        c->value[0] = at + 1;
+    else
+        c->letters = at + 1;
+    return i;
+}
+
 int cli_next(struct cli *c, struct err *e)
 {
+    if (c->letters != NULL)
+        return next_short(c, c->name, c->letters, e);
     if (c->next < c->argc && !c->only_positional && strcmp(c->argv[c->next], "--") == 0) {
         c->only_positional = true;
         c->next++;
@@ -37,34 +101,7 @@ int cli_next(struct cli *c, struct err *e)
         c->value[0] = arg;
         return CLI_POSITIONAL;
     }
-    const char *equals = NULL;
-    int i;
-    if (arg[1] == '-') {
-        equals = strchr(arg, '=');
-        i = find_long(c->options, arg + 2, equals ? (size_t)(equals - arg - 2) : strlen(arg + 2));
-    } else {
-        i = arg[2] == '\0' ? find_short(c->options, arg[1]) : CLI_ERROR;
-    }
-    if (i == CLI_ERROR) {
-        err_set(e, "unknown option '%s' (see --help)", arg);
-        return CLI_ERROR;
-    }
-    const struct cli_option *o = &c->options[i];
-    if (equals != NULL) {
-        if (o->num_args != 1) {
-            err_set(e, "option --%s takes %d arguments, not '='", o->long_name, o->num_args);
-            return CLI_ERROR;
-        }
-        c->value[0] = equals + 1;
-        return i;
-    }
-    if (c->argc - c->next < o->num_args) {
-        err_set(e, "option '%s' needs %s", arg, o->args);
-        return CLI_ERROR;
-    }
-    for (int k = 0; k < o->num_args; k++)
-        c->value[k] = c->argv[c->next++];
-    return i;
+    return arg[1] == '-' ? next_long(c, arg, e) : next_short(c, arg, arg + 1, e);
 }
 
 void cli_print_options(FILE *f, const struct cli_option *options)

@@ -24,12 +24,14 @@ struct cli {
     bool only_positional; /* after "--" */
     const char *value[4]; /* the arguments of the option just returned */
     const char *name;     /* the option as the user wrote it, for messages */
+    const char *letters;  /* short options left in that word, NULL: none */
 };
 
 enum { CLI_END = -1, CLI_POSITIONAL = -2, CLI_ERROR = -3 };
 
 /* The index of the next option in the table, CLI_POSITIONAL (value[0] holds it), CLI_END or
- * CLI_ERROR (e says what). "--" ends the options; --name=value works for one argument. */
+ * CLI_ERROR (e says what). "--" ends the options; --name=value and -nvalue work for one
+ * argument, and short options without any may stand together, as getopt has it. */
 int cli_next(struct cli *c, struct err *e);
 
 /* Prints the table, two columns. */

@@ -32,10 +32,23 @@ float microfacet_lambda(enum microfacet_kind kind, float alpha, vec3 w)
     return 0.5f * (expf(-a * a) / (a * SQRT_PI_F) - erfcf(a));
 }
 
-float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3 wo, vec3 wi)
+static float smith_g2(enum microfacet_kind kind, float alpha, bool separable, vec3 wo, vec3 wi)
 {
     float lo = microfacet_lambda(kind, alpha, wo), li = microfacet_lambda(kind, alpha, wi);
     return separable ? 1 / ((1 + lo) * (1 + li)) : 1 / (1 + lo + li);
+}
+
+static float starter_lambda(float alpha, vec3 w)
+{
+    float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z), a = 1 / (alpha * sqrtf(tan2));
+    return tan2 > 0 ? 0.5f * (expf(-a * a) / (a * PI_F) - erfcf(a)) : 0;
+}
+
+float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3 wo, vec3 wi)
+{
+    return kind == MICROFACET_BECKMANN_STARTER
+               ? 1 / (1 + starter_lambda(alpha, wo) + starter_lambda(alpha, wi))
+               : smith_g2(kind, alpha, separable, wo, wi);
 }
 
 /* Visible normals of a hemisphere seen from wo, stretched back [Heitz18, section 3]. */

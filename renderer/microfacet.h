@@ -9,7 +9,11 @@
 /* Smoother than this is a mirror: float32 hardly tells the normals apart. */
 #define MICROFACET_MIN_ALPHA 1e-4f
 
-enum microfacet_kind { MICROFACET_GGX, MICROFACET_BECKMANN };
+enum microfacet_kind {
+    MICROFACET_GGX,
+    MICROFACET_BECKMANN,
+    MICROFACET_BECKMANN_STARTER /* Beckmann's, but for microfacet_g2() (starter.h) */
+};
 
 /* Density of normals per steradian of m and unit of macroscopic area [Walter07 eq. 25, 33]. */
 float microfacet_d(enum microfacet_kind kind, float alpha, vec3 m);
@@ -19,7 +23,8 @@ float microfacet_d(enum microfacet_kind kind, float alpha, vec3 m);
 float microfacet_lambda(enum microfacet_kind kind, float alpha, vec3 w);
 
 /* Both seen from wo and lit from wi: of the whole surface's height at once (correlated), or as if
- * the two were independent (separable). */
+ * the two were independent (separable). MICROFACET_BECKMANN_STARTER: of the whole surface, with a pi for the
+ * sqrt(pi) of its lambda; more than 1 where the surface is seen and lit from above. */
 float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3 wo, vec3 wi);
 
 /* A normal with density D(m) max(0, wo.m) / ((1 + lambda(wo)) wo.z), per steradian: GGX [Heitz18];

@@ -131,7 +131,7 @@ static const struct cli_option options[] = {
                    "does, or the whole of it (crop)"},
     [OPT_STARTER] = {0, "starter", 1, "DEFECT",
                      "do wrong what the assignment's starter code does: light-pdf,\n"
-                     "turned-lamp; for grading; may be given again"},
+                     "turned-lamp, beckmann; for grading; may be given again"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress, no statistics"},
     [OPT_LIST] = {0, "list", 0, "", "print the names that options take"},
     [OPT_VERSION] = {0, "version", 0, "", "print version and libraries"},
@@ -327,8 +327,8 @@ static bool complete(struct options *s, int accumulate, struct err *e)
     if (s->last > s->spp)
         return err_set(e, "--samples: %d:%d goes past the %d of --spp", s->first, s->last, s->spp);
     if (s->starter != 0 && s->direct == DIRECT_MIS && s->kind == INTEGRATE_PATHS)
-        return err_set(e,
-                       "--starter is about lights that are sampled alone: give --direct light too");
+        return err_set(
+            e, "--starter is about programs that sample lights alone: give --direct light too");
     if (s->starter != 0 && s->isa > ISA_AUTO)
         return err_set(e, "--starter is in the scalar code alone: not with --isa %s",
                        isa_names[s->isa]);

@@ -16,25 +16,21 @@ void rate_colour(double rate, uint8_t rgb8[3])
     rgb8[2] = (uint8_t)(rate <= 0.5 ? 255 * (1 - 2 * rate) : 0);
 }
 
-enum { COMMAND_SIZE = 8192, NUM_TEXTS = 12 };
+enum { NUM_TEXTS = 12 };
 
-static void command_line(const struct output *o, char text[COMMAND_SIZE])
-{
-    text[0] = '\0';
-    shell_append_all(text, COMMAND_SIZE, (const char *const *)o->argv);
-}
-
-/* The metadata of an EXR. */
+/* The metadata of an EXR. command is its own, to free(). */
 struct texts {
-    char command[COMMAND_SIZE], samples[64], seconds[64], rays[128];
+    char *command, samples[64], seconds[64], rays[128];
     struct image_attr attr[NUM_TEXTS];
     int num;
 };
 
-static void make_texts(const struct output *o, uint32_t num_samples,
+static bool make_texts(const struct output *o, uint32_t num_samples,
                        const struct render_stats *stats, struct texts *t)
 {
-    command_line(o, t->command);
+    t->command = shell_join(NULL, (const char *const *)o->argv);
+    if (t->command == NULL)
+        return false;
     snprintf(t->samples, sizeof t->samples, "%d:%lld", o->opt->first,
              (long long)o->opt->first + num_samples);
     if (stats != NULL) {
@@ -59,6 +55,7 @@ static void make_texts(const struct output *o, uint32_t num_samples,
         {"assay:rays", t->rays}};
     memcpy(t->attr, attrs, sizeof attrs);
     t->num = NUM_TEXTS - (stats == NULL ? 2 : 0);
+    return true;
 }
 
 struct output_writer {
@@ -107,9 +104,13 @@ static bool exr_rows(struct output_writer *w, const struct film *band, struct er
         const struct image *more = band->first != NULL ? &layers : NULL;
         if (ok && w->y == 0) {
             struct texts t;
-            make_texts(w->o, w->num_samples, w->stats, &t);
+            ok = make_texts(w->o, w->num_samples, w->stats, &t) ||
+                 err_set(e, "%s: out of memory", opt->output[i]);
+            if (!ok)
+                break;
             w->exr[i] =
                 moments_writer_open(opt->output[i], &band->m, w->height, more, t.attr, t.num, e);
+            free(t.command);
         }
         ok = ok && w->exr[i] != NULL && moments_writer_rows(w->exr[i], &band->m, more, e);
     }
@@ -221,12 +222,14 @@ void print_summary(const struct output *o, const struct film *f, const struct re
 
 void print_how_to_resume(const struct output *o, const struct film *f)
 {
-    char command[COMMAND_SIZE];
-    command_line(o, command);
-    if (o->opt->resume == NULL && strlen(command) + 32 < COMMAND_SIZE) {
-        strcat(command, " --resume");
-        shell_append(command, COMMAND_SIZE, o->opt->output[0]);
-    }
-    fprintf(stderr, "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s\n",
-            (unsigned long)f->num_samples, o->opt->last - o->opt->first, command);
+    const char *const picture[] = {o->opt->output[0], NULL};
+    char *command = shell_join(NULL, (const char *const *)o->argv);
+    char *more = o->opt->resume == NULL ? shell_join("--resume", picture) : NULL;
+    fprintf(stderr,
+            "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s%s%s\n",
+            (unsigned long)f->num_samples, o->opt->last - o->opt->first,
+            command != NULL ? command : "the same command", more != NULL ? " " : "",
+            more != NULL ? more : "");
+    free(command);
+    free(more);
 }

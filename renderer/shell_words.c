@@ -1,30 +1,42 @@
 #include "shell_words.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-bool shell_append(char *text, size_t size, const char *word)
+/* One word at `to`, which has room for it, in quotes where a shell would need them; returns its end. */
+static char *append(char *to, const char *word)
 {
     static const char safe[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                "-_./:=,+%@";
-    size_t n = strlen(text), quotes = 0;
-    const char *quote = word[0] != '\0' && strspn(word, safe) == strlen(word) ? "" : "'";
-    for (const char *c = word; *c != '\0'; c++)
-        quotes += *c == '\'';
-    if (n + 1 + 2 * strlen(quote) + strlen(word) + 3 * quotes + 1 > size)
-        return false;
-    n += (size_t)snprintf(text + n, size - n, "%s%s", n > 0 ? " " : "", quote);
+    if (word[0] != '\0' && strspn(word, safe) == strlen(word))
+        return stpcpy(to, word);
+    *to++ = '\'';
     for (; *word != '\0'; word++)
-        n += (size_t)snprintf(text + n, size - n, *word == '\'' ? "'\\''" : "%c", *word);
-    snprintf(text + n, size - n, "%s", quote);
-    return true;
+        if (*word == '\'')
+            to = stpcpy(to, "'\\''");
+        else
+            *to++ = *word;
+    return stpcpy(to, "'");
 }
 
-void shell_append_all(char *text, size_t size, const char *const *word)
+char *shell_join(const char *first, const char *const *word)
 {
-    while (*word != NULL && shell_append(text, size, *word))
-        word++;
+    enum { WORST = 4, AROUND = 3 }; /* '\'' for each quote; two quotes and a blank */
+    size_t size = 1 + (first != NULL ? WORST * strlen(first) + AROUND : 0);
+    for (int i = 0; word[i] != NULL; i++)
+        size += WORST * strlen(word[i]) + AROUND;
+    char *text = malloc(size), *end = text;
+    if (text == NULL)
+        return NULL;
+    *end = '\0';
+    if (first != NULL)
+        end = append(end, first);
+    for (; *word != NULL; word++) {
+        if (end > text)
+            *end++ = ' ';
+        end = append(end, *word);
+    }
+    return text;
 }
 
 /* One word from *text on, unquoted to *to with its zero; false on what is not accepted. */

@@ -1,6 +1,6 @@
 #include "starter.h"
 
-const char *const starter_names[NUM_STARTERS + 1] = {"light-pdf", "turned-lamp", NULL};
+const char *const starter_names[NUM_STARTERS + 1] = {"light-pdf", "turned-lamp", "beckmann", NULL};
 
 vec3 starter_turn(const struct scene *s, const struct light *l, vec3 p)
 {
@@ -34,4 +34,7 @@ void starter_apply(struct scene *s, unsigned bits)
     for (uint32_t l = 0; l < s->num_lights && starter_has(s, STARTER_TURNED_LAMP); l++)
         if (s->lights[l].kind == LIGHT_TRIANGLES)
             turn_lamp(s, &s->lights[l]);
+    for (uint32_t m = 0; m < s->num_materials && starter_has(s, STARTER_BECKMANN); m++)
+        if (s->materials[m].microfacet == MICROFACET_BECKMANN)
+            s->materials[m].microfacet = MICROFACET_BECKMANN_STARTER;
 }

@@ -6,6 +6,8 @@ build=$(realpath "${1:?usage: tests/end_to_end.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
 # Where bad input is fed in, the sanitized builds run.
 san_pathtracer=$build/san/pathtracer san_assay=$build/san/assay
+# Whose objects mutants are made of, and what is installed: tests/coverage.sh counts lines in programs of another compiler.
+plain=$(realpath "${PLAIN_BUILD:-$build}")
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
@@ -88,7 +90,7 @@ for patch in tests/mutants/*.patch; do
 done
 [ $stale -eq 0 ] && ok "mutants apply and say what they are"
 # Three of them are built and found, and the renderer as it is passes the same scenes.
-if tests/mutants.sh --quick "$build" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
+if tests/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
     not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
 fi
 rm -f "$tmp/mutants.out"
@@ -519,20 +521,20 @@ expect "golden: unknown" 3 "none of render" $golden forget
 # diagnose: names a bug, and none where there is none.
 expect "diagnose: help lists the views" 0 "12_point_plane" "$san_assay" diagnose --help
 expect "diagnose: the correct renderer" 0 "nothing wrong found" "$assay" diagnose --seed 5
-if tests/mutants.sh --build-only "$build" point_light_linear seed_ignored variance_halved; then
+if tests/mutants.sh --build-only "$plain" point_light_linear seed_ignored variance_halved; then
     ok "bugs can be built"
 else
     not_ok "bugs can be built" "see $build/mutants"
 fi
 for bug in point_light_linear seed_ignored variance_halved; do
     expect "diagnose: $bug" 1 "tests/mutants/$bug.patch" "$assay" diagnose --seed 6 \
-        --pathtracer "$build/mutants/$bug/pathtracer" --json "$tmp/diagnosis.json"
+        --pathtracer "$plain/mutants/$bug/pathtracer" --json "$tmp/diagnosis.json"
     expect "diagnose: $bug alone" 0 "\"named\":\[\"$bug\"\]" bash -c "tr -d ' \n' <'$tmp/diagnosis.json'"
 done
 expect "diagnose: left out of the catalogue" 1 "none of the" "$assay" diagnose --seed 6 \
-    --pathtracer "$build/mutants/point_light_linear/pathtracer" --without point_light_linear
+    --pathtracer "$plain/mutants/point_light_linear/pathtracer" --without point_light_linear
 expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only 12_point_plane \
-    --pathtracer "$build/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
+    --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
 expect "diagnose: the pictures of a validation" 1 "tests/mutants/point_light_linear.patch" \
     "$assay" diagnose "$tmp/wrong_suite/results.json"
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
@@ -586,7 +588,7 @@ sub nothing <<<'exit 0'
 { printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
 mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
 if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
-    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
     for good in right pictures source; do
         [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
@@ -599,12 +601,13 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
         expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
     done
     expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"
+    expect "grade: the chance of another score" 0 '"chance": [0-9.e-]*' cat "$tmp/grades/right/grade.json"
     expect "grade: JUnit" 0 'testsuite name="fork_bomb" tests="1" failures="1"' xmllint "$tmp/grades/junit.xml"
     expect "grade: TAP" 0 "^ok [0-9]* - right point (8.00 of 8)" cat "$tmp/grades/grades.tap"
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
     expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
-    mkdir "$tmp/two" && cp -r "$build/mutants/point_light_linear" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
+    mkdir "$tmp/two" && cp -r "$plain/mutants/point_light_linear" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
     sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
         $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
         sed 's/^total 8/total 10/' >"$tmp/named.rubric"
@@ -631,6 +634,9 @@ fi
 expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
 expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
 expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
+tests/grading.sh "$build" >"$tmp/grading"
+cat "$tmp/grading"
+failures=$((failures + $(grep -c '^not ok' "$tmp/grading")))
 tests/autograder.sh "$build" >"$tmp/autograder"
 cat "$tmp/autograder"
 failures=$((failures + $(grep -c '^not ok' "$tmp/autograder")))
@@ -649,6 +655,16 @@ tests/reproduce.sh "$build" >"$tmp/reproduce"
 cat "$tmp/reproduce"
 failures=$((failures + $(grep -c '^not ok' "$tmp/reproduce")))
 
+# What a file or a command line may ask for.
+tests/limits.sh "$build" >"$tmp/limits"
+cat "$tmp/limits"
+failures=$((failures + $(grep -c '^not ok' "$tmp/limits")))
+
+# Verbs, and ways through them, that nothing above takes.
+tests/verbs.sh "$build" >"$tmp/verbs"
+cat "$tmp/verbs"
+failures=$((failures + $(grep -c '^not ok' "$tmp/verbs")))
+
 # The same work in jobs.
 tests/scale.sh "$build" >"$tmp/scale"
 cat "$tmp/scale"
@@ -666,7 +682,7 @@ failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
 grep -q '^ok ' "$tmp/browser" || not_ok "the page in a browser" "nothing was looked at"
 
 # Installed elsewhere, it needs nothing of the checkout.
-if make -s BUILD="$build" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
+if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"
 fi
 cd "$tmp" || exit 1

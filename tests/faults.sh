@@ -1,12 +1,17 @@
 #!/bin/bash
-# tests/faults.sh BUILD [KILLS [STEP]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
-# render, a golden update, a grading batch and a report: no output is ever half written, going on ends with the bits of an
-# uninterrupted run. Full disk, read-only directory, closed pipe. Every STEP-th allocation (61st) fails in turn, in pathtracer
+# tests/faults.sh BUILD [KILLS [STEP [PART...]]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
+# render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
+# of an uninterrupted run. Full disk, read-only directory, closed pipe. Every STEP-th allocation (61st) fails in turn, in pathtracer
 # and in assay: one line and exit 3, or the right answer. Prints "ok NAME" or "not ok NAME: why".
+# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory (all; disk uses what grading and
+# validation leave).
 set -u
-build=$(realpath "${1:?usage: tests/faults.sh BUILD [KILLS [STEP]]}") kills=${2:-6} step=${3:-61}
+build=$(realpath "${1:?usage: tests/faults.sh BUILD [KILLS [STEP [PART...]]]}") kills=${2:-6} step=${3:-61}
+shift $(($# > 3 ? 3 : $#))
+[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory
 pathtracer=$build/pathtracer assay=$build/assay scene=$PWD/reference/scenes/41_cornell.dae
 tmp=$(mktemp -d)
+# What is killed here, or has no disk, keeps no counts for tests/coverage.sh (LLVM_PROFILE_FILE): it would spoil those of the others.
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 RANDOM=1 # the moments are the same parts of a run in every run of this script
@@ -17,13 +22,18 @@ tell() { # NAME WHY: not ok where WHY says something
         failures=$((failures + 1))
     fi
 }
+# As many kills as asked for, of at most five times as many tries.
+more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills)) ]; }
+too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
-# killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself.
+# killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself, else counted in hits.
+hits=0
 killed() {
     local part=$((1 + RANDOM * $1 / 32767)) status
     shift
-    { timeout -s KILL "$(printf '%d.%03d' $((part / 1000)) $((part % 1000)))" "$@" >"$tmp/out" 2>"$tmp/err" </dev/null; } 2>/dev/null
+    { LLVM_PROFILE_FILE=/dev/null timeout -s KILL "$(printf '%d.%03d' $((part / 1000)) $((part % 1000)))" "$@" >"$tmp/out" 2>"$tmp/err" </dev/null; } 2>/dev/null
     status=$?
+    [ $status -eq 137 ] && hits=$((hits + 1))
     [ $status -ne 137 ] && [ $status -ne 0 ] && echo "status $status: $(head -c 300 "$tmp/err")" >>"$tmp/why"
     return $status
 }
@@ -34,19 +44,26 @@ is_whole() {
 }
 
 kill_renders() {
-    local dir=$tmp/render why="" k=0 before=0 now most start resume="" killed_at lag=0 n
+    local dir=$tmp/render why="" k=0 before=0 most start began resume="" lost=0 now n
     mkdir -p "$dir"
     local render=("$pathtracer" -q -t 2 -r 48 32 -s 1000 --aov)
     start=$(milliseconds)
     "${render[@]}" --keep-state -f "$dir/whole.exr" "$scene" >/dev/null
     most=$((($(milliseconds) - start) / 2 + 60))
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr"
+        began=$(milliseconds)
         if killed $most "${render[@]}" --keep-state --write-every 0.05 $resume -f "$dir/x.exr" "$scene"; then
             # It came to its end: again from the start.
             cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null || why="other bits after $k kills"
             rm -f "$dir"/x.exr* && resume="" && before=0
+        else
+            # What was done since the state was written, or since the start.
+            now=$(milliseconds)
+            n=$(stat -c %.3Y "$dir/x.exr.state" 2>/dev/null | tr -d .)
+            [ "${n:-0}" -gt "$began" ] && began=$n
+            [ $((now - began)) -gt $lost ] && lost=$((now - began))
         fi
         k=$((k + 1))
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
@@ -61,7 +78,7 @@ kill_renders() {
     [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr" || resume=""
     [ -z "$why" ] && "${render[@]}" --keep-state $resume -f "$dir/x.exr" "$scene" >/dev/null 2>"$tmp/err"
     [ -z "$why" ] && ! cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null && why="other bits at the end: $(cat "$tmp/err")"
-    tell "kill -9, $kills moments of a render: whole pictures, none of the samples lost, the same bits" "$why"
+    tell "kill -9, $hits moments of a render ($k tries): whole pictures, no written sample lost (at most $lost ms of work), the same bits" "${why:-$(too_few $k)}"
 }
 
 # New references that differ in the last bits from those stored.
@@ -99,7 +116,7 @@ kill_golden() {
     cmp -s "$tmp/straight.txt" <(hashes "$tmp/first") && why="nothing was updated"
     rm -f "$tmp/why"
     cp -r "$tmp/first" "$store"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names
         [ $? -eq 0 ] && rm -rf "$store" && cp -r "$tmp/first" "$store"
         k=$((k + 1))
@@ -109,10 +126,11 @@ kill_golden() {
         done
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
     done
-    "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >/dev/null 2>&1
-    [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") && why="other images at the end"
+    "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names >"$tmp/last" 2>&1
+    [ -z "$why" ] && ! cmp -s "$tmp/straight.txt" <(hashes "$store") &&
+        why="other images at the end: $(diff "$tmp/straight.txt" <(hashes "$store")); $(cat "$tmp/last")"
     [ -z "$why" ] && [ -n "$(find "$store" -name '*.next')" ] && why="an image is left beside its place"
-    tell "kill -9, $kills moments of a golden update: no reference is lost, the same images at the end" "$why"
+    tell "kill -9, $hits moments of a golden update ($k tries): no reference is lost, the same images at the end" "${why:-$(too_few $k)}"
 }
 
 kill_grading() {
@@ -132,7 +150,7 @@ kill_grading() {
     most=$(($(milliseconds) - start))
     [ "$(grep -c '"8.00"\|8\.00' "$tmp/straight_grades/grades.csv")" -gt 2 ] || why="$(cat "$tmp/straight_grades/grades.csv")"
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "$assay" grade -q -o "$out" "$tmp/quick.rubric" "$tmp/subs"/*
         [ $? -eq 0 ] && rm -rf "$out"
         k=$((k + 1))
@@ -143,7 +161,7 @@ kill_grading() {
     done
     "$assay" grade -q -o "$out" "$tmp/quick.rubric" "$tmp/subs"/* >/dev/null 2>&1
     [ -z "$why" ] && ! cmp -s "$tmp/straight_grades/grades.csv" "$out/grades.csv" && why="other points at the end"
-    tell "kill -9, $kills moments of a grading batch: no half of a file, the same points at the end" "$why"
+    tell "kill -9, $hits moments of a grading batch ($k tries): no half of a file, the same points at the end" "${why:-$(too_few $k)}"
 }
 # A JSON file is whole when its braces close; the last byte that is no blank says it, since all are objects.
 json_is_whole() { [ "$(tr -d ' \n' <"$1" | tail -c 1)" = "}" ] && [ "$(tr -d ' \n' <"$1" | head -c 1)" = "{" ]; }
@@ -158,14 +176,14 @@ kill_report() {
     [ -s "$dir/index.html" ] || why="no page"
     cp "$dir/index.html" "$tmp/page.html"
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         [ $((k % 2)) -eq 0 ] && rm -f "$dir/index.html"
         killed $most "$assay" report "$dir/results.json"
         k=$((k + 1))
         [ -e "$dir/index.html" ] && ! cmp -s "$tmp/page.html" "$dir/index.html" && why="kill $k left another page"
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
     done
-    tell "kill -9, $kills moments of a report: the whole page or none" "$why"
+    tell "kill -9, $hits moments of a report ($k tries): the whole page or none" "${why:-$(too_few $k)}"
 }
 
 kill_validation() {
@@ -175,7 +193,7 @@ kill_validation() {
     "${validate[@]}" --out "$tmp/straight_suite" >/dev/null 2>&1
     most=$(($(milliseconds) - start))
     rm -f "$tmp/why"
-    while [ $k -lt "$kills" ] && [ -z "$why" ]; do
+    while more_kills $k && [ -z "$why" ]; do
         killed $most "${validate[@]}" --out "$dir"
         [ $? -eq 0 ] && rm -rf "$dir"
         k=$((k + 1))
@@ -188,7 +206,7 @@ kill_validation() {
     done
     "$assay" report --markdown "$tmp/straight_suite/results.json" >"$tmp/a.md" && "$assay" report --markdown "$dir/results.json" >"$tmp/b.md"
     cmp -s "$tmp/a.md" "$tmp/b.md" || why="${why:-other verdicts at the end: $(diff "$tmp/a.md" "$tmp/b.md" | head -n 5)}"
-    tell "kill -9, $kills moments of a validation: whole results or none, the same verdicts at the end" "$why"
+    tell "kill -9, $hits moments of a validation ($k tries): whole results or none, the same verdicts at the end" "${why:-$(too_few $k)}"
 }
 
 # refused NAME PATTERN DIR COMMAND...: exit 3, one line with the pattern, and DIR as it was.
@@ -211,16 +229,21 @@ cat >"$tmp/limited" <<'END'
 trap '' XFSZ
 ulimit -f "$1"
 shift
+export LLVM_PROFILE_FILE=/dev/null
 exec "$@"
 END
 chmod +x "$tmp/limited"
+
+render_shares() {
+    "$pathtracer" -q -r 64 64 --samples 4:8 -f "$tmp/share1.exr" "$scene" >/dev/null
+    "$pathtracer" -q -r 64 64 --samples 0:4 -f "$tmp/share0.exr" "$scene" >/dev/null
+}
 
 disk() {
     local dir=$tmp/disk small
     mkdir -p "$dir"
     "$pathtracer" -q -r 64 64 -s 4 -f "$dir/x.exr" -f "$dir/x.png" "$scene" >/dev/null
-    "$pathtracer" -q -r 64 64 --samples 4:8 -f "$tmp/share1.exr" "$scene" >/dev/null
-    "$pathtracer" -q -r 64 64 --samples 0:4 -f "$tmp/share0.exr" "$scene" >/dev/null
+    render_shares
     refused "disk full: a picture; the one before stays" "x.exr: cannot write: File too large" "$dir" \
         "$tmp/limited" 16 "$pathtracer" -q -r 64 64 -s 8 -f "$dir/x.exr" "$scene"
     refused "disk full: a PNG picture" "x.png: cannot write" "$dir" \
@@ -231,6 +254,11 @@ disk() {
     refused "disk full: merge" "m.exr: cannot write: File too large" "$dir" \
         "$tmp/limited" 16 "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
     refused "disk full: export" "cannot write.*: File too large" "$dir" "$tmp/limited" 1 "$assay" export -o "$dir/s.pov" "$scene"
+    refused "disk full: a comparison" "c.json.z.exr: cannot write: File too large" "$dir" \
+        "$tmp/limited" 4 "$assay" compare -q --margin 0.9 --margin-tile 0.9 --json "$dir/c.json" "$tmp/share0.exr" "$tmp/share1.exr"
+    refused "disk full: a validation" "cannot write: File too large" "$dir" \
+        "$tmp/limited" 16 "$assay" validate -q --only 12_point_plane --out "$tmp/full_suite"
+    [ -e "$tmp/full_suite/index.html" ] && tell "disk full: no page of a validation" "there is one"
     refused "disk full: the page" "index.html: cannot write: File too large" "$tmp/straight_suite" \
         "$tmp/limited" 16 "$assay" report "$tmp/straight_suite/results.json"
     if [ -d "$tmp/candidates" ]; then
@@ -246,10 +274,16 @@ disk() {
         else tell "disk full: what ${small##*/} prints" "$(head -c 300 "$tmp/err")"; fi
     done
     if bwrap --ro-bind / / --dev /dev true 2>/dev/null; then
-        local ro=(bwrap --ro-bind / / --dev /dev)
+        local ro=(env LLVM_PROFILE_FILE=/dev/null bwrap --ro-bind / / --dev /dev)
         refused "read-only directory: a picture" "n.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$pathtracer" -q -r 8 8 -f "$dir/n.exr" "$scene"
         refused "read-only directory: merge" "m.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
         refused "read-only directory: a validation" "Read-only" "$dir" "${ro[@]}" "$assay" validate -q --only 12_point_plane --out "$dir/v"
+        refused "read-only directory: export" "s.pov: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" export -o "$dir/s.pov" "$scene"
+        refused "read-only directory: the page" "index.html: cannot write: Read-only" "$tmp/straight_suite" "${ro[@]}" "$assay" report "$tmp/straight_suite/results.json"
+        if [ -d "$tmp/candidates" ]; then
+            refused "read-only directory: a golden update" "Read-only" "$tmp/first" \
+                "${ro[@]}" "$assay" golden approve --from "$tmp/candidates" --golden "$tmp/first" 41_cornell/cycles
+        fi
         refused "read-only directory: grading" "no temporary directory\|Read-only" "$dir" "${ro[@]}" "$assay" grade -q -o "$dir/g" "$tmp/quick.rubric" "$tmp/subs/s1"
     else
         echo "ok bubblewrap is not here: no read-only directory"
@@ -291,6 +325,7 @@ no_memory() { # NAME OUTPUT COMMAND...
 
 memory() {
     mkdir -p "$tmp/memory"
+    [ -e "$tmp/share1.exr" ] || render_shares
     gcc -O1 -shared -fPIC -o "$tmp/no_memory.so" tests/faults/no_memory.c -ldl || tell "no memory" "cannot build it"
     no_memory "render" "$tmp/memory/x.png.state" "$pathtracer" -q -r 8 8 -s 2 -t 1 --aov --keep-state -f "$tmp/memory/x.png" -f "$tmp/memory/x.exr" "$scene"
     no_memory "merge" "$tmp/memory/m.exr" "$assay" merge "$tmp/memory/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
@@ -316,12 +351,8 @@ clock() {
     tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
 }
 
-kill_renders
-kill_golden
-kill_grading
-kill_report
-kill_validation
-disk
-clock
-memory
+for part in "$@"; do
+    hits=0
+    $part
+done
 [ $failures -eq 0 ]

@@ -22,10 +22,15 @@ subs=$work/submissions
 rubric=$work/rubric/cs184.rubric
 rm -rf "$subs" "$work/rubric"
 mkdir -p "$subs" "$work/rubric" "$work/told"
-tests/mutants.sh --build-only "$build" "${bugs[@]}" cosine_missing beckmann_lambda || exit 1
-cp tools/rubrics/*.dae tools/rubrics/*.exr "$work/rubric"
-# As the course's program would: lights are sampled alone. Programs that lose points render the views of assay diagnose.
-sed "s/^command {program} /&--direct light /; s/^# diagnose /diagnose /" tools/rubrics/cs184.rubric >"$rubric"
+stale=()
+for bug in "${bugs[@]}" cosine_missing beckmann_lambda; do
+    mutant=$build/mutants/$bug/mutant
+    [ -x "$mutant" ] && [ -z "$(find renderer tests/mutants -name '*.[chp]*' -newer "$mutant" | head -1)" ] || stale+=("$bug")
+done
+[ ${#stale[@]} -eq 0 ] || tests/mutants.sh --build-only "$build" "${stale[@]}" || exit 1
+cp -R tools/rubrics/*.dae tools/rubrics/*.exr tools/rubrics/cs184-bugs "$work/rubric"
+# As the course's program would: lights are sampled alone. Bugs are named by the 8-bit pictures alone.
+sed "s/^command {program} /&--direct light /" tools/rubrics/cs184.rubric >"$rubric"
 
 # sub NAME WHAT: a program from stdin, described for the table
 sub() {
@@ -89,10 +94,15 @@ if [ -z "$few" ]; then
     pictures copies_reference 11400714819323198485 0 && echo "hands in the references" >"$work/told/copies_reference.txt"
 fi
 
+before=''
+[ -e "$work/grades" ] && before=', less what had been graded before'
 started=$SECONDS
-"$build/assay" grade -j 2 -o "$work/grades" "$rubric" "$subs"/*
+TIMEFORMAT='%U %S'
+{ time "$build/assay" grade -j2 -o "$work/grades" "$rubric" "$subs"/* 2>&3; } 3>&2 2>"$work/time"
 status=$?
-echo "$(((SECONDS - started + 30) / 60)) minutes, less what was graded before" >&2
+took="$(((SECONDS - started + 30) / 60)) minutes on $(nproc) processors, load average $(cut -d ' ' -f 2 /proc/loadavg), \
+$(awk '{ printf "%.0f", $1 + $2 }' "$work/time") CPU seconds besides those of the submissions' programs$before"
+echo "$took" >&2
 [ $status -eq 3 ] && exit 3
 if [ -n "$few" ]; then
     exec "$build/tests/grade_table" "$work/grades/grades.json" tests/mutants "$work/told"
@@ -103,8 +113,9 @@ mkdir -p tests/grading
 # A class of fifty, graded
 
 Each submission is a renderer with a known bug of tests/mutants, or one of those that try something else. \`make grade-show\` builds them,
-grades them by tools/rubrics/cs184.rubric (137 points; 8-bit PNG; \`assay grade -j 2\`) and writes this page. Bold: less than all of the part's points.
-"In its part": whether points were lost in the part of the assignment in which the bug was made. "Named": what the student is told it looks like.
+grades them by tools/rubrics/cs184.rubric (137 points; \`assay grade -j2\`) and writes this page. Bold: less than all of the part's points.
+"In its part": whether points were lost in the part of the assignment in which the bug was made. "Named": what the student is told it looks like, by these 8-bit
+pictures alone. The batch took $took.
 
 EOF
     "$build/tests/grade_table" "$work/grades/grades.json" tests/mutants "$work/told"

@@ -97,6 +97,18 @@ static void print_names(const json_t *grade, const char *id, bool known)
                                                                    : "different, cause unknown");
 }
 
+static bool has_right_picture(const json_t *grade)
+{
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        if (strcmp(text_of(c, "kind"), "equal") == 0 && member_number(c, "share") == 1)
+            return true;
+    }
+    return false;
+}
+
 int main(int argc, char **argv)
 {
     json_t *grades = argc == 4 ? json_load_file(argv[1], 0, NULL) : NULL, *g, *p;
@@ -146,6 +158,14 @@ int main(int argc, char **argv)
         "\n%d of %d known bugs lost points, %d of them in the bug's part; of %d that were given a name %d were given theirs. "
         "Right programs that lost points: %d. The pictures took %.0f CPU seconds.\n",
         lost, bugs, there, names, named, wrong, cpu_s);
+    fputs("Of those with a picture that costs no points these have noise like nobody else's:",
+          stdout);
+    json_array_foreach(grades, i, g)
+    {
+        if (has_right_picture(g) && json_array_size(json_object_get(g, "alike")) == 0)
+            printf(" %s", text_of(g, "id"));
+    }
+    puts(".");
     json_decref(grades);
     return wrong > 0 || bad > 0;
 }

@@ -41,6 +41,7 @@ again "stopped by --error" --error 60% -s 200 $scene
 again "an environment" -s 4 -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae
 again "hemisphere, a lens" -s 4 -H -b 0.1 -d 3 $scene
 cp $scene "$tmp/it's a scene.dae"
+again "a command of 15 KB" $(yes -- '-s 2' | head -n 3000) $scene
 again "a name that needs quotes" -s 2 "$tmp/it's a scene.dae"
 timeout --preserve-status -s INT 1 "$pathtracer" -q -r 24 16 -s 1000000 -f "$tmp/r.exr" $scene >/dev/null 2>&1
 n=$(sed -n 's/.*after \([0-9]*\) of.*/\1/p' <("$pathtracer" -q -r 24 16 -s 1 --resume "$tmp/r.exr" -f "$tmp/r.exr" $scene 2>&1) | head -n 1)

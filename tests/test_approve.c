@@ -165,6 +165,28 @@ static void a_new_one_has_to_be_called_new(void **state)
     assert_accepted(f, 2, "IDENTICAL");
 }
 
+/* A kill before the image's last rename: the manifest is the new one, so nothing is left to approve, but the image is not yet
+ * in its place. */
+static void an_interrupted_approval_is_ended(void **state)
+{
+    struct fixture *f = *state;
+    char exr[256], next[sizeof exr + 8], old[65], now[65];
+    snprintf(exr, sizeof exr, "%s/12_plane/cycles.exr", f->golden);
+    snprintf(next, sizeof next, "%s.next", exr);
+    render(f, f->from, 1, 2);
+    render(f, f->golden, 1, 2);
+    hash(f->golden, "cycles.exr", old);
+    assert_int_equal(rename(exr, next), 0);
+    FILE *stale = fopen(exr, "w");
+    assert_non_null(stale);
+    fclose(stale);
+    assert_int_equal(run(f), APPROVE_UNCHANGED);
+    hash(f->golden, "cycles.exr", now);
+    assert_string_equal(now, old);
+    hash(f->golden, "cycles.exr.next", now);
+    assert_string_equal(now, "none");
+}
+
 static void other_seeds_are_accepted_with_their_effect(void **state)
 {
     struct fixture *f = *state;
@@ -352,6 +374,7 @@ int main(void)
 #define WITH_FILES(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
         WITH_FILES(a_new_one_has_to_be_called_new),
+        WITH_FILES(an_interrupted_approval_is_ended),
         WITH_FILES(other_seeds_are_accepted_with_their_effect),
         WITH_FILES(a_difference_needs_a_reason),
         WITH_FILES(an_inconclusive_one_is_refused_whatever_is_said),

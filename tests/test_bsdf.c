@@ -351,6 +351,27 @@ static void facets_cover_the_surface(void **state)
     assert_true(fabs(over_all(&v, &f) / v.cos_o - 1) > 3e-2);
 }
 
+/* On purpose: its shadowing with that masking, by its text G = 1/(1 + lambda + lambda) in double precision. */
+static void starter_code_shadows_as_its_header_says(void **state)
+{
+    (void)state;
+    for (int i = 0; i < ANGLES; i++)
+        for (int o = 0; o < ANGLES; o++) {
+            double ci = cos(angle[i] * DEGREE), co = cos(angle[o] * DEGREE);
+            if (ci > 0.9999 || co > 0.9999)
+                continue; /* lambda is 0 there, or 0/0 */
+            vec3 wi = v3((float)sqrt(1 - ci * ci), 0, (float)ci),
+                 wo = v3(0, (float)sqrt(1 - co * co), (float)co);
+            double g = (double)microfacet_g2(MICROFACET_BECKMANN_STARTER, 0.5f, false, wo, wi);
+            double text =
+                1 / (1 + lambda_of_the_assignment(0.5, co) + lambda_of_the_assignment(0.5, ci));
+            assert_true(fabs(g / text - 1) < 1e-4);
+            double right = (double)microfacet_g2(MICROFACET_BECKMANN, 0.5f, false, wo, wi);
+            if (angle[i] > 60 || angle[o] > 60)
+                assert_true(g > right * 1.02);
+        }
+}
+
 /* Every corner of what the sampler can return, down to directions in the surface itself. */
 static void nothing_becomes_nan(void **state)
 {
@@ -563,6 +584,7 @@ int main(void)
         cmocka_unit_test(albedo_in_closed_form),
         cmocka_unit_test(values_and_reciprocity),
         cmocka_unit_test(facets_cover_the_surface),
+        cmocka_unit_test(starter_code_shadows_as_its_header_says),
         cmocka_unit_test(nothing_becomes_nan),
         cmocka_unit_test(dielectric_by_complex_amplitudes),
         cmocka_unit_test(dielectric_in_closed_form),

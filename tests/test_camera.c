@@ -89,11 +89,82 @@ static void lens_far_from_the_origin(void **state)
     }
 }
 
+static bool near(vec3 a, double x, double y, double z)
+{
+    return fabs((double)a.x - x) < 1e-5 && fabs((double)a.y - y) < 1e-5 &&
+           fabs((double)a.z - z) < 1e-5;
+}
+
+/* A box of 4 x 4 x 7 about (1, 2, 3): its diagonal is 9, so the eye stands 13.5 from (1, 2, 3) towards where the file's camera
+ * looks from, whatever place the file gives it. The angle is the vertical one of 35 degrees at 800 x 600 where the file's angles
+ * are those of a wider shape, else such that the horizontal one fits; fewer pixels see less. */
+static void the_assignment_frames_the_scene(void **state)
+{
+    (void)state;
+    const double degree = acos(-1) / 180;
+    struct scene s = {.dialect = DIALECT_CGL,
+                      .frame_min = {-1, 0, -0.5f},
+                      .frame_max = {3, 4, 6.5f},
+                      .camera = {.present = true, .eye = {9, 9, 9}, .backward = {0, 3, 4}}};
+    struct camera c;
+    struct err e;
+    s.camera.hfov = (float)(40 * degree);
+    s.camera.vfov = (float)(35 * degree);
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, 2 + 13.5 * 0.6, 3 + 13.5 * 0.8));
+    assert_true(near(c.backward, 0, 0.6, 0.8) && near(c.right, 1, 0, 0) &&
+                near(c.up, 0, 0.8, -0.6));
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree)) < 1e-6);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    /* 400 x 300 crops to the middle, unless the whole is asked for. */
+    assert_true(camera_init(&c, &s, 400, 300, &e));
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree) / 2) < 1e-6);
+    camera_show_whole(&c);
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree)) < 1e-6);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    /* A shape of its own: as much as fits. */
+    assert_true(camera_init(&c, &s, 400, 600, &e));
+    camera_show_whole(&c);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    assert_true(fabs((double)c.tan_v - 1.5 * (double)c.tan_h) < 1e-6);
+    s.camera.hfov = (float)(90 * degree);
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(fabs((double)c.tan_h - 1) < 1e-6 && fabs((double)c.tan_v - 0.75) < 1e-6);
+    /* From straight above, north is up; from below, too. */
+    s.camera.backward = (vec3){0, 2, 0};
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, 15.5, 3) && near(c.up, 0, 0, -1) && near(c.right, 1, 0, 0));
+    s.camera.backward = (vec3){0, -2, 0};
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, -11.5, 3) && near(c.up, 0, 0, 1) && near(c.right, 1, 0, 0));
+}
+
+/* COLLADA: the file's horizontal angle, or its vertical one, and square pixels. */
+static void collada_keeps_the_angle_of_the_file(void **state)
+{
+    (void)state;
+    struct scene s = {.dialect = DIALECT_COLLADA, .camera = {.present = true, .vfov = 1}};
+    struct camera c;
+    struct err e = {""};
+    assert_true(camera_init(&c, &s, 300, 200, &e));
+    assert_true(fabs((double)c.tan_v - tan(0.5)) < 1e-6 &&
+                fabs((double)c.tan_h - 1.5 * tan(0.5)) < 1e-6);
+    s.camera.hfov = 1;
+    assert_true(camera_init(&c, &s, 300, 200, &e));
+    assert_true(fabs((double)c.tan_h - tan(0.5)) < 1e-6 &&
+                fabs((double)c.tan_v - tan(0.5) / 1.5) < 1e-6);
+    s.camera.present = false;
+    assert_false(camera_init(&c, &s, 300, 200, &e));
+    assert_non_null(strstr(e.msg, "no camera"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refuses_what_has_no_rays),
         cmocka_unit_test(lens_far_from_the_origin),
+        cmocka_unit_test(the_assignment_frames_the_scene),
+        cmocka_unit_test(collada_keeps_the_angle_of_the_file),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

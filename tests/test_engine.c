@@ -9,6 +9,7 @@
 #include "../reference/features.h"
 #include "../reference/job.h"
 #include "../renderer/fs.h"
+#include "../renderer/shell_words.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -440,6 +441,15 @@ static void replicates_are_folded(void **state)
         assert_int_equal(json_integer_value(json_array_get(seeds, (size_t)k)),
                          replicate_seed(SEED, k));
     assert_int_equal(strlen(json_string_value(json_object_get(manifest, "binary_sha256"))), 64);
+    /* One of the words has blanks. */
+    int num;
+    char **word = shell_split(json_string_value(json_object_get(manifest, "command")), &num, &e);
+    assert_non_null(word);
+    const json_t *command = json_object_get(en.json, "command");
+    assert_int_equal(num, json_array_size(command));
+    for (int i = 0; i < num; i++)
+        assert_string_equal(word[i], json_string_value(json_array_get(command, (size_t)i)));
+    free(word);
     /* {spp} {depth} {width} {height} {threads} */
     char args[64] = "", want[64];
     FILE *f = fopen(path_of("args"), "r");

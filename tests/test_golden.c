@@ -230,6 +230,22 @@ static void a_killed_update_leaves_the_old_pair_or_the_new(void **state)
     struct err e;
     assert_true(moments_write(next, &f->m, NULL, 0, &e));
     assert_first_value(f, 5.0 / 3 + 2);
+    /* No further update comes: what was interrupted is done, and nothing where nothing was. */
+    assert_int_equal(rename(f->exr, old), 0);
+    f->m.mean[0] += 1;
+    write_golden(f);
+    assert_int_equal(rename(f->exr, next), 0);
+    assert_int_equal(rename(old, f->exr), 0);
+    assert_true(golden_settle(f->dir, "12_plane", "cycles", &e));
+    assert_true(access(next, F_OK) != 0);
+    assert_first_value(f, 5.0 / 3 + 3);
+    f->m.mean[0] += 1;
+    assert_true(moments_write(next, &f->m, NULL, 0, &e));
+    assert_true(golden_settle(f->dir, "12_plane", "cycles", &e));
+    assert_true(access(next, F_OK) != 0);
+    assert_first_value(f, 5.0 / 3 + 3);
+    assert_true(golden_settle(f->dir, "12_plane", "cycles", &e));
+    assert_true(moments_write(next, &f->m, NULL, 0, &e));
     assert_true(golden_remove(f->dir, "12_plane", "cycles", &e));
     assert_true(access(next, F_OK) != 0);
 }

@@ -210,6 +210,54 @@ static void points_follow_the_interval(void **state)
     assert_true(score_chance(&wide, &between) == 1);
 }
 
+/* What is printed is the chance itself: 20 000 further runs, normal around the estimate, for each place of it. H0: they get
+ * other points as often as it says; 5 standard deviations of that count (binomial), over 60 places, alpha below 1e-4. */
+static void the_chance_is_that_of_another_run(void **state)
+{
+    (void)state;
+    enum { RUNS = 20000 };
+    const struct margin m = {0.02, 0.06, true};
+    int places = 0, likely = 0;
+    for (double at = 0; at < 0.12; at += 0.002) {
+        const double sd = 0.004, half = 0.01;
+        const struct interval i = {at, at - half, at + half, sd};
+        double share = score_share(&m, &i), chance = score_chance(&m, &i);
+        if (share > 0 && share < 1)
+            continue; /* where every run has others */
+        int other = 0;
+        for (int k = 0; k < RUNS; k++) {
+            double v = at + gsl_ran_gaussian(rng, sd);
+            const struct interval again = {v, v - half, v + half, sd};
+            other += score_share(&m, &again) != share;
+        }
+        if (fabs(other - RUNS * chance) > 5 * sqrt(RUNS * chance * (1 - chance)) + 1)
+            fail_msg("at %g: %d of %d runs have other points, %g is said", at, other, RUNS, chance);
+        places++;
+        likely += chance > 0.1;
+    }
+    assert_true(places >= 30 && likely >= 3);
+}
+
+/* Of a right program: below 1e-4, printed, and no point is lost. Control: one that is off by as much as costs nothing. */
+static void a_right_program_keeps_its_score(void **state)
+{
+    (void)state;
+    enum { RUNS = 100 };
+    double most = 0;
+    for (int k = 0; k < RUNS; k++) {
+        struct result r = equal(&none, SPP, 1e-5);
+        assert_true(r.share == 1);
+        most = fmax(most, r.chance);
+        result_free(&r);
+    }
+    printf("largest chance of other points, of %d right pictures: %.2g\n", RUNS, most);
+    assert_true(most < 1e-4);
+    const struct bug near = {.scale = 1.03, .square = 1, .noise = 1};
+    struct result r = equal(&near, SPP, 1e-5);
+    assert_true(r.chance > 1e-4);
+    result_free(&r);
+}
+
 /* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 pictures; by
  * chance more than 34 have a probability below 1e-3 (binomial). Control: 3 % too bright. */
 static void a_right_picture_keeps_its_points(void **state)
@@ -543,6 +591,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_follow_the_interval),
+        cmocka_unit_test(the_chance_is_that_of_another_run),
+        cmocka_unit_test(a_right_program_keeps_its_score),
         cmocka_unit_test(a_right_picture_keeps_its_points),
         cmocka_unit_test(noise_is_not_bias),
         cmocka_unit_test(bugs_cost_points),

@@ -117,7 +117,7 @@ static void the_shipped_ones_are_right(void **state)
                                         "tools/rubrics/template.rubric",
                                         "tools/rubrics/deviations.rubric"};
     static const double points[] = {137, 10, 10};
-    static const int sets[] = {2, 1, 8};
+    static const int sets[] = {4, 1, 8};
     struct err e;
     for (int i = 0; i < 3; i++) {
         assert_true(rubric_read(paths[i], &suite, rubric, &mistakes, &e));
@@ -150,6 +150,9 @@ static void each_mistake_is_named_with_its_line(void **state)
         {1, 1, "rubric a\noutput x.jpg", "no file name"},
         {1, 1, "rubric a\nprogram /bin/sh", "not inside"},
         {1, 1, "rubric a\ntotal 5", "add up to 4"},
+        {1, 1, "rubric a\nbugs nowhere", "no directory 'nowhere'"},
+        {1, 2, "rubric a\nbugs a/b", "no name"},
+        {1, 3, "rubric a\nbugs a\nbugs b", "a second 'bugs'"},
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
         {1, 2, "rubric a\nrubric b", "second"},

@@ -130,21 +130,29 @@ static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
     return render_ours(r, &ours, "", opt, out, e);
 }
 
-/* With the student's options and samples: how many of them each pixel takes. */
+bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
+                   const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    struct rubric_picture ours = r->picture[picture];
+    char all[sizeof ours.reference_options + sizeof r->set->words + 64];
+    /* By the reference's estimator: its noise decides how many samples adaptive sampling takes. */
+    bool has =
+        as_asked && ours.reference == REFERENCE_OURS && strcmp(ours.reference_options, "none") != 0;
+    snprintf(all, sizeof all, "%s %s", has ? ours.reference_options : "", words);
+    ours.reference_spp = spp;
+    if (as_asked)
+        ours.reference_options[0] = '\0';
+    return render_ours(r, &ours, all, opt, out, e);
+}
+
+/* How many samples each pixel takes, where a check wants to know. */
 static bool as_asked(const struct rubric *r, int picture, const char *words,
                      const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    struct rubric_picture ours = r->picture[picture];
-    char all[sizeof ours.reference_options + sizeof r->set->words];
     bool needed = false;
     for (int i = 0; i < r->num_checks; i++)
         needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
-    /* By the reference's estimator: its noise decides how many samples there are. */
-    bool has = ours.reference == REFERENCE_OURS && strcmp(ours.reference_options, "none") != 0;
-    snprintf(all, sizeof all, "%s %s", has ? ours.reference_options : "", words);
-    ours.reference_spp = ours.spp;
-    ours.reference_options[0] = '\0';
-    return !needed || render_ours(r, &ours, all, opt, out, e);
+    return !needed || answer_render(r, picture, true, words, r->picture[picture].spp, opt, out, e);
 }
 
 /* Does our renderer make another picture with these words? Told by one sample a pixel, of the same seed. */

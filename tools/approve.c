@@ -188,6 +188,8 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
 {
     struct golden candidate, stored;
     enum approval done = APPROVE_IMPOSSIBLE;
+    if (!golden_settle(opt->golden_dir, scene->name, ref->engine, e))
+        return done;
     golden_inspect(opt->from_dir, scene, ref, &candidate);
     golden_inspect(opt->golden_dir, scene, ref, &stored);
     fprintf(out, "%s/%s\n", scene->name, ref->engine);

@@ -1,8 +1,11 @@
 #include "claim.h"
 
+#include "../renderer/shell_words.h"
 #include "../renderer/version.h"
 
+#include <assert.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -138,18 +141,19 @@ static void describe_machine(char *text, size_t size)
 
 json_t *results_new(int argc, char **argv, double alpha)
 {
-    char command[4096] = "assay", date[32], machine[192];
-    size_t n = strlen(command);
-    for (int i = 0; i < argc && n < sizeof command - 1; i++) {
-        int added = snprintf(command + n, sizeof command - n, " %s", argv[i]);
-        n += added > 0 ? (size_t)added : 0;
-    }
+    char date[32], machine[192];
+    assert(argv[argc] == NULL);
+    char *command = shell_join("assay", (const char *const *)argv);
+    if (command == NULL)
+        return NULL;
     time_t now = time(NULL);
     struct tm utc;
     gmtime_r(&now, &utc);
     strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
     describe_machine(machine, sizeof machine);
-    return json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command,
-                     "version", assay_version, "date", date, "machine", machine, "alpha", alpha,
-                     "claims");
+    json_t *root =
+        json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command, "version",
+                  assay_version, "date", date, "machine", machine, "alpha", alpha, "claims");
+    free(command);
+    return root;
 }

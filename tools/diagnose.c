@@ -466,7 +466,9 @@ bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
         ok = check(&clue[k], e);
     struct candidate *all = calloc((size_t)c->num_bugs, sizeof *all);
     ok = ok && (all != NULL || err_set(e, "out of memory")) && tally_correct(&h, e) &&
-         gate(clue, num_clues, opt->alpha, &differs, out, e);
+         (opt->by_likelihood || gate(clue, num_clues, opt->alpha, &differs, out, e));
+    for (int k = 0; ok && k < num_clues; k++)
+        out->log_likelihood += h.correct[k].log_likelihood;
     int num = ok ? rank_full(&h, opt, all) : 0;
     if (ok && num > 0) {
         out->largest_lead = all[0].log_likelihood;

@@ -18,6 +18,9 @@ struct diagnose_options {
     double alpha; /* bounds the chance that a correct renderer is accused of anything */
     const char
         *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
+    bool
+        by_likelihood; /* no other test says that something is wrong, as for pictures that state no error: a bug has
+                         * to lead by diagnose_bound() */
 };
 
 enum finding { FINDING_CORRECT, FINDING_BUG, FINDING_UNKNOWN };
@@ -46,8 +49,10 @@ struct diagnosis {
     struct candidate candidate[DIAGNOSE_CANDIDATES]; /* most likely first; none if CORRECT */
     int num_candidates;
     double largest_lead; /* of any bug at full strength over "correct", natural logarithm */
-    int num_named;       /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
-    double probability;  /* of those together, among all known bugs, equally likely beforehand */
+    double
+        log_likelihood; /* of "correct": to hold catalogues of the same cells against each other */
+    int num_named;      /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
+    double probability; /* of those together, among all known bugs, equally likely beforehand */
 };
 
 /* clues: at least one, of views of c, each seen at most once and independent of each other. */

@@ -24,10 +24,12 @@ static uint64_t picture_seed(uint64_t seed, int picture)
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
-    char rubric[65], text[1024];
-    if (!sha256_file(job->rubric->path, rubric, e))
+    char rubric[65], bugs[65] = "", path[MAX_PATH], text[1024];
+    snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
+    if (!sha256_file(job->rubric->path, rubric, e) ||
+        (job->bugs != NULL && !sha256_file(path, bugs, e)))
         return false;
-    snprintf(text, sizeof text, "%s %s %s %llu %.17g %d", assay_version, rubric, s->sha256,
+    snprintf(text, sizeof text, "%s %s %s %s %llu %.17g %d", assay_version, rubric, bugs, s->sha256,
              (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
     sha256_text(text, key);
     return true;
@@ -117,21 +119,21 @@ static json_t *picture_json(const struct rubric_picture *p, const struct made *m
                      s->mean != NULL ? s->sha256 : NULL);
 }
 
-static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t *grade,
+static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t *grade, int *set,
                        struct err *e)
 {
     const struct rubric *r = job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
-    double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, cpu_s = 0;
+    double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
     struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
-    int set = 0;
     bool ok = (result != NULL || err_set(e, "out of memory")) &&
-              grading_all(r, job->answers, h, job->alpha, result, &set, e);
+              grading_all(r, job->answers, h, job->alpha, result, set, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;
         of[r->check[i].part] += r->check[i].points;
         points += r->check[i].points * result[i].share;
+        chance = fmin(1, chance + result[i].chance);
         result_free(&result[i]);
     }
     free(result);
@@ -146,28 +148,59 @@ static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t 
     }
     json_object_set_new(grade, "points", json_real(points));
     json_object_set_new(grade, "of", json_real(rubric_points(r)));
+    json_object_set_new(grade, "chance", json_real(chance));
     json_object_set_new(grade, "cpu_s", json_real(cpu_s));
-    json_object_set_new(grade, "accepted", json_string(r->set[set].name));
+    json_object_set_new(grade, "accepted", json_string(r->set[*set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
     json_object_set_new(grade, "pictures", pictures);
     return ok;
 }
 
+/* A picture that is not of the student's making looks like no bug. */
+static bool is_flagged(const json_t *grade)
+{
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        if (json_string_length(json_object_get(c, "flag")) > 0)
+            return true;
+    }
+    return false;
+}
+
+/* By the pictures that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
+static json_t *name_bug(const struct grade_job *job, const struct submission *s,
+                        const struct handed_in *h, int set, const char *work)
+{
+    json_t *by_pictures =
+        job->bugs != NULL
+            ? diagnosis_by_pictures(job->bugs, job->rubric, job->answers, h, set, job->alpha)
+            : json_null();
+    if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
+        json_array_size(json_object_get(by_pictures, "named")) == 1)
+        return by_pictures;
+    json_t *by_views =
+        diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed, job->threads, job->alpha);
+    size_t views = json_array_size(json_object_get(by_views, "named")),
+           pictures = json_array_size(json_object_get(by_pictures, "named"));
+    bool better = json_is_null(by_pictures) || (views > 0 && (pictures == 0 || views < pictures));
+    json_decref(better ? by_pictures : by_views);
+    return better ? by_views : by_pictures;
+}
+
 static bool grade_made(const struct grade_job *job, const struct submission *s, const char *work,
                        const char *out, json_t *grade, struct err *e)
 {
     struct handed_in *h = calloc(1, sizeof *h);
+    int set = 0;
     bool ok = h != NULL || err_set(e, "out of memory");
-    ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, e);
+    ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
     bool lost =
         ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
     json_object_set_new(grade, "diagnosis",
-                        lost && job->diagnosis != NULL && s->kind != SUBMISSION_IMAGES &&
-                                s->why[0] == '\0'
-                            ? diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed,
-                                           job->threads, job->alpha)
-                            : json_null());
+                        lost && !is_flagged(grade) ? name_bug(job, s, h, set, work) : json_null());
     for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
         student_free(&h->picture[i]);
     free(h);

@@ -16,7 +16,8 @@ struct grade_job {
     const char *const *path; /* of the submissions */
     int num, jobs, threads;
     double alpha;                            /* of one check */
-    const struct grade_diagnosis *diagnosis; /* NULL: bugs are not named */
+    const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the pictures */
+    const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
     uint64_t seed;
     bool again; /* also those that have been graded already */
     void (*done)(void *ctx, int num, const char *id,
@@ -25,9 +26,10 @@ struct grade_job {
 };
 
 /* grade.json:
- *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, submission, seed, alpha, version: while it
+ *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
  *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
  *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
+ *     "chance": of any check's points being others in another run, at most (the sum of theirs),
  *     "cpu_s": , "accepted": "light_pdf" (deviations that are not the student's fault, with which it was graded) | "",
  *     "parts": [{"number": , "title": , "points": , "of": }],
  *     "checks": [{"kind": "equal", "part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,

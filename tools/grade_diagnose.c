@@ -103,6 +103,26 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
                      named);
 }
 
+json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
+                              const struct answers *a, const struct handed_in *h, int set,
+                              double alpha)
+{
+    struct diagnosis found;
+    struct err e;
+    int with, pictures = 0;
+    for (int i = 0; i < r->num_pictures; i++)
+        pictures += b->view[0][i] >= 0 && h->picture[i].mean != NULL;
+    if (pictures == 0)
+        return json_null();
+    if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, &found, &with, &e))
+        return json_pack("{ss}", "error", e.msg);
+    if (found.finding == FINDING_CORRECT)
+        found.finding = FINDING_UNKNOWN;
+    json_t *json = finding_json(&b->catalogue, &found);
+    json_object_set_new(json, "with", json_string(r->set[with].name));
+    return json;
+}
+
 json_t *diagnosis_of(const struct grade_diagnosis *d, const struct sandbox *box,
                      const struct submission *s, const char *work, uint64_t seed, int threads,
                      double alpha)

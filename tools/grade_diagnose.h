@@ -1,10 +1,9 @@
-/* The bug's name in a student's feedback: the views of `assay diagnose`, rendered by a submission in the sandbox. For
- * programs that can write our moments (rubric.h: diagnose); others get no name. */
+/* The bug's name in a student's feedback: by the pictures that were graded (rubric_bugs.h), and by the views of `assay
+ * diagnose`, rendered by a submission in the sandbox, for programs that can write our moments (rubric.h: diagnose). */
 #ifndef ASSAY_GRADE_DIAGNOSE_H
 #define ASSAY_GRADE_DIAGNOSE_H
 
-#include "catalogue.h"
-#include "submission.h"
+#include "rubric_bugs.h"
 
 #include <jansson.h>
 
@@ -20,6 +19,12 @@ bool diagnosis_open(const struct rubric *r, const char *catalogue_dir, const str
                     const char *stage, struct grade_diagnosis *out, struct err *e)
     __attribute__((warn_unused_result));
 void diagnosis_close(struct grade_diagnosis *d);
+
+/* By the pictures, graded with the deviations of `set`, in the form below; "correct" is never said of pictures that lost points:
+ * "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no picture. */
+json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
+                              const struct answers *a, const struct handed_in *h, int set,
+                              double alpha);
 
 /* { "finding": "correct" | "bug" | "unknown", "gate": "one line",
  *   "named": [{"name": , "bug": "one line", "where": "place in the assignment"}] }   likeliest first

@@ -85,6 +85,12 @@ static void table(FILE *f, const json_t *grades)
             fputs(k > 0 ? " or " : "", f);
             html_text(f, grade_text(p, "name"));
         }
+        /* Of other deviations than those it was graded with: staff may want to know. */
+        const char *with = grade_text(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, grade_text(g, "accepted")) != 0) {
+            fputs(" on top of ", f);
+            html_text(f, with);
+        }
         fputs("</td><td>", f);
         html_text(f, grade_text(g, "trouble"));
         html_text(f, grade_text(g, "wrong"));
@@ -209,6 +215,60 @@ static void look_alikes(FILE *f, const json_t *grades)
         fputs("</ul>\n", f);
 }
 
+/* Adds to `group` all that are like i, and what they are like; group[k]: 0 not yet seen, else a number from 1 on. */
+static void join_group(const json_t *grades, size_t i, int number, int *group)
+{
+    size_t k, m;
+    json_t *like, *other;
+    group[i] = number;
+    json_array_foreach(json_object_get(json_array_get(grades, i), "alike"), k, like)
+    {
+        json_array_foreach(grades, m, other)
+        {
+            if (group[m] == 0 && strcmp(grade_text(other, "id"), grade_text(like, "id")) == 0)
+                join_group(grades, m, number, group);
+        }
+    }
+}
+
+static void list_group(FILE *f, const json_t *grades, int number, const int *group)
+{
+    size_t i, members = 0;
+    json_t *g;
+    fputs("<li>", f);
+    json_array_foreach(grades, i, g)
+    {
+        if (group[i] != number)
+            continue;
+        fputs(members++ > 0 ? ", " : "", f);
+        link_to(f, grade_text(g, "id"));
+    }
+    fputs("</li>\n", f);
+}
+
+/* grade_alike.h */
+static void same_noise(FILE *f, const json_t *grades)
+{
+    int *group = calloc(json_array_size(grades) + 1, sizeof *group), number = 0;
+    size_t i;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        if (group == NULL || group[i] > 0 || json_array_size(json_object_get(g, "alike")) == 0)
+            continue;
+        if (number == 0)
+            fputs(
+                "<h2>The same noise</h2><p>Pictures that cost no points and whose errors go together more than those of programs "
+                "that draw numbers of their own: one false alarm in a thousand classes. No proof of anything: the same fixed seed in "
+                "what all were given does it too. Each line is a chain of likenesses.</p><ul>\n",
+                f);
+        join_group(grades, i, ++number, group);
+        list_group(f, grades, number, group);
+    }
+    fputs(number > 0 ? "</ul>\n" : "", f);
+    free(group);
+}
+
 void grade_overview(FILE *f, const json_t *grades)
 {
     struct tally *t = calloc(json_array_size(grades) + 1, sizeof *t);
@@ -222,6 +282,7 @@ void grade_overview(FILE *f, const json_t *grades)
         slowest(f, grades, t);
     }
     look_alikes(f, grades);
+    same_noise(f, grades);
     table(f, grades);
     free(t);
 }

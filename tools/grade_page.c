@@ -112,19 +112,18 @@ static bool show_picture(FILE *f, const char *path, const char *name, const json
     return ok;
 }
 
-/* The chance that another run gets other points. */
-static void show_chance(FILE *f, const json_t *c)
+/* The chance that another run gets other points, of a check or of all of them. */
+static void show_chance(FILE *f, double chance, bool moves, const char *here)
 {
-    double chance = member_number(c, "chance"), share = member_number(c, "share");
     fputs("<p class=\"where\">", f);
-    if (share > 0 && share < 1)
+    if (moves)
         fputs("Between none and all, points move a little with the noise of each run.", f);
     else if (chance >= 1e-4)
-        fprintf(f,
-                "Another run of the same program gets other points here with a chance of %.2g %%.",
-                100 * chance);
+        fprintf(f, "Another run of the same program gets other points%s with a chance of %.2g %%.",
+                here, 100 * chance);
     else
-        fputs("Another run of the same program gets the same points here, but for 1 in 10 000.", f);
+        fprintf(f, "Another run of the same program gets the same points%s, but for 1 in 10 000.",
+                here);
     fputs("</p>\n", f);
 }
 
@@ -153,7 +152,8 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
     paragraph(f,
               "Explained by what you were given, no points lost for it:", grade_text(c, "accepted"),
               "");
-    show_chance(f, c);
+    double share = member_number(c, "share");
+    show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
     const json_t *p = picture_of(grade, grade_text(c, "picture"));
     bool ok = true;
     if (!full) {
@@ -212,6 +212,8 @@ bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
             member_number(grade, "of"));
     html_text(f, grade_text(grade, "rubric"));
     fputs("</p>\n", f);
+    if (grade_text(grade, "trouble")[0] == '\0' && strcmp(grade_text(grade, "kind"), "images") != 0)
+        show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
     paragraph(f, "Could not be graded:", grade_text(grade, "trouble"), "lost");
     paragraph(f, "All of it:", grade_text(grade, "wrong"), "lost");
     show_bug(f, json_object_get(grade, "diagnosis"));

@@ -28,6 +28,12 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
                   struct err *e) __attribute__((warn_unused_result));
 void answers_free(struct answers *a);
 
+/* One picture by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
+ * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
+bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
+                   const struct answer_options *opt, struct moments *out, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
  * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
  * half its width is judged too: 1 up to margin.none, 0 from twice that; the smaller of the two counts. */

@@ -101,6 +101,13 @@ static bool compare(const char *path, const struct image *a, const struct image 
     return true;
 }
 
+static bool set_command(struct reproduced *out, const char *const *word, struct err *e)
+{
+    free(out->command);
+    out->command = shell_join(NULL, word);
+    return out->command != NULL || err_set(e, "out of memory");
+}
+
 static bool remake_render(const char *path, const struct image *im, char **word, int num,
                           const struct reproduce_options *opt, const char *to,
                           struct reproduced *out, struct err *e)
@@ -111,9 +118,7 @@ static bool remake_render(const char *path, const struct image *im, char **word,
     const char **argv = calloc((size_t)num + 12, sizeof *argv);
     bool ok = (argv != NULL || err_set(e, "out of memory")) &&
               command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, argv, e);
-    out->command[0] = '\0';
-    if (ok)
-        shell_append_all(out->command, sizeof out->command, argv);
+    ok = ok && set_command(out, argv, e);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
     free(argv);
@@ -147,10 +152,7 @@ static bool remake_merge(const char *path, char **word, int num,
         share_free(&share[i]);
     free(share);
     share_free(&whole);
-    out->command[0] = '\0';
-    if (ok)
-        shell_append_all(out->command, sizeof out->command, (const char *const *)word);
-    return ok;
+    return ok && set_command(out, (const char *const *)word, e);
 }
 
 /* Into the file `to`. */
@@ -183,13 +185,19 @@ static bool remake(const char *path, const struct reproduce_options *opt, const 
     return ok;
 }
 
+void reproduced_free(struct reproduced *r)
+{
+    free(r->command);
+    *r = (struct reproduced){0};
+}
+
 bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
                struct err *e)
 {
     struct image then = {0}, now = {0};
     struct err ignored;
     char dir[] = "/tmp/assay-reproduce.XXXXXX", to[MAX_PATH];
-    *out = (struct reproduced){.command = ""};
+    *out = (struct reproduced){0};
     if (!image_read_exr(path, &then, NULL, e))
         return false;
     if (mkdtemp(dir) == NULL) {
@@ -203,6 +211,8 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
         ok = image_write_exr(opt->keep, &now, e);
     image_free(&then);
     image_free(&now);
+    if (!ok)
+        reproduced_free(out);
     bool removed = remove_tree(dir, &ignored);
     (void)removed; /* it is in /tmp */
     return ok;

@@ -12,11 +12,14 @@ struct reproduce_options {
 };
 
 struct reproduced {
-    char command[8192]; /* that was run, or "assay merge ..." */
-    char made_by[128];  /* version and commit of the program that wrote the file */
+    char *command;     /* that was run, or "assay merge ..." */
+    char made_by[128]; /* version and commit of the program that wrote the file */
     double num_values, num_different;
     char first[256]; /* where and what, of the first value that differs */
 };
+
+/* Also of one that is zero. */
+void reproduced_free(struct reproduced *r);
 
 /* A picture with moments, of pathtracer or of `assay merge`, whose shares are then made again in turn. All channels are compared bit
  * by bit. False if it cannot be judged: no provenance, a scene, camera or environment file that is not

@@ -331,7 +331,11 @@ static void read_statement(struct statement *s)
         take_text(s, word, r->command, sizeof r->command);
     else if (strcmp(word, "diagnose") == 0)
         take_text(s, word, r->diagnose, sizeof r->diagnose);
-    else if (strcmp(word, "output") == 0)
+    else if (strcmp(word, "bugs") == 0) {
+        if (r->bugs[0] != '\0')
+            mistake(s->m, s->line, "a second 'bugs'");
+        take_name(s, word, r->bugs, sizeof r->bugs);
+    } else if (strcmp(word, "output") == 0)
         take_text(s, word, r->output, sizeof r->output);
     else if (strcmp(word, "program") == 0)
         take_text(s, word, r->program, sizeof r->program);

@@ -13,6 +13,8 @@
  *   build WORDS                         run first in a submitted source tree; without it trees are as they are
  *   diagnose WORDS                      a command as above that writes our moments (.exr) to {out}, from plain COLLADA:
  *                                       programs that lose points are then diagnosed, and the bug is named
+ *   bugs DIR                            a directory beside the rubric (rubric_bugs.h): what known bugs do to its
+ *                                       pictures. Submissions of any kind that lose points are then told the bug
  *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
  *   total POINTS                        what all checks have to add up to
  *   mask X Y W H                        pixels that no check looks at, of every picture, from the bottom left as in the
@@ -133,7 +135,8 @@ struct rubric_part {
 
 struct rubric {
     char path[4096], dir[4096]; /* of the file; of what lies beside it */
-    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512];
+    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512],
+        bugs[128];
     struct sandbox_limits limit;
     double build_s, total;
     int mask[4]; /* x y width height, from the bottom left; width 0: none */

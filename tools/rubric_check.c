@@ -40,6 +40,13 @@ static void check_command(const char *what, const char *command, struct rubric_m
         mistake(m, LINE_WHOLE, "%s: without {out} there is no picture", what);
 }
 
+static bool is_beside(const struct rubric *r, const char *file)
+{
+    char path[8192];
+    snprintf(path, sizeof path, "%s/%s", r->dir, file);
+    return strchr(file, '/') == NULL && access(path, R_OK) == 0;
+}
+
 static void check_head(struct rubric *r, struct rubric_mistakes *m)
 {
     struct curve curve;
@@ -67,13 +74,8 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     check_command("command", r->command, m);
     if (r->diagnose[0] != '\0')
         check_command("diagnose", r->diagnose, m);
-}
-
-static bool is_beside(const struct rubric *r, const char *file)
-{
-    char path[8192];
-    snprintf(path, sizeof path, "%s/%s", r->dir, file);
-    return strchr(file, '/') == NULL && access(path, R_OK) == 0;
+    if (r->bugs[0] != '\0' && !is_beside(r, r->bugs))
+        mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
 }
 
 static void check_golden(const struct rubric_picture *p, const char *engine,

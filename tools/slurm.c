@@ -187,7 +187,7 @@ static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 /* The next round: an array whose tasks each run the jobs of a line. */
 static bool submit(struct cluster *c, int lost, struct err *e)
 {
-    char assay[4096], todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM] = "";
+    char assay[4096], todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM];
     int tasks = lost < MOST_TASKS ? lost : MOST_TASKS;
     c->rounds++;
     if (!write_round(c, lost, tasks, e))
@@ -201,18 +201,18 @@ static bool submit(struct cluster *c, int lost, struct err *e)
     char output[ROOM + 64];
     snprintf(output, sizeof output, "--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name,
              c->rounds);
-    bool fits = shell_append(script, sizeof script, "exec") &&
-                shell_append(script, sizeof script, assay) &&
-                shell_append(script, sizeof script, "run-job") &&
-                shell_append(script, sizeof script, c->plan->dir) &&
-                strlen(script) + strlen(" $(sed -n ${SLURM_ARRAY_TASK_ID}p )") < sizeof script;
-    if (fits) {
-        strcat(script, " $(sed -n ${SLURM_ARRAY_TASK_ID}p");
-        fits = shell_append(script, sizeof script, todo) && strlen(script) + 2 < sizeof script;
-    }
-    if (!fits)
+    char *run = shell_join("exec", (const char *const[]){assay, "run-job", c->plan->dir, NULL});
+    char *jobs = shell_join(NULL, (const char *const[]){todo, NULL});
+    bool ok = run != NULL && jobs != NULL;
+    size_t need = ok ? (size_t)snprintf(script, sizeof script,
+                                        "%s $(sed -n ${SLURM_ARRAY_TASK_ID}p %s)", run, jobs)
+                     : 0;
+    free(run);
+    free(jobs);
+    if (!ok)
+        return err_set(e, "out of memory");
+    if (need >= sizeof script)
         return err_set(e, "%.64s...: path too long", c->plan->dir);
-    strcat(script, ")");
     const char *const argv[] = {
         "sbatch", "--no-requeue", "--open-mode=append", name, array, cpus, output, "--wrap", script,
         NULL};

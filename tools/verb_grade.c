@@ -1,6 +1,7 @@
 #include "../renderer/cli.h"
 #include "../renderer/fs.h"
 #include "grade.h"
+#include "grade_alike.h"
 #include "grade_options.h"
 #include "results.h"
 #include "verbs.h"
@@ -67,6 +68,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     char stage[512], views[512];
     struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
+    struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
     struct grade_job job = {.rubric = r,
                             .answers = answers,
                             .sandbox = box,
@@ -85,16 +87,23 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%.400s/stage", box->dir);
     snprintf(views, sizeof views, "%.400s/views", box->dir);
-    bool ok = submission_stage(r, stage, e);
+    bool ok = (bugs != NULL || err_set(e, "out of memory")) && submission_stage(r, stage, e);
+    if (ok && r->bugs[0] != '\0') {
+        ok = rubric_bugs_open(r, answers, bugs, e);
+        job.bugs = bugs;
+    }
     if (ok && r->diagnose[0] != '\0') {
         ok = diagnosis_open(r, s->catalogue, suite, views, &diagnosis, e);
         job.diagnosis = &diagnosis;
     }
-    ok = ok && grade_all(&job, &grades, e);
+    ok = ok && grade_all(&job, &grades, e) && grade_alike(s->out, r, answers, grades, e);
     if (ok && grade_write(s->out, grades, e) && grade_pages(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
     diagnosis_close(&diagnosis);
+    if (bugs != NULL)
+        rubric_bugs_close(bugs);
+    free(bugs);
     return code;
 }
 

@@ -14,7 +14,7 @@ int verb_merge(int argc, char **argv, struct err *e)
     int code = EXIT_NOT_JUDGED, num = 0;
     const char *out = NULL;
     struct share whole = {0};
-    char command[4096] = "assay";
+    char *command = NULL;
     struct share *share = calloc((size_t)argc, sizeof *share);
     if (share == NULL) {
         err_set(e, "out of memory");
@@ -43,8 +43,9 @@ int verb_merge(int argc, char **argv, struct err *e)
         err_set(e, "merge needs an output and two shares or more (see --help)");
         goto done;
     }
-    shell_append_all(command, sizeof command, (const char *const *)argv);
-    if (merge_shares(share, num, &whole, e) && share_write(out, &whole, command, e)) {
+    command = shell_join("assay", (const char *const *)argv);
+    if ((command != NULL || err_set(e, "out of memory")) && merge_shares(share, num, &whole, e) &&
+        share_write(out, &whole, command, e)) {
         printf("%s\n", out);
         code = 0;
     }
@@ -52,6 +53,7 @@ done:
     for (int i = 0; i < num; i++)
         share_free(&share[i]);
     free(share);
+    free(command);
     share_free(&whole);
     return code;
 }

@@ -5,7 +5,6 @@
 #include "results.h"
 #include "verbs.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_HELP };
@@ -60,22 +59,18 @@ int verb_reproduce(int argc, char **argv, struct err *e)
         err_set(e, "reproduce needs a picture (see --help)");
         return EXIT_NOT_JUDGED;
     }
-    struct reproduced *r = malloc(sizeof *r);
-    if (r == NULL || !reproduce(path, &opt, r, e)) {
-        if (r == NULL)
-            err_set(e, "out of memory");
-        free(r);
+    struct reproduced r;
+    if (!reproduce(path, &opt, &r, e))
         return EXIT_NOT_JUDGED;
-    }
-    bool same = r->num_different == 0;
+    bool same = r.num_different == 0;
     if (same)
-        printf("%s: the same bits in all %.0f values\n", path, r->num_values);
+        printf("%s: the same bits in all %.0f values\n", path, r.num_values);
     else
-        printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r->num_different, r->num_values,
-               r->first);
-    printf("made again by: %s\n", r->command);
-    if (strcmp(r->made_by, assay_version) != 0)
-        printf("the picture is of version %s, this is %s\n", r->made_by, assay_version);
-    free(r);
+        printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r.num_different, r.num_values,
+               r.first);
+    printf("made again by: %s\n", r.command);
+    if (strcmp(r.made_by, assay_version) != 0)
+        printf("the picture is of version %s, this is %s\n", r.made_by, assay_version);
+    reproduced_free(&r);
     return same ? 0 : 1;
 }

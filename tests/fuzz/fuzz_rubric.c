@@ -41,19 +41,22 @@ static void check_rubric(const struct rubric *r)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct suite suite;
+    static struct rubric
+        *r; /* once: half a megabyte of new pages would cost more than the reading */
+    static struct rubric_mistakes *m;
     struct err e = {""};
-    if (suite.num_scenes == 0)
+    if (r == NULL) {
         fuzz_require(suite_load("reference/scenes", &suite, &e), "the suite is not here");
+        r = malloc(sizeof *r);
+        m = malloc(sizeof *m);
+        fuzz_require(r != NULL && m != NULL, "no memory");
+    }
     const char *path = fuzz_file(data, size, ".rubric");
-    struct rubric *r = calloc(1, sizeof *r);
-    struct rubric_mistakes *m = calloc(1, sizeof *m);
     if (!rubric_read(path, &suite, r, m, &e))
         fuzz_check_line(&e, path);
     else if (m->num > 0)
         check_mistakes(m);
     else
         check_rubric(r);
-    free(r);
-    free(m);
     return 0;
 }

@@ -26,7 +26,7 @@ fixed_executions() {
     case $1 in
     collada) echo 20000 ;;
     picture) echo 4000 ;;
-    rubric) echo 8000 ;;
+    rubric) echo 30000 ;;
     results) echo 50000 ;;
     moments) echo 200000 ;;
     *) echo 250000 ;;

@@ -1,7 +1,7 @@
 #!/bin/bash
 # tools/autograder/pack.sh BUILD RUBRIC OUT.zip COMMIT PACKAGE...: an autograder for Gradescope. The zip holds setup.sh and
-# run_autograder, our sources (built where they run: the libraries differ), the directory of the rubric, and its references,
-# which are rendered here, once.
+# run_autograder, our sources (built where they run: the libraries differ), the files beside the rubric, its catalogue of bugs,
+# and its references, which are rendered here, once.
 set -eu
 build=$(realpath "$1") rubric=$2 out=$3 commit=$4
 shift 4
@@ -13,6 +13,8 @@ cp tools/autograder/setup.sh tools/autograder/run_autograder "$tmp/zip"
 cp -R Makefile LICENSE renderer reference tools "$tmp/zip/assay"
 cp -R golden "$tmp/zip/assay"
 find "$(dirname "$rubric")" -maxdepth 1 -type f -exec cp {} "$tmp/zip/rubric" \;
+bugs=$(awk '$1 == "bugs" { print $2 }' "$rubric")
+[ -z "$bugs" ] || cp -R "$(dirname "$rubric")/$bugs" "$tmp/zip/rubric"
 basename "$rubric" >"$tmp/zip/rubric_name"
 echo "$commit" >"$tmp/zip/commit"
 echo "$@" >"$tmp/zip/packages"
