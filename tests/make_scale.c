@@ -180,13 +180,13 @@ int main(void)
         {"10^4 scenes", 10000, 6.6, 1, 10, 16, 1, 2.6e5, 1.4e6, 0.05, 1000},
         {"the same, 100 nodes", 10000, 6.6, 1, 100, 16, 1, 2.6e5, 1.4e6, 0.05, 1000},
         {"16384^2, 10^5 samples, 1000 jobs", 1000, paths / paths_s / 1000, 0.5, 1000, 16, 16, 1e6,
-         96 * pixels / 1000, 0.6, 1000},
+         96 * pixels / 1000, 0.2, 1000},
         {"the same, 8000 jobs", 8000, paths / paths_s / 8000, 0.5, 1000, 16, 16, 1e6,
-         96 * pixels / 8000, 0.075, 1000},
+         96 * pixels / 8000, 0.025, 1000},
         {"the same, one thread each", 16000, paths / paths_s / 16000, 0.5, 1000, 16, 1, 1e6,
-         96 * pixels / 16000, 0.038, 1000},
+         96 * pixels / 16000, 0.0125, 1000},
         {"the same, MaxArraySize 16001", 16000, paths / paths_s / 16000, 0.5, 1000, 16, 1, 1e6,
-         96 * pixels / 16000, 0.038, 16000}};
+         96 * pixels / 16000, 0.0125, 16000}};
     puts(
         "| work | jobs | nodes x cores | CPU h | ideal s | wall s | longest job s | busy | jobs lost | CPU h lost | controller | GB | gather s | cost |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");

@@ -7,6 +7,7 @@
 #include "places.h"
 #include "plan_kinds.h"
 #include "results.h"
+#include "rubric.h"
 #include "verbs.h"
 
 #include <errno.h>
@@ -47,6 +48,40 @@ static bool prepare(const char *references, const char **words, int num, struct 
     return verb_grade(5 + num, (char **)argv, e) == 0;
 }
 
+static bool beside_rubric(struct plan *p, const struct rubric *r, const char *name, struct err *e)
+{
+    char path[PLAN_PATH + 256];
+    snprintf(path, sizeof path, "%s/%s", r->dir, name);
+    return name[0] == '\0' || plan_input(p, path, e);
+}
+
+/* The rubric and what it names. */
+static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct err *e)
+{
+    struct suite suite = {0};
+    struct rubric *r = calloc(1, sizeof *r);
+    struct rubric_mistakes m;
+    bool ok = (r != NULL || err_set(e, "out of memory")) && suite_load(s->suite, &suite, e) &&
+              rubric_read(s->rubric, &suite, r, &m, e);
+    if (ok && m.num > 0)
+        ok = err_set(e, "%s:%d: %s", s->rubric, m.at[0].line, m.at[0].text);
+    for (int i = 0; ok && i < r->num_pictures; i++) {
+        const struct rubric_picture *picture = &r->picture[i];
+        if (picture->suite == NULL)
+            ok = beside_rubric(p, r, picture->scene, e) &&
+                 beside_rubric(p, r, picture->environment, e);
+        else
+            ok = plan_input(p, picture->suite->dae, e) &&
+                 (picture->suite->environment[0] == '\0' ||
+                  plan_input(p, picture->suite->environment, e));
+    }
+    ok = ok && beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
+         (r->diagnose[0] == '\0' || plan_input(p, s->catalogue, e));
+    suite_free(&suite);
+    free(r);
+    return ok;
+}
+
 static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, struct plan *p,
                       struct err *e)
 {
@@ -61,9 +96,8 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     ok = ok && prepare(references, words, num, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
          plan_run_words(p, words, num, true, e) &&
-         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, s->rubric, e) &&
-         plan_input(p, references, e) && plan_input(p, s->pathtracer, e) &&
-         plan_input(p, s->suite, e);
+         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
+         plan_input(p, s->pathtracer, e) && rubric_inputs(p, s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
     for (int k = 0; ok && k < s->num; k++)
         ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
