@@ -104,6 +104,38 @@ int cli_next(struct cli *c, struct err *e)
     return arg[1] == '-' ? next_long(c, arg, e) : next_short(c, arg, arg + 1, e);
 }
 
+char **cli_apart(const struct cli_option *options, int argc, char **argv)
+{
+    size_t most = (size_t)argc + 1;
+    for (int k = 1; k < argc; k++)
+        most += strlen(argv[k]);
+    char **word = malloc(most * (sizeof *word + sizeof "-x"));
+    if (word == NULL)
+        return NULL;
+    char *letters = (char *)(word + most);
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    struct err e;
+    size_t n = 0;
+    word[n++] = argv[0];
+    for (;;) {
+        const int from = c.next, i = cli_next(&c, &e);
+        if (i == CLI_END || i == CLI_ERROR)
+            break;
+        if (i == CLI_POSITIONAL || c.name[1] == '-' || c.name[2] == '\0') {
+            for (int k = from; k < c.next; k++)
+                word[n++] = argv[k];
+            continue;
+        }
+        sprintf(letters, "-%c", options[i].short_name);
+        word[n++] = letters;
+        letters += sizeof "-x";
+        for (int k = 0; k < options[i].num_args; k++)
+            word[n++] = (char *)c.value[k];
+    }
+    word[n] = NULL;
+    return word;
+}
+
 void cli_print_options(FILE *f, const struct cli_option *options)
 {
     for (const struct cli_option *o = options; o->long_name != NULL; o++) {

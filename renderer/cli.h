@@ -34,6 +34,11 @@ enum { CLI_END = -1, CLI_POSITIONAL = -2, CLI_ERROR = -3 };
  * argument, and short options without any may stand together, as getopt has it. */
 int cli_next(struct cli *c, struct err *e);
 
+/* The words of a command that parsed, each short option and its argument by itself ("-qj4" as "-q -j 4"), for who stores
+ * commands or leaves words out: a NULL-terminated array that points into argv too, to free(). NULL: out of memory. */
+char **cli_apart(const struct cli_option *options, int argc, char **argv)
+    __attribute__((warn_unused_result));
+
 /* Prints the table, two columns. */
 void cli_print_options(FILE *f, const struct cli_option *options);
 

@@ -246,14 +246,21 @@ int main(int argc, char **argv)
     struct session s = {.out = {.opt = &o, .argc = argc, .argv = argv}};
     struct err e = {0};
     bool ok = options_parse(argc, argv, &o, &e);
+    char **words = ok ? options_apart(argc, argv) : NULL;
+    if (ok && words == NULL)
+        ok = err_set(&e, "out of memory");
+    if (ok)
+        for (s.out.argv = words, s.out.argc = 0; words[s.out.argc] != NULL;)
+            s.out.argc++;
     if (ok && o.action != ACTION_RENDER)
         options_print(&o);
     else if (ok && o.slurm > 0)
-        ok = hand_over(argc, argv, &e);
+        ok = hand_over(s.out.argc, words, &e);
     else
         ok = ok && run(&s, &e);
     if (ok && fflush(stdout) != 0)
         ok = err_set(&e, "cannot write to standard output");
+    free(words);
     if (!ok) {
         fprintf(stderr, "pathtracer: %s\n", e.msg);
         return EXIT_BAD_INPUT;

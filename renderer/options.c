@@ -341,6 +341,11 @@ static bool complete(struct options *s, int accumulate, struct err *e)
     return true;
 }
 
+char **options_apart(int argc, char **argv)
+{
+    return cli_apart(options, argc, argv);
+}
+
 bool options_parse(int argc, char **argv, struct options *s, struct err *e)
 {
     *s = (struct options){.width = 800,

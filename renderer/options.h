@@ -36,6 +36,8 @@ struct options {
     enum { ACTION_RENDER, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
 };
 
+/* cli_apart() of a command that options_parse() took. */
+char **options_apart(int argc, char **argv) __attribute__((warn_unused_result));
 /* Fills *o from the command line, with defaults where it is silent. An action other than
  * ACTION_RENDER leaves the rest unchecked. */
 bool options_parse(int argc, char **argv, struct options *o, struct err *e)

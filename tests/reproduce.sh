@@ -30,6 +30,11 @@ again() { # NAME ARGUMENT...
     expect "$name" 0 "the same bits in all" "$tmp/x.exr"
 }
 again "a render" -s 5 -t 3 $scene
+# The file that is looked at stays as it is, also where its name hangs on its option.
+"$pathtracer" -qHs4 -r 16 16 -f"$tmp/together.exr" $scene >/dev/null
+cp "$tmp/together.exr" "$tmp/together.was"
+expect "short options together" 0 "the same bits in all" "$tmp/together.exr"
+cmp -s "$tmp/together.exr" "$tmp/together.was" || { echo "not ok reproduce: short options together: the file has changed" && failures=$((failures + 1)); }
 again "layers" -s 5 --aov $scene
 again "a share of the samples" --samples 3:7 $scene
 again "a cell" -s 5 -p 3 2 11 9 $scene

@@ -8,6 +8,7 @@
 #include "../renderer/cli.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const struct cli_option options[] = {{'j', "jobs", 1, "N", "jobs"},
@@ -81,8 +82,37 @@ static void words_are_read_as_by_getopt(void **state)
     }
 }
 
+static void words_are_set_apart(void **state)
+{
+    (void)state;
+    static const char *const cases[][2] = {
+        {"-j2 x", "-j 2 x"},
+        {"-qHj4 -s 5 --jobs=2", "-q -H -j 4 -s 5 --jobs=2"},
+        {"-qr 64 48 -j -2 y", "-q -r 64 48 -j -2 y"},
+        {"x -- -j2 -q", "x -- -j2 -q"},
+        {"", ""},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char words[128] = "", out[512] = "", *argv[16] = {"program"};
+        int argc = 1;
+        snprintf(words, sizeof words, "%s", cases[i][0]);
+        for (char *w = strtok(words, " "); w != NULL; w = strtok(NULL, " "))
+            argv[argc++] = w;
+        char **apart = cli_apart(options, argc, argv);
+        assert_non_null(apart);
+        for (int k = 1; apart[k] != NULL; k++) {
+            strcat(out, k > 1 ? " " : "");
+            strcat(out, apart[k]);
+        }
+        assert_string_equal(apart[0], "program");
+        assert_string_equal(out, cases[i][1]);
+        free(apart);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(words_are_read_as_by_getopt)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(words_are_read_as_by_getopt),
+                                       cmocka_unit_test(words_are_set_apart)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,6 +7,7 @@
 #include "results.h"
 #include "tree_hash.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -175,6 +176,12 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
     if (kind == NUM_KINDS)
         return err_set(e, "what to plan begins with pathtracer, grade or validate, not '%s'",
                        argc > 0 ? argv[0] : "");
+    for (int k = 1; k < argc; k++)
+        if (argv[k][0] == '-' && isalpha((unsigned char)argv[k][1]) && argv[k][2] != '\0')
+            return err_set(
+                e,
+                "'%s': in a command that is planned, short options and their arguments stand apart",
+                argv[k]);
     if (getcwd(cwd, sizeof cwd) == NULL)
         return err_set(e, "no current directory: %s", strerror(errno));
     if (dir != NULL && strlen(dir) >= sizeof p.dir)
