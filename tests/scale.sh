@@ -58,7 +58,7 @@ in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 
 # A plan, its jobs, and what is not done. Of 4 x 40 rows the third job's file is looked into.
 cp "$scene" "$tmp/s.dae"
 plan=$tmp/plan4 why=""
-"$assay" plan --plan "$plan" --parts 4 pathtracer -q -r 48 160 -s 2 -f "$tmp/y.exr" "$tmp/s.dae" >"$tmp/jobs"
+"$san_assay" plan --plan "$plan" --parts 4 pathtracer -q -r 48 160 -s 2 -f "$tmp/y.exr" "$tmp/s.dae" >"$tmp/jobs"
 key() { sed -n "s/^{\"job\":$1,\"key\":\"\([0-9a-f]*\)\".*/\1/p" "$tmp/jobs"; }
 hash=$(sha256sum "$scene" | cut -c1-64)
 grep -q "\"$tmp/s.dae\":\"$hash\"" "$tmp/jobs" || why="no hash of the scene in $(head -n 1 "$tmp/jobs")"
@@ -68,11 +68,11 @@ expect "a job is made" 0 "job 2: made" "$san_assay" run-job "$plan" 2
 expect "and is not made twice" 0 "job 2: was there" "$san_assay" run-job "$plan" 2
 state=$plan/jobs/$(key 2)/cell.png.state
 cp "$state" "$tmp/state" && printf 'x' | dd of="$state" bs=1 seek=5000 conv=notrunc 2>/dev/null
-expect "one that was damaged is made again" 0 "job 2: made" "$assay" run-job "$plan" 2
+expect "one that was damaged is made again" 0 "job 2: made" "$san_assay" run-job "$plan" 2
 why=$(cmp "$state" "$tmp/state" 2>&1)
 tell "with the same bits" "$why"
 printf 'x' | dd of="$state" bs=1 seek=5000 conv=notrunc 2>/dev/null
-"$assay" run-job "$plan" 0 1 3 >/dev/null
+"$san_assay" run-job "$plan" 0 1 3 >/dev/null
 expect "one that was damaged is not gathered" 3 "cell.png.state: damaged" "$san_assay" gather "$plan"
 rm -rf "$plan/jobs/$(key 1)"
 mv "$tmp/s.dae" "$tmp/t.dae"
