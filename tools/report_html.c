@@ -7,18 +7,30 @@
 #include <nettle/base64.h>
 #include <nettle/sha2.h>
 
+static void html_byte(FILE *f, unsigned char c)
+{
+    switch (c) {
+    case '<': fputs("&lt;", f); break;
+    case '>': fputs("&gt;", f); break;
+    case '&': fputs("&amp;", f); break;
+    case '"': fputs("&quot;", f); break;
+    case '\'': fputs("&#39;", f); break;
+    default: fputc((c < 0x20 && c != '\n') || c == 0x7f ? ' ' : c, f);
+    }
+}
+
 void html_text(FILE *f, const char *s)
 {
+    for (; s != NULL && *s != '\0'; s++)
+        html_byte(f, (unsigned char)*s);
+}
+
+void html_name(FILE *f, const char *s)
+{
     for (; s != NULL && *s != '\0'; s++) {
-        unsigned char c = (unsigned char)*s;
-        switch (c) {
-        case '<': fputs("&lt;", f); break;
-        case '>': fputs("&gt;", f); break;
-        case '&': fputs("&amp;", f); break;
-        case '"': fputs("&quot;", f); break;
-        case '\'': fputs("&#39;", f); break;
-        default: fputc((c < 0x20 && c != '\n') || c == 0x7f ? ' ' : c, f);
-        }
+        html_byte(f, (unsigned char)*s);
+        if (*s == '_')
+            fputs("<wbr>", f);
     }
 }
 

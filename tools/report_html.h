@@ -16,6 +16,8 @@ struct number_text {
 /* Text or attribute value: < > & " ' escaped, control characters replaced by a space. NULL is "".
  */
 void html_text(FILE *f, const char *s);
+/* The same as text that may go on in another line behind each underscore. */
+void html_name(FILE *f, const char *s);
 
 /* 0.0123 -> "+1.230": always three decimals and no percent sign, for a column. The minus sign is
  * U+2212. What rounds to zero has no sign. */

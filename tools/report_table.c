@@ -13,9 +13,9 @@ static void write_row(FILE *f, const struct claim_ref *claim)
     fprintf(f, "<tr%s><td>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
     report_badge(f, claim);
     fprintf(f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
-    html_text(f, member_text(c, "scene"));
+    html_name(f, member_text(c, "scene"));
     fputs("</a></th><td class=\"name\">", f);
-    html_text(f, member_text(c, "a"));
+    html_name(f, member_text(c, "a"));
     fputs("</td><td class=\"name\">", f);
     report_reference(f, claim);
     fputs("</td><td>", f);
