@@ -90,6 +90,38 @@ static void test_every_patch_is_in_the_catalogue(void **state)
         fail_msg("%s", e.msg);
 }
 
+static void test_what_a_patch_is_by(void **state)
+{
+    struct fixture *f = *state;
+    static const char head[] = "Bug: b\nWhere: w\n\n--- a/x.c\n+++ b/x.c\n";
+    static const struct {
+        const char *text;
+        bool same;
+    } cases[] = {
+        {"@@ -1,3 +1,3 @@\n one;\n-two;\n+three;\n four;\n", true},
+        {"@@ -9,2 +9,2 @@\n other;\n\n-two;\n+three;\n", true},
+        {"@@ -1,3 +1,3 @@\n one;\n-two;\n+thre;\n four;\n", false},
+        {"@@ -1,3 +1,3 @@\n one;\n-too;\n+three;\n four;\n", false},
+        {"@@ -1,3 +1,4 @@\n one;\n-two;\n+three;\n+\n four;\n", false},
+    };
+    struct bug first, bug;
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char path[200];
+        snprintf(path, sizeof path, "%s/one.patch", f->dir);
+        FILE *out = fopen(path, "w");
+        assert_non_null(out);
+        fprintf(out, "%s%s", head, cases[i].text);
+        assert_int_equal(fclose(out), 0);
+        assert_true(bug_of_patch(path, &bug, &e));
+        assert_string_equal(bug.what, "b");
+        assert_string_equal(bug.where, "w");
+        if (i == 0)
+            first = bug;
+        assert_int_equal(strcmp(bug.patch_sha256, first.patch_sha256) == 0, cases[i].same);
+    }
+}
+
 static void test_a_stale_catalogue_is_refused(void **state)
 {
     struct fixture *f = *state;
@@ -360,6 +392,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_patch_is_in_the_catalogue),
+        cmocka_unit_test(test_what_a_patch_is_by),
         cmocka_unit_test(test_a_stale_catalogue_is_refused),
         cmocka_unit_test(test_a_damaged_catalogue_is_refused),
         cmocka_unit_test(test_a_sight_pools_pixels),

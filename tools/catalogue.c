@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_PATH = 4600 };
+enum { MAX_PATH = 4600, MAX_PATCH = 8192 };
 
 static const char *const suffix[3] = {"R", "G", "B"};
 
@@ -83,9 +83,15 @@ static bool header_line(const char *line, const char *key, char *out, size_t siz
     return length > 0 && length < size;
 }
 
+/* Not the lines around a change nor their numbers. */
+static bool is_of_the_bug(const char *line, bool in_code)
+{
+    return !in_code || !(line[0] == ' ' || line[0] == '\n' || strncmp(line, "@@", 2) == 0);
+}
+
 bool bug_of_patch(const char *path, struct bug *out, struct err *e)
 {
-    char line[1024];
+    char line[1024], text[MAX_PATCH] = "";
     const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
     *out = (struct bug){0};
     size_t length = strcspn(name, ".");
@@ -95,15 +101,25 @@ bool bug_of_patch(const char *path, struct bug *out, struct err *e)
     FILE *f = fopen(path, "r");
     if (f == NULL)
         return err_set(e, "%s: %s", path, strerror(errno));
-    bool what = false, where = false;
-    while (fgets(line, sizeof line, f) != NULL && strncmp(line, "---", 3) != 0) {
-        what = what || header_line(line, "Bug:", out->what, sizeof out->what);
-        where = where || header_line(line, "Where:", out->where, sizeof out->where);
+    bool what = false, where = false, in_code = false;
+    size_t used = 0;
+    while (fgets(line, sizeof line, f) != NULL) {
+        in_code = in_code || strncmp(line, "---", 3) == 0;
+        what = what || (!in_code && header_line(line, "Bug:", out->what, sizeof out->what));
+        where = where || (!in_code && header_line(line, "Where:", out->where, sizeof out->where));
+        if (!is_of_the_bug(line, in_code))
+            continue;
+        used += strlen(line);
+        if (used < sizeof text)
+            strcat(text, line);
     }
     fclose(f);
     if (!what || !where)
         return err_set(e, "%s: no line '%s'", path, what ? "Where:" : "Bug:");
-    return sha256_file(path, out->patch_sha256, e);
+    if (used >= sizeof text)
+        return err_set(e, "%s: more than %d characters", path, MAX_PATCH - 1);
+    sha256_text(text, out->patch_sha256);
+    return true;
 }
 
 bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct err *e)

@@ -23,10 +23,10 @@
 #include "sight.h"
 
 struct bug {
-    char name[64];   /* of tests/mutants/NAME.patch */
-    char what[256];  /* its line "Bug:" */
-    char where[160]; /* its line "Where:", the place in the assignment */
-    char patch_sha256[65];
+    char name[64];         /* of tests/mutants/NAME.patch */
+    char what[256];        /* its line "Bug:" */
+    char where[160];       /* its line "Where:", the place in the assignment */
+    char patch_sha256[65]; /* of what it says, removes and adds, without the lines around */
 };
 
 struct effect {

@@ -43,14 +43,15 @@ static struct axes axes_of(const json_t *rungs)
 
 static void write_ticks(FILE *f, const struct axes *a)
 {
-    for (double v = 0, step = tick(a->top); v <= a->top; v += step)
+    const double up = tick(a->top), along = fmax(1, tick(2 * a->right));
+    for (int i = 0; i * up <= a->top; i++)
         fprintf(f,
                 "<path class=\"grid\" d=\"M%d %.1fh%d\"/><text x=\"%d\" y=\"%.1f\" "
                 "text-anchor=\"end\">%g</text>",
-                LEFT, at_y(a, v), WIDTH, LEFT - 6, at_y(a, v) + 4, v);
-    for (double d = 0, step = fmax(1, tick(2 * a->right)); d <= a->right; d += step)
-        fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>", at_x(a, d),
-                BOTTOM + 16, d);
+                LEFT, at_y(a, i * up), WIDTH, LEFT - 6, at_y(a, i * up) + 4, i * up);
+    for (int i = 0; i * along <= a->right; i++)
+        fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>", at_x(a, i * along),
+                BOTTOM + 16, i * along);
 }
 
 static void write_line(FILE *f, const struct axes *a, const json_t *rungs, const char *name,
