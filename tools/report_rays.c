@@ -57,11 +57,14 @@ static void write_plot(FILE *f, const struct bar *bar, size_t num)
         "<svg class=\"plot rays\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Box and primitive tests of a "
         "ray in %zu scenes; the numbers are in the CSV file\">",
         LEFT + WIDTH + 50, bottom + 40, num);
-    for (double x = 0, step = tick(top); x <= top; x += step)
+    const double step = tick(top);
+    for (int i = 0; i * step <= top; i++) {
+        double at = LEFT + WIDTH * i * step / top;
         fprintf(f,
                 "<path class=\"grid\" d=\"M%.1f %dV%d\"/><text x=\"%.1f\" y=\"%d\" "
                 "text-anchor=\"middle\">%g</text>",
-                LEFT + WIDTH * x / top, TOP, bottom, LEFT + WIDTH * x / top, bottom + 16, x);
+                at, TOP, bottom, at, bottom + 16, i * step);
+    }
     for (size_t i = 0; i < num; i++) {
         double y = TOP + ROW * (double)i, boxes = WIDTH * bar[i].boxes / top,
                primitives = WIDTH * bar[i].primitives / top;
