@@ -101,3 +101,14 @@ bool remove_tree(const char *path, struct err *e)
         return err_set(e, "%s: cannot remove: %s", path, strerror(errno));
     return true;
 }
+
+void beside_program(char *path, size_t size, const char *name)
+{
+    char self[3072];
+    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
+    self[n > 0 ? n : 0] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash != NULL)
+        *slash = '\0';
+    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
+}

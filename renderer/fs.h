@@ -29,4 +29,7 @@ bool make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unuse
 /* rm -r of a directory that we made; missing is fine. */
 bool remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
 
+/* Into path: the file `name` beside the program that runs, or in the current directory if that cannot be known. */
+void beside_program(char *path, size_t size, const char *name);
+
 #endif

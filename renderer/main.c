@@ -1,5 +1,6 @@
 /* pathtracer: options -> scene -> render -> pictures. */
 #include "collada.h"
+#include "fs.h"
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
@@ -219,18 +220,10 @@ done:
 static bool hand_over(int argc, char **argv, struct err *e)
 {
     char path[4096];
-    ssize_t n = readlink("/proc/self/exe", path, sizeof path - sizeof "assay");
-    char *slash = NULL;
-    if (n > 0) {
-        path[n] = '\0';
-        slash = strrchr(path, '/');
-    }
+    beside_program(path, sizeof path, "assay");
     char **words = calloc((size_t)argc + 3, sizeof *words);
-    if (slash == NULL || words == NULL) {
-        free(words);
-        return err_set(e, "--slurm: cannot find the assay beside this program");
-    }
-    strcpy(slash + 1, "assay");
+    if (words == NULL)
+        return err_set(e, "--slurm: out of memory");
     words[0] = path;
     words[1] = (char[]){"slurm"};
     words[2] = (char[]){"pathtracer"};

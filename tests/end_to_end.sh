@@ -36,6 +36,18 @@ expect() {
     fi
 }
 
+# part SCRIPT ARGUMENT...: one that prints such lines too. To have looked at nothing, or not to the end, is a failure.
+part() {
+    local wrong status
+    "$@" >"$tmp/part"
+    status=$?
+    cat "$tmp/part"
+    wrong=$(grep -c '^not ok' "$tmp/part")
+    failures=$((failures + wrong))
+    grep -q '^ok ' "$tmp/part" || not_ok "$1" "nothing was looked at"
+    [ $status -eq 0 ] || [ "$wrong" -gt 0 ] || not_ok "$1" "ended with status $status"
+}
+
 scene=reference/scenes/41_cornell.dae
 small="-r 32 32 -s 16 -t 2 -q"
 
@@ -634,52 +646,32 @@ fi
 expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
 expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
 expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
-tests/grading.sh "$build" >"$tmp/grading"
-cat "$tmp/grading"
-failures=$((failures + $(grep -c '^not ok' "$tmp/grading")))
-tests/autograder.sh "$build" >"$tmp/autograder"
-cat "$tmp/autograder"
-failures=$((failures + $(grep -c '^not ok' "$tmp/autograder")))
-grep -q '^ok ' "$tmp/autograder" || not_ok "the autograder" "nothing was looked at"
+part tests/grading.sh "$build"
+part tests/autograder.sh "$build"
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
 expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
 expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 
 # The same bits on any number of threads.
-tests/threads.sh "$pathtracer" >"$tmp/threads"
-cat "$tmp/threads"
-failures=$((failures + $(grep -c '^not ok' "$tmp/threads")))
+part tests/threads.sh "$pathtracer"
 
 # Pictures made again from what they say of themselves.
-tests/reproduce.sh "$build" >"$tmp/reproduce"
-cat "$tmp/reproduce"
-failures=$((failures + $(grep -c '^not ok' "$tmp/reproduce")))
+part tests/reproduce.sh "$build"
 
 # What a file or a command line may ask for.
-tests/limits.sh "$build" >"$tmp/limits"
-cat "$tmp/limits"
-failures=$((failures + $(grep -c '^not ok' "$tmp/limits")))
+part tests/limits.sh "$build"
 
 # Verbs, and ways through them, that nothing above takes.
-tests/verbs.sh "$build" >"$tmp/verbs"
-cat "$tmp/verbs"
-failures=$((failures + $(grep -c '^not ok' "$tmp/verbs")))
+part tests/verbs.sh "$build"
 
 # The same work in jobs.
-tests/scale.sh "$build" >"$tmp/scale"
-cat "$tmp/scale"
-failures=$((failures + $(grep -c '^not ok' "$tmp/scale")))
+part tests/scale.sh "$build"
 
 # Kills, full disks and missing memory.
-tests/faults.sh "$build" 2 499 >"$tmp/faults"
-cat "$tmp/faults"
-failures=$((failures + $(grep -c '^not ok' "$tmp/faults")))
+part tests/faults.sh "$build" 2 499
 
 # The page, in a browser.
-tests/browser/run.sh "$build" >"$tmp/browser"
-cat "$tmp/browser"
-failures=$((failures + $(grep -c '^not ok' "$tmp/browser")))
-grep -q '^ok ' "$tmp/browser" || not_ok "the page in a browser" "nothing was looked at"
+part tests/browser/run.sh "$build"
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

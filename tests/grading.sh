@@ -32,6 +32,7 @@ grade() { "$build/assay" grade -q "$@" "$rubric" "$tmp/submissions"/*; }
 sums() { (cd "$1" && cat */grade.json | grep -v '"cpu_s"\|"wall_s"' | sha256sum) | grep .; }
 points() { grep -q "^\"$1\",$2," "$tmp/two/grades.csv"; }
 
+check "the rubric" "$build/assay" grade --check-rubric "$rubric"
 if ! grade -o "$tmp/two" -j2 >"$tmp/out" 2>&1 && grep -q "no sandbox" "$tmp/out"; then
     echo "skip grading: programs of submissions ($(cat "$tmp/out"))"
     exit 0

@@ -28,3 +28,15 @@ int words_to_drop(const struct option_words *table, char *const *word, int left)
     }
     return 0;
 }
+
+int words_kept(const struct option_words *table, int num, char *const *word, char **kept)
+{
+    int n = 0;
+    for (int i = 0; i < num;) {
+        int drop = words_to_drop(table, &word[i], num - i);
+        if (drop == 0)
+            kept[n++] = word[i];
+        i += drop > 0 ? drop : 1;
+    }
+    return n;
+}

@@ -18,4 +18,7 @@ bool has_word(int argc, char *const *argv, const char *short_name, const char *l
 /* How many words from word[0] on to leave out by the table: 0, or an option and its arguments, `left` at most. */
 int words_to_drop(const struct option_words *table, char *const *word, int left);
 
+/* Into kept[], with room for num, the words that the table does not leave out; how many. kept may be word. */
+int words_kept(const struct option_words *table, int num, char *const *word, char **kept);
+
 #endif

@@ -1,3 +1,4 @@
+#include "../renderer/fs.h"
 #include "grade_options.h"
 
 #include "../renderer/cli.h"

@@ -67,9 +67,7 @@ static const struct moments *expected_noise(const struct work *w, int k)
 
 static bool is_masked(const struct work *w, const struct student *s, size_t p)
 {
-    const int *m = w->r->mask;
-    int x = (int)(p % (size_t)s->width), y = s->height - 1 - (int)(p / (size_t)s->width);
-    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
+    return rubric_masks(w->r, s->width, s->height, p);
 }
 
 static unsigned char *usable(const struct work *w, struct err *e)

@@ -4,10 +4,7 @@
 
 #include <stddef.h>
 
-/* A file beside this program, or below the installation's share directory ("../share/assay/..."). */
-void beside_program(char *path, size_t size, const char *name);
-
-/* `checkout` if the current directory is a checkout, else `installed` beside the program, in path. */
+/* `checkout` if the current directory is a checkout, else `installed` beside the program ("../share/assay/..."), in path. */
 const char *find_dir(char *path, size_t size, const char *checkout, const char *installed);
 
 #endif

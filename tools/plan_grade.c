@@ -4,7 +4,6 @@
 #include "../renderer/fs.h"
 #include "command_words.h"
 #include "grade_options.h"
-#include "places.h"
 #include "plan_kinds.h"
 #include "results.h"
 #include "rubric.h"
@@ -22,23 +21,21 @@ static const struct option_words not_of_a_job[] = {
     {"-q", 0}, {"--quiet", 0}, {0}};
 
 /* Into to[], with room for argc, the words that every job has of the command: its options and the rubric. */
-static int words_of_a_job(int argc, char **argv, const struct grade_settings *s, const char **to)
+static int words_of_a_job(int argc, char **argv, const struct grade_settings *s, char **to)
 {
-    int num = 0;
-    for (int i = 1; i < argc;) {
-        int drop = words_to_drop(not_of_a_job, &argv[i], argc - i);
+    int num = 0, all = words_kept(not_of_a_job, argc - 1, argv + 1, to);
+    for (int i = 0; i < all; i++) {
         bool is_submission = false;
         for (int k = 0; k < s->num; k++)
-            is_submission = is_submission || s->submission[k] == argv[i];
-        if (drop == 0 && !is_submission)
-            to[num++] = argv[i];
-        i += drop > 0 ? drop : 1;
+            is_submission = is_submission || s->submission[k] == to[i];
+        if (!is_submission)
+            to[num++] = to[i];
     }
     return num;
 }
 
 /* The references are made here and now: all jobs need the same. */
-static bool prepare(const char *references, const char **words, int num, struct err *e)
+static bool prepare(const char *references, char *const *words, int num, struct err *e)
 {
     enum { MOST = 64 };
     const char *argv[MOST + 5] = {"grade", "-q", "--prepare", "--references", references};
@@ -86,7 +83,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
                       struct err *e)
 {
     char assay[4096], references[PLAN_PATH + 16];
-    const char **words = calloc((size_t)argc, sizeof *words);
+    char **words = calloc((size_t)argc, sizeof *words);
     bool ok = words != NULL || err_set(e, "out of memory");
     int num = ok ? words_of_a_job(argc, argv, s, words) : 0;
     beside_program(assay, sizeof assay, "assay");
@@ -95,7 +92,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
     ok = ok && prepare(references, words, num, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
-         plan_run_words(p, words, num, true, e) &&
+         plan_run_words(p, (const char *const *)words, num, true, e) &&
          plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
          plan_input(p, s->pathtracer, e) && rubric_inputs(p, s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */

@@ -2,10 +2,10 @@
  * put beside each other are the picture of one render bit by bit, whatever the cells. */
 #include "../renderer/cli.h"
 #include "../renderer/collada.h"
+#include "../renderer/fs.h"
 #include "../renderer/output.h"
 #include "../renderer/state.h"
 #include "command_words.h"
-#include "places.h"
 #include "plan_kinds.h"
 #include "results.h"
 
@@ -66,15 +66,15 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct option
         program,          "-q",    "-t",        t,      "--keep-state", "-f",
         "{out}/cell.png", "{job}", "--samples", samples};
     bool some = o->first > 0 || o->last < o->spp;
+    char **word = calloc((size_t)argc, sizeof *word);
+    if (word == NULL)
+        return err_set(e, "out of memory");
+    int num = words_kept(render_how, argc - 1, argv + 1, word);
+    num = words_kept(cells_and_threads, num, word, word);
     bool ok =
-        plan_run_words(p, first, (int)(sizeof first / sizeof *first) - (some ? 0 : 2), false, e);
-    for (int i = 1; ok && i < argc;) {
-        int drop = words_to_drop(render_how, &argv[i], argc - i);
-        if (drop == 0)
-            drop = words_to_drop(cells_and_threads, &argv[i], argc - i);
-        ok = drop > 0 || plan_run_words(p, (const char *const *)&argv[i], 1, true, e);
-        i += drop > 0 ? drop : 1;
-    }
+        plan_run_words(p, first, (int)(sizeof first / sizeof *first) - (some ? 0 : 2), false, e) &&
+        plan_run_words(p, (const char *const *)word, num, true, e);
+    free(word);
     return ok;
 }
 
@@ -222,21 +222,15 @@ int render_gather(const struct plan *p, int argc, char **argv, struct err *e)
     struct scene scene = {0};
     struct gathering g = {.plan = p, .o = &o};
     struct output out = {.opt = &o, .id = &g.id, .scene = &scene};
-    int kept = 0;
     char **word = calloc((size_t)argc + 1, sizeof *word);
     g.part = calloc((size_t)p->num, sizeof *g.part);
     bool ok = (word != NULL && g.part != NULL) || err_set(e, "out of memory");
     /* As a render here would have been asked for. */
     static const struct option_words slurm[] = {{"--slurm", 1}, {0}};
-    for (int i = 0; ok && i < argc;) {
-        int drop = words_to_drop(slurm, &argv[i], argc - i);
-        if (drop == 0)
-            word[kept++] = argv[i];
-        i += drop > 0 ? drop : 1;
-    }
-    out.argc = kept;
+    if (ok)
+        out.argc = words_kept(slurm, argc, argv, word);
     out.argv = word;
-    ok = ok && options_parse(kept, word, &o, e) && identity_make(&o, &g.id, e) &&
+    ok = ok && options_parse(out.argc, word, &o, e) && identity_make(&o, &g.id, e) &&
          collada_load(o.scene, (enum dialect)o.dialect, &scene, e);
     if (ok)
         snprintf(out.accel, sizeof out.accel, "%s: in %d parts", bvh_kind_names[o.accel], p->num);

@@ -2,7 +2,6 @@
 #include "../reference/process.h"
 #include "../renderer/fs.h"
 #include "command_words.h"
-#include "places.h"
 #include "plan_kinds.h"
 #include "results.h"
 #include "validate_command.h"
@@ -35,12 +34,13 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct valida
     const char *const first[] = {
         assay,   "validate", "-q",    "--of-claims",      n,   "-t", threads,
         "--out", "{out}",    "{job}", "--reference-seed", seed};
-    bool ok = plan_run_words(p, first, sizeof first / sizeof *first, false, e);
-    for (int i = 1; ok && i < argc;) {
-        int drop = words_to_drop(not_of_a_job, &argv[i], argc - i);
-        ok = drop > 0 || plan_run_words(p, (const char *const *)&argv[i], 1, true, e);
-        i += drop > 0 ? drop : 1;
-    }
+    char **word = calloc((size_t)argc, sizeof *word);
+    if (word == NULL)
+        return err_set(e, "out of memory");
+    int num = words_kept(not_of_a_job, argc - 1, argv + 1, word);
+    bool ok = plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+              plan_run_words(p, (const char *const *)word, num, true, e);
+    free(word);
     return ok;
 }
 

@@ -56,16 +56,12 @@ static void write_csv(FILE *f, const json_t *engines)
         const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
         for (size_t i = 0; i < json_array_size(rungs); i++) {
             const json_t *g = json_array_get(rungs, i);
-            bool has_ci = json_array_size(json_object_get(g, "rmse_ci")) == 2;
             csv_text(&csv, member_text(j, "engine"));
             for (size_t n = 0; n < sizeof number / sizeof *number; n++)
                 csv_number(&csv, json_is_number(json_object_get(g, number[n]))
                                      ? member_number(g, number[n])
                                      : NAN);
-            for (size_t n = 0; n < 2; n++)
-                csv_number(&csv, has_ci ? json_number_value(
-                                              json_array_get(json_object_get(g, "rmse_ci"), n))
-                                        : NAN);
+            csv_interval(&csv, g, "rmse_ci");
             csv_line(&csv);
         }
     }

@@ -177,12 +177,10 @@ static void write_plot_csv(FILE *f, const json_t *engines, bool against_time)
         const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
         for (size_t i = 0; i < json_array_size(rungs); i++) {
             const json_t *g = json_array_get(rungs, i);
-            bool has_ci = json_array_size(json_object_get(g, "rmse_ci")) == 2;
             csv_text(&csv, member_text(j, "engine"));
             csv_number(&csv, rung_x(j, g, against_time));
             csv_number(&csv, member_number(g, "rmse"));
-            for (size_t n = 0; n < 2; n++)
-                csv_number(&csv, has_ci ? end(g, "rmse_ci", n) : NAN);
+            csv_interval(&csv, g, "rmse_ci");
             csv_line(&csv);
         }
     }

@@ -45,6 +45,14 @@ void csv_number(struct csv *c, double v)
         fprintf(c->f, "%.6g", v);
 }
 
+void csv_interval(struct csv *c, const json_t *object, const char *name)
+{
+    const json_t *ends = json_object_get(object, name);
+    for (size_t n = 0; n < 2; n++)
+        csv_number(c,
+                   json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n)) : NAN);
+}
+
 void csv_line(struct csv *c)
 {
     fputs("%0D%0A", c->f);

@@ -2,6 +2,7 @@
 #ifndef ASSAY_REPORT_CSV_H
 #define ASSAY_REPORT_CSV_H
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stdio.h>
 
@@ -16,6 +17,8 @@ struct csv csv_open(FILE *f, const char *name, const char *header);
  * formula it gets an apostrophe before it. What is not finite is an empty field. */
 void csv_text(struct csv *c, const char *s);
 void csv_number(struct csv *c, double v);
+/* The two numbers of the member `name`, or two empty fields. */
+void csv_interval(struct csv *c, const json_t *object, const char *name);
 void csv_line(struct csv *c);
 /* The link's text: "CSV". */
 void csv_close(struct csv *c);

@@ -49,14 +49,10 @@ static bool command_of(const char *path, const struct image *im,
         return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
     if (!check_scene(path, opt->scene != NULL ? opt->scene : o.scene, attr(im, "assay:scene"), e))
         return false;
-    int n = 0;
-    argv[n++] = opt->pathtracer;
-    for (int i = 1; i < num;) {
-        int drop = words_to_drop(render_how, &word[i], num - i);
-        if (drop == 0)
-            argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
-        i += drop > 0 ? drop : 1;
-    }
+    int n = 1 + words_kept(render_how, num - 1, word + 1, word + 1);
+    argv[0] = opt->pathtracer;
+    for (int i = 1; i < n; i++)
+        argv[i] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
     const char *more[] = {"-q", "-t", threads, "--samples", samples, "-f", out, NULL};
     memcpy(argv + n, more, sizeof more);
     return true;
@@ -83,12 +79,12 @@ static bool compare(const char *path, const struct image *a, const struct image 
         return err_set(e, "%s: %d x %d x %d values, made again %d x %d x %d", path, a->width,
                        a->height, a->channels, b->width, b->height, b->channels);
     size_t num = (size_t)a->width * (size_t)a->height * (size_t)a->channels;
+    for (int c = 0; c < a->channels; c++)
+        if (image_channel(b, a->names[c]) != c)
+            return err_set(e, "%s: made again its channel %d is no %s", path, c, a->names[c]);
     for (size_t i = 0; i < num; i++) {
         size_t c = i % (size_t)a->channels, p = i / (size_t)a->channels;
-        int other = image_channel(b, a->names[c]);
-        if (other < 0)
-            return err_set(e, "%s: made again it has no channel %s", path, a->names[c]);
-        const float *x = &a->data[i], *y = &b->data[p * (size_t)b->channels + (size_t)other];
+        const float *x = &a->data[i], *y = &b->data[i];
         uint32_t bits[2];
         memcpy(&bits[0], x, sizeof *x);
         memcpy(&bits[1], y, sizeof *y);

@@ -426,3 +426,10 @@ double rubric_points(const struct rubric *r)
         sum += r->check[i].points;
     return sum;
 }
+
+bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel)
+{
+    const int *m = r->mask;
+    int x = (int)(pixel % (size_t)width), y = height - 1 - (int)(pixel / (size_t)width);
+    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
+}

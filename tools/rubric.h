@@ -166,4 +166,7 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
 
 double rubric_points(const struct rubric *r);
 
+/* Is pixel number `pixel`, by rows from the top, one that no check looks at? */
+bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel);
+
 #endif

@@ -178,13 +178,6 @@ struct seen {
     bool clipped;
 };
 
-static bool is_masked(const struct rubric *r, const struct student *s, size_t p)
-{
-    const int *m = r->mask;
-    int x = (int)(p % (size_t)s->width), y = s->height - 1 - (int)(p / (size_t)s->width);
-    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
-}
-
 /* Pixels that are masked are taken to be right. */
 static void fill_cells(const struct rubric *r, const struct student *s, const struct moments *m,
                        double clip, struct sight *out, struct seen *cells)
@@ -193,7 +186,7 @@ static void fill_cells(const struct rubric *r, const struct student *s, const st
         for (size_t c = 0; c < 3; c++) {
             size_t k = 3 * i + c, j = cell_at(out, i) + c;
             double right = fmin(m->mean[k], clip);
-            double value = is_masked(r, s, i) ? right : fmin(s->mean[k], clip);
+            double value = rubric_masks(r, s->width, s->height, i) ? right : fmin(s->mean[k], clip);
             out->mean[j] += value / (out->cell * out->cell);
             cells[j].sum += value - right;
             cells[j].square += pow(value - right, 2);

@@ -6,7 +6,6 @@
 #include "../renderer/progress.h"
 #include "../renderer/sha256.h"
 #include "../renderer/shell_words.h"
-#include "places.h"
 
 #include <dirent.h>
 #include <errno.h>

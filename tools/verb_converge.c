@@ -1,4 +1,5 @@
 #include "../renderer/cli.h"
+#include "../renderer/fs.h"
 #include "converge_run.h"
 #include "convergence.h"
 #include "places.h"

@@ -1,6 +1,6 @@
 #include "../renderer/cli.h"
+#include "../renderer/fs.h"
 #include "../renderer/version.h"
-#include "places.h"
 #include "reproduce.h"
 #include "results.h"
 #include "verbs.h"
