@@ -17,6 +17,7 @@
 struct stream {
     int fd;
     char why[200];
+    bool no_memory; /* for a text of the header: OpenEXR leaves it out and goes on */
 };
 
 /* Only while reading: a file that is written holds its lock where memory runs out, and asking it for our data would
@@ -24,10 +25,10 @@ struct stream {
 static void keep_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
 {
     void *s = NULL;
-    (void)code;
     if (f == NULL || exr_get_user_data(f, &s) != EXR_ERR_SUCCESS || s == NULL)
         return;
     struct stream *stream = s;
+    stream->no_memory |= code == EXR_ERR_OUT_OF_MEMORY;
     if (stream->why[0] == '\0')
         snprintf(stream->why, sizeof stream->why, "%s", msg);
 }
@@ -345,6 +346,8 @@ bool image_read_exr(const char *path, struct image *out, bool *half, struct err 
     struct image im = {0};
     bool small = false;
     exr_result_t r = exr_start_read(&f, path, &init);
+    if (r == EXR_ERR_SUCCESS && s.no_memory)
+        r = EXR_ERR_OUT_OF_MEMORY;
     bool ok = r == EXR_ERR_SUCCESS || failed(path, "read", &s, r, e);
     ok = ok && read_header(f, path, &s, &im, &small, e);
     if (ok) {
