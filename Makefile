@@ -49,7 +49,7 @@ TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
 CHECKED   = $(patsubst %,$(BUILD)/san/%,$(filter-out $(RATES),$(TESTS))) $(patsubst %,$(BUILD)/%,$(RATES))
 BENCH    := $(wildcard tests/bench*.c) tests/embree_tracer.c
-SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/grade_table.c tests/student_tracer.c,$(wildcard tests/*.c))
+SUPPORT  := $(filter-out $(TESTS:=.c) $(BENCH) tests/make_%.c tests/diagnose_rates.c tests/grade_table.c tests/student_tracer.c tests/alloc_fail.c,$(wildcard tests/*.c))
 obj       = $(patsubst %,$(1)/%.o,$(2))
 
 Q  := $(if $(V),,@)
@@ -285,6 +285,8 @@ $(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
+# With a malloc() of their own, which can fail.
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/cov,$(eval $(patsubst %,$(b)/%,$(filter tests/test_memory%,$(TESTS))): $(b)/tests/alloc_fail.c.o))
 $(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench: TEST_LIBS := -lcmocka -lembree3
 $(BUILD)/san/tests/%.c.o: | $(BUILD)/deps-test
 $(BUILD)/libassay.a: $(call obj,$(BUILD),$(HARNESS) $(RENDERER))
@@ -370,7 +372,7 @@ $(BUILD)/lint/cppcheck.ok: .cppcheck-suppressions $(wildcard renderer/*.[ch] ref
 	  '-Djson_object_foreach(o,k,v)=for(;(k=json_key(o))&&(v=json_value(o));)' renderer reference tools tests && touch $@
 
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
-programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
+programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) tests/alloc_fail.c $(TESTS:=.c) \
   $(wildcard tests/make_*.c tests/diagnose_rates.c tests/grade_table.c) $(BENCH))
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
