@@ -1,0 +1,408 @@
+/* Every allocation fails in turn in what compares: statistics, tests, FLIP, and the files that they start from. Results are
+ * held against those with memory enough. */
+#include "alloc_fail.h"
+#include "simulate.h"
+
+#include "../renderer/fs.h"
+#include "../tools/compare.h"
+#include "../tools/consistency.h"
+#include "../tools/efficiency.h"
+#include "../tools/flip.h"
+#include "../tools/gate.h"
+#include "../tools/input.h"
+#include "../tools/merge.h"
+#include "../tools/permutation.h"
+#include "../tools/pyramid.h"
+#include "../tools/renders.h"
+#include "../tools/spatial.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32, RENDERS = 4 };
+
+static char dir[] = "/tmp/test_memory_compare_XXXXXX";
+static char path_text[4][128];
+
+static const char *file(int slot, const char *name)
+{
+    snprintf(path_text[slot], sizeof path_text[slot], "%s/%s", dir, name);
+    return path_text[slot];
+}
+
+static int make_place(void **state)
+{
+    (void)state;
+    alloc_json(ALLOC_JSON_ENDS, NULL);
+    return mkdtemp(dir) == NULL;
+}
+
+static int remove_place(void **state)
+{
+    struct err e;
+    alloc_fail_sum(state);
+    return !remove_tree(dir, &e);
+}
+
+struct pair {
+    struct moments a, b, a2, b2;
+    struct compare_options opt;
+    struct comparison first; /* by gate_first() */
+    double sum;              /* of what came out with memory enough; 0: not known yet */
+};
+
+static void hold(double *right, double sum)
+{
+    if (*right == 0)
+        *right = sum;
+    assert_true(sum == *right);
+}
+
+static double comparison_sum(const struct comparison *c)
+{
+    double sum = 1 + (double)c->verdict + c->num_tests + c->rms_bias + c->direction.explained;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        sum += (s + 1) * c->statistic[s].log10_p;
+    for (int i = 0; i < c->tiles_x * c->tiles_y; i++)
+        sum += (i + 1) * c->tile_t[i];
+    for (int i = 0; i < SIDE * SIDE; i++)
+        sum += c->z.data[i] + c->relative.data[i];
+    return sum;
+}
+
+static bool finish_comparison(struct pair *p, struct comparison *c, bool ok)
+{
+    alloc_fail_off();
+    if (ok) {
+        hold(&p->sum, comparison_sum(c));
+        comparison_free(c);
+    }
+    return ok;
+}
+
+static bool compare(void *ctx, struct err *e)
+{
+    struct pair *p = ctx;
+    struct comparison c = {0};
+    return finish_comparison(p, &c, compare_moments(&p->a, &p->b, &p->opt, &c, e));
+}
+
+static bool first_stage(void *ctx, struct err *e)
+{
+    struct pair *p = ctx;
+    struct comparison c = {0};
+    return finish_comparison(p, &c, gate_first(&p->a, &p->b, &p->opt, &c, e));
+}
+
+static bool second_stage(void *ctx, struct err *e)
+{
+    struct pair *p = ctx;
+    struct comparison c = {0};
+    return finish_comparison(p, &c, gate_confirm(&p->first, &p->a2, &p->b2, &p->opt, &c, e));
+}
+
+static bool sums_of_regions(void *ctx, struct err *e)
+{
+    struct pair *p = ctx;
+    struct pyramid s = {0};
+    bool ok = pyramid_build(&p->a, &p->b, CHANNEL_LUMINANCE, 8, &s, e);
+    alloc_fail_off();
+    if (ok) {
+        hold(&p->sum, s.level[s.num_levels - 1].cell[0].a);
+        pyramid_free(&s);
+    }
+    return ok;
+}
+
+static struct moments drawn(double scale, uint64_t seed)
+{
+    struct moments m = new_moments(SIDE, SIDE, "sample");
+    simulate(&m, LAW_EXPONENTIAL, scale, 16, false, &seed);
+    return m;
+}
+
+static void comparisons(void **state)
+{
+    (void)state;
+    struct err e;
+    struct pair p = {.a = drawn(1.2, 1),
+                     .b = drawn(1, 2),
+                     .a2 = drawn(1.2, 3),
+                     .b2 = drawn(1, 4),
+                     .opt = {.alpha = 1e-3, .margin_global = 0.01, .margin_tile = 0.05, .tile = 8}};
+    alloc_fail_each("pyramid_build", ALLOC_ALL, sums_of_regions, &p);
+    p.sum = 0;
+    alloc_fail_each("compare_moments", ALLOC_ALL, compare, &p);
+    p.sum = 0;
+    alloc_fail_each("gate_first", ALLOC_ALL, first_stage, &p);
+    assert_true(gate_first(&p.a, &p.b, &p.opt, &p.first, &e));
+    assert_int_equal(p.first.verdict, VERDICT_DIFFERENT);
+    p.sum = 0;
+    alloc_fail_each("gate_confirm", ALLOC_ALL, second_stage, &p);
+    comparison_free(&p.first);
+    moments_free(&p.a);
+    moments_free(&p.b);
+    moments_free(&p.a2);
+    moments_free(&p.b2);
+}
+
+/* Nothing of a side may have changed where it fails, or the caller could not try again. */
+static bool spatial(void *ctx, struct err *e)
+{
+    struct pair *p = ctx;
+    struct spatial s;
+    alloc_fail_off();
+    struct moments a = drawn(1, 1), b = drawn(1, 2);
+    alloc_fail_on();
+    bool ok = spatial_variance(&a, &b, NULL, NULL, NULL, &s, e);
+    alloc_fail_off();
+    if (ok)
+        hold(&p->sum, a.m2[77] + s.factor[1]);
+    moments_free(&a);
+    moments_free(&b);
+    return ok;
+}
+
+struct replicates {
+    struct renders a, b;
+    struct moments render[RENDERS];
+    double variance[3 * SIDE * SIDE];
+    double sum;
+};
+
+static bool permute(void *ctx, struct err *e)
+{
+    struct replicates *r = ctx;
+    const struct permutation_options opt = {.alpha = 0.05};
+    struct permutation first, second;
+    bool ok = permutation_test(&r->a, &r->b, &opt, &first, e) &&
+              permutation_confirm(&first, &r->a, &r->b, &opt, &second, e);
+    alloc_fail_off();
+    if (ok)
+        hold(&r->sum, first.p + first.t + second.t);
+    return ok;
+}
+
+static bool judge_consistency(void *ctx, struct err *e)
+{
+    struct replicates *r = ctx;
+    struct consistency c;
+    struct efficiency f;
+    bool ok = consistency_judge(r->render, RENDERS, 0.2, 1e-3, &c, e) &&
+              efficiency_judge(r->render, RENDERS, 16, r->variance, 0.2, 1e-3, &f, e);
+    alloc_fail_off();
+    if (ok)
+        hold(&r->sum, c.pixels + c.image + f.ratio);
+    return ok;
+}
+
+static float *pictures[RENDERS];
+
+static void replicates(void **state)
+{
+    (void)state;
+    struct pair p = {.sum = 0};
+    static char *name[] = {"0", "1", "2", "3"};
+    static struct replicates r;
+    uint64_t seed = 9;
+    float *values = calloc(2 * RENDERS, sizeof *values * 3 * SIDE * SIDE);
+    assert_non_null(values);
+    for (int i = 0; i < 2 * RENDERS * 3 * SIDE * SIDE; i++)
+        values[i] = (float)draw(LAW_EXPONENTIAL, &seed);
+    float *more[RENDERS];
+    for (int k = 0; k < RENDERS; k++) {
+        pictures[k] = values + k * 3 * SIDE * SIDE;
+        more[k] = values + (RENDERS + k) * 3 * SIDE * SIDE;
+        r.render[k] = drawn(1, 20 + (uint64_t)k);
+    }
+    for (int i = 0; i < 3 * SIDE * SIDE; i++)
+        r.variance[i] = 1;
+    r.a = (struct renders){RENDERS, SIDE, SIDE, pictures, name};
+    r.b = (struct renders){RENDERS, SIDE, SIDE, more, name};
+    alloc_fail_each("spatial_variance", ALLOC_ALL, spatial, &p);
+    alloc_fail_each("permutation_test, permutation_confirm", ALLOC_ALL, permute, &r);
+    r.sum = 0;
+    alloc_fail_each("consistency_judge, efficiency_judge", ALLOC_ALL, judge_consistency, &r);
+    for (int k = 0; k < RENDERS; k++)
+        moments_free(&r.render[k]);
+    free(values);
+}
+
+static bool see(void *ctx, struct err *e)
+{
+    double *right = ctx;
+    static double reference[3 * SIDE * SIDE], test[3 * SIDE * SIDE];
+    static float low[SIDE * SIDE], high[SIDE * SIDE];
+    struct flip_exposures exposures;
+    for (int i = 0; i < 3 * SIDE * SIDE; i++) {
+        reference[i] = (i * 7 % 11) / 10.0;
+        test[i] = (i * 5 % 13) / 12.0;
+    }
+    bool ok = flip_ldr(reference, test, SIDE, SIDE, FLIP_PPD, low, e) &&
+              flip_exposures(reference, SIDE * SIDE, &exposures, e) &&
+              flip_hdr(reference, test, SIDE, SIDE, FLIP_PPD, &exposures, high, e);
+    alloc_fail_off();
+    if (ok)
+        hold(right, flip_mean(low, SIDE * SIDE) + flip_mean(high, SIDE * SIDE));
+    return ok;
+}
+
+static void flip(void **state)
+{
+    (void)state;
+    double right = 0;
+    alloc_fail_each("flip_ldr, flip_exposures, flip_hdr", ALLOC_ALL, see, &right);
+}
+
+struct side {
+    const char *path;
+    struct input_options opt;
+    double sum;
+};
+
+static bool read_side(void *ctx, struct err *e)
+{
+    struct side *s = ctx;
+    struct input in = {0};
+    struct notes notes = {0};
+    bool ok = input_read(s->path, 'a', &s->opt, &in, &notes, e);
+    alloc_fail_off();
+    if (ok) {
+        hold(&s->sum, 1 + in.m.mean[0] + in.m.mean[4] + notes.num);
+        input_free(&in);
+    }
+    return ok;
+}
+
+static bool pair_sides(void *ctx, struct err *e)
+{
+    struct side *s = ctx;
+    struct input a = {0}, b = {0};
+    struct notes notes = {0};
+    alloc_fail_off();
+    assert_true(input_read(file(0, "one.pfm"), 'a', &s->opt, &a, &notes, e) &&
+                input_read(file(1, "two.pfm"), 'b', &s->opt, &b, &notes, e));
+    alloc_fail_on();
+    bool ok = input_pair(&a, &b, &notes, e);
+    alloc_fail_off();
+    if (ok)
+        hold(&s->sum, a.m.m2[7] + b.m.m3[8]);
+    input_free(&a);
+    input_free(&b);
+    return ok;
+}
+
+static bool read_renders(void *ctx, struct err *e)
+{
+    double *right = ctx;
+    struct renders r = {0};
+    struct moments m = {0};
+    bool ok = renders_read(file(0, "replicates"), &r, e) && renders_moments(&r, &m, e);
+    alloc_fail_off();
+    if (ok)
+        hold(right, m.mean[5] + m.m2[6] + r.num);
+    renders_free(&r);
+    moments_free(&m);
+    return ok;
+}
+
+static void write_pfm(const char *path, uint64_t seed)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fprintf(f, "PF\n%d %d\n-1\n", SIDE, SIDE);
+    for (int i = 0; i < 3 * SIDE * SIDE; i++) {
+        float v = (float)draw(LAW_EXPONENTIAL, &seed);
+        fwrite(&v, sizeof v, 1, f);
+    }
+    assert_int_equal(fclose(f), 0);
+}
+
+/* OpenImageIO looks at these files; where its own memory is out it may end the program. So only our allocations fail. */
+static void inputs(void **state)
+{
+    (void)state;
+    struct err e;
+    struct moments m = drawn(1, 5);
+    assert_true(moments_write(file(0, "m.exr"), &m, NULL, 0, &e) &&
+                make_parent_dirs(file(1, "replicates/x"), &e));
+    moments_free(&m);
+    write_pfm(file(1, "one.pfm"), 1);
+    write_pfm(file(1, "two.pfm"), 2);
+    write_pfm(file(1, "replicates/1.pfm"), 3);
+    write_pfm(file(1, "replicates/2.pfm"), 4);
+    write_pfm(file(1, "replicates/3.pfm"), 5);
+    struct side side[] = {{file(2, "m.exr"), {0}, 0},
+                          {file(3, "one.pfm"), {0}, 0},
+                          {"tests/fuzz/seeds/picture.png", {.curve = "srgb"}, 0},
+                          {"tests/fuzz/seeds/picture.exr", {0}, 0}};
+    for (size_t i = 0; i < sizeof side / sizeof side[0]; i++)
+        alloc_fail_each(strrchr(side[i].path, '/') + 1, ALLOC_OURS, read_side, &side[i]);
+    struct side pair = {.sum = 0};
+    alloc_fail_each("input_pair", ALLOC_OURS, pair_sides, &pair);
+    double right = 0;
+    alloc_fail_each("renders_read, renders_moments", ALLOC_OURS, read_renders, &right);
+}
+
+static void write_share(const char *path, const char *cell, const char *samples, uint64_t seed)
+{
+    struct moments m = new_moments(4, 2, "sample");
+    struct err e = {0};
+    simulate(&m, LAW_EXPONENTIAL, 1, 4, false, &seed);
+    const struct image_attr attrs[] = {{"assay:version", "1"},   {"assay:scene", "s"},
+                                       {"assay:settings", "t"},  {"assay:seed", "1"},
+                                       {"assay:cell", cell},     {"assay:samples", samples},
+                                       {"assay:adaptive", "off"}};
+    assert_true(moments_write(path, &m, attrs, sizeof attrs / sizeof attrs[0], &e));
+    moments_free(&m);
+}
+
+static bool merge(void *ctx, struct err *e)
+{
+    double *right = ctx;
+    struct share share[3] = {{0}}, whole = {0};
+    bool ok = share_read(file(0, "s0.exr"), &share[0], e) &&
+              share_read(file(1, "s1.exr"), &share[1], e) && merge_shares(share, 2, &whole, e) &&
+              share_write(file(2, "merged/m.exr"), &whole, "assay merge", e);
+    alloc_fail_off();
+    if (ok) {
+        assert_true(share_read(file(3, "merged/m.exr"), &share[2], e));
+        hold(right, share[2].m.mean[5] + share[2].m.m2[6] + share[2].num_parts);
+    }
+    alloc_fail_output(file(2, "merged/m.exr"), ok);
+    share_free(&share[0]);
+    share_free(&share[1]);
+    share_free(&share[2]);
+    share_free(&whole);
+    return ok;
+}
+
+static void merging(void **state)
+{
+    (void)state;
+    struct err e;
+    double right = 0;
+    assert_true(make_parent_dirs(file(0, "merged/x"), &e));
+    write_share(file(0, "s0.exr"), "0 0 4 2 of 4 2", "0:4", 1);
+    write_share(file(0, "s1.exr"), "0 0 4 2 of 4 2", "4:8", 2);
+    alloc_fail_each("share_read, merge_shares, share_write", ALLOC_ALL, merge, &right);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_teardown(comparisons, alloc_fail_tell),
+        cmocka_unit_test_teardown(replicates, alloc_fail_tell),
+        cmocka_unit_test_teardown(flip, alloc_fail_tell),
+        cmocka_unit_test_teardown(inputs, alloc_fail_tell),
+        cmocka_unit_test_teardown(merging, alloc_fail_tell),
+    };
+    return cmocka_run_group_tests(tests, make_place, remove_place);
+}
