@@ -5,6 +5,8 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <nettle/base16.h>
+#include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,10 +46,11 @@ static bool hash_entry(const char *path, char *kind, char hex[65], struct err *e
 static bool hash_list(const char *path, struct dirent **list, int num, const char *except,
                       char hex[65], struct err *e)
 {
-    char *text = NULL, below[MAX_PATH], kind = 'o';
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    bool ok = f != NULL || err_set(e, "%s: out of memory", path);
+    char below[MAX_PATH], line[MAX_PATH], kind = 'o';
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    struct sha256_ctx all;
+    bool ok = true;
+    sha256_init(&all);
     for (int i = 0; ok && i < num; i++) {
         const char *name = list[i]->d_name;
         if (strcmp(name, ".") == 0 || strcmp(name, "..") == 0 ||
@@ -56,15 +59,17 @@ static bool hash_list(const char *path, struct dirent **list, int num, const cha
         int n = snprintf(below, sizeof below, "%s/%s", path, name);
         ok = (n > 0 && (size_t)n < sizeof below) || err_set(e, "%.64s...: path too long", path);
         ok = ok && hash_entry(below, &kind, hex, e);
-        if (ok)
-            fprintf(f, "%c %s %s\n", kind, hex, name);
+        if (ok) {
+            n = snprintf(line, sizeof line, "%c %s %s\n", kind, hex, name);
+            sha256_update(&all, (size_t)n, (const uint8_t *)line);
+        }
     }
-    if (f != NULL && fclose(f) != 0 && ok)
-        ok = err_set(e, "%s: out of memory", path);
-    if (ok)
-        sha256_text(text, hex);
-    free(text);
-    return ok;
+    if (!ok)
+        return false;
+    sha256_digest(&all, sizeof digest, digest);
+    base16_encode_update(hex, sizeof digest, digest);
+    hex[64] = '\0';
+    return true;
 }
 
 bool tree_hash(const char *path, const char *except, char hex[65], struct err *e)
