@@ -86,9 +86,8 @@ bool claim_lacks_time(const json_t *claim);
 int results_exit_code(const json_t *results);
 
 /* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown, and below it
- * the error line of each claim that could not be judged. *text belongs to the caller (free()). */
-bool results_print_table(const json_t *results, bool markdown, char **text, struct err *e)
-    __attribute__((warn_unused_result));
+ * the error line of each claim that could not be judged. */
+void results_print_table(FILE *f, const json_t *results, bool markdown);
 
 /* JUnit XML: one testsuite, one testcase per claim; failure for a wrong verdict, error for one that
  * could not be judged. Appears by rename. */

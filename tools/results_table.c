@@ -81,16 +81,23 @@ static void print_padded(FILE *f, const char *s, size_t width, bool right)
     fprintf(f, "%*s%s%*s", right ? gap : 0, "", s, right ? 0 : gap, "");
 }
 
-static void print_terminal(FILE *f, const struct row *row, size_t num_rows)
+static void print_terminal(FILE *f, const json_t *claims)
 {
-    size_t width[NUM_COLUMNS] = {0};
+    struct row row;
+    size_t width[NUM_COLUMNS], num = json_array_size(claims);
     for (size_t c = 0; c < NUM_COLUMNS; c++)
-        for (size_t r = 0; r <= num_rows; r++) {
-            size_t w = text_columns(r < num_rows ? row[r].cell[c] : heading[c]);
+        width[c] = text_columns(heading[c]);
+    for (size_t r = 0; r < num; r++) {
+        fill_row(&row, json_array_get(claims, r), false);
+        for (size_t c = 0; c < NUM_COLUMNS; c++) {
+            size_t w = text_columns(row.cell[c]);
             width[c] = w > width[c] ? w : width[c];
         }
-    for (size_t r = 0; r <= num_rows; r++) {
-        const char *const *cell = r == 0 ? heading : row[r - 1].cell;
+    }
+    for (size_t r = 0; r <= num; r++) {
+        if (r > 0)
+            fill_row(&row, json_array_get(claims, r - 1), false);
+        const char *const *cell = r == 0 ? heading : row.cell;
         for (size_t c = 0; c + 1 < NUM_COLUMNS; c++) {
             print_padded(f, cell[c], width[c], right_aligned[c]);
             fputs("  ", f);
@@ -116,21 +123,23 @@ static void print_markdown_text(FILE *f, const char *s)
     }
 }
 
-static void print_markdown(FILE *f, const struct row *row, size_t num_rows)
+static void print_markdown(FILE *f, const json_t *claims)
 {
+    struct row row;
     for (size_t c = 0; c < NUM_COLUMNS; c++)
         fprintf(f, "| %s ", heading[c]);
     fputs("|\n", f);
     for (size_t c = 0; c < NUM_COLUMNS; c++)
         fputs(right_aligned[c] ? "|--:" : "|---", f);
     fputs("|\n", f);
-    for (size_t r = 0; r < num_rows; r++) {
+    for (size_t r = 0; r < json_array_size(claims); r++) {
+        fill_row(&row, json_array_get(claims, r), true);
         for (size_t c = 0; c < NUM_COLUMNS; c++) {
             fputs("| ", f);
             if (c < FIRST_OF_OURS)
-                print_markdown_text(f, row[r].cell[c]);
+                print_markdown_text(f, row.cell[c]);
             else
-                fputs(row[r].cell[c], f);
+                fputs(row.cell[c], f);
             fputc(' ', f);
         }
         fputs("|\n", f);
@@ -160,34 +169,12 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
     }
 }
 
-bool results_print_table(const json_t *results, bool markdown, char **text, struct err *e)
+void results_print_table(FILE *f, const json_t *results, bool markdown)
 {
     const json_t *claims = json_object_get(results, "claims");
-    size_t num_rows = json_array_size(claims), size;
-    char *buffer = NULL;
-    struct row *row = calloc(num_rows + 1, sizeof *row);
-    FILE *f = open_memstream(&buffer, &size);
-    if (row == NULL || f == NULL)
-        goto fail;
-    for (size_t i = 0; i < num_rows; i++)
-        fill_row(&row[i], json_array_get(claims, i), markdown);
     if (markdown)
-        print_markdown(f, row, num_rows);
+        print_markdown(f, claims);
     else
-        print_terminal(f, row, num_rows);
+        print_terminal(f, claims);
     print_errors(f, claims, markdown);
-    int failed = ferror(f);
-    failed |= fclose(f);
-    f = NULL;
-    if (failed)
-        goto fail;
-    free(row);
-    *text = buffer;
-    return true;
-fail:
-    if (f != NULL)
-        fclose(f);
-    free(buffer);
-    free(row);
-    return err_set(e, "out of memory for the verdict table");
 }

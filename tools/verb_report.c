@@ -35,28 +35,24 @@ static const struct cli_option options[] = {
 static bool print_markdown(FILE *f, const char *path, bool headline, struct err *e)
 {
     json_t *results;
-    char *table = NULL;
     if (!results_read(path, &results, e))
         return false;
     bool has_claims = json_array_size(json_object_get(results, "claims")) > 0;
     const json_t *convergence = json_object_get(results, "convergence");
-    bool ok = !has_claims || results_print_table(results, true, &table, e);
-    if (ok && headline) {
+    if (headline) {
         fputs("## ", f);
         annotations_headline(f, results);
         fputs("\n\n", f);
     }
-    if (ok && has_claims)
-        fputs(table, f);
-    if (ok)
-        consistency_print(f, json_object_get(results, "consistency"), true);
-    if (ok && has_claims && convergence != NULL)
+    if (has_claims)
+        results_print_table(f, results, true);
+    consistency_print(f, json_object_get(results, "consistency"), true);
+    if (has_claims && convergence != NULL)
         putc('\n', f);
-    if (ok && convergence != NULL)
+    if (convergence != NULL)
         convergence_print_markdown(f, convergence);
-    free(table);
     json_decref(results);
-    return ok;
+    return true;
 }
 
 static bool print_github(const char *path, struct err *e)

@@ -183,15 +183,14 @@ static bool write_page_so_far(const json_t *so_far, const struct validate_option
 
 static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
 {
-    char json[4096], junit[4096], html[4096], *table;
+    char json[4096], junit[4096], html[4096];
     snprintf(json, sizeof json, "%s/results.json", out_dir);
     snprintf(junit, sizeof junit, "%s/junit.xml", out_dir);
     snprintf(html, sizeof html, "%s/index.html", out_dir);
     if (!json_write(json, results, e) || !results_write_junit(junit, results, e) ||
-        !report_write(json, html, e) || !results_print_table(results, false, &table, e))
+        !report_write(json, html, e))
         return false;
-    fputs(table, stdout);
-    free(table);
+    results_print_table(stdout, results, false);
     consistency_print(stdout, json_object_get(results, "consistency"), false);
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
