@@ -1,6 +1,7 @@
 #include "mitsuba_xml.h"
 
 #include "../renderer/fs.h"
+#include "xml_complaints.h"
 
 #include <stdio.h>
 
@@ -16,7 +17,9 @@ static void attribute(struct mitsuba_xml *x, const char *name, const char *value
 
 bool mitsuba_new(struct mitsuba_xml *x, struct err *e)
 {
-    *x = (struct mitsuba_xml){.buffer = xmlBufferCreate()};
+    *x = (struct mitsuba_xml){.w = NULL};
+    xml_complaints_to(&x->failed);
+    x->buffer = xmlBufferCreate();
     if (x->buffer != NULL)
         x->w = xmlNewTextWriterMemory(x->buffer, 0);
     if (x->w == NULL)
@@ -48,6 +51,7 @@ void mitsuba_free(struct mitsuba_xml *x)
         xmlFreeTextWriter(x->w);
     if (x->buffer != NULL)
         xmlBufferFree(x->buffer);
+    xml_complaints_to(NULL);
     *x = (struct mitsuba_xml){0};
 }
 

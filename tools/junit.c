@@ -1,5 +1,6 @@
 #include "results.h"
 
+#include "../reference/xml_complaints.h"
 #include "../renderer/fs.h"
 
 #include <stdlib.h>
@@ -120,15 +121,18 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
 
 bool results_write_junit(const char *path, const json_t *results, struct err *e)
 {
-    bool ok = false;
+    bool failed = false;
+    xml_complaints_to(&failed);
     xmlBuffer *buffer = xmlBufferCreate();
     xmlTextWriter *writer = buffer != NULL ? xmlNewTextWriterMemory(buffer, 0) : NULL;
-    if (writer != NULL)
-        ok = write_testsuite(writer, results);
+    bool ok = writer != NULL && write_testsuite(writer, results);
     xmlFreeTextWriter(writer);
+    ok = ok && !failed;
+    xml_complaints_to(NULL);
     struct out_file out;
     if (!ok) {
-        err_set(e, "%s: cannot compose the JUnit XML", path);
+        /* results_read() has seen that all of it is there and UTF-8. */
+        err_set(e, "%s: out of memory for the JUnit XML", path);
     } else if (!make_parent_dirs(path, e) || !out_open(&out, path, e)) {
         ok = false;
     } else {
