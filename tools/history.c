@@ -3,6 +3,7 @@
 #include "results.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +24,9 @@ static bool add_run(struct history *h, const char *path, size_t root, struct err
     h->run = grown;
     struct history_run *r = &grown[h->num_runs];
     *r = (struct history_run){.path = strdup(path + root)};
-    if (r->path == NULL || !results_read(path, &r->results, e)) {
+    if (r->path == NULL)
+        return err_set(e, "out of memory for the history");
+    if (!results_read(path, &r->results, e)) {
         free(r->path);
         return false;
     }
@@ -36,7 +39,7 @@ static bool walk(struct history *h, const char *dir, size_t root, int depth, str
 {
     DIR *d = opendir(dir);
     if (d == NULL)
-        return err_set(e, "%s: not a directory that can be read", dir);
+        return err_set(e, "%s: not a directory that can be read: %s", dir, strerror(errno));
     bool ok = true;
     for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
         char path[4096];
