@@ -209,7 +209,8 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
         p->num_scenes++;
     }
     report_alike_table(p);
-    report_rays(f, json_object_get(root, "claims"));
+    if (!report_rays(f, json_object_get(root, "claims"), e))
+        return false;
     report_consistency(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);

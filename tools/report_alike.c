@@ -44,14 +44,24 @@ static bool measure_idiff(const struct moments *a, const struct moments *b, doub
     return true;
 }
 
+/* As flip_exposures() has it. */
+static bool is_black(const struct moments *m)
+{
+    for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++) {
+        const double *v = m->mean + 3 * i;
+        if (0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2] > 0)
+            return false;
+    }
+    return true;
+}
+
 bool alike_measure(const struct moments *a, const struct moments *b, double white,
                    struct alike *out, float *map, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
-    struct err black;
-    *out = (struct alike){0};
-    out->has_flip = flip_exposures(b->mean, pixels, &out->exposures, &black);
-    return (!out->has_flip || measure_flip(a, b, white, out, map, e)) &&
+    *out = (struct alike){.has_flip = !is_black(b)};
+    return (!out->has_flip || (flip_exposures(b->mean, pixels, &out->exposures, e) &&
+                               measure_flip(a, b, white, out, map, e))) &&
            measure_idiff(a, b, white, out, e);
 }
 

@@ -157,7 +157,8 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
         return false;
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
-    report_qq(f, json);
+    if (!report_qq(f, json, e))
+        return false;
     report_power(f, json);
     fputs("</div>\n", f);
     report_tiles(f, json);

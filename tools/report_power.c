@@ -117,12 +117,14 @@ static void write_tile_csv(FILE *f, const json_t *claim)
     csv_close(&csv);
 }
 
-void report_qq(FILE *f, const json_t *claim)
+bool report_qq(FILE *f, const json_t *claim, struct err *e)
 {
     const json_t *list = json_object_get(claim, "tile_log10_p");
     double *v = calloc(json_array_size(list) + 1, sizeof *v);
     int n = 0, outside = 0;
-    for (size_t i = 0; v != NULL && i < json_array_size(list); i++)
+    if (v == NULL)
+        return err_set(e, "out of memory for the report");
+    for (size_t i = 0; i < json_array_size(list); i++)
         if (json_is_number(json_array_get(list, i)))
             v[n++] = fmin(json_number_value(json_array_get(list, i)), 0);
     if (n >= 4) {
@@ -158,6 +160,7 @@ void report_qq(FILE *f, const json_t *claim)
         fputs("</figcaption></figure>\n", f);
     }
     free(v);
+    return true;
 }
 
 struct power power_of(const json_t *claim)

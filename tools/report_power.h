@@ -2,8 +2,9 @@
 #ifndef ASSAY_REPORT_POWER_H
 #define ASSAY_REPORT_POWER_H
 
+#include "../renderer/err.h"
+
 #include <jansson.h>
-#include <stdbool.h>
 #include <stdio.h>
 
 /* The i-th smallest of n uniform p-values lies within these with 95 %: quantiles of Beta(i, n + 1 - i),
@@ -11,8 +12,8 @@
 void qq_band(int i, int n, double *low, double *high);
 
 /* <figure> of the tiles' p-values against those that uniform ones would have, with its band; nothing for
- * fewer than 4 tiles with noise. */
-void report_qq(FILE *f, const json_t *claim);
+ * fewer than 4 tiles with noise. Fails only out of memory. */
+bool report_qq(FILE *f, const json_t *claim, struct err *e) __attribute__((warn_unused_result));
 
 /* The chance that a bias of the image's mean (relative) comes out DIFFERENT, by the statistic of the image
  * alone: Phi((bias - margin)/SE - c), c the normal quantile at the level of its tests, SE from the MDB, which

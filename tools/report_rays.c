@@ -85,10 +85,12 @@ static void write_plot(FILE *f, const struct bar *bar, size_t num)
             LEFT, TOP, bottom, LEFT + WIDTH, LEFT + WIDTH / 2, bottom + 34);
 }
 
-void report_rays(FILE *f, const json_t *claims)
+bool report_rays(FILE *f, const json_t *claims, struct err *e)
 {
     struct bar *bar = calloc(json_array_size(claims) + 1, sizeof *bar);
-    size_t num = bar != NULL ? gather(claims, bar) : 0;
+    if (bar == NULL)
+        return err_set(e, "out of memory for the report");
+    size_t num = gather(claims, bar);
     if (num > 0) {
         fputs(
             "<section id=\"rays\">\n<h2>What a ray costs</h2>\n<figure><div class=\"wide plain\" tabindex=\"0\" role=\"region\" aria-label=\"Plot of tests of a ray\">",
@@ -113,4 +115,5 @@ void report_rays(FILE *f, const json_t *claims)
         fputs("</figcaption></figure>\n</section>\n", f);
     }
     free(bar);
+    return true;
 }

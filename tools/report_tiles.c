@@ -4,7 +4,6 @@
 #include "results.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 enum { SHOWN = 8 };
 
@@ -13,12 +12,16 @@ struct tile {
     double log10_p;
 };
 
-static int compare_tiles(const void *a, const void *b)
+/* Puts one that comes after all in `tile` among the SHOWN smallest, in their order. */
+static void keep_smallest(struct tile tile[SHOWN], size_t num, struct tile one)
 {
-    const struct tile *x = a, *y = b;
-    if (x->log10_p != y->log10_p)
-        return x->log10_p < y->log10_p ? -1 : 1;
-    return (x->index > y->index) - (x->index < y->index);
+    size_t i = num < SHOWN ? num : SHOWN;
+    if (i == SHOWN && one.log10_p >= tile[SHOWN - 1].log10_p)
+        return;
+    i -= i == SHOWN;
+    for (; i > 0 && tile[i - 1].log10_p > one.log10_p; i--)
+        tile[i] = tile[i - 1];
+    tile[i] = one;
 }
 
 void report_tiles(FILE *f, const json_t *claim)
@@ -28,12 +31,13 @@ void report_tiles(FILE *f, const json_t *claim)
     size_t num = 0, size = json_array_size(log10_p),
            columns = (size_t)member_number(claim, "tiles_x");
     double side = member_number(claim, "tile");
-    struct tile *tile = calloc(size + 1, sizeof *tile);
-    for (size_t i = 0; tile != NULL && i < size; i++)
-        if (json_is_number(json_array_get(log10_p, i)))
-            tile[num++] = (struct tile){i, json_number_value(json_array_get(log10_p, i))};
+    struct tile tile[SHOWN] = {{0}};
+    for (size_t i = 0; i < size; i++) {
+        const json_t *p = json_array_get(log10_p, i);
+        if (json_is_number(p))
+            keep_smallest(tile, num++, (struct tile){i, json_number_value(p)});
+    }
     if (num > 0 && columns > 0) {
-        qsort(tile, num, sizeof *tile, compare_tiles);
         fprintf(f,
                 "<div class=\"tiles\"><h4>The tiles of smallest p, of %zu</h4>\n<div "
                 "class=\"tabs\">\n",
@@ -55,5 +59,4 @@ void report_tiles(FILE *f, const json_t *claim)
             "it.</p></div>\n",
             f);
     }
-    free(tile);
 }
