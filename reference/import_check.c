@@ -7,6 +7,7 @@
 #include "../renderer/fs.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -202,13 +203,13 @@ static bool write_jobs(const struct suite_scene *const *scene, int num, const ch
     json_t *jobs = json_array();
     bool ok = true;
     for (int i = 0; ok && i < num; i++) {
-        char *full = realpath(scene[i]->dae, NULL);
-        ok = full != NULL || err_set(e, "%s: %s", scene[i]->dae, strerror(errno));
+        char full[PATH_MAX];
+        ok = realpath(scene[i]->dae, full) != NULL ||
+             err_set(e, "%s: %s", scene[i]->dae, strerror(errno));
         ok = ok && (json_array_append_new(jobs, json_pack("{s:s, s:i, s:i}", "dae", full, "width",
                                                           scene[i]->width, "height",
                                                           scene[i]->height)) == 0 ||
                     err_set(e, "out of memory"));
-        free(full);
     }
     snprintf(path, sizeof path, "%s/jobs.json", dir);
     ok = ok && json_write(path, jobs, e);

@@ -7,8 +7,9 @@
 
 /* Whose calls count and fail. Not operator new: libraries of C++ may end the program there. */
 enum alloc_by {
-    ALLOC_ALL, /* everyone's, libraries included */
-    ALLOC_OURS /* those of the code that is linked into the program itself */
+    ALLOC_ALL,  /* everyone's, libraries included */
+    ALLOC_OURS, /* those of the code that is linked into the program itself */
+    ALLOC_LOSSY /* everyone's; no leak is looked for, as a library loses blocks itself when it fails */
 };
 
 /* Calls `call` without failure, counting its allocations, then once for each of them, which fails, then without failure again.

@@ -6,6 +6,7 @@
 
 #include "../renderer/fs.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -222,13 +223,10 @@ static bool side_file(const struct compared *c, int side, const char *json, char
 {
     const char *slash = strrchr(json, '/');
     if (c->is_file[side]) {
-        char *full = realpath(c->path[side], NULL);
-        if (full == NULL || strlen(full) >= size) {
-            free(full);
+        char full[PATH_MAX];
+        if (realpath(c->path[side], full) == NULL || strlen(full) >= size)
             return err_set(e, "%s: its full path is not known", c->path[side]);
-        }
         strcpy(out, full);
-        free(full);
         return true;
     }
     snprintf(out, size, "%s.%c.exr", json, "ab"[side]);
