@@ -59,19 +59,29 @@ static int lock_directory(const char *golden_dir, const char *scene, struct err 
     return -1;
 }
 
-static bool has_hash(const char *path, const json_t *entry)
+/* *has: it is there and what the entry describes. Fails where it is there and cannot be read. */
+static bool look_at_hash(const char *path, const json_t *entry, bool *has, struct err *e)
 {
     char sha256[65];
-    struct err ignored;
     const char *want = json_string_value(json_object_get(entry, "exr_sha256"));
-    return want != NULL && access(path, F_OK) == 0 && sha256_file(path, sha256, &ignored) &&
-           strcmp(want, sha256) == 0;
+    *has = false;
+    if (want == NULL || access(path, F_OK) != 0)
+        return true;
+    if (!sha256_file(path, sha256, e))
+        return false;
+    *has = strcmp(want, sha256) == 0;
+    return true;
 }
 
-/* Which file is the image of an entry: after an interruption it may be the next one still. */
+/* Which file is the image of an entry: after an interruption it may be the next one still. What cannot be read is not it. */
 static const char *image_of(const json_t *entry, const char *exr, const char *next)
 {
-    return !has_hash(exr, entry) && has_hash(next, entry) ? next : exr;
+    struct err ignored;
+    bool here, waits;
+    return (!look_at_hash(exr, entry, &here, &ignored) || !here) &&
+                   look_at_hash(next, entry, &waits, &ignored) && waits
+               ? next
+               : exr;
 }
 
 /* Under the lock nobody writes: an image that waits is what a kill left. That of the manifest takes its place, another goes. */
@@ -79,7 +89,10 @@ static bool settle(const json_t *entry, const char *exr, const char *next, struc
 {
     if (access(next, F_OK) != 0)
         return true;
-    int r = image_of(entry, exr, next) == next ? rename(next, exr) : unlink(next);
+    bool here, waits;
+    if (!look_at_hash(exr, entry, &here, e) || !look_at_hash(next, entry, &waits, e))
+        return false;
+    int r = waits && !here ? rename(next, exr) : unlink(next);
     return r == 0 || err_set(e, "%s: cannot write: %s", exr, strerror(errno));
 }
 
@@ -118,12 +131,15 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
     bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
-    ok = ok && moments_write(next, m, attrs, 2, e) && sha256_file(next, sha256, e);
+    bool waits = ok && moments_write(next, m, attrs, 2, e);
+    ok = waits && sha256_file(next, sha256, e);
     if (ok) {
         ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
              json_object_set(all, engine, entry) == 0;
         ok = ok ? json_write(path, all, e) : err_set(e, "%s: out of memory", path);
     }
+    if (waits && !ok)
+        unlink(next); /* no manifest names it */
     if (ok && rename(next, exr) != 0)
         ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
     json_decref(entry);
