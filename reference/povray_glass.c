@@ -55,13 +55,14 @@ static int by_ends(const void *a, const void *b)
     return memcmp(a, b, 2 * sizeof(vec3));
 }
 
-/* Each edge is there once in each direction, and the volume is positive. */
-static bool is_closed(const struct scene *s, const struct object *o)
+/* *is_closed: each edge is there once in each direction, and the volume is positive. Fails only out of memory. */
+static bool look_if_closed(const struct scene *s, const struct object *o, bool *is_closed,
+                           struct err *e)
 {
     size_t n = 3 * (size_t)o->num_triangles;
     vec3 *edge = malloc(4 * n * sizeof *edge);
     if (edge == NULL)
-        return false;
+        return err_set(e, "POV-Ray: out of memory for the glass '%s'", o->name);
     vec3 *back = edge + 2 * n;
     double volume = 0;
     for (size_t i = 0; i < n; i++) {
@@ -79,7 +80,8 @@ static bool is_closed(const struct scene *s, const struct object *o)
     for (size_t i = 1; closed && i < n; i++)
         closed = by_ends(&edge[2 * i - 2], &edge[2 * i]) != 0;
     free(edge);
-    return closed && volume > 0;
+    *is_closed = closed && volume > 0;
+    return true;
 }
 
 static bool check_material(const struct material *m, struct err *e)
@@ -115,7 +117,10 @@ static bool check_mesh(const struct scene *s, const struct object *o, vec3 eye, 
         struct box t = triangle_box(&s->position[3 * ((size_t)o->first_triangle + i)]);
         body = (struct box){vmin(body.lo, t.lo), vmax(body.hi, t.hi)};
     }
-    if (!is_closed(s, o))
+    bool is_closed;
+    if (!look_if_closed(s, o, &is_closed, e))
+        return false;
+    if (!is_closed)
         return err_set(e, "POV-Ray: the glass '%s' is not a closed surface with its front outside",
                        o->name);
     if (distance_to_box(eye, &body) <= touch)
