@@ -1,4 +1,5 @@
 /* assay: one program, several verbs. */
+#include "../reference/gsl_errors.h"
 #include "../renderer/image_oiio.h"
 #include "../renderer/image.h"
 #include "../renderer/version.h"
@@ -59,6 +60,7 @@ static void *json_memory(size_t size)
 int main(int argc, char **argv)
 {
     json_set_alloc_funcs(json_memory, free);
+    gsl_errors_of_memory_return();
     if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
         print_help();
         return 0;
