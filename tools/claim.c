@@ -1,5 +1,7 @@
 #include "claim.h"
 
+#include "utf8.h"
+
 #include "../renderer/shell_words.h"
 #include "../renderer/version.h"
 
@@ -139,13 +141,20 @@ static void describe_machine(char *text, size_t size)
              model[0] ? model : "unknown processor");
 }
 
-json_t *results_new(int argc, char **argv, double alpha)
+json_t *results_new(int argc, char **argv, double alpha, struct err *e)
 {
     char date[32], machine[192];
     assert(argv[argc] == NULL);
+    for (int i = 0; i < argc; i++)
+        if (!utf8_is_valid(argv[i])) {
+            err_set(e, "argument '%s' is no UTF-8, and results hold nothing else", argv[i]);
+            return NULL;
+        }
     char *command = shell_join("assay", (const char *const *)argv);
-    if (command == NULL)
+    if (command == NULL) {
+        err_set(e, "out of memory");
         return NULL;
+    }
     time_t now = time(NULL);
     struct tm utc;
     gmtime_r(&now, &utc);
@@ -155,5 +164,7 @@ json_t *results_new(int argc, char **argv, double alpha)
         json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command, "version",
                   assay_version, "date", date, "machine", machine, "alpha", alpha, "claims");
     free(command);
+    if (root == NULL)
+        err_set(e, "out of memory");
     return root;
 }

@@ -246,14 +246,18 @@ bool compared_write_json(const struct compare_job *job, const struct compared *c
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
     snprintf(z, sizeof z, "%s.z.exr", path);
     snprintf(relative, sizeof relative, "%s.relative.exr", path);
+    json_t *root = results_new(argc, argv, job->opt.alpha, e);
+    if (root == NULL)
+        return false;
     if (!make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
         !image_write_exr(relative, &c->r.relative, e) ||
         !side_file(c, 0, path, side[0], sizeof side[0], e) ||
-        !side_file(c, 1, path, side[1], sizeof side[1], e))
+        !side_file(c, 1, path, side[1], sizeof side[1], e)) {
+        json_decref(root);
         return false;
-    json_t *root = results_new(argc, argv, job->opt.alpha);
+    }
     json_t *claim = claim_judged(&context, &c->r);
-    bool ok = root != NULL && claim != NULL;
+    bool ok = claim != NULL;
     if (ok && !c->is_guessed)
         ok = claim_add_observations(claim, "a", &c->m[0]) &&
              claim_add_observations(claim, "b", &c->m[1]);

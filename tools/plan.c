@@ -6,6 +6,7 @@
 #include "plan_kinds.h"
 #include "results.h"
 #include "tree_hash.h"
+#include "utf8.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -49,11 +50,18 @@ char **plan_words(const json_t *array, int *num)
     return words;
 }
 
+/* A text that jansson would not take. */
+static bool refuse(const char *text, struct err *e)
+{
+    return utf8_is_valid(text) ? err_set(e, "out of memory for the plan")
+                               : err_set(e, "'%s' is no UTF-8 and cannot be planned", text);
+}
+
 static bool add_words(json_t *array, const char *const *word, int num, struct err *e)
 {
     for (int i = 0; i < num; i++)
         if (json_array_append_new(array, json_string(word[i])) != 0)
-            return err_set(e, "'%s' is no UTF-8 and cannot be planned", word[i]);
+            return refuse(word[i], e);
     return true;
 }
 
@@ -62,8 +70,7 @@ static bool add_input(json_t *inputs, const char *path, struct err *e)
     char hex[65];
     if (!tree_hash(path, NULL, hex, e))
         return false;
-    return json_object_set_new(inputs, path, json_string(hex)) == 0 ||
-           err_set(e, "'%s' is no UTF-8 and cannot be planned", path);
+    return json_object_set_new(inputs, path, json_string(hex)) == 0 || refuse(path, e);
 }
 
 bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
@@ -78,10 +85,10 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
     if (realpath(dir, full) == NULL || strlen(full) >= sizeof p->dir)
         return err_set(e, "%s: %s", dir, strerror(errno));
     strcpy(p->dir, full);
-    json_object_set_new(p->head, "output", json_string(output));
-    json_object_set_new(p->head, "product", json_string(product));
-    json_object_set_new(p->head, "cpus", json_integer(cpus));
-    return true;
+    return (json_object_set_new(p->head, "output", json_string(output)) == 0 &&
+            json_object_set_new(p->head, "product", json_string(product)) == 0 &&
+            json_object_set_new(p->head, "cpus", json_integer(cpus)) == 0) ||
+           refuse(output, e);
 }
 
 bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)
@@ -97,7 +104,9 @@ bool plan_run_words(struct plan *p, const char *const *word, int num, bool user,
 
 void plan_may_end(struct plan *p, int code)
 {
-    json_array_append_new(json_object_get(p->head, "ends"), json_integer(code));
+    /* Without them plan_make() fails. */
+    if (json_array_append_new(json_object_get(p->head, "ends"), json_integer(code)) != 0)
+        json_object_del(p->head, "ends");
 }
 
 bool plan_input(struct plan *p, const char *path, struct err *e)
@@ -106,22 +115,43 @@ bool plan_input(struct plan *p, const char *path, struct err *e)
 }
 
 /* What all jobs have in common and their bits depend on. */
-static void hash_common(const struct plan *p, char hex[65])
+static bool hash_common(const struct plan *p, char hex[65])
 {
     json_t *common = json_pack(
         "{ss, sO, sO, sO}", "version", assay_version, "run", json_object_get(p->head, "run"),
         "inputs", json_object_get(p->head, "inputs"), "cwd", json_object_get(p->head, "cwd"));
     char *text = json_dumps(common, JSON_COMPACT | JSON_SORT_KEYS);
-    sha256_text(text, hex);
+    if (text != NULL)
+        sha256_text(text, hex);
     free(text);
     json_decref(common);
+    return text != NULL;
+}
+
+/* The line of a job, to free(); NULL out of memory. */
+static char *job_line(const struct plan *p, json_t *words, json_t *inputs)
+{
+    char common[65], key[65];
+    if (!hash_common(p, common))
+        return NULL;
+    json_t *job = json_pack("{ss, sO, sO}", "common", common, "words", words, "inputs", inputs);
+    char *text = json_dumps(job, JSON_COMPACT | JSON_SORT_KEYS);
+    json_decref(job);
+    if (text == NULL)
+        return NULL;
+    sha256_text(text, key);
+    free(text);
+    job =
+        json_pack("{si, ss, sO, sO}", "job", p->num, "key", key, "words", words, "inputs", inputs);
+    text = json_dumps(job, JSON_COMPACT);
+    json_decref(job);
+    return text;
 }
 
 bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
               struct err *e)
 {
     json_t *words = json_array(), *inputs = json_object();
-    char *text = NULL, common[65], key[65];
     char **line = realloc(p->line, ((size_t)p->num + 1) * sizeof *line);
     bool ok = line != NULL || err_set(e, "out of memory");
     if (line != NULL)
@@ -130,16 +160,9 @@ bool plan_job(struct plan *p, const char *const *word, int num, const char *cons
     for (; ok && *input != NULL; input++)
         ok = add_input(inputs, *input, e);
     if (ok) {
-        hash_common(p, common);
-        json_t *job = json_pack("{ss, sO, sO}", "common", common, "words", words, "inputs", inputs);
-        text = json_dumps(job, JSON_COMPACT | JSON_SORT_KEYS);
-        sha256_text(text, key);
-        free(text);
-        json_decref(job);
-        job = json_pack("{si, ss, sO, sO}", "job", p->num, "key", key, "words", words, "inputs",
-                        inputs);
-        p->line[p->num++] = json_dumps(job, JSON_COMPACT);
-        json_decref(job);
+        p->line[p->num] = job_line(p, words, inputs);
+        ok = p->line[p->num] != NULL || err_set(e, "out of memory for the plan");
+        p->num += ok;
     }
     json_decref(words);
     json_decref(inputs);
@@ -153,7 +176,10 @@ static bool write_plan(const struct plan *p, struct err *e)
     snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
     if (!out_open(&out, path, e))
         return false;
-    json_dumpf(p->head, out.f, JSON_COMPACT);
+    if (json_dumpf(p->head, out.f, JSON_COMPACT) != 0) {
+        out_abandon(&out);
+        return err_set(e, "%s: cannot write, or out of memory", path);
+    }
     for (int k = 0; k < p->num; k++)
         fprintf(out.f, "\n%s", p->line[k]);
     fputc('\n', out.f); /* out_commit() looks at the error flag */
@@ -190,13 +216,14 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
     p.head = json_pack("{si, ss, ss, ss?, s[], s[i], s[], s{}}", "assay_plan", 1, "kind",
                        kinds[kind].name, "version", assay_version, "cwd", cwd, "command", "ends", 0,
                        "run", "inputs");
-    bool ok = (p.head != NULL || err_set(e, "%s: cannot be written into a plan", cwd)) &&
+    bool ok = (p.head != NULL || refuse(cwd, e)) &&
               add_words(json_object_get(p.head, "command"), (const char *const *)argv, argc, e) &&
               kinds[kind].plan(argc, argv, parts, &p, e);
-    if (ok) {
-        json_object_set_new(p.head, "jobs", json_integer(p.num));
-        ok = write_plan(&p, e);
-    }
+    if (ok)
+        ok = (json_object_get(p.head, "ends") != NULL &&
+              json_object_set_new(p.head, "jobs", json_integer(p.num)) == 0) ||
+             err_set(e, "out of memory for the plan");
+    ok = ok && write_plan(&p, e);
     if (ok)
         *out = p;
     else
@@ -243,23 +270,30 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
     char *line = NULL;
     size_t room = 0;
     ssize_t n;
-    bool ok = true;
+    bool ok = true, no_memory = false;
+    errno = 0;
     while (ok && (n = getline(&line, &room, f)) > 0) {
         if (line[n - 1] == '\n')
             line[n - 1] = '\0';
         if (p->head == NULL) {
-            p->head = json_loads(line, 0, NULL);
+            json_error_t why = {.text = ""};
+            p->head = json_loads(line, 0, &why);
             ok = check_head(p);
+            no_memory = p->head == NULL && json_error_code(&why) == json_error_out_of_memory;
             continue;
         }
         char **more = realloc(p->line, ((size_t)p->num + 1) * sizeof *more);
         p->line = more != NULL ? more : p->line;
         char *copy = more != NULL ? strdup(line) : NULL;
         ok = copy != NULL;
+        no_memory = !ok;
         if (ok)
             p->line[p->num++] = copy;
     }
+    no_memory |= ok && errno == ENOMEM; /* of getline() */
     free(line);
+    if (no_memory)
+        return err_set(e, "%s/plan.jsonl: out of memory", p->dir);
     return (ok && p->head != NULL && p->num > 0 &&
             json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
            err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);

@@ -83,21 +83,21 @@ static char **command_of(const struct plan *p, const json_t *job, const char *ou
     json_t *run = json_object_get(p->head, "run"), *own = json_object_get(job, "words"),
            *all = json_array(), *v;
     size_t i;
-    int num;
+    int num, failed = 0;
     json_array_foreach(run, i, v)
     {
         const char *word = json_string_value(v);
         char path[2 * ROOM];
         if (strcmp(word, "{job}") == 0) {
-            json_array_extend(all, own);
+            failed |= json_array_extend(all, own);
         } else if (strncmp(word, "{out}", 5) == 0) {
             snprintf(path, sizeof path, "%s%s", out, word + 5);
-            json_array_append_new(all, json_string(path));
+            failed |= json_array_append_new(all, json_string(path));
         } else {
-            json_array_append(all, v);
+            failed |= json_array_append(all, v);
         }
     }
-    char **words = plan_words(all, &num);
+    char **words = failed == 0 ? plan_words(all, &num) : NULL;
     json_decref(all);
     return words;
 }

@@ -158,9 +158,9 @@ static int stages_of(const struct validate_options *o)
 bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
                     struct err *e)
 {
-    json_t *root = results_new(argc, argv, o->alpha);
+    json_t *root = results_new(argc, argv, o->alpha, e);
     if (root == NULL)
-        return err_set(e, "out of memory");
+        return false;
     json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));
     if (o->live)
         json_object_set_new(root, "reference_seed", json_integer(o->reference_seed));

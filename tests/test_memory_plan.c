@@ -1,0 +1,223 @@
+/* Every allocation fails in turn, those of jansson and of other libraries too, in what plans work, does a job of it and puts the
+ * jobs together. The program of the jobs is a script that copies what a render would have left. */
+#include "alloc_fail.h"
+
+#include "../renderer/film.h"
+#include "../renderer/fs.h"
+#include "../renderer/identity.h"
+#include "../renderer/options.h"
+#include "../renderer/state.h"
+#include "../tools/claim.h"
+#include "../tools/plan.h"
+
+#include <fcntl.h>
+#include <libxml/xmlerror.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char dir[] = "/tmp/test_memory_plan_XXXXXX";
+static char picture[128], plan_dir[128], program[4096];
+static bool is_our_program;
+
+/* `assay plan` takes the pathtracer beside the program that runs. */
+static int make_place(void **state)
+{
+    (void)state;
+    struct err e;
+    alloc_json(ALLOC_JSON_FAILS, NULL);
+    if (mkdtemp(dir) == NULL)
+        return -1;
+    snprintf(picture, sizeof picture, "%s/out/x.png", dir);
+    snprintf(plan_dir, sizeof plan_dir, "%s/plan", dir);
+    beside_program(program, sizeof program, "pathtracer");
+    is_our_program = access(program, F_OK) != 0;
+    return make_parent_dirs(picture, &e) && is_our_program ? 0 : -1;
+}
+
+static int remove_place(void **state)
+{
+    struct err e;
+    alloc_fail_sum(state);
+    if (is_our_program)
+        unlink(program);
+    return remove_tree(dir, &e) ? 0 : -1;
+}
+
+static char *command[] = {"pathtracer", "-q", "-r", "8",     "32",
+                          "-s",         "4",  "-f", picture, "reference/scenes/12_point_plane.dae",
+                          NULL};
+enum { WORDS = sizeof command / sizeof command[0] - 1 };
+
+/* Writes the state of each job's cell where the script finds it, by its words: -p X Y W H. */
+static void write_states(const struct plan *p)
+{
+    struct options o;
+    struct identity id;
+    struct err e = {0};
+    assert_true(options_parse(WORDS, command, &o, &e) && identity_make(&o, &id, &e));
+    for (int k = 0; k < p->num; k++) {
+        json_t *job = json_loads(p->line[k], 0, NULL), *words = json_object_get(job, "words");
+        int cell[4];
+        char path[256];
+        struct film f;
+        for (size_t i = 0; i < 4; i++)
+            cell[i] = atoi(json_string_value(json_array_get(words, i + 1)));
+        json_decref(job);
+        identity_cell(cell, o.width, o.height, id.cell);
+        assert_true(film_alloc(&f, cell[2], cell[3], false, &e));
+        for (size_t i = 0; i < (size_t)(cell[2] * cell[3]); i++)
+            for (int n = 0; n < 4; n++)
+                moments_add(&f.m, i, (double[3]){cell[1], 0.5, n});
+        f.num_samples = 4;
+        snprintf(path, sizeof path, "%s/%d_%d.state", dir, cell[0], cell[1]);
+        assert_true(state_write(path, &id, &f, &e));
+        film_free(&f);
+    }
+}
+
+static void write_program(void)
+{
+    FILE *f = fopen(program, "w");
+    assert_non_null(f);
+    fprintf(
+        f,
+        "#!/bin/sh\nwhile [ $# -gt 0 ]; do case $1 in -f) out=$2;; -p) from=$2_$3;; esac; shift; "
+        "done\ncp '%s'/$from.state \"$out.state\"\n",
+        dir);
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(chmod(program, 0755), 0);
+}
+
+static char *plan_lines(const struct plan *p)
+{
+    size_t room = 1;
+    for (int k = 0; k < p->num; k++)
+        room += strlen(p->line[k]) + 1;
+    char *text = calloc(room, 1);
+    assert_non_null(text);
+    for (int k = 0; k < p->num; k++)
+        strcat(strcat(text, p->line[k]), "\n");
+    return text;
+}
+
+static bool make_plan(void *ctx, struct err *e)
+{
+    char **right = ctx, path[200];
+    struct plan p = {.dir = "", .head = NULL};
+    bool ok = plan_make(plan_dir, WORDS, command, 2, &p, e);
+    alloc_fail_off();
+    assert_int_equal(ok, p.head != NULL);
+    snprintf(path, sizeof path, "%s/plan.jsonl", plan_dir);
+    if (ok && right != NULL) {
+        char *lines = plan_lines(&p);
+        if (*right == NULL)
+            *right = strdup(lines);
+        assert_string_equal(*right, lines);
+        free(lines);
+    }
+    if (ok) {
+        plan_free(&p);
+        assert_true(plan_read(plan_dir, &p, e));
+        assert_int_equal(p.num, 2);
+        plan_free(&p);
+    }
+    alloc_fail_output(path, ok);
+    return ok;
+}
+
+static bool read_plan(void *ctx, struct err *e)
+{
+    const char *right = ctx;
+    struct plan p = {.dir = "", .head = NULL};
+    bool ok = plan_read(plan_dir, &p, e);
+    alloc_fail_off();
+    if (ok) {
+        char *lines = plan_lines(&p);
+        assert_string_equal(right, lines);
+        free(lines);
+        plan_free(&p);
+    }
+    return ok;
+}
+
+static bool do_job(void *ctx, struct err *e)
+{
+    const struct plan *p = ctx;
+    char path[PLAN_PATH + 256];
+    struct err none = {0};
+    bool made = false, ok = plan_run_job(p, 0, &made, e);
+    alloc_fail_off();
+    assert_int_equal(ok, made);
+    assert_int_equal(ok, plan_is_made(p, 0));
+    assert_true(!ok || plan_verify(p, 0, &none));
+    plan_artefact(p, 0, NULL, path);
+    if (ok)
+        assert_true(remove_tree(path, &none));
+    snprintf(path, sizeof path, "%s/jobs", plan_dir);
+    assert_true(rmdir(path) == 0 || access(path, F_OK) != 0); /* nothing else is in it */
+    return ok;
+}
+
+static bool verify_job(void *ctx, struct err *e)
+{
+    return plan_is_made(ctx, 0) ? plan_verify(ctx, 0, e) : err_set(e, "out of memory or missing");
+}
+
+static bool gather(void *ctx, struct err *e)
+{
+    int code = plan_gather(ctx, e);
+    alloc_fail_off();
+    assert_int_equal(code == 0, access(picture, F_OK) == 0);
+    alloc_fail_output(picture, code == 0);
+    xmlResetLastError();
+    return code == 0;
+}
+
+static void plans(void **state)
+{
+    (void)state;
+    struct err e = {0};
+    struct plan p;
+    char *lines = NULL;
+    bool made;
+    write_program();
+    alloc_json(ALLOC_JSON_ENDS, NULL);
+    alloc_fail_each("plan_make", ALLOC_ALL, make_plan, &lines);
+    /* json_dumps() itself leaves out parts where it has no memory (2.14), so that what comes out is not looked at. */
+    alloc_json(ALLOC_JSON_FAILS, NULL);
+    alloc_fail_each("plan_make, jansson too", ALLOC_ALL, make_plan, NULL);
+    assert_true(plan_make(plan_dir, WORDS, command, 2, &p, &e));
+    alloc_fail_each("plan_read", ALLOC_ALL, read_plan, lines);
+    free(lines);
+    write_states(&p);
+    /* A job that cannot be read in whole is none: here the program ends instead (tools/main.c). */
+    alloc_json(ALLOC_JSON_ENDS, NULL);
+    alloc_fail_each("plan_run_job", ALLOC_ALL, do_job, &p);
+    assert_true(plan_run_job(&p, 0, &made, &e) && plan_run_job(&p, 1, &made, &e));
+    alloc_fail_each("plan_is_made, plan_verify", ALLOC_ALL, verify_job, &p);
+    int out = dup(STDOUT_FILENO), nowhere = open("/dev/null", O_WRONLY);
+    assert_true(out >= 0 && nowhere >= 0 && fflush(stdout) == 0);
+    dup2(nowhere, STDOUT_FILENO); /* it says what it wrote */
+    alloc_fail_each("plan_gather", ALLOC_ALL, gather, &p);
+    fflush(stdout);
+    dup2(out, STDOUT_FILENO);
+    close(out);
+    close(nowhere);
+    plan_free(&p);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_teardown(plans, alloc_fail_tell),
+    };
+    return cmocka_run_group_tests(tests, make_place, remove_place);
+}
