@@ -117,7 +117,7 @@ static bool check_mesh(const struct scene *s, const struct object *o, vec3 eye, 
         struct box t = triangle_box(&s->position[3 * ((size_t)o->first_triangle + i)]);
         body = (struct box){vmin(body.lo, t.lo), vmax(body.hi, t.hi)};
     }
-    bool is_closed;
+    bool is_closed = false;
     if (!look_if_closed(s, o, &is_closed, e))
         return false;
     if (!is_closed)
