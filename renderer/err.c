@@ -11,6 +11,16 @@ void err_hide_controls(char *text)
             *c = '?';
 }
 
+bool err_is_of_memory(const struct err *e)
+{
+    static const char *const says[] = {"out of memory", "Cannot allocate memory",
+                                       "Unable to allocate"};
+    for (size_t i = 0; i < sizeof says / sizeof says[0]; i++)
+        if (strstr(e->msg, says[i]) != NULL)
+            return true;
+    return false;
+}
+
 bool(err_set)(struct err *e, const char *fmt, ...)
 {
     if (e == NULL)

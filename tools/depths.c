@@ -26,7 +26,7 @@ static bool measure_one(const struct converge_job *job, const struct suite_refer
     struct suite_scene scene = *job->scene;
     struct converge_job at = *job;
     struct moments m;
-    struct err none;
+    struct err none = {""};
     double se, ignored;
     scene.depth = depth;
     at.scene = &scene;
@@ -38,6 +38,10 @@ static bool measure_one(const struct converge_job *job, const struct suite_refer
     if (truth != NULL && truth_render(&scene, truth, &m, &none)) {
         json_object_set_new(rung, "truth", json_real(mean_of(&m, &ignored)));
         moments_free(&m);
+    }
+    if (err_is_of_memory(&none)) {
+        json_decref(rung);
+        return err_set(e, "%s", none.msg);
     }
     return json_array_append_new(rungs, rung) == 0 || err_set(e, "out of memory for the results");
 }

@@ -50,6 +50,8 @@ static bool make_pictures(const struct grade_job *job, const struct submission *
             err_set(&why, "%s", h->made[i].why);
         else if (student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
             why.msg[0] = '\0';
+        else if (err_is_of_memory(&why)) /* which is our trouble */
+            return err_set(e, "%s: %s", p->name, why.msg);
         snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
     }
     return true;

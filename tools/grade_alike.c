@@ -128,7 +128,7 @@ static bool is_right(const json_t *grade, const char *picture)
     return asked;
 }
 
-/* Pictures that cannot be read any more are left out. */
+/* Pictures that cannot be read any more are left out; for want of memory none is. */
 static bool read_noise(const char *out, const struct rubric *r, const struct answers *a, int i,
                        const json_t *grade, struct alike_noise *noise, struct err *e)
 {
@@ -136,13 +136,14 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     const struct rubric_picture *p = &r->picture[i];
     const struct moments *own = &a->of[set_of(r, grade)][i].m, *plain = &a->of[0][i].m;
     struct student s;
-    struct err ignored;
+    struct err why;
     char path[4600];
     snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, text_of(grade, "id"),
              text_of(made, "file"));
-    if (!is_right(grade, p->name) || text_of(made, "file")[0] == '\0' ||
-        !student_read(path, r->curve, p->width, p->height, &s, &ignored))
+    if (!is_right(grade, p->name) || text_of(made, "file")[0] == '\0')
         return true;
+    if (!student_read(path, r->curve, p->width, p->height, &s, &why))
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     bool ok = alike_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
     student_free(&s);
     return ok;

@@ -141,15 +141,18 @@ static void score_agreement(const struct rubric_check *c, struct result *out)
     tell(&out->agreement, out->seen, sizeof out->seen);
 }
 
-/* A against B; what keeps them from being compared is the student's to mend. */
-static void compare(const struct work *w, const struct student *a, const struct student *b,
-                    const unsigned char *use, struct result *out)
+/* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
+static bool compare(const struct work *w, const struct student *a, const struct student *b,
+                    const unsigned char *use, struct result *out, struct err *e)
 {
     struct err why;
     if (agreement_measure(a, b, use, w->alpha, &out->agreement, &why))
         score_agreement(w->check, out);
+    else if (err_is_of_memory(&why))
+        return err_set(e, "%s", why.msg);
     else
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
+    return true;
 }
 
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
@@ -166,8 +169,12 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    compare(w, student(w, 0), &b, use, out);
+    const bool ok = compare(w, student(w, 0), &b, use, out, e);
     student_free(&b);
+    if (!ok) {
+        free(use);
+        return false;
+    }
     if (is_copy(student(w, 0), reference(w, 0), p->spp, use) ||
         is_copy(student(w, 0), plain, p->spp, use)) {
         out->share = out->chance = 0;
@@ -218,8 +225,7 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
     unsigned char *use = usable(w, e);
     struct student b = {0};
     bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
-    if (ok)
-        compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out);
+    ok = ok && compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out, e);
     student_free(&b);
     free(use);
     return ok;
@@ -239,7 +245,7 @@ static bool check_sum(const struct work *w, struct result *out, struct err *e)
     if (ok)
         student_unclipped(&sum, use);
     if (ok) {
-        compare(w, student(w, 0), &sum, use, out);
+        ok = compare(w, student(w, 0), &sum, use, out, e);
         student_free(&sum);
     }
     free(use);
@@ -357,7 +363,6 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
                          *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
     struct rates rates;
     struct err why;
-    (void)e;
     snprintf(
         out->expected, sizeof out->expected,
         "every pixel of the rate picture stands for a multiple of %d samples, and on average for as many as in our render, within %.3g %%",
@@ -368,6 +373,8 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     }
     if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height, picture(w, 0)->spp,
                     c->batch, ours->n, &rates, &why)) {
+        if (err_is_of_memory(&why))
+            return err_set(e, "%s", why.msg);
         snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
         return true;
     }

@@ -231,18 +231,20 @@ static bool sight_of_student(const struct rubric *r, int picture, const struct s
     return true;
 }
 
-static void count_samples(const struct rubric *r, int picture, const struct answers *a,
-                          const struct made *made, struct sight *s)
+static bool count_samples(const struct rubric *r, int picture, const struct answers *a,
+                          const struct made *made, struct sight *s, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
     struct rates rates;
-    struct err ignored;
-    if (made->rates[0] == '\0' ||
-        !rates_read(made->rates, p->width, p->height, p->spp, rates_check(r, picture)->batch,
-                    a->of[0][picture].as_asked.n, &rates, &ignored))
-        return; /* its check has said so */
+    struct err why;
+    if (made->rates[0] == '\0')
+        return true;
+    if (!rates_read(made->rates, p->width, p->height, p->spp, rates_check(r, picture)->batch,
+                    a->of[0][picture].as_asked.n, &rates, &why)) /* its check has said so */
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     s->fact[FACT_SAMPLES] = log(rates.mean / p->spp);
     s->fact_sd[FACT_SAMPLES] = rates.sd;
+    return true;
 }
 
 static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answers *a,
@@ -258,8 +260,8 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
         *out = (struct clue){.view = v, .is_consistent = true};
         if (!sight_of_student(r, i, &h->picture[i], &answer->m, &v->correct, &out->seen, e))
             return false;
-        if (rubric_bugs_counts(r, i))
-            count_samples(r, i, a, &h->made[i], &out->seen);
+        if (rubric_bugs_counts(r, i) && !count_samples(r, i, a, &h->made[i], &out->seen, e))
+            return false;
     }
     return true;
 }

@@ -96,12 +96,10 @@ bool student_read(const char *path, const char *curve, int width, int height, st
     if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
         !picture_read_inspected(path, &info, &pic, e))
         return false;
-    bool ok = allocate(out, e) && fill(out, &pic, &c, e);
+    bool ok = allocate(out, e) && fill(out, &pic, &c, e) && sha256_file(path, out->sha256, e);
     picture_free(&pic);
     if (!ok)
         student_free(out);
-    else
-        ok = sha256_file(path, out->sha256, e);
     return ok;
 }
 
