@@ -247,14 +247,14 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
 }
 
 /* grade_alike.h */
-static void same_noise(FILE *f, const json_t *grades)
+static void same_noise(FILE *f, const json_t *grades, int *group)
 {
-    int *group = calloc(json_array_size(grades) + 1, sizeof *group), number = 0;
+    int number = 0;
     size_t i;
     json_t *g;
     json_array_foreach(grades, i, g)
     {
-        if (group == NULL || group[i] > 0 || json_array_size(json_object_get(g, "alike")) == 0)
+        if (group[i] > 0 || json_array_size(json_object_get(g, "alike")) == 0)
             continue;
         if (number == 0)
             fputs(
@@ -266,23 +266,28 @@ static void same_noise(FILE *f, const json_t *grades)
         list_group(f, grades, number, group);
     }
     fputs(number > 0 ? "</ul>\n" : "", f);
-    free(group);
 }
 
-void grade_overview(FILE *f, const json_t *grades)
+bool grade_overview(FILE *f, const json_t *grades, struct err *e)
 {
     struct tally *t = calloc(json_array_size(grades) + 1, sizeof *t);
+    int *group = calloc(json_array_size(grades) + 1, sizeof *group);
+    if (t == NULL || group == NULL) {
+        free(t);
+        free(group);
+        return err_set(e, "out of memory for the page of the class");
+    }
     fputs(grade_page_head, f);
     fputs("<title>Grades</title>\n<h1>", f);
     html_text(f, grade_text(json_array_get(grades, 0), "rubric"));
     fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
     histogram(f, grades);
-    if (t != NULL) {
-        common_bugs(f, grades, t);
-        slowest(f, grades, t);
-    }
+    common_bugs(f, grades, t);
+    slowest(f, grades, t);
     look_alikes(f, grades);
-    same_noise(f, grades);
+    same_noise(f, grades, group);
     table(f, grades);
     free(t);
+    free(group);
+    return true;
 }

@@ -96,9 +96,9 @@ static bool show_picture(FILE *f, const char *path, const char *name, const json
                          struct err *e)
 {
     struct picture pic;
-    struct err ignored;
-    if (!picture_read(path, &pic, &ignored))
-        return true; /* what is wrong with it has been said */
+    struct err why;
+    if (!picture_read(path, &pic, &why)) /* what is wrong with it has been said */
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     uint8_t *rgb8 = codes(&pic);
     bool ok = rgb8 != NULL || err_set(e, "out of memory");
     fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", GRADE_SHOWN);

@@ -26,7 +26,8 @@ void grade_show_difference(FILE *f, const json_t *check, double width, double he
  * none. */
 void grade_show_intervals(FILE *f, const json_t *check);
 
-/* Of the whole class, for staff. */
-void grade_overview(FILE *f, const json_t *grades);
+/* Of the whole class, for staff. Fails only out of memory. */
+bool grade_overview(FILE *f, const json_t *grades, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -289,5 +289,11 @@ bool grade_pages(const char *out, const json_t *grades, struct err *e)
         if (!out_commit(&o, e))
             return false;
     }
-    return write_file(out, "index.html", grades, grade_overview, e);
+    snprintf(path, sizeof path, "%.4000s/index.html", out);
+    if (!out_open(&o, path, e))
+        return false;
+    if (grade_overview(o.f, grades, e))
+        return out_commit(&o, e);
+    out_abandon(&o);
+    return false;
 }
