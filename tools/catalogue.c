@@ -320,7 +320,8 @@ static bool get_effects(struct view *v, const struct catalogue *c, const json_t 
         struct effect *effect = calloc(1, sizeof *effect);
         if (b < 0 || effect == NULL) {
             free(effect);
-            return err_set(e, "%s: bug '%s' is not in its list, or out of memory", path, name);
+            return b < 0 ? err_set(e, "%s: bug '%s' is not in its list", path, name)
+                         : err_set(e, "%s: out of memory", path);
         }
         v->effect[b] = effect;
         effect->pixels = json_is_true(json_object_get(value, "pixels"));
