@@ -126,47 +126,55 @@ static bool library(void *ctx, struct err *e)
     return fclose(f) == 0;
 }
 
-/* In a process of its own, in which a failed assertion of cmocka is an abort(): whether alloc_fail_each() ends it. */
-static bool is_caught(bool (*call)(void *ctx, struct err *e), void *ctx)
+/* In a process of its own, in which a failed assertion of cmocka is an abort(): whether alloc_fail_each() ends it, saying `why`. */
+static bool is_caught(bool (*call)(void *ctx, struct err *e), void *ctx, const char *why)
 {
+    char said[4096];
+    FILE *log = tmpfile();
+    assert_non_null(log);
     const pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
-        if (freopen("/dev/null", "w", stderr) != NULL &&
-            freopen("/dev/null", "w", stdout) != NULL && setenv("CMOCKA_TEST_ABORT", "1", 1) == 0)
+        if (dup2(fileno(log), STDERR_FILENO) >= 0 && dup2(fileno(log), STDOUT_FILENO) >= 0 &&
+            setenv("CMOCKA_TEST_ABORT", "1", 1) == 0)
             alloc_fail_each("control", ALLOC_OURS, call, ctx);
         _exit(0);
     }
     int status;
     assert_int_equal(waitpid(child, &status, 0), child);
-    return !WIFEXITED(status) || WEXITSTATUS(status) != 0;
+    rewind(log);
+    said[fread(said, 1, sizeof said - 1, log)] = '\0';
+    fclose(log);
+    const bool ended = !WIFEXITED(status) || WEXITSTATUS(status) != 0;
+    if (ended && strstr(said, why) == NULL)
+        fail_msg("caught, but not for '%s': %s", why, said);
+    return ended;
 }
 
 static void careful_code_passes(void **state)
 {
     (void)state;
     alloc_fail_each("careful", ALLOC_OURS, careful, NULL);
-    assert_false(is_caught(careful, NULL));
+    assert_false(is_caught(careful, NULL, ""));
 }
 
 static void faults_are_caught(void **state)
 {
     (void)state;
     bool broken = false;
-    char path[] = "/tmp/test_memory_XXXXXX";
-    assert_true(is_caught(unchecked, NULL));
-    assert_true(is_caught(leaking, NULL));
-    assert_true(is_caught(silent, NULL));
-    assert_true(is_caught(misleading, NULL));
-    assert_true(is_caught(two_lines, NULL));
-    assert_true(is_caught(wrong_result, NULL));
-    assert_true(is_caught(broken_for_good, &broken));
+    assert_true(is_caught(unchecked, NULL, ""));
+    assert_true(is_caught(leaking, NULL, "1 blocks are left"));
+    assert_true(is_caught(silent, NULL, "failed without a line"));
+    assert_true(is_caught(misleading, NULL, "speaks of no memory"));
+    assert_true(is_caught(two_lines, NULL, "more than one line"));
+    assert_true(is_caught(wrong_result, NULL, "0x2a"));
+    assert_true(is_caught(broken_for_good, &broken, "fails afterwards"));
     alloc_json(ALLOC_JSON_ENDS, "/dev/null");
-    assert_true(is_caught(json_too_late, path));
+    assert_true(is_caught(json_too_late, NULL, "/dev/null was there before"));
     alloc_json(ALLOC_JSON_ENDS, "/dev/null/none");
-    assert_false(is_caught(json_too_late, path));
+    assert_false(is_caught(json_too_late, NULL, ""));
     alloc_json(ALLOC_JSON_FAILS, NULL);
-    assert_true(is_caught(json_unchecked, NULL));
+    assert_true(is_caught(json_unchecked, NULL, "json_real_value"));
 }
 
 /* Allocations of a shared library fail if all shall, and do not if only ours. */
@@ -174,7 +182,7 @@ static void libraries_fail_if_asked(void **state)
 {
     (void)state;
     alloc_fail_each("fopen", ALLOC_ALL, library, NULL);
-    assert_true(is_caught(library, NULL)); /* no allocation of ours */
+    assert_true(is_caught(library, NULL, "no allocation")); /* no allocation of ours */
 }
 
 int main(void)

@@ -6,8 +6,6 @@
 #include "../reference/engine.h"
 #include "../reference/suite.h"
 #include "../renderer/fs.h"
-#include "../tools/annotations.h"
-#include "../tools/catalogue.h"
 #include "../tools/claim.h"
 #include "../tools/comparing.h"
 #include "../tools/history.h"
@@ -15,7 +13,6 @@
 #include "../tools/results.h"
 #include "../tools/rubric.h"
 #include "../tools/tree_hash.h"
-#include "../tools/watch.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -82,16 +79,25 @@ static bool load_suite(void *ctx, struct err *e)
 
 static bool load_engine(void *ctx, struct err *e)
 {
-    static const char *const values[] = {"scene.xml", "4", "7", "out.pfm", NULL};
     struct engine en = {.json = NULL};
-    char **argv = NULL;
-    (void)values;
     bool ok = engine_load(ctx, &en, e);
     alloc_fail_off();
-    free(argv);
+    assert_true(!ok || en.replicates > 0);
     if (ok)
         engine_free(&en);
     return ok;
+}
+
+static bool new_results(void *ctx, struct err *e)
+{
+    char *argv[] = {"compare", "a.exr", "b  c.exr", NULL};
+    (void)ctx;
+    json_t *root = results_new(3, argv, 0.01, e);
+    alloc_fail_off();
+    assert_true(root == NULL ||
+                strcmp(member_text(root, "command"), "assay compare a.exr 'b  c.exr'") == 0);
+    json_decref(root);
+    return root != NULL;
 }
 
 static bool read_rubric(void *ctx, struct err *e)
@@ -154,6 +160,9 @@ static void results(void **state)
     (void)state;
     struct err e;
     assert_true(make_parent_dirs(file(0, "out/x"), &e));
+    alloc_json(ALLOC_JSON_FAILS, NULL);
+    alloc_fail_each("results_new, jansson too", ALLOC_ALL, new_results, NULL);
+    alloc_json(ALLOC_JSON_ENDS, NULL);
     alloc_fail_each("results_read, results_write_junit", ALLOC_OURS, read_results, NULL);
     /* libxml2's writer loses blocks where its lists fail. */
     alloc_fail_each("the same, libxml2 too", ALLOC_LOSSY, read_results, NULL);
