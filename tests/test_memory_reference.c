@@ -119,6 +119,7 @@ static void exports(void **state)
         {"12_point_plane", "export_mitsuba", FORMAT_MITSUBA, ALLOC_LOSSY},
         {"41_cornell", "export_cycles", FORMAT_CYCLES, ALLOC_ALL},
         {"22_glass_sphere", "export_cycles, glass", FORMAT_CYCLES, ALLOC_ALL},
+        {"12_point_plane", "export_pbrt", FORMAT_PBRT, ALLOC_ALL},
         {"19_glass_slab", "export_povray, glass", FORMAT_POVRAY, ALLOC_ALL},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
