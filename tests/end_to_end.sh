@@ -668,7 +668,7 @@ part tests/verbs.sh "$build"
 part tests/scale.sh "$build"
 
 # Kills, full disks and missing memory.
-part tests/faults.sh "$build" 2 499
+part tests/faults.sh "$build" 2 97
 
 # The page, in a browser.
 part tests/browser/run.sh "$build"

@@ -294,8 +294,8 @@ disk() {
     if is_whole "$tmp/p1.exr" && is_whole "$tmp/p2.exr"; then tell "closed pipe: whole pictures" ""; else tell "closed pipe: whole pictures" "no"; fi
 }
 
-# A results file but for what a clock says.
-content() { grep -av '"date"\|"seconds\|_s":\|_seconds' "$1" | sha256sum; }
+# A results file but for what a clock says, and the processor's name, which is "unknown" where it cannot be read.
+content() { grep -av '"date"\|"machine"\|"seconds\|_s":\|_seconds' "$1" | sha256sum; }
 # OUTPUT, a file that the command writes, must be right where it says 0. OpenImageIO ends a program where memory is out
 # in one of its destructors; nothing catches that, so it is counted.
 no_memory() { # NAME OUTPUT COMMAND...
