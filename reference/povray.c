@@ -1,4 +1,5 @@
-/* Drives POV-Ray: the pictures of povray_picture.h, rendered side by side and folded. */
+/* Drives POV-Ray: the pictures of povray_picture.h, rendered side by side and folded. Picture t of a reference is window t
+ * for t < POVRAY_WINDOWS, and for the rest what a replicate adds: all passes of a window, or those of a replicate's pair. */
 #include "job.h"
 
 #include "independence.h"
@@ -15,18 +16,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the workers share. Task t < POVRAY_WINDOWS is a window, the rest are replicates. */
+/* What the workers share. */
 struct crew {
     const struct reference_job *job;
     const struct povray_plan *plan;
     const char *program;
-    int num_tasks;
-    size_t size;   /* floats in a picture */
-    float *result; /* num_tasks pictures: radiance, box-averaged to the job's size */
+    int first, last; /* of the pictures that are wanted */
+    size_t size;     /* floats in a picture */
     pthread_mutex_t lock;
     int next;
     bool failed;
-    struct err first; /* of the failures */
+    struct err why; /* of the first failure */
 };
 
 static struct povray_picture window(const struct crew *w, int j, int pass)
@@ -126,8 +126,8 @@ static bool run_engine(const struct process *run, struct err *e)
     }
 }
 
-static bool render(struct crew *w, const struct povray_picture *p, float sign, float *out,
-                   struct err *e)
+static bool render_one(struct crew *w, const struct povray_picture *p, float sign, float *out,
+                       struct err *e)
 {
     char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
     const char *argv[NUM_ARGS];
@@ -154,20 +154,27 @@ static bool render(struct crew *w, const struct povray_picture *p, float sign, f
            add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
 }
 
+/* Adds its passes up, box-averaged to the job's size, into a file. */
 static bool run_task(struct crew *w, int t, struct err *e)
 {
-    float *out = w->result + (size_t)t * w->size;
-    bool ok = true;
+    char path[PICTURE_PATH];
+    float *out = calloc(w->size, sizeof *out);
+    bool ok = out != NULL || err_set(e, "a picture: out of memory");
     for (int pass = 0; ok && pass < w->plan->num_passes; pass++) {
         if (t < POVRAY_WINDOWS) {
             struct povray_picture fine = window(w, t, pass);
-            ok = render(w, &fine, 1, out, e);
+            ok = render_one(w, &fine, 1, out, e);
         } else if (w->plan->pass[pass].recursion > 0) {
             struct povray_picture indirect = replicate(w, t - POVRAY_WINDOWS, pass, true);
             struct povray_picture direct = replicate(w, t - POVRAY_WINDOWS, pass, false);
-            ok = render(w, &indirect, 1, out, e) && render(w, &direct, -1, out, e);
+            ok = render_one(w, &indirect, 1, out, e) && render_one(w, &direct, -1, out, e);
         }
     }
+    if (ok) {
+        pictures_path(w->job->dir, povray_driver.prefix, t - w->first, path);
+        ok = pictures_write(path, w->job->suite->width, w->job->suite->height, out, e);
+    }
+    free(out);
     return ok;
 }
 
@@ -176,7 +183,7 @@ static void *work(void *arg)
     struct crew *w = arg;
     for (;;) {
         pthread_mutex_lock(&w->lock);
-        int t = w->failed || w->next == w->num_tasks ? -1 : w->next++;
+        int t = w->failed || w->next == w->last ? -1 : w->next++;
         pthread_mutex_unlock(&w->lock);
         if (t < 0)
             return NULL;
@@ -185,7 +192,7 @@ static void *work(void *arg)
             continue;
         pthread_mutex_lock(&w->lock);
         if (!w->failed)
-            w->first = e;
+            w->why = e;
         w->failed = true;
         pthread_mutex_unlock(&w->lock);
     }
@@ -208,7 +215,7 @@ static bool run_crew(struct crew *w, struct err *e)
     pthread_mutex_destroy(&w->lock);
     if (!w->failed)
         return true;
-    *e = w->first;
+    *e = w->why;
     return err_prefix(e, "POV-Ray");
 }
 
@@ -236,13 +243,17 @@ static bool engine_version(const struct crew *w, char line[128], struct err *e)
     return true;
 }
 
-static bool describe(const struct crew *w, json_t *manifest, struct err *e)
+/* How many replicates there are: none where the picture has no noise. */
+static int replicates_of(const struct crew *w)
 {
-    char version[128], sha256[65], text[4][32], command[512] = "povray";
+    return povray_plan_is_noisy(w->plan) ? w->job->ref->replicates : 0;
+}
+
+static bool describe(const struct crew *w, const json_t *said, json_t *manifest, struct err *e)
+{
+    char text[4][32], command[512] = "povray";
     const char *argv[NUM_ARGS];
-    int replicates = w->num_tasks - POVRAY_WINDOWS;
-    if (!engine_version(w, version, e) || !sha256_file(w->program, sha256, e))
-        return false;
+    int replicates = replicates_of(w);
     struct povray_picture first = replicates > 0 ? replicate(w, 0, 0, true) : window(w, 0, 0);
     command_line(w, &first, text, argv);
     for (int i = 1; argv[i] != NULL; i++)
@@ -273,12 +284,13 @@ static bool describe(const struct crew *w, json_t *manifest, struct err *e)
                                      "jittered_lamp_cells", first.variant.lamp_cells, "roulette",
                                      POVRAY_ROULETTE, "block_sizes", blocks)
                          : json_string("none: the picture has no noise");
-    bool ok = json_object_set(settings, "replicate", scheme) == 0 &&
-              json_object_set_new(manifest, "version", json_string(version)) == 0 &&
-              json_object_set_new(manifest, "binary_sha256", json_string(sha256)) == 0 &&
-              json_object_set_new(manifest, "command", json_string(command)) == 0 &&
-              json_object_set(manifest, "settings", settings) == 0 &&
-              json_object_set(manifest, "seeds", seeds) == 0;
+    bool ok =
+        json_object_set(settings, "replicate", scheme) == 0 &&
+        json_object_set(manifest, "version", json_object_get(said, "version")) == 0 &&
+        json_object_set(manifest, "binary_sha256", json_object_get(said, "binary_sha256")) == 0 &&
+        json_object_set_new(manifest, "command", json_string(command)) == 0 &&
+        json_object_set(manifest, "settings", settings) == 0 &&
+        json_object_set(manifest, "seeds", seeds) == 0;
     json_decref(settings);
     json_decref(scheme);
     json_decref(seeds);
@@ -286,53 +298,76 @@ static bool describe(const struct crew *w, json_t *manifest, struct err *e)
     return ok || err_set(e, "POV-Ray manifest: out of memory");
 }
 
-/* Replicates that repeat would make a standard error that is too small. */
-static bool check_different(const struct crew *w, struct err *e)
+/* The mean of the windows. */
+static bool mean_window(const struct crew *w, const struct pictures *pictures, double *fine,
+                        struct err *e)
 {
-    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++)
-        for (int u = POVRAY_WINDOWS; u < t; u++)
-            if (memcmp(w->result + (size_t)t * w->size, w->result + (size_t)u * w->size,
-                       w->size * sizeof *w->result) == 0)
-                return err_set(e, "POV-Ray: replicates %d and %d are the same", u - POVRAY_WINDOWS,
-                               t - POVRAY_WINDOWS);
+    for (int t = 0; t < POVRAY_WINDOWS; t++) {
+        char path[PICTURE_PATH];
+        pictures->path_of(pictures->ctx, t, path);
+        float *px = pictures_read(path, w->job->suite->width, w->job->suite->height, true, e);
+        if (px == NULL)
+            return false;
+        for (size_t i = 0; i < w->size; i++)
+            fine[i] += (double)px[i] / POVRAY_WINDOWS;
+        free(px);
+    }
+    return true;
+}
+
+/* fine + the difference of replicate k, into the moments. */
+static bool add_replicate(const struct crew *w, const struct pictures *pictures, int k,
+                          const double *fine, struct repeats *repeats, struct replicates *all,
+                          struct moments *m, struct err *e)
+{
+    char path[PICTURE_PATH];
+    pictures->path_of(pictures->ctx, POVRAY_WINDOWS + k, path);
+    float *px = pictures_read(path, m->width, m->height, true, e);
+    if (px == NULL)
+        return false;
+    int first = repeats_add(repeats, px, w->size);
+    if (first < k) {
+        free(px);
+        return err_set(e, "POV-Ray: replicates %d and %d are the same", first, k);
+    }
+    for (size_t i = 0; i < w->size; i++)
+        px[i] = (float)(fine[i] + (double)px[i]);
+    moments_add_image(m, px);
+    if (w->job->opt->on_replicate != NULL)
+        w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, k, px);
+    replicates_add(all, px);
+    free(px);
     return true;
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
-static bool fold(const struct crew *w, struct moments *out, json_t *manifest, struct err *e)
+static bool fold_pictures(const struct crew *w, const struct pictures *pictures,
+                          struct moments *out, json_t *manifest, struct err *e)
 {
     const struct suite_scene *suite = w->job->suite;
-    bool exact = w->num_tasks == POVRAY_WINDOWS;
+    int replicates = replicates_of(w);
     struct moments m = {0};
     struct replicates all = {0};
+    struct repeats repeats = {0};
     double *fine = calloc(w->size, sizeof *fine);
     bool ok = fine != NULL || err_set(e, "POV-Ray pictures: out of memory");
-    ok = ok && check_different(w, e) && moments_alloc(&m, suite->width, suite->height, e) &&
-         (exact || replicates_alloc(&all, m.width, m.height, w->num_tasks - POVRAY_WINDOWS, e));
-    if (!ok)
-        goto out;
-    for (int t = 0; t < POVRAY_WINDOWS; t++)
-        for (size_t i = 0; i < w->size; i++)
-            fine[i] += (double)w->result[(size_t)t * w->size + i] / POVRAY_WINDOWS;
-    strcpy(m.unit, exact ? "exact" : "replicate");
-    m.spp = exact ? 0 : w->job->ref->subgrid * w->job->ref->subgrid;
-    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++) {
-        float *sum = w->result + (size_t)t * w->size;
-        for (size_t i = 0; i < w->size; i++)
-            sum[i] = (float)(fine[i] + (double)sum[i]);
-        moments_add_image(&m, sum);
-        if (w->job->opt->on_replicate != NULL)
-            w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, t - POVRAY_WINDOWS, sum);
-        replicates_add(&all, sum);
-    }
-    ok = exact || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray");
-    for (size_t i = 0; exact && i < w->size; i++) {
+    ok = ok && moments_alloc(&m, suite->width, suite->height, e) &&
+         (replicates == 0 || (replicates_alloc(&all, m.width, m.height, replicates, e) &&
+                              repeats_alloc(&repeats, replicates, e))) &&
+         mean_window(w, pictures, fine, e);
+    strcpy(m.unit, replicates == 0 ? "exact" : "replicate");
+    m.spp = replicates == 0 ? 0 : w->job->ref->subgrid * w->job->ref->subgrid;
+    for (int k = 0; ok && k < replicates; k++)
+        ok = add_replicate(w, pictures, k, fine, &repeats, &all, &m, e);
+    ok = ok &&
+         (replicates == 0 || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray"));
+    for (size_t i = 0; ok && replicates == 0 && i < w->size; i++) {
         m.mean[i] = fine[i];
         m.n[i / 3] = 1;
     }
-out:
     free(fine);
     replicates_free(&all);
+    repeats_free(&repeats);
     if (ok)
         *out = m;
     else
@@ -340,26 +375,68 @@ out:
     return ok;
 }
 
+static bool crew_of(const struct reference_job *job, struct povray_plan *plan, struct crew *w,
+                    struct err *e)
+{
+    if (!povray_plan(job->scene, job->camera, job->suite->depth, plan, e))
+        return false;
+    *w = (struct crew){.job = job,
+                       .plan = plan,
+                       .program = "povray",
+                       .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
+    assert(replicates_of(w) == 0 || (job->ref->replicates > 1 && job->ref->subgrid > 0));
+    return true;
+}
+
+static bool count(const struct reference_job *job, int *num, struct err *e)
+{
+    struct povray_plan plan;
+    struct crew w;
+    if (!crew_of(job, &plan, &w, e))
+        return false;
+    *num = POVRAY_WINDOWS + replicates_of(&w);
+    return true;
+}
+
+static bool render(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e)
+{
+    char program[4096], version[128], sha256[65];
+    struct povray_plan plan;
+    struct crew w;
+    if (!process_find("povray", program, sizeof program))
+        return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
+    if (strlen(job->dir) >= 4096)
+        return err_set(e, "%.64s...: path too long", job->dir);
+    if (!crew_of(job, &plan, &w, e))
+        return false;
+    w.program = program;
+    w.first = w.next = first;
+    w.last = last;
+    return run_crew(&w, e) && engine_version(&w, version, e) && sha256_file(program, sha256, e) &&
+           ((json_object_set_new(said, "version", json_string(version)) == 0 &&
+             json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0) ||
+            err_set(e, "out of memory"));
+}
+
+static bool fold(const struct reference_job *job, const struct pictures *pictures,
+                 const json_t *said, struct moments *out, json_t *manifest, struct err *e)
+{
+    struct povray_plan plan;
+    struct crew w;
+    return crew_of(job, &plan, &w, e) && describe(&w, said, manifest, e) &&
+           fold_pictures(&w, pictures, out, manifest, e);
+}
+
+const struct driver povray_driver = {.engine = "povray",
+                                     .prefix = "picture",
+                                     .below_zero = true,
+                                     .count = count,
+                                     .render = render,
+                                     .fold = fold};
+
 bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
                    struct err *e)
 {
-    char program[4096];
-    struct povray_plan plan;
-    if (!process_find("povray", program, sizeof program))
-        return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
-    if (!povray_plan(job->scene, job->camera, job->suite->depth, &plan, e))
-        return false;
-    bool exact = !povray_plan_is_noisy(&plan);
-    assert(exact || (job->ref->replicates > 1 && job->ref->subgrid > 0));
-    struct crew w = {.job = job,
-                     .plan = &plan,
-                     .program = program,
-                     .num_tasks = POVRAY_WINDOWS + (exact ? 0 : job->ref->replicates),
-                     .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
-    w.result = calloc((size_t)w.num_tasks * w.size, sizeof *w.result);
-    if (w.result == NULL)
-        return err_set(e, "POV-Ray pictures: out of memory");
-    bool ok = run_crew(&w, e) && describe(&w, manifest, e) && fold(&w, out, manifest, e);
-    free(w.result);
-    return ok;
+    return driver_render(&povray_driver, job, out, manifest, e);
 }
