@@ -24,6 +24,9 @@ bool plan_input(struct plan *p, const char *path, struct err *e)
  * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
 bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
                         const char **sha256, struct err *e) __attribute__((warn_unused_result));
+/* What a validation with --live runs: Blender, and POV-Ray where it is in PATH, since not every scene needs that. */
+bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+    __attribute__((warn_unused_result));
 /* The next job; input: what it alone reads, NULL at the end. After all of the above. */
 bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
               struct err *e) __attribute__((warn_unused_result));

@@ -62,6 +62,15 @@ bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_di
     return ok;
 }
 
+bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+{
+    char path[PLAN_PATH + 64];
+    snprintf(path, sizeof path, "%.4000s/importer.py", share_dir);
+    return plan_input(p, path, e) && plan_engine_inputs(p, "cycles", share_dir, NULL, e) &&
+           (!process_find("povray", path, sizeof path) ||
+            plan_engine_inputs(p, "povray", share_dir, NULL, e));
+}
+
 /* A reference that has to be rendered. */
 struct wanted {
     const struct suite_scene *scene;
