@@ -74,11 +74,9 @@ void timing_stop(struct timing *t)
 
 const struct driver *driver_of(const char *engine)
 {
-    static const struct driver *const drivers[] = {&cycles_driver, &povray_driver};
-    for (size_t i = 0; i < sizeof drivers / sizeof *drivers; i++)
-        if (strcmp(drivers[i]->engine, engine) == 0)
-            return drivers[i];
-    return NULL;
+    return strcmp(engine, cycles_driver.engine) == 0   ? &cycles_driver
+           : strcmp(engine, povray_driver.engine) == 0 ? &povray_driver
+                                                       : NULL;
 }
 
 struct here {

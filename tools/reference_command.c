@@ -114,6 +114,8 @@ bool reference_command_read(int argc, char **argv, struct reference_command *c, 
         return false;
     if (c->help)
         return true;
+    if (c->last > 0 && (c->slurm || c->fresh || c->golden != NULL))
+        return err_set(e, "--pictures goes with none of --slurm, --fresh, --golden");
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();
     c->opt.work_dir = c->work;

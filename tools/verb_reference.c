@@ -76,11 +76,10 @@ int verb_reference(int argc, char **argv, struct err *e)
     struct reference_command c;
     int code = EXIT_NOT_JUDGED;
     bool ok = reference_command_read(argc, argv, &c, e);
-    if (ok && (c.help || (c.last > 0 && make_pictures(&c, e))))
-        code = 0;
-    else if (ok && c.last == 0 && c.slurm)
+    if (ok && c.slurm && !c.help)
         code = on_slurm(argc, argv, e);
-    else if (ok && c.last == 0 && reference_command_each(&c, make_one, &c, e))
+    else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
+                                          : reference_command_each(&c, make_one, &c, e))))
         code = 0;
     reference_command_free(&c);
     return code;
