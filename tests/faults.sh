@@ -22,8 +22,8 @@ tell() { # NAME WHY: not ok where WHY says something
         failures=$((failures + 1))
     fi
 }
-# As many kills as asked for, of at most five times as many tries.
-more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills)) ]; }
+# As many kills as asked for, of at most five times as many tries and 50: on a busy machine a program may end sooner than when it was timed.
+more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills + 50)) ]; }
 too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
 # killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself, else counted in hits.

@@ -1,5 +1,5 @@
 /* assay: one program, several verbs. */
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/image.h"
 #include "../renderer/version.h"
 #include "results.h"
@@ -64,8 +64,10 @@ int main(int argc, char **argv)
         return 0;
     }
     if (argc > 1 && strcmp(argv[1], "--version") == 0) {
+        struct err why;
+        const char *oiio = image_oiio_version(&why);
         printf("assay %s, %s, %s, jansson %s\n", assay_version, image_library_version(),
-               image_oiio_version(), JANSSON_VERSION);
+               oiio != NULL ? oiio : why.msg, JANSSON_VERSION);
         return 0;
     }
     struct err e = {0};
