@@ -87,6 +87,10 @@ faults: $(BUILD)/pathtracer $(BUILD)/assay
 slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
 	tests/slurm.sh $(BUILD)
 
+# Live references and validations in jobs, with Blender and POV-Ray themselves (minutes).
+scale-live: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-live
+	tests/scale_live.sh $(BUILD)
+
 # A picture of 16384 x 16384 in 64 jobs, each program within 2 GiB (SIDE=16384; 30 GB of disk).
 large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 	tests/large.sh $(BUILD) $(or $(SIDE),16384)
@@ -185,6 +189,7 @@ help:
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
 	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'
+	@echo 'make scale-live live references and validations in jobs, with Blender and POV-Ray (minutes)'
 	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
 	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
 	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (40 minutes)'
@@ -426,7 +431,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 $(BUILD)/deps-slurm: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_SLURM))
 
-.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

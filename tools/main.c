@@ -27,7 +27,7 @@ static const struct {
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
     {"reproduce", verb_reproduce, "render again what made a picture, and compare bits"},
-    {"plan", verb_plan, "cut a render, a grading batch or a validation into jobs"},
+    {"plan", verb_plan, "cut a render, a batch, a validation or references into jobs"},
     {"run-job", verb_run_job, "make some of the jobs of a plan"},
     {"gather", verb_gather, "put the jobs of a plan together"},
     {"slurm", verb_slurm, "all three, the jobs on a Slurm cluster"},

@@ -22,7 +22,8 @@ static const struct {
     int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
 } kinds[] = {{"pathtracer", render_plan, render_gather},
              {"grade", grade_plan, grade_gather},
-             {"validate", validate_plan, validate_gather}};
+             {"validate", validate_plan, validate_gather},
+             {"reference", reference_plan, reference_gather}};
 enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 const char *plan_text(const struct plan *p, const char *name)
@@ -174,8 +175,9 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
     struct plan p = {.dir = ""};
     int kind = argc > 0 ? kind_of(argv[0]) : NUM_KINDS;
     if (kind == NUM_KINDS)
-        return err_set(e, "what to plan begins with pathtracer, grade or validate, not '%s'",
-                       argc > 0 ? argv[0] : "");
+        return err_set(
+            e, "what to plan begins with pathtracer, grade, validate or reference, not '%s'",
+            argc > 0 ? argv[0] : "");
     for (int k = 1; k < argc; k++)
         if (argv[k][0] == '-' && isalpha((unsigned char)argv[k][1]) && argv[k][2] != '\0')
             return err_set(
@@ -260,8 +262,8 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
             p->line[p->num++] = copy;
     }
     free(line);
-    return (ok && p->head != NULL && p->num > 0 &&
-            json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
+    const json_t *jobs = json_object_get(p->head, "jobs"); /* none where all is done already */
+    return (ok && json_is_integer(jobs) && json_integer_value(jobs) == p->num) ||
            err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);
 }
 
