@@ -23,7 +23,8 @@ static const struct {
     int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
 } kinds[] = {{"pathtracer", render_plan, render_gather},
              {"grade", grade_plan, grade_gather},
-             {"validate", validate_plan, validate_gather}};
+             {"validate", validate_plan, validate_gather},
+             {"reference", reference_plan, reference_gather}};
 enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 const char *plan_text(const struct plan *p, const char *name)
@@ -176,9 +177,9 @@ static bool write_plan(const struct plan *p, struct err *e)
     snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
     if (!out_open(&out, path, e))
         return false;
-    if (json_dumpf(p->head, out.f, JSON_COMPACT) != 0) {
+    if (json_dumpf(p->head, out.f, JSON_COMPACT) != 0 && !ferror(out.f)) {
         out_abandon(&out);
-        return err_set(e, "%s: cannot write, or out of memory", path);
+        return err_set(e, "%s: out of memory", path);
     }
     for (int k = 0; k < p->num; k++)
         fprintf(out.f, "\n%s", p->line[k]);
@@ -200,8 +201,9 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
     struct plan p = {.dir = ""};
     int kind = argc > 0 ? kind_of(argv[0]) : NUM_KINDS;
     if (kind == NUM_KINDS)
-        return err_set(e, "what to plan begins with pathtracer, grade or validate, not '%s'",
-                       argc > 0 ? argv[0] : "");
+        return err_set(
+            e, "what to plan begins with pathtracer, grade, validate or reference, not '%s'",
+            argc > 0 ? argv[0] : "");
     for (int k = 1; k < argc; k++)
         if (argv[k][0] == '-' && isalpha((unsigned char)argv[k][1]) && argv[k][2] != '\0')
             return err_set(
@@ -294,8 +296,8 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
     free(line);
     if (no_memory)
         return err_set(e, "%s/plan.jsonl: out of memory", p->dir);
-    return (ok && p->head != NULL && p->num > 0 &&
-            json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
+    const json_t *jobs = json_object_get(p->head, "jobs"); /* none where all is done already */
+    return (ok && json_is_integer(jobs) && json_integer_value(jobs) == p->num) ||
            err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);
 }
 

@@ -2,7 +2,7 @@
  * hash and leaves one artefact, a directory that appears by rename. tools/SCALE.md is the manual.
  *
  * DIR/plan.jsonl: a line of JSON for the whole, then one for each job.
- *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate", "version": , "cwd": , "jobs": 64,
+ *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate" | "reference", "version": , "cwd": , "jobs": 64,
  *     "command": ["pathtracer", ...]        that would do all of it here,
  *     "output": "OUT.exr", "product": name  of the file that every job leaves,
  *     "ends": [0], "cpus": 1,               exit codes that are as they should be; threads of a job

@@ -15,7 +15,8 @@ enum { OPT_DIR, OPT_PARTS, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_DIR] = {0, "plan", 1, "DIR", "where the plan and its jobs are kept (OUTPUT.plan)"},
-    [OPT_PARTS] = {0, "parts", 1, "N", "into about how many jobs a render is cut (64)"},
+    [OPT_PARTS] = {0, "parts", 1, "N",
+                   "into about how many jobs a render or references are cut (64)"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 static const struct cli_option only_help[] = {{'h', "help", 0, "", "print this"}, {0}};
@@ -50,7 +51,8 @@ static bool parse(int argc, char **argv, struct wishes *w, struct err *e)
 
 static void print_help(const char *verb, const char *what)
 {
-    printf("usage: assay %s [options] pathtracer|grade|validate ARGUMENT...\n\n%s\n", verb, what);
+    printf("usage: assay %s [options] pathtracer|grade|validate|reference ARGUMENT...\n\n%s\n",
+           verb, what);
     cli_print_options(stdout, options);
 }
 
