@@ -4,6 +4,7 @@
 #include "simulate.h"
 
 #include "../reference/engine.h"
+#include "../reference/image_oiio.h"
 #include "../reference/suite.h"
 #include "../renderer/fs.h"
 #include "../tools/claim.h"
@@ -51,9 +52,11 @@ static void copy(const char *from, const char *to)
 
 static int make_place(void **state)
 {
+    struct err e;
     (void)state;
     alloc_json(ALLOC_JSON_ENDS, NULL);
-    return mkdtemp(dir) == NULL;
+    /* OpenImageIO is loaded once and for good, and keeps what it then asks for. */
+    return mkdtemp(dir) == NULL || image_oiio_version(&e) == NULL;
 }
 
 static int remove_place(void **state)
@@ -230,7 +233,7 @@ static void comparisons_and_reports(void **state)
     assert_true(make_parent_dirs(file(0, "json/x"), &e) && make_parent_dirs(file(0, "page/x"), &e));
     snprintf(json_output, sizeof json_output, "%s", file(0, "json/c.json"));
     alloc_json(ALLOC_JSON_ENDS, json_output);
-    alloc_fail_each("compared_run, compared_write_json", ALLOC_OURS, compare_files, NULL);
+    alloc_fail_each("compared_run, compared_write_json", ALLOC_ALL, compare_files, NULL);
     alloc_json(ALLOC_JSON_ENDS, NULL);
     struct compare_job job = {
         .path = {file(0, "a.exr"), file(1, "b.exr")},

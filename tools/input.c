@@ -48,16 +48,17 @@ static bool is_moments(const struct image *im)
     return image_channel(im, "M2.R") >= 0;
 }
 
-/* Ours are told by their header, and OpenImageIO stays where it is. */
-static bool says_moments(const char *path)
+/* Ours are told by their header, and OpenImageIO stays where it is. Fails only out of memory: then that could not be had either. */
+static bool look_for_moments(const char *path, bool *says, struct err *e)
 {
     struct image head;
-    struct err ignored;
-    if (!image_read_exr_head(path, &head, &ignored))
-        return false;
-    bool says = is_moments(&head);
+    struct err why;
+    *says = false;
+    if (!image_read_exr_head(path, &head, &why))
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    *says = is_moments(&head);
     image_free(&head);
-    return says;
+    return true;
 }
 
 static bool read_moments(const char *path, char side, const struct input_options *opt,
@@ -78,8 +79,10 @@ static bool read_file(const char *path, char side, const struct input_options *o
 {
     struct image_info info;
     struct image im;
-    bool mitsuba = false;
-    if (says_moments(path))
+    bool mitsuba = false, ours;
+    if (!look_for_moments(path, &ours, e))
+        return false;
+    if (ours)
         return read_moments(path, side, opt, out, e);
     if (!image_inspect(path, &info, e))
         return false;
