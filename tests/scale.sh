@@ -55,6 +55,83 @@ in_jobs "the assignment's adaptive rule" 2 once -s 24 -a 4 0.3 "$scene"
 in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 \
     -e reference/scenes/46_sky.exr -- reference/scenes/46_sky.dae
 
+# Sample ranges: in_ranges NAME PARTS RANGES ARGUMENT...: jobs of sample ranges, run in two orders, by one process and by three: the
+# same file. Against one render: all channels to float32 rounding, counts exactly. Made again as one cell in as many ranges: the same bits.
+in_ranges() {
+    local name=$1 parts=$2 ranges=$3 why="" num
+    shift 3
+    rm -rf "$tmp/plan" "$tmp"/[lxy].*
+    local words=(-q -r 37 29 --seed 3)
+    "$pathtracer" "${words[@]}" -f "$tmp/l.exr" -f "$tmp/l.png" "$@" >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    "$assay" plan --plan "$tmp/plan" --parts "$parts" --ranges "$ranges" pathtracer "${words[@]}" -f "$tmp/x.exr" -f "$tmp/x.png" "$@" >"$tmp/jobs" 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    num=$(grep -c '^{"job".*"--samples"' "$tmp/jobs")
+    [ "$num" -ge $((parts * ranges)) ] && [ $((num % ranges)) -eq 0 ] || why="$num jobs: $why"
+    "$assay" run-job "$tmp/plan" $(seq 0 $((num - 1))) >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    "$assay" gather "$tmp/plan" >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    mv "$tmp/x.exr" "$tmp/y.exr"
+    rm -rf "$tmp/plan/jobs"
+    local stride
+    for stride in 2 1 0; do "$assay" run-job "$tmp/plan" $(seq $((num - 1 - stride)) -3 0) >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"; done
+    "$san_assay" gather "$tmp/plan" >/dev/null 2>"$tmp/err" || why="$(cat "$tmp/err")"
+    cmp "$tmp/x.exr" "$tmp/y.exr" >"$tmp/out" 2>&1 || why="$why another order: $(cat "$tmp/out")"
+    for end in exr png; do
+        idiff -q -fail 0 -failrelative 1e-6 -warn 1 "$tmp/l.$end" "$tmp/x.$end" >"$tmp/out" 2>&1 || why="$why $end: $(head -c 300 "$tmp/out")"
+    done
+    oiiotool "$tmp/l.exr" --ch n "$tmp/x.exr" --ch n --fail 0 --warn 0 --diff >"$tmp/out" 2>&1 || why="$why counts: $(head -c 300 "$tmp/out")"
+    case " $* " in *adaptive*) cmp "$tmp/l_rate.png" "$tmp/x_rate.png" >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")" ;; esac
+    [ -z "$why" ] && { "$assay" reproduce "$tmp/x.exr" >"$tmp/out" 2>&1 || why="$(cat "$tmp/out")"; }
+    tell "$name" "$why"
+}
+in_ranges "sample ranges of cells" 3 4 -s 22 --aov "$scene"
+# Of the same ranges by assay merge, which has them as float32; terms of M3 cancel, which that magnifies.
+merged=() why=""
+for at in 0:5 5:11 11:16 16:22; do "$pathtracer" -q -r 37 29 --seed 3 --aov --samples $at -f "$tmp/r$at.exr" "$scene" >/dev/null && merged+=("$tmp/r$at.exr"); done
+"$assay" merge "$tmp/m.exr" "${merged[@]}" >/dev/null 2>"$tmp/err" || why=$(cat "$tmp/err")
+all=$(oiiotool --info -v "$tmp/x.exr" | sed -n 's/^ *channel list: //p' | tr -d ' ')
+for near in "1e-6 $(tr , '\n' <<<"$all" | grep -v M3 | paste -sd,)" "1e-3 M3.R,M3.G,M3.B"; do
+    oiiotool "$tmp/m.exr" --ch "${near#* }" -o "$tmp/m1.exr" && oiiotool "$tmp/x.exr" --ch "${near#* }" -o "$tmp/x1.exr"
+    idiff -q -fail 0 -failrelative "${near% *}" -warn 1 "$tmp/m1.exr" "$tmp/x1.exr" >"$tmp/out" 2>&1 || why="$why not within $near $(head -c 300 "$tmp/out")"
+done
+oiiotool "$tmp/x.exr" --ch n --printstats 2>"$tmp/err" | grep -q "Constant Color: 22.00" || why="$why not 22 samples everywhere"
+grep -q "assay:ranges: \"0:5,5:11,11:16,16:22\"" <(oiiotool --info -v "$tmp/x.exr") || why="$why not the ranges that they are"
+tell "sample ranges are what assay merge makes of them" "$why"
+oiiotool "$tmp/l.exr" --mulc 1.000004 -o "$tmp/off.exr"
+why=$(idiff -q -fail 0 -failrelative 1e-6 -warn 1 "$tmp/off.exr" "$tmp/x.exr" >/dev/null 2>&1 && echo "4e-6 too bright, and not seen")
+tell "which would show 4e-6" "$why"
+in_ranges "sample ranges of a pilot" 1 3 -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 "$scene"
+in_ranges "as many sample ranges as samples, of sobol" 2 5 -s 5 --sampler sobol "$scene"
+
+# Whose they are: job 1 of 2 cells and 3 ranges is samples 2:4 of the first.
+plan=$tmp/ranges
+words=(pathtracer -q -r 16 32 -f "$tmp/z.exr" "$scene")
+"$assay" plan --plan "$plan" --parts 2 --ranges 3 "${words[@]}" -s 6 >"$tmp/jobs"
+"$assay" run-job "$plan" 0 1 2 3 4 5 >/dev/null
+key() { sed -n "s/^{\"job\":$1,\"key\":\"\([0-9a-f]*\)\".*/\1/p" "$tmp/jobs"; }
+state=$plan/jobs/$(key 1)/cell.png.state
+cp "$state" "$tmp/state"
+replaced() { # NAME PATTERN ARGUMENT...: job 1 with a state by other words is not gathered
+    local name=$1 pattern=$2
+    shift 2
+    "$pathtracer" -q -r 16 32 -p 0 0 16 16 --keep-state -f "$tmp/o.png" "$scene" "$@" >/dev/null && mv "$tmp/o.png.state" "$state"
+    expect "$name" 3 "$pattern" "$san_assay" gather "$plan"
+}
+replaced "a range of another seed" "'seed 2' there, 'seed 1' here" -s 6 --samples 2:4 --seed 2
+replaced "another range" "'first sample 0' there, 'first sample 2' here" -s 6 --samples 0:4
+replaced "a longer range" "has not the samples 2:4" -s 6 --samples 2:5
+replaced "a shorter range" "has not the samples 2:4" -s 6 --samples 2:3
+[ -e "$tmp/z.exr" ] && why="something was written" || why=""
+tell "nothing of these is gathered" "$why"
+cp "$tmp/state" "$state" && printf 'x' | dd of="$state" bs=1 seek=5000 conv=notrunc 2>/dev/null
+expect "a damaged range" 3 "cell.png.state: damaged" "$san_assay" gather "$plan"
+cp "$tmp/state" "$state"
+expect "the right one" 0 "z.exr" "$san_assay" gather "$plan"
+sed '3d; s/"jobs":6/"jobs":5/' "$plan/plan.jsonl" >"$tmp/p" && cp "$tmp/p" "$plan/plan.jsonl"
+expect "a plan that lacks a range" 3 "no job that follows the one before" "$san_assay" gather "$plan"
+expect "more ranges than samples" 3 "7 of 6 samples" "$san_assay" plan --plan "$tmp/p1" --ranges 7 "${words[@]}" -s 6
+expect "ranges of the assignment's rule" 3 "not with --adaptive" "$san_assay" plan --plan "$tmp/p1" --ranges 2 "${words[@]}" -s 6 -a 2 0.1
+expect "ranges and a state" 3 "not with --keep-state" "$san_assay" plan --plan "$tmp/p1" --ranges 2 "${words[@]}" --keep-state
+expect "ranges of what is no render" 3 "says how pathtracer is cut, not grade" "$san_assay" plan --plan "$tmp/p1" --ranges 2 grade -o "$tmp/g0" tests/quick.rubric
+
 # A plan, its jobs, and what is not done. Of 4 x 40 rows the third job's file is looked into.
 cp "$scene" "$tmp/s.dae"
 plan=$tmp/plan4 why=""

@@ -95,10 +95,10 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, struct 
            validate_parts(o, plan_scene, &g, e);
 }
 
-bool validate_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
 {
     struct validate_command c;
-    (void)parts; /* a job for each scene */
+    (void)w; /* a job for each scene */
     if (!validate_command_read(argc, argv, &c, e))
         return false;
     bool ok = c.help ? err_set(e, "--help cannot be planned") : plan_jobs(&c, argc, argv, p, e);

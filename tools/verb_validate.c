@@ -290,7 +290,7 @@ int verb_validate(int argc, char **argv, struct err *e)
     if (c.help)
         code = 0;
     else if (c.slurm)
-        code = slurm_command(NULL, argc, argv, 1, e);
+        code = slurm_command(NULL, argc, argv, NULL, e);
     else if (validate(&c.opt, argc, argv, &results, e))
         code = validate_command_finish(&c, results, e);
     json_decref(results);
