@@ -240,6 +240,7 @@ bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
     init_sides(v);
     bool ok = ask_engine(v, can, cannot, e);
     int most = 0;
+    v->num_tasks = 0;
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
         most += scene_is_selected(v->opt, v->suite.scene[i].name) ? MAX_CLAIMS : 0;
     v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
