@@ -23,7 +23,7 @@ DEPS_SLURM := slurm-wlm munge
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenEXR libpng OpenImageIO jansson gsl nettle zlib libdeflate libmicrohttpd
+PKGS    := libxml-2.0 OpenEXR libpng jansson gsl nettle zlib libdeflate libmicrohttpd
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
@@ -36,14 +36,15 @@ WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
 WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 # -ffp-contract=off: the same bits whether or not a processor can multiply and add in one step.
 cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(pkg_cflags)
-cxxflags  = -std=c++17 $(OPT) $(WARN) $(CXXFLAGS) $(pkg_cflags)
+# OpenImageIO is in oiio.so alone (reference/image_oiio.h).
+cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
 # Compiled once for each instruction set (renderer/isa.h), renderer/wide_kernel_avx2.c.o say.
 ISAS     := sse42 avx2 avx512
 BY_ISA   := renderer/wide_kernel renderer/wide_split renderer/lanes_kernel
 KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
 RENDERER := $(filter-out renderer/main.c $(BY_ISA:=.c),$(wildcard renderer/*.c)) $(KERNELS)
-HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c)) renderer/image_oiio.cc
+HARNESS  := $(wildcard reference/*.c) $(filter-out tools/main.c,$(wildcard tools/*.c))
 TESTS    := $(patsubst %.c,%,$(wildcard tests/test_*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES    := $(patsubst %,tests/test_%,calibration compare_rates converge permutation sequence spatial statistics)
@@ -55,7 +56,7 @@ obj       = $(patsubst %,$(1)/%.o,$(2))
 Q  := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
-all: $(BUILD)/pathtracer $(BUILD)/assay
+all: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/oiio.so
 
 validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
@@ -74,7 +75,7 @@ lint: $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(B
 threads: $(BUILD)/pathtracer
 	tests/threads.sh $(BUILD)/pathtracer
 THREADED := test_bvh_wide test_integrator test_lanes test_render
-tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(THREADED:%=$(BUILD)/tsan/tests/%)
+tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(BUILD)/tsan/oiio.so $(THREADED:%=$(BUILD)/tsan/tests/%)
 	tests/tsan.sh $(BUILD)/tsan $(THREADED)
 
 # kill -9 at 200 moments each of a render, a golden update, a grading batch, a report and a validation; every allocation
@@ -86,6 +87,10 @@ faults: $(BUILD)/pathtracer $(BUILD)/assay
 slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
 	tests/slurm.sh $(BUILD)
 
+# Live references and validations in jobs, with Blender and POV-Ray themselves (minutes).
+scale-live: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-live
+	tests/scale_live.sh $(BUILD)
+
 # A picture of 16384 x 16384 in 64 jobs, each program within 2 GiB (SIDE=16384; 30 GB of disk).
 large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 	tests/large.sh $(BUILD) $(or $(SIDE),16384)
@@ -95,7 +100,7 @@ scale: $(BUILD)/tests/make_scale
 	$(BUILD)/tests/make_scale
 
 # Lines of renderer/, reference/ and tools/ that the tests and the end-to-end runs reach.
-coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
+coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(BUILD)/cov/oiio.so $(patsubst %,$(BUILD)/cov/%,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
 	tests/coverage.sh $(BUILD) $(patsubst %,$(BUILD)/cov/%,$(TESTS))
 
@@ -134,7 +139,7 @@ bvh-table: $(BUILD)/pathtracer
 	tests/bvh_table.sh $(BUILD)
 
 # What our gate and the rules of other renderers' tests find on the same pictures: tests/anchors.
-anchors: $(BUILD)/tests/make_anchors
+anchors: $(BUILD)/tests/make_anchors $(BUILD)/oiio.so
 	$(BUILD)/tests/make_anchors tests/anchors $(BUILD)/anchors
 
 golden: all $(BUILD)/deps-live
@@ -165,6 +170,7 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/assay $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
+	install -D -m 755 $(BUILD)/oiio.so $(DESTDIR)$(PREFIX)/lib/assay/oiio.so
 	install -m 644 reference/cycles*.py reference/importer.py $(DESTDIR)$(PREFIX)/share/assay
 	cp -R reference/scenes reference/engines golden tools/rubrics $(DESTDIR)$(PREFIX)/share/assay
 
@@ -183,6 +189,7 @@ help:
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
 	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'
+	@echo 'make scale-live live references and validations in jobs, with Blender and POV-Ray (minutes)'
 	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
 	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
 	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (40 minutes)'
@@ -205,7 +212,7 @@ help:
 	@echo 'make install    into PREFIX=$(PREFIX)'
 
 # Three builds of everything: the programs, the same under sanitizers, and all of it by clang, to see that
-# it compiles without a warning there too, and for the fuzzers.
+# it has no warning there too, and for the fuzzers.
 $(BUILD)/san/%: OPT := $(SANITIZE)
 $(BUILD)/san/%: WERROR := 1
 $(BUILD)/clang/%: CC := clang
@@ -272,6 +279,9 @@ TREES := $(BUILD) $(BUILD)/san $(BUILD)/clang $(BUILD)/tsan $(BUILD)/cov
 $(foreach b,$(TREES),$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
   $(eval $(call kernel_object,$(b),$(k),$(i))))))
 
+$(TREES:%=%/oiio.so): %/oiio.so: %/reference/oiio.cc.o
+	$(call say,LINK,$@)
+	$(Q)$(CXX) $(OPT) -shared -o $@ $< $(shell pkg-config --libs OpenImageIO)
 $(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
 	$(link)
 $(BUILD)/assay: $(call obj,$(BUILD),tools/main.c $(HARNESS) $(RENDERER))
@@ -280,9 +290,9 @@ $(BUILD)/san/pathtracer: $(call obj,$(BUILD)/san,renderer/main.c $(RENDERER))
 	$(link)
 $(BUILD)/san/assay: $(call obj,$(BUILD)/san,tools/main.c $(HARNESS) $(RENDERER))
 	$(link)
-$(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT)) $(BUILD)/san/libassay.a
+$(BUILD)/san/tests/%: $(BUILD)/san/tests/%.c.o $(call obj,$(BUILD)/san,$(SUPPORT)) $(BUILD)/san/libassay.a | $(BUILD)/san/oiio.so
 	$(link)
-$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a
+$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $(call obj,$(BUILD),$(SUPPORT)) $(BUILD)/libassay.a | $(BUILD)/oiio.so
 	$(link)
 $(BUILD)/san/tests/% $(BUILD)/tests/%: TEST_LIBS := -lcmocka
 $(BUILD)/san/tests/test_embree $(BUILD)/tests/test_embree $(BUILD)/tests/bench: TEST_LIBS := -lcmocka -lembree3
@@ -324,9 +334,9 @@ $(BUILD)/cov/pathtracer: $(call obj,$(BUILD)/cov,renderer/main.c) $(BUILD)/cov/l
 	$(link)
 $(BUILD)/tsan/tests/% $(BUILD)/cov/tests/%: TEST_LIBS := -lcmocka
 $(BUILD)/cov/tests/test_embree: TEST_LIBS := -lcmocka -lembree3
-$(BUILD)/tsan/tests/%: $(BUILD)/tsan/tests/%.c.o $(call obj,$(BUILD)/tsan,$(SUPPORT)) $(BUILD)/tsan/libassay.a
+$(BUILD)/tsan/tests/%: $(BUILD)/tsan/tests/%.c.o $(call obj,$(BUILD)/tsan,$(SUPPORT)) $(BUILD)/tsan/libassay.a | $(BUILD)/tsan/oiio.so
 	$(link)
-$(BUILD)/cov/tests/%: $(BUILD)/cov/tests/%.c.o $(call obj,$(BUILD)/cov,$(SUPPORT)) $(BUILD)/cov/libassay.a
+$(BUILD)/cov/tests/%: $(BUILD)/cov/tests/%.c.o $(call obj,$(BUILD)/cov,$(SUPPORT)) $(BUILD)/cov/libassay.a | $(BUILD)/cov/oiio.so
 	$(link)
 $(BUILD)/cov/tests/student_tracer: $(BUILD)/cov/tests/student_tracer.c.o
 	$(link)
@@ -343,7 +353,7 @@ $(BUILD)/clang/libassay.a: $(call obj,$(BUILD)/clang,$(HARNESS) $(RENDERER))
 	$(archive)
 $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): TEST_LIBS := -fsanitize=fuzzer
 $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): $(BUILD)/clang/fuzz_%: \
-  $(BUILD)/clang/tests/fuzz/fuzz_%.c.o $(BUILD)/clang/tests/fuzz/fuzz.c.o $(BUILD)/clang/libassay.a
+  $(BUILD)/clang/tests/fuzz/fuzz_%.c.o $(BUILD)/clang/tests/fuzz/fuzz.c.o $(BUILD)/clang/libassay.a | $(BUILD)/clang/oiio.so
 	$(link)
 programs-fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ))
 fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
@@ -362,16 +372,24 @@ $(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(wildcard renderer/*.h) | $(BU
 	$$(call clang_tidy,$(call isa_flags,$(2)))
 endef
 $(foreach k,$(BY_ISA),$(foreach i,$(ISAS),$(eval $(call kernel_lint,$(k),$(i)))))
-$(BUILD)/lint/cppcheck.ok: .cppcheck-suppressions $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch]) | $(BUILD)/deps-lint
+# Both are asked about planted faults first: who does not see them sees nothing (cppcheck is silent about a file that it cannot read).
+cppcheck = cppcheck --enable=warning,performance,portability --std=c11 --quiet --inline-suppr --error-exitcode=1 \
+  --suppressions-list=.cppcheck-suppressions -D_XOPEN_SOURCE=700 -DISA=avx2 --include=tests/lint/jansson.h
+$(BUILD)/lint/planted.ok: tests/lint/planted.c tests/lint/jansson.h .clang-tidy .cppcheck-suppressions | $(BUILD)/deps-lint
+	$(Q)mkdir -p $(@D); ! $(cppcheck) $< 2>/dev/null || { echo 'cppcheck does not see a planted fault' >&2; exit 1; }
+	$(Q)! clang-tidy --quiet $< -- -std=c17 $(pkg_cflags) >/dev/null 2>&1 || { echo 'clang-tidy does not see a planted fault' >&2; exit 1; }
+	$(Q)touch $@
+$(BUILD)/lint/cppcheck.ok: $(BUILD)/lint/planted.ok $(wildcard renderer/*.[ch] reference/*.[ch] tools/*.[ch] tests/*.[ch])
 	$(call say,CHECK,cppcheck)
-	$(Q)mkdir -p $(@D); cppcheck --enable=warning,performance,portability --std=c11 --quiet --inline-suppr --error-exitcode=1 \
-	  --suppressions-list=.cppcheck-suppressions -D_XOPEN_SOURCE=700 -DISA=avx2 \
-	  '-Djson_array_foreach(a,i,v)=for(i=0;i<json_array_size(a)&&(v=json_array_get(a,i));i++)' \
-	  '-Djson_object_foreach(o,k,v)=for(;(k=json_key(o))&&(v=json_value(o));)' renderer reference tools tests && touch $@
+	$(Q)$(cppcheck) -i tests/lint renderer reference tools tests && touch $@
 
-programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay
-programs-clang: $(call obj,$(BUILD)/clang,renderer/main.c tools/main.c $(RENDERER) $(HARNESS) $(SUPPORT) $(TESTS:=.c) \
+programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay $(BUILD)/san/oiio.so
+# What the fuzzers are linked from, and all the rest as far as clang's warnings look.
+programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,renderer/main.c tools/main.c $(SUPPORT) $(TESTS:=.c) \
   $(wildcard tests/make_*.c tests/diagnose_rates.c tests/grade_table.c) $(BENCH))
+$(BUILD)/clang/%.c.ok: %.c | $(BUILD)/deps-test
+	$(call say,CC,$@)
+	$(Q)mkdir -p $(@D) && $(CC) $(cflags) -MMD -MP -MF $@.d -MT $@ -fsyntax-only $< && touch $@
 
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
@@ -413,7 +431,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 $(BUILD)/deps-slurm: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_SLURM))
 
-.PHONY: all validate check lint threads tsan faults slurm large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
+.PHONY: all validate check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants print-compile print-libs print-kernels bench bench-rays bvh-table anchors golden report autograder deps deps-live install format clean help catalogue diagnose-rates grade-show rubric-bugs calibrate FORCE \
   programs-san programs-clang programs-fuzz
 .SECONDARY:
 .DELETE_ON_ERROR:

@@ -5,7 +5,7 @@
 #include "job.h"
 #include "process.h"
 
-#include "../renderer/image_oiio.h"
+#include "image_oiio.h"
 #include "../renderer/fs.h"
 #include "../renderer/progress.h"
 

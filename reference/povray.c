@@ -1,8 +1,7 @@
-/* Drives POV-Ray: the pictures of povray_picture.h, rendered side by side and folded. */
+/* Drives POV-Ray: the pictures of a povray_set, rendered side by side. */
 #include "job.h"
 
-#include "independence.h"
-#include "povray_picture.h"
+#include "povray_set.h"
 #include "process.h"
 
 #include "../renderer/sha256.h"
@@ -15,32 +14,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the workers share. Task t < POVRAY_WINDOWS is a window, the rest are replicates. */
+/* What the workers share. */
 struct crew {
-    const struct reference_job *job;
-    const struct povray_plan *plan;
+    const struct povray_set *set;
+    const struct reference_job *job; /* of the set */
     const char *program;
-    int num_tasks;
-    size_t size;   /* floats in a picture */
-    float *result; /* num_tasks pictures: radiance, box-averaged to the job's size */
+    int first, last; /* of the pictures that are wanted */
     pthread_mutex_t lock;
     int next;
     bool failed;
-    struct err first; /* of the failures */
+    struct err why; /* of the first failure */
 };
-
-static struct povray_picture window(const struct crew *w, int j, int pass)
-{
-    return povray_window(w->plan, w->job->suite->width, w->job->suite->height, j, pass);
-}
-
-static struct povray_picture replicate(const struct crew *w, int i, int pass, bool indirect)
-{
-    i += w->job->opt->first_replicate;
-    return povray_replicate(w->plan, w->job->suite->width, w->job->suite->height,
-                            w->job->ref->subgrid, i, replicate_seed(w->job->opt->seed, i), pass,
-                            indirect);
-}
 
 /* A picture with radiosity must say in its log that no sample was kept; a cache would be a bias that
  * nobody sees. */
@@ -94,24 +78,7 @@ static bool add_picture(const struct crew *w, const struct povray_picture *p, co
     return ok;
 }
 
-enum {
-    NUM_ARGS = 16,  /* of the engine's command line, NULL included */
-    MAX_STARTS = 10 /* of one picture */
-};
-
-/* The command line, in text that belongs to the caller. */
-static void command_line(const struct crew *w, const struct povray_picture *p, char text[4][32],
-                         const char *argv[NUM_ARGS])
-{
-    snprintf(text[0], sizeof text[0], "+W%d", p->grid * w->job->suite->width);
-    snprintf(text[1], sizeof text[1], "+H%d", p->grid * w->job->suite->height);
-    snprintf(text[2], sizeof text[2], "+BS%d", p->block);
-    const char *const args[] = {
-        w->program, "+Iscene.pov", "+Oscene.exr", "+FE", text[0], text[1], text[2],          "+WT1",
-        "-A",       "-C",          "-D",          "-P",  "-V",    "+Q9",   "File_Gamma=1.0", NULL};
-    static_assert(sizeof args / sizeof *args == NUM_ARGS, "one slot per argument");
-    memcpy(argv, args, sizeof args);
-}
+enum { MAX_STARTS = 10 /* of one picture */ };
 
 /* On a busy machine POV-Ray gives up before it has begun, when its own threads start too slowly. That
  * says nothing about the picture, so it is asked again. */
@@ -126,11 +93,11 @@ static bool run_engine(const struct process *run, struct err *e)
     }
 }
 
-static bool render(struct crew *w, const struct povray_picture *p, float sign, float *out,
-                   struct err *e)
+static bool render_one(struct crew *w, const struct povray_picture *p, float sign, float *out,
+                       struct err *e)
 {
     char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
-    const char *argv[NUM_ARGS];
+    const char *argv[POVRAY_ARGS];
     if (snprintf(dir, sizeof dir, "%s/%s", w->job->dir, p->name) >= (int)sizeof dir)
         return err_set(e, "%.64s...: path too long", w->job->dir);
     snprintf(pov, sizeof pov, "%s/scene.pov", dir);
@@ -146,28 +113,37 @@ static bool render(struct crew *w, const struct povray_picture *p, float sign, f
         ok = err_set(e, "%s: cannot write: %s", pov, strerror(errno));
     if (!ok)
         return false;
-    command_line(w, p, text, argv);
+    povray_command_line(w->set, w->program, p, text, argv);
     struct process run = {
         .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
-    bool radiosity = p->variant.indirect && w->plan->pass[p->variant.pass].recursion > 0;
+    bool radiosity = p->variant.indirect && w->set->plan.pass[p->variant.pass].recursion > 0;
     return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
            add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
 }
 
+/* Adds its passes up, box-averaged to the job's size, into a file. */
 static bool run_task(struct crew *w, int t, struct err *e)
 {
-    float *out = w->result + (size_t)t * w->size;
-    bool ok = true;
-    for (int pass = 0; ok && pass < w->plan->num_passes; pass++) {
+    char path[PICTURE_PATH];
+    float *out = calloc(w->set->size, sizeof *out);
+    bool ok = out != NULL || err_set(e, "a picture: out of memory");
+    for (int pass = 0; ok && pass < w->set->plan.num_passes; pass++) {
         if (t < POVRAY_WINDOWS) {
-            struct povray_picture fine = window(w, t, pass);
-            ok = render(w, &fine, 1, out, e);
-        } else if (w->plan->pass[pass].recursion > 0) {
-            struct povray_picture indirect = replicate(w, t - POVRAY_WINDOWS, pass, true);
-            struct povray_picture direct = replicate(w, t - POVRAY_WINDOWS, pass, false);
-            ok = render(w, &indirect, 1, out, e) && render(w, &direct, -1, out, e);
+            struct povray_picture fine = povray_set_window(w->set, t, pass);
+            ok = render_one(w, &fine, 1, out, e);
+        } else if (w->set->plan.pass[pass].recursion > 0) {
+            struct povray_picture indirect =
+                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, true);
+            struct povray_picture direct =
+                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, false);
+            ok = render_one(w, &indirect, 1, out, e) && render_one(w, &direct, -1, out, e);
         }
     }
+    if (ok) {
+        pictures_path(w->job->dir, povray_driver.prefix, t - w->first, path);
+        ok = pictures_write(path, w->job->suite->width, w->job->suite->height, out, e);
+    }
+    free(out);
     return ok;
 }
 
@@ -176,7 +152,7 @@ static void *work(void *arg)
     struct crew *w = arg;
     for (;;) {
         pthread_mutex_lock(&w->lock);
-        int t = w->failed || w->next == w->num_tasks ? -1 : w->next++;
+        int t = w->failed || w->next == w->last ? -1 : w->next++;
         pthread_mutex_unlock(&w->lock);
         if (t < 0)
             return NULL;
@@ -185,7 +161,7 @@ static void *work(void *arg)
             continue;
         pthread_mutex_lock(&w->lock);
         if (!w->failed)
-            w->first = e;
+            w->why = e;
         w->failed = true;
         pthread_mutex_unlock(&w->lock);
     }
@@ -208,7 +184,7 @@ static bool run_crew(struct crew *w, struct err *e)
     pthread_mutex_destroy(&w->lock);
     if (!w->failed)
         return true;
-    *e = w->first;
+    *e = w->why;
     return err_prefix(e, "POV-Ray");
 }
 
@@ -236,130 +212,43 @@ static bool engine_version(const struct crew *w, char line[128], struct err *e)
     return true;
 }
 
-static bool describe(const struct crew *w, json_t *manifest, struct err *e)
+static bool render(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e)
 {
-    char version[128], sha256[65], text[4][32], command[512] = "povray";
-    const char *argv[NUM_ARGS];
-    int replicates = w->num_tasks - POVRAY_WINDOWS;
-    if (!engine_version(w, version, e) || !sha256_file(w->program, sha256, e))
+    char program[4096], version[128], sha256[65];
+    struct povray_set set;
+    struct crew w = {.set = &set, .job = job, .program = program, .first = first, .last = last};
+    if (!process_find("povray", program, sizeof program))
+        return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
+    if (strlen(job->dir) >= 4096)
+        return err_set(e, "%.64s...: path too long", job->dir);
+    if (!povray_set(job, &set, e))
         return false;
-    struct povray_picture first = replicates > 0 ? replicate(w, 0, 0, true) : window(w, 0, 0);
-    command_line(w, &first, text, argv);
-    for (int i = 1; argv[i] != NULL; i++)
-        snprintf(command + strlen(command), sizeof command - strlen(command), " %s", argv[i]);
-    json_t *seeds = json_array(), *blocks = json_array();
-    for (int i = 0; i < replicates; i++) {
-        json_array_append_new(seeds, json_integer(replicate_seed(
-                                         w->job->opt->seed, w->job->opt->first_replicate + i)));
-        json_array_append_new(blocks, json_integer(replicate(w, i, 0, true).block));
-    }
-    double top = POVRAY_TOP_VALUE / w->plan->radiance;
-    json_t *passes = json_array();
-    for (int i = 0; i < w->plan->num_passes; i++) {
-        const struct povray_pass *pass = &w->plan->pass[i];
-        json_array_append_new(
-            passes, json_pack("{s:b, s:b, s:i, s:i, s:i}", "light_sources", pass->sources, "glow",
-                              pass->glow, "recursion_limit", pass->recursion, "max_trace_level",
-                              pass->levels, "max_trace_level_indirect", pass->levels_indirect));
-    }
-    struct povray_picture fine = window(w, 0, 0);
-    json_t *settings =
-        json_pack("{s:o, s:[f,f], s:{s:i, s:i, s:i, s:s}}", "passes", passes, "scale", top, 2 * top,
-                  "fine", "windows", (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
-                  "lamp_cells", fine.variant.lamp_cells, "rule",
-                  fine.variant.rule == POVRAY_GAUSS ? "gauss2" : "shifted grid");
-    json_t *scheme = replicates > 0
-                         ? json_pack("{s:i, s:i, s:f, s:O}", "subgrid", w->job->ref->subgrid,
-                                     "jittered_lamp_cells", first.variant.lamp_cells, "roulette",
-                                     POVRAY_ROULETTE, "block_sizes", blocks)
-                         : json_string("none: the picture has no noise");
-    bool ok = json_object_set(settings, "replicate", scheme) == 0 &&
-              json_object_set_new(manifest, "version", json_string(version)) == 0 &&
-              json_object_set_new(manifest, "binary_sha256", json_string(sha256)) == 0 &&
-              json_object_set_new(manifest, "command", json_string(command)) == 0 &&
-              json_object_set(manifest, "settings", settings) == 0 &&
-              json_object_set(manifest, "seeds", seeds) == 0;
-    json_decref(settings);
-    json_decref(scheme);
-    json_decref(seeds);
-    json_decref(blocks);
-    return ok || err_set(e, "POV-Ray manifest: out of memory");
+    w.next = first;
+    return run_crew(&w, e) && engine_version(&w, version, e) && sha256_file(program, sha256, e) &&
+           ((json_object_set_new(said, "version", json_string(version)) == 0 &&
+             json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0) ||
+            err_set(e, "out of memory"));
 }
 
-/* Replicates that repeat would make a standard error that is too small. */
-static bool check_different(const struct crew *w, struct err *e)
+static bool count(const struct reference_job *job, int *num, struct err *e)
 {
-    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++)
-        for (int u = POVRAY_WINDOWS; u < t; u++)
-            if (memcmp(w->result + (size_t)t * w->size, w->result + (size_t)u * w->size,
-                       w->size * sizeof *w->result) == 0)
-                return err_set(e, "POV-Ray: replicates %d and %d are the same", u - POVRAY_WINDOWS,
-                               t - POVRAY_WINDOWS);
+    struct povray_set set;
+    if (!povray_set(job, &set, e))
+        return false;
+    *num = POVRAY_WINDOWS + set.replicates;
     return true;
 }
 
-/* fine + each replicate's difference; fine alone if there are none. */
-static bool fold(const struct crew *w, struct moments *out, json_t *manifest, struct err *e)
-{
-    const struct suite_scene *suite = w->job->suite;
-    bool exact = w->num_tasks == POVRAY_WINDOWS;
-    struct moments m = {0};
-    struct replicates all = {0};
-    double *fine = calloc(w->size, sizeof *fine);
-    bool ok = fine != NULL || err_set(e, "POV-Ray pictures: out of memory");
-    ok = ok && check_different(w, e) && moments_alloc(&m, suite->width, suite->height, e) &&
-         (exact || replicates_alloc(&all, m.width, m.height, w->num_tasks - POVRAY_WINDOWS, e));
-    if (!ok)
-        goto out;
-    for (int t = 0; t < POVRAY_WINDOWS; t++)
-        for (size_t i = 0; i < w->size; i++)
-            fine[i] += (double)w->result[(size_t)t * w->size + i] / POVRAY_WINDOWS;
-    strcpy(m.unit, exact ? "exact" : "replicate");
-    m.spp = exact ? 0 : w->job->ref->subgrid * w->job->ref->subgrid;
-    for (int t = POVRAY_WINDOWS; t < w->num_tasks; t++) {
-        float *sum = w->result + (size_t)t * w->size;
-        for (size_t i = 0; i < w->size; i++)
-            sum[i] = (float)(fine[i] + (double)sum[i]);
-        moments_add_image(&m, sum);
-        if (w->job->opt->on_replicate != NULL)
-            w->job->opt->on_replicate(w->job->opt->on_replicate_ctx, t - POVRAY_WINDOWS, sum);
-        replicates_add(&all, sum);
-    }
-    ok = exact || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray");
-    for (size_t i = 0; exact && i < w->size; i++) {
-        m.mean[i] = fine[i];
-        m.n[i / 3] = 1;
-    }
-out:
-    free(fine);
-    replicates_free(&all);
-    if (ok)
-        *out = m;
-    else
-        moments_free(&m);
-    return ok;
-}
+const struct driver povray_driver = {.engine = "povray",
+                                     .prefix = "picture",
+                                     .below_zero = true,
+                                     .count = count,
+                                     .render = render,
+                                     .fold = povray_fold};
 
 bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
                    struct err *e)
 {
-    char program[4096];
-    struct povray_plan plan;
-    if (!process_find("povray", program, sizeof program))
-        return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
-    if (!povray_plan(job->scene, job->camera, job->suite->depth, &plan, e))
-        return false;
-    bool exact = !povray_plan_is_noisy(&plan);
-    assert(exact || (job->ref->replicates > 1 && job->ref->subgrid > 0));
-    struct crew w = {.job = job,
-                     .plan = &plan,
-                     .program = program,
-                     .num_tasks = POVRAY_WINDOWS + (exact ? 0 : job->ref->replicates),
-                     .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
-    w.result = calloc((size_t)w.num_tasks * w.size, sizeof *w.result);
-    if (w.result == NULL)
-        return err_set(e, "POV-Ray pictures: out of memory");
-    bool ok = run_crew(&w, e) && describe(&w, manifest, e) && fold(&w, out, manifest, e);
-    free(w.result);
-    return ok;
+    return driver_render(&povray_driver, job, out, manifest, e);
 }

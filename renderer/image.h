@@ -50,6 +50,9 @@ enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
  * channel. */
 bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
+/* Its header alone: data stays NULL. */
+bool image_read_exr_head(const char *path, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
 /* Reads a Radiance picture (RGBE, rows from the top) as R G B. */
 bool image_read_hdr(const char *path, struct image *out, struct err *e)
     __attribute__((warn_unused_result));

@@ -235,8 +235,8 @@ bool image_write_exr(const char *path, const struct image *im, struct err *e)
 }
 
 /* An image of the shape that the header says, and its texts. */
-static bool read_header(exr_context_t f, const char *path, const struct stream *s, struct image *im,
-                        bool *half, struct err *e)
+static bool read_header(exr_context_t f, const char *path, const struct stream *s, bool pixels,
+                        struct image *im, bool *half, struct err *e)
 {
     const exr_attr_chlist_t *list;
     exr_attr_box2i_t w;
@@ -275,7 +275,7 @@ static bool read_header(exr_context_t f, const char *path, const struct stream *
     if (bytes > IMAGE_MAX_EXPANSION * (double)size)
         return err_set(e, "%s: an image of %lld x %lld x %d cannot be in %lld bytes", path,
                        (long long)width, (long long)height, channels, (long long)size);
-    if (!image_alloc(im, (int)width, (int)height, channels, names, e))
+    if (!(pixels ? image_alloc : image_head)(im, (int)width, (int)height, channels, names, e))
         return err_prefix(e, "%s", path);
     /* "type" says how the file is made, not what of, and a writer has its own. */
     for (int i = 0; i < num_attrs; i++) {
@@ -334,7 +334,8 @@ static exr_result_t read_tiles(exr_context_t f, struct image *im)
     return r;
 }
 
-bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
+/* The pixels too, or the header alone. */
+static bool read_exr(const char *path, bool pixels, struct image *out, bool *half, struct err *e)
 {
     struct stream s = {.fd = open(path, O_RDONLY | O_CLOEXEC)};
     if (s.fd < 0)
@@ -346,8 +347,8 @@ bool image_read_exr(const char *path, struct image *out, bool *half, struct err 
     bool small = false;
     exr_result_t r = exr_start_read(&f, path, &init);
     bool ok = r == EXR_ERR_SUCCESS || failed(path, "read", &s, r, e);
-    ok = ok && read_header(f, path, &s, &im, &small, e);
-    if (ok) {
+    ok = ok && read_header(f, path, &s, pixels, &im, &small, e);
+    if (ok && pixels) {
         exr_get_storage(f, 0, &storage);
         r = storage == EXR_STORAGE_TILED ? read_tiles(f, &im) : read_rows(f, &im);
         ok = r == EXR_ERR_SUCCESS || failed(path, "read", &s, r, e);
@@ -362,4 +363,14 @@ bool image_read_exr(const char *path, struct image *out, bool *half, struct err 
     if (half != NULL)
         *half = small;
     return true;
+}
+
+bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
+{
+    return read_exr(path, true, out, half, e);
+}
+
+bool image_read_exr_head(const char *path, struct image *out, struct err *e)
+{
+    return read_exr(path, false, out, NULL, e);
 }

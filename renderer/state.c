@@ -121,7 +121,8 @@ static bool check_body(const struct state_file *s, struct sha256_ctx *ctx, uint3
     if (!get(s->f, ctx, counts, 2 * sizeof *counts) || counts[1] > 1)
         return false;
     /* Only whether they are there is looked at. */
-    shape.first = s->first_hits ? &(struct first_hit_sums){0} : NULL;
+    struct first_hit_sums some = {0};
+    shape.first = s->first_hits ? &some : NULL;
     shape.target = counts[1] == 1 ? counts : NULL;
     for (int n = body_arrays(a, &shape), i = 0; i < n; i++)
         left += a[i].each * (size_t)s->width * (size_t)s->height;

@@ -47,7 +47,7 @@ static struct at_size measure_mesh(const struct bench_options *o, uint32_t trian
     struct at_size out = {.triangles = s->num_triangles};
     double build[2][BENCH_MAX_ROUNDS], rate[2][BENCH_MAX_ROUNDS];
     int builds = triangles > 2000000 ? 1 : o->rounds;
-    struct tracer t[2];
+    struct tracer t[2] = {0};
     for (int k = 0; k < builds; k++) {
         if (k > 0) {
             tracer_free(&t[0]);

@@ -74,7 +74,7 @@ static bool render_chunk(void *arg, int chunk, struct err *e)
     size_t end = (size_t)(chunk + 1) * CHUNK;
     for (size_t i = (size_t)chunk * CHUNK; ok && i < end && i < job->pairs; i++) {
         uint64_t seed = (cell->seed << 32) + i * per_pair;
-        struct moments a, b;
+        struct moments a = {0}, b = {0};
         if (!picture(job, seed, &a, e))
             return false;
         ok = (cell->replicates > 0 ? replicates : picture)(job, seed + 1, &b, e);

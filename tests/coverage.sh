@@ -33,7 +33,7 @@ fi
 grep -h '^not ok' "$cov"/log/*
 llvm-profdata merge -sparse -o "$cov/profile/all" "$cov"/profile/*.profraw || exit 1
 objects=()
-for program in "$cov/assay" "$@"; do
+for program in "$cov/assay" "$cov/oiio.so" "$@"; do
     objects+=(-object "$program")
 done
 llvm-cov export -format=lcov "$cov/pathtracer" "${objects[@]}" -instr-profile="$cov/profile/all" \

@@ -666,9 +666,10 @@ part tests/verbs.sh "$build"
 
 # The same work in jobs.
 part tests/scale.sh "$build"
+part tests/scale_reference.sh "$build"
 
 # Kills, full disks and missing memory.
-part tests/faults.sh "$build" 2 499
+part tests/faults.sh "$build" 2 97
 
 # The page, in a browser.
 part tests/browser/run.sh "$build"

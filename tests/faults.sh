@@ -22,8 +22,8 @@ tell() { # NAME WHY: not ok where WHY says something
         failures=$((failures + 1))
     fi
 }
-# As many kills as asked for, of at most five times as many tries.
-more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills)) ]; }
+# As many kills as asked for, of at most five times as many tries and 50: on a busy machine a program may end sooner than when it was timed.
+more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills + 50)) ]; }
 too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
 # killed MOST COMMAND...: runs it for a random part of MOST milliseconds. Status 0 if it had ended by itself, else counted in hits.
@@ -294,8 +294,8 @@ disk() {
     if is_whole "$tmp/p1.exr" && is_whole "$tmp/p2.exr"; then tell "closed pipe: whole pictures" ""; else tell "closed pipe: whole pictures" "no"; fi
 }
 
-# A results file but for what a clock says.
-content() { grep -av '"date"\|"seconds\|_s":\|_seconds' "$1" | sha256sum; }
+# A results file but for what a clock says, and the processor's name, which is "unknown" where it cannot be read.
+content() { grep -av '"date"\|"machine"\|"seconds\|_s":\|_seconds' "$1" | sha256sum; }
 # OUTPUT, a file that the command writes, must be right where it says 0. OpenImageIO ends a program where memory is out
 # in one of its destructors; nothing catches that, so it is counted.
 no_memory() { # NAME OUTPUT COMMAND...

@@ -73,7 +73,7 @@ static int run_round(struct cluster *c, const double *cost, int *todo, int num, 
     const struct work *w = c->w;
     int tasks = num < w->most_tasks ? num : w->most_tasks, lost = 0;
     int *again = malloc((size_t)num * sizeof *again);
-    double end = *begin, controller = *begin, told = 0;
+    double controller = *begin, end = controller, told = 0;
     assert(again != NULL);
     for (int t = 0; t < tasks; t++) {
         controller += controller_s;

@@ -150,9 +150,10 @@ void odd_png(const char *path, int width, int height, int channels, int bits, co
     put_chunk(f, "IHDR", head, sizeof head);
     size_t bytes = (size_t)bits / 8, line = 1 + (size_t)(width * channels) * bytes;
     size_t n = line * (size_t)height;
-    uint8_t *data = calloc(n + 11, 1), *raw = data + 7;
+    uint8_t *data = calloc(n + 11, 1);
     if (data == NULL || n > 65535)
         abort();
+    uint8_t *raw = data + 7;
     for (int y = 0; y < height; y++)
         for (int i = 0; i < width * channels; i++) {
             uint16_t v = code[y * width * channels + i];

@@ -151,7 +151,7 @@ expect "no such job" 3 "is not a whole number from 0 to 3" "$san_assay" run-job 
 head -n 3 "$plan/plan.jsonl" >"$tmp/p" && mkdir "$tmp/half" && cp "$tmp/p" "$tmp/half/plan.jsonl"
 expect "a plan cut short" 3 "not a whole plan" "$san_assay" run-job "$tmp/half" 0
 expect "a render that looks at all of its picture" 3 "cannot be cut into jobs" "$san_assay" plan --plan "$tmp/p1" pathtracer --error 1% -f "$tmp/y.exr" "$scene"
-expect "what cannot be planned" 3 "begins with pathtracer, grade or validate" "$san_assay" plan report x.json
+expect "what cannot be planned" 3 "begins with pathtracer, grade, validate or reference" "$san_assay" plan report x.json
 expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay" plan --plan "$tmp/p1" pathtracer -f x.exr -e "{out}" -s 1 "{job}"
 
 # The class: what is right, what is dead, what is no program.

@@ -55,11 +55,14 @@ static double tent(double d)
 double sky_radiance(const struct sky *s, double x, double y)
 {
     double sum = 0, inner = fmin(fmax(y, 0.5), s->height - 0.5);
-    for (int j = 0; j < s->height; j++)
-        for (int i = 0; i < s->width; i++) {
-            double d = remainder(x - i - 0.5, s->width);
-            sum += (double)s->value[j * s->width + i] * tent(d) * tent(inner - j - 0.5);
+    for (int j = 0; j < s->height; j++) {
+        double row = tent(inner - j - 0.5);
+        for (int i = 0; row > 0 && i < s->width; i++) {
+            double d = x - i - 0.5;
+            d -= s->width * rint(d / s->width);
+            sum += (double)s->value[j * s->width + i] * tent(d) * row;
         }
+    }
     return sum;
 }
 

@@ -2,7 +2,7 @@
 # tests/slurm.sh BUILD: a Slurm cluster of four nodes on this machine, in a directory of its own: munged, slurmctld, and a slurmd for each
 # node in a process namespace of its own, so that killing its first process takes everything on the node, like a plug that is pulled.
 # On it: a render of which a node is killed in the middle, the controller is restarted, and the follower is killed and
-# begun again; a grading batch; a validation; a job that cannot be made. Results have the bits of the local commands, and nothing is
+# begun again; a grading batch; a validation; replicates of a reference; a job that cannot be made. Results have the bits of the local commands, and nothing is
 # made twice but what was lost. As root. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/slurm.sh BUILD}")
@@ -155,6 +155,10 @@ cmp -s l2.png x2.png || why="another picture: $why"
 [ -e x2.exr.plan ] && why="$why the plan was left"
 tell "pathtracer --slurm" "$why"
 
+"$assay" slurm --parts 1 --ranges 3 pathtracer -q -r 64 64 -s 16 -f x3.exr "$scene" >"$tmp/out" 2>"$tmp/err" && "$assay" reproduce x3.exr >"$tmp/out" 2>>"$tmp/err" &&
+    grep -q "3 of 3 jobs made" "$tmp/err" && why="" || why="$(tail -n 2 "$tmp/out" "$tmp/err" | tr '\n' ' ')"
+tell "sample ranges are what their jobs make here" "$why"
+
 cd "$OLDPWD" || exit 1
 mkdir "$tmp/class"
 cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && cp "$pathtracer" "$tmp/class/again"
@@ -168,6 +172,27 @@ why=$("$assay" validate -q --slurm --only 12_point_plane --only 31_spot_plane --
 no_times() { sed -E 's/"(seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date)":/d' "$1"; }
 cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") && cmp -s <(grep -v index.html "$tmp/t1") <(grep -v index.html "$tmp/t2") && why="" || why="other results: $why"
 tell "a validation" "$why"
+why=$("$assay" slurm --by claim validate -q --only 12_point_plane --only 31_spot_plane --only 10_furnace_one --out "$tmp/v3" 2>&1 >"$tmp/t3")
+cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v3/results.json") && cmp -s <(grep -v index.html "$tmp/t1") <(grep -v index.html "$tmp/t3") && why="" || why="other results: $why"
+tell "a validation by claims" "$why"
+
+# References, each job some replicates of one, by Blender itself.
+if command -v blender >/dev/null; then
+    mkdir "$tmp/suite"
+    cp "$scene" "$tmp/suite"
+    sed 's/"width": [0-9]*, "height": [0-9]*/"width": 16, "height": 16/; s/"tile": 16/"tile": 8/; /"consistency"/d
+        s/"replicates": [0-9]*, "spp": [0-9]*/"replicates": 4, "spp": 16/' reference/scenes/41_cornell.json >"$tmp/suite/41_cornell.json"
+    words=(reference --suite "$tmp/suite" --work "$tmp/work" --engine cycles)
+    why=$("$assay" "${words[@]}" -t 1 --out "$tmp/r1" 2>&1 >/dev/null | grep -v rendering)
+    "$assay" "${words[@]}" --slurm --out "$tmp/r2" >"$tmp/out" 2>"$tmp/err" || why="$why $(tail -n 2 "$tmp/err")"
+    grep -q "4 of 4 jobs made" "$tmp/err" || why="$why not 4 jobs: $(tail -n 2 "$tmp/err")"
+    cmp "$tmp/r1/41_cornell/cycles.exr" "$tmp/r2/41_cornell/cycles.exr" >"$tmp/cmp" 2>&1 || why="$why $(cat "$tmp/cmp")"
+    no_times() { sed -E '/"(cpu_s|wall_s|date)":/d' "$1"; }
+    cmp -s <(no_times "$tmp/r1/41_cornell/manifest.json") <(no_times "$tmp/r2/41_cornell/manifest.json") || why="$why another manifest"
+    tell "replicates of a reference" "$why"
+else
+    echo "skip slurm: replicates of a reference: no blender in PATH: NOT TESTED"
+fi
 
 # A job that cannot be made: its input is another one as soon as it is planned.
 why=""

@@ -4,7 +4,7 @@
 #include "anchors.h"
 
 #include "../reference/process.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/fs.h"
 #include "simulate.h"
 

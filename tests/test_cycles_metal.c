@@ -61,7 +61,7 @@ struct albedo {
 
 static struct albedo tabulate(const struct metal *a)
 {
-    struct albedo t;
+    struct albedo t = {0};
     for (int k = 0; k < 3; k++) {
         struct optics_metal o = channel_of(a, k);
         for (int i = 0; i <= TABLE; i++) {

@@ -3,7 +3,7 @@
 #include "sky.h"
 
 #include "../reference/export_cycles.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/fs.h"
 
 #include <setjmp.h>

@@ -6,7 +6,7 @@
 #include "build_scene.h"
 
 #include "../reference/export_mitsuba.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/environment.h"
 #include "../renderer/fs.h"
 #include "../renderer/image.h"

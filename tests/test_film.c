@@ -1,5 +1,5 @@
 /* Stopping and going on, adaptive sampling, layers. */
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/heatmap.h"
 #include "../renderer/output.h"
 #include "../renderer/state.h"

@@ -378,10 +378,10 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
     struct rubric *r = a_rubric(CHECK_EQUAL, 1);
     struct answers *a = calloc(1, sizeof *a);
     struct err e;
+    assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
     r->num_sets = 2;
     strcpy(r->set[1].name, "bright");
     a->of[0][0].m = a->of[0][0].noise = reference;
-    assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
     struct moments *m = &a->of[1][0].m;
     for (size_t i = 0; i < 3 * PIXELS; i++) {
         m->n[i / 3] = REFERENCE;

@@ -1,7 +1,7 @@
 /* Our readers and writers of picture files against OpenImageIO's, a route of its own: the same bits of
  * every channel, whichever way OpenEXR and RGBE pack them; and files that are cut short or damaged. */
 #include "../renderer/fs.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/sampler.h"
 #include "../reference/process.h"
 

@@ -3,7 +3,7 @@
 #include "odd_images.h"
 #include "simulate.h"
 
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/fs.h"
 #include "../tools/curve.h"
 #include "../tools/input.h"

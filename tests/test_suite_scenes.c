@@ -6,7 +6,7 @@
 #include "../reference/suite.h"
 #include "render_check.h"
 #include "suite_files.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 
 #include <math.h>
 #include <setjmp.h>

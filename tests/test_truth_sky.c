@@ -5,7 +5,7 @@
 #include "../reference/truth_sky.h"
 #include "../reference/truth_view.h"
 #include "optics.h"
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 
 #include <gsl/gsl_integration.h>
 

@@ -48,31 +48,50 @@ static bool is_moments(const struct image *im)
     return image_channel(im, "M2.R") >= 0;
 }
 
+/* Ours are told by their header, and OpenImageIO stays where it is. */
+static bool says_moments(const char *path)
+{
+    struct image head;
+    struct err ignored;
+    if (!image_read_exr_head(path, &head, &ignored))
+        return false;
+    bool says = is_moments(&head);
+    image_free(&head);
+    return says;
+}
+
+static bool read_moments(const char *path, char side, const struct input_options *opt,
+                         struct input *out, struct err *e)
+{
+    out->kind = INPUT_MOMENTS;
+    if (!moments_read(path, &out->m, NULL, e))
+        return false;
+    if (strcmp(out->m.unit, "picture") == 0)
+        return err_set(e, "%s: is one side of a comparison; its variance belongs to both", path);
+    return !(opt->spp > 0) ||
+           err_set(e, "%s: --spp-%c: a moments image says itself how many samples it has", path,
+                   side);
+}
+
 static bool read_file(const char *path, char side, const struct input_options *opt,
                       struct input *out, struct notes *notes, struct err *e)
 {
     struct image_info info;
+    struct image im;
+    bool mitsuba = false;
+    if (says_moments(path))
+        return read_moments(path, side, opt, out, e);
     if (!image_inspect(path, &info, e))
         return false;
     if (strcmp(info.format, "openexr") != 0)
         return input_picture(path, side, opt, out, notes, e);
-    struct image im;
     if (!image_read(path, &im, NULL, e))
         return false;
-    bool ok, moments = is_moments(&im), mitsuba = false;
-    if (moments) {
-        out->kind = INPUT_MOMENTS;
-        ok = moments_read(path, &out->m, NULL, e);
-        if (ok && strcmp(out->m.unit, "picture") == 0)
-            ok = err_set(e, "%s: is one side of a comparison; its variance belongs to both", path);
-    } else {
-        ok = input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
-    }
-    if (ok && moments && opt->spp > 0)
-        ok = err_set(e, "%s: --spp-%c: a moments image says itself how many samples it has", path,
-                     side);
+    bool ok = is_moments(&im) ? read_moments(path, side, opt, out, e)
+                              : input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
+    bool done = !ok || is_moments(&im) || mitsuba;
     image_free(&im);
-    return ok && (moments || mitsuba || input_picture(path, side, opt, out, notes, e));
+    return done ? ok : input_picture(path, side, opt, out, notes, e);
 }
 
 bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,

@@ -2,7 +2,7 @@
 #ifndef ASSAY_INPUT_PRIV_H
 #define ASSAY_INPUT_PRIV_H
 
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "input.h"
 
 /* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is such a one at all; false and no error if

@@ -1,5 +1,5 @@
 /* assay: one program, several verbs. */
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 #include "../renderer/image.h"
 #include "../renderer/version.h"
 #include "results.h"
@@ -27,7 +27,7 @@ static const struct {
     {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
     {"reproduce", verb_reproduce, "render again what made a picture, and compare bits"},
-    {"plan", verb_plan, "cut a render, a grading batch or a validation into jobs"},
+    {"plan", verb_plan, "cut a render, a batch, a validation or references into jobs"},
     {"run-job", verb_run_job, "make some of the jobs of a plan"},
     {"gather", verb_gather, "put the jobs of a plan together"},
     {"slurm", verb_slurm, "all three, the jobs on a Slurm cluster"},
@@ -64,8 +64,10 @@ int main(int argc, char **argv)
         return 0;
     }
     if (argc > 1 && strcmp(argv[1], "--version") == 0) {
+        struct err why;
+        const char *oiio = image_oiio_version(&why);
         printf("assay %s, %s, %s, jansson %s\n", assay_version, image_library_version(),
-               image_oiio_version(), JANSSON_VERSION);
+               oiio != NULL ? oiio : why.msg, JANSSON_VERSION);
         return 0;
     }
     struct err e = {0};

@@ -3,7 +3,7 @@
 #ifndef ASSAY_PICTURE_H
 #define ASSAY_PICTURE_H
 
-#include "../renderer/image_oiio.h"
+#include "../reference/image_oiio.h"
 
 struct picture {
     int width, height;

@@ -22,7 +22,8 @@ static const struct {
     int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
 } kinds[] = {{"pathtracer", render_plan, render_gather},
              {"grade", grade_plan, grade_gather},
-             {"validate", validate_plan, validate_gather}};
+             {"validate", validate_plan, validate_gather},
+             {"reference", reference_plan, reference_gather}};
 enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 const char *plan_text(const struct plan *p, const char *name)
@@ -172,13 +173,16 @@ static bool check_wishes(const char *kind, const struct plan_wishes *w, struct e
 {
     const struct {
         bool given;
-        const char *name, *of;
-    } wish[] = {{w->parts > 0, "--parts", "pathtracer"},
-                {w->ranges > 0, "--ranges", "pathtracer"},
-                {w->by != PLAN_BY_DEFAULT, "--by", "validate"}};
+        const char *name, *of, * or ;
+    } wish[] = {{w->parts > 0, "--parts", "pathtracer", "reference"},
+                {w->ranges > 0, "--ranges", "pathtracer", NULL},
+                {w->by != PLAN_BY_DEFAULT, "--by", "validate", NULL}};
     for (size_t i = 0; i < sizeof wish / sizeof *wish; i++)
-        if (wish[i].given && strcmp(kind, wish[i].of) != 0)
-            return err_set(e, "%s says how %s is cut, not %s", wish[i].name, wish[i].of, kind);
+        if (wish[i].given && strcmp(kind, wish[i].of) != 0 &&
+            (wish[i].or == NULL || strcmp(kind, wish[i].or) != 0))
+            return err_set(e, "%s says how %s%s%s is cut, not %s", wish[i].name, wish[i].of,
+                           wish[i].or != NULL ? " or " : "", wish[i].or != NULL ? wish[i].or : "",
+                           kind);
     return true;
 }
 
@@ -189,9 +193,10 @@ bool plan_make(const char *dir, int argc, char **argv, const struct plan_wishes 
     struct plan p = {.dir = ""};
     int kind = argc > 0 ? kind_of(argv[0]) : NUM_KINDS;
     if (kind == NUM_KINDS)
-        return err_set(e, "what to plan begins with pathtracer, grade or validate, not '%s'",
-                       argc > 0 ? argv[0] : "");
-    if (!check_wishes(argv[0], w, e))
+        return err_set(
+            e, "what to plan begins with pathtracer, grade, validate or reference, not '%s'",
+            argc > 0 ? argv[0] : "");
+    if (!check_wishes(kinds[kind].name, w, e))
         return false;
     for (int k = 1; k < argc; k++)
         if (argv[k][0] == '-' && isalpha((unsigned char)argv[k][1]) && argv[k][2] != '\0')
@@ -277,8 +282,8 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
             p->line[p->num++] = copy;
     }
     free(line);
-    return (ok && p->head != NULL && p->num > 0 &&
-            json_integer_value(json_object_get(p->head, "jobs")) == p->num) ||
+    const json_t *jobs = json_object_get(p->head, "jobs"); /* none where all is done already */
+    return (ok && json_is_integer(jobs) && json_integer_value(jobs) == p->num) ||
            err_set(e, "%s/plan.jsonl: not a whole plan", p->dir);
 }
 

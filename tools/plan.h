@@ -2,7 +2,7 @@
  * hash and leaves one artefact, a directory that appears by rename. tools/SCALE.md is the manual.
  *
  * DIR/plan.jsonl: a line of JSON for the whole, then one for each job.
- *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate", "version": , "cwd": , "jobs": 64,
+ *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate" | "reference", "version": , "cwd": , "jobs": 64,
  *     "command": ["pathtracer", ...]        that would do all of it here,
  *     "output": "OUT.exr", "product": name  of the file that every job leaves,
  *     "ends": [0], "cpus": 1,               exit codes that are as they should be; threads of a job
@@ -27,9 +27,10 @@ struct plan {
     int num;
 };
 
+enum { PLAN_PARTS = 64 };
 /* How a command is to be cut; zero: nothing was said. What is not of its kind is refused. */
 struct plan_wishes {
-    int parts;  /* of a render: into about how many cells (64) */
+    int parts; /* of a render: into about how many cells, of references: how many jobs (PLAN_PARTS) */
     int ranges; /* of a render: into how many sample ranges each of them (1) */
     enum {
         PLAN_BY_DEFAULT,

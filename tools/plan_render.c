@@ -125,7 +125,7 @@ bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan
     if (!options_parse(argc, argv, &o, e) || !check_options(&o, e) || !check_ranges(&o, ranges, e))
         return false;
     beside_program(beside, sizeof beside, "pathtracer");
-    int parts = o.slurm > 0 ? o.slurm : w->parts > 0 ? w->parts : 64;
+    int parts = o.slurm > 0 ? o.slurm : w->parts > 0 ? w->parts : PLAN_PARTS;
     int threads = has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
     const char *const inputs[] = {o.scene, o.camera_file, o.environment_file};
     bool ok = plan_begin(p, o.output[0], PRODUCT, threads, e) &&

@@ -100,7 +100,7 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, bool by
     for (int code = EXIT_DIFFERENT; code <= EXIT_NOT_JUDGED; code++)
         plan_may_end(p, code);
     return plan_begin(p, o->out_dir, "results.json", g.cpus, e) &&
-           plan_input(p, o->pathtracer, e) &&
+           plan_input(p, o->pathtracer, e) && (!o->live || plan_live_inputs(p, o->share_dir, e)) &&
            (o->engine == NULL || plan_input(p, o->engine->file, e)) &&
            validate_parts(o, by_claim, plan_part, &g, e);
 }

@@ -61,7 +61,7 @@ static bool find_channels(const struct share *s, struct share_part *p, bool kept
         if (kept)
             part_name(p->first, p->last, i, name);
         p->channel[i] = image_channel(&s->im, kept ? name : part_channel(i));
-        if (p->channel[i] < 0 && i < 10)
+        if (i < 10 && p->channel[i] < 0)
             return err_set(e, "%s: lacks channel %s", s->path, kept ? name : part_channel(i));
     }
     return true;

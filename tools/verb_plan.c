@@ -15,7 +15,9 @@ enum { OPT_DIR, OPT_PARTS, OPT_RANGES, OPT_BY, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_DIR] = {0, "plan", 1, "DIR", "where the plan and its jobs are kept (OUTPUT.plan)"},
-    [OPT_PARTS] = {0, "parts", 1, "N", "into about how many cells a render is cut (64)"},
+    [OPT_PARTS] = {0, "parts", 1, "N",
+                   "into about how many cells a render is cut, or how many jobs\n"
+                   "references (64)"},
     [OPT_RANGES] = {0, "ranges", 1, "R",
                     "each cell into R sample ranges, a job each; at most one for each\n"
                     "sample. Their sums are added up, so that the picture is that of\n"
@@ -75,7 +77,8 @@ static bool parse(int argc, char **argv, struct words *w, struct err *e)
 
 static void print_help(const char *verb, const char *what)
 {
-    printf("usage: assay %s [options] pathtracer|grade|validate ARGUMENT...\n\n%s\n", verb, what);
+    printf("usage: assay %s [options] pathtracer|grade|validate|reference ARGUMENT...\n\n%s\n",
+           verb, what);
     cli_print_options(stdout, options);
 }
 

@@ -1,4 +1,5 @@
-/* LD_PRELOAD: lets the allocation number NO_MEMORY_AT since main() began fail, whoever asks for it, the libraries included;
+/* LD_PRELOAD: lets the allocation number NO_MEMORY_AT since main() began fail, whoever asks for it, the libraries included,
+ * but not while one is being loaded: C++ libraries end the program where their own beginnings find no memory;
  * with NO_MEMORY_AFTER set, all that follow too. Writes how many there were into the file NO_MEMORY_COUNT. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -49,6 +50,17 @@ int posix_memalign(void **p, size_t alignment, size_t size)
         return ENOMEM;
     *p = __libc_memalign(alignment, size);
     return *p == NULL ? ENOMEM : 0;
+}
+
+void *dlopen(const char *name, int flags)
+{
+    void *(*next)(const char *, int);
+    *(void **)&next = dlsym(RTLD_NEXT, "dlopen");
+    _Bool was = counting;
+    counting = 0;
+    void *module = next(name, flags);
+    counting = was;
+    return module;
 }
 
 static void write_count(void)

@@ -1,9 +1,9 @@
-/* The C face of OpenImageIO (image_oiio.cc), for pictures from elsewhere. Not part of pathtracer: the
- * library takes a fifth of a second to load. No C++ exception crosses this line. */
+/* Pictures from elsewhere, by OpenImageIO. That library brings 230 others along and takes a fifth of a second to load, so it is in a
+ * file of its own, oiio.so, which is loaded when the first picture is read; without it every call fails with a line. */
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
-#include "image.h"
+#include "../renderer/image.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
  * colour conversion. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
@@ -21,15 +21,16 @@ enum image_type {
 struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
     enum image_type type; /* the smallest of its channels */
+    int bytes;            /* of one value of that channel */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;            /* pictures in one file (EXR parts), 1 .. */
     int width, height, channels;
-    bool is_cropped;      /* the file holds another rectangle than the picture shown */
+    bool is_cropped; /* the file holds another rectangle than the picture shown */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Text that names the library: "OpenImageIO 2.4.7". */
-const char *image_oiio_version(void);
+/* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */
+const char *image_oiio_version(struct err *e);
 
 #endif

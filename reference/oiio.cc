@@ -1,0 +1,151 @@
+// The one C++ file: oiio.h. Exceptions end here, as text.
+extern "C" {
+#include "oiio.h"
+}
+
+#include <OpenImageIO/imageio.h>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+struct oiio_picture {
+    std::unique_ptr<OIIO::ImageInput> in;
+    std::vector<std::pair<std::string, std::string>> texts;
+};
+
+namespace
+{
+
+void tell(const std::string &text, char *why, size_t size)
+{
+    size_t n = text.find_last_not_of("\n ");
+    std::snprintf(why, size, "%s",
+                  n == std::string::npos ? "unknown image error" : text.substr(0, n + 1).c_str());
+}
+
+// Runs f, which returns what went wrong or nothing.
+template <typename F> bool guarded(char *why, size_t size, F &&f)
+{
+    try {
+        std::string wrong = f();
+        if (wrong.empty())
+            return true;
+        tell(wrong, why, size);
+    } catch (const std::exception &x) {
+        tell(x.what(), why, size);
+    }
+    return false;
+}
+
+enum image_type type_of(OIIO::TypeDesc type)
+{
+    return type == OIIO::TypeDesc::UINT8    ? IMAGE_INT8
+           : type == OIIO::TypeDesc::UINT16 ? IMAGE_INT16
+           : type == OIIO::TypeDesc::HALF   ? IMAGE_HALF
+           : type == OIIO::TypeDesc::FLOAT  ? IMAGE_FLOAT
+                                            : IMAGE_OTHER;
+}
+
+struct oiio_picture *open_picture(const char *path, const char *format, char *why, size_t size)
+{
+    std::unique_ptr<oiio_picture> p;
+    bool ok = guarded(why, size, [&]() -> std::string {
+        p = std::make_unique<oiio_picture>();
+        OIIO::ImageSpec spec;
+        p->in = OIIO::ImageInput::create(format);
+        if (!p->in || !p->in->open(path, spec))
+            return "cannot read: " + (p->in ? p->in->geterror() : OIIO::geterror());
+        for (const auto &a : spec.extra_attribs)
+            if (a.type() == OIIO::TypeDesc::STRING)
+                p->texts.emplace_back(a.name().string(), a.get_string());
+        return "";
+    });
+    return ok ? p.release() : nullptr;
+}
+
+void close_picture(struct oiio_picture *p)
+{
+    delete p;
+}
+
+bool head_of(struct oiio_picture *p, struct image_info *out, int *depth, double *bytes, char *why,
+             size_t size)
+{
+    *out = {};
+    return guarded(why, size, [&]() -> std::string {
+        const OIIO::ImageSpec &spec = p->in->spec();
+        out->width = spec.width;
+        out->height = spec.height;
+        out->channels = spec.nchannels;
+        *depth = spec.depth;
+        *bytes = double(spec.image_bytes(true));
+        std::snprintf(out->format, sizeof out->format, "%s", p->in->format_name());
+        size_t smallest = 8;
+        for (int c = 0; c < spec.nchannels; c++)
+            if (spec.channelformat(c).size() < smallest) {
+                smallest = spec.channelformat(c).size();
+                out->type = type_of(spec.channelformat(c));
+            }
+        out->bytes = int(smallest);
+        int bits = spec.get_int_attribute("oiio:BitsPerSample", int(8 * smallest));
+        if (spec.deep || smallest == 8 || bits != int(8 * smallest))
+            out->type = IMAGE_OTHER;
+        out->orientation = spec.get_int_attribute("Orientation", 1);
+        out->is_cropped = spec.x != spec.full_x || spec.y != spec.full_y ||
+                          spec.width != spec.full_width || spec.height != spec.full_height;
+        return "";
+    });
+}
+
+const char *channel_of(const struct oiio_picture *p, int c)
+{
+    const auto &names = p->in->spec().channelnames;
+    return size_t(c) < names.size() ? names[size_t(c)].c_str() : "";
+}
+
+bool read_picture(struct oiio_picture *p, float *data, char *why, size_t size)
+{
+    return guarded(why, size, [&]() -> std::string {
+        if (!p->in->read_image(0, 0, 0, p->in->spec().nchannels, OIIO::TypeDesc::FLOAT, data))
+            return "cannot read: " + p->in->geterror();
+        return "";
+    });
+}
+
+bool text_of(const struct oiio_picture *p, int k, const char **name, const char **value)
+{
+    if (size_t(k) >= p->texts.size())
+        return false;
+    *name = p->texts[size_t(k)].first.c_str();
+    *value = p->texts[size_t(k)].second.c_str();
+    return true;
+}
+
+int parts_of(struct oiio_picture *p)
+{
+    int parts = 1;
+    char why[8];
+    // What cannot be sought is no further picture.
+    guarded(why, sizeof why, [&]() -> std::string {
+        while (p->in->seek_subimage(parts, 0))
+            parts++;
+        return "";
+    });
+    return parts;
+}
+
+} // namespace
+
+extern "C" const struct oiio_table assay_oiio;
+const struct oiio_table assay_oiio = {"OpenImageIO " OIIO_VERSION_STRING,
+                                      open_picture,
+                                      close_picture,
+                                      head_of,
+                                      channel_of,
+                                      read_picture,
+                                      text_of,
+                                      parts_of};
