@@ -22,7 +22,8 @@ static const struct cli_option options[] = {
                     "each cell into R sample ranges, a job each; at most one for each\n"
                     "sample. Their sums are added up, so that the picture is that of\n"
                     "one render to rounding, not to the bit; the same bits for the\n"
-                    "same R whatever the cells and the order (1)"},
+                    "same R whatever the cells and the order; not with --adaptive and\n"
+                    "--keep-state (1)"},
     [OPT_BY] = {0, "by", 1, "WHAT",
                 "a validation: scene, a job for each scene, whose claims share its\n"
                 "renders; claim, a job for each claim, each of which renders what it\n"
