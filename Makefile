@@ -62,7 +62,7 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
-check: $(BUILD)/deps-test all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer \
+check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz $(CHECKED) $(BUILD)/tests/student_tracer \
   $(BUILD)/libassay.a $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json
 	tests/run.sh $(BUILD) $(CHECKED)
 
@@ -184,8 +184,8 @@ help:
 	@echo 'make            build pathtracer and assay'
 	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
 	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
-	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests'
-	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes)'
+	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests, lint, fuzzers'
+	@echo 'make lint       clang-tidy and cppcheck, no finding (minutes; a part of make check)'
 	@echo 'make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race'
 	@echo 'make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)'
 	@echo 'make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)'

@@ -2,6 +2,7 @@
 
 #include "alloc_large.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,6 +76,32 @@ void film_add(struct film *f, size_t pixel, const struct batch *b, int i)
     f->s2[pixel] += illuminance * illuminance;
     if (f->first != NULL)
         add_first_hit(&f->first[pixel], f->m.n[pixel] == 1, &b->first, i);
+}
+
+static void add_first_hits(struct first_hit_sums *dst, const struct first_hit_sums *src)
+{
+    dst->hits += src->hits;
+    dst->depth += src->depth;
+    for (int c = 0; c < 3; c++) {
+        dst->normal[c] += src->normal[c];
+        dst->albedo[c] += src->albedo[c];
+    }
+}
+
+bool film_merge(struct film *dst, const struct film *src, size_t first, int num, struct err *e)
+{
+    struct moments to = moments_run(&dst->m, first, num), from = moments_run(&src->m, first, num);
+    assert(dst->m.width == src->m.width && (dst->first == NULL) == (src->first == NULL));
+    for (size_t p = first; p < first + (size_t)num; p++) {
+        dst->s1[p] += src->s1[p];
+        dst->s2[p] += src->s2[p];
+        if (dst->first == NULL)
+            continue;
+        if (dst->m.n[p] == 0)
+            dst->first[p].object = src->first[p].object;
+        add_first_hits(&dst->first[p], &src->first[p]);
+    }
+    return moments_merge(&to, &from, e);
 }
 
 double film_relative_error(const struct film *f)

@@ -37,6 +37,11 @@ void film_set_sampler(struct film *f, enum sampler_kind kind);
 /* Adds lane i of a batch to a pixel. */
 void film_add(struct film *f, size_t pixel, const struct batch *b, int i);
 
+/* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of these pixels, by moments_merge(). Both are
+ * films of the same size, with the same layers; targets and film.num_samples are not looked at. */
+bool film_merge(struct film *dst, const struct film *src, size_t first, int num, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* Root mean square over the pixels of the standard error of luminance, over the mean luminance of the
  * picture. INFINITY while a pixel has fewer than two samples or the picture is black. */
 double film_relative_error(const struct film *f);

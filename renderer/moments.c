@@ -83,6 +83,19 @@ bool moments_merge(struct moments *dst, const struct moments *src, struct err *e
     return true;
 }
 
+struct moments moments_run(const struct moments *m, size_t first, int num)
+{
+    struct moments run = *m;
+    run.width = num;
+    run.height = 1;
+    run.n += first;
+    run.mean += 3 * first;
+    run.m2 += 3 * first;
+    run.m3 += 3 * first;
+    run.tolerance = m->tolerance != NULL ? m->tolerance + 3 * first : NULL;
+    return run;
+}
+
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 {
     double n = m->n[pixel];

@@ -16,7 +16,7 @@ void rate_colour(double rate, uint8_t rgb8[3])
     rgb8[2] = (uint8_t)(rate <= 0.5 ? 255 * (1 - 2 * rate) : 0);
 }
 
-enum { NUM_TEXTS = 12 };
+enum { NUM_TEXTS = 13 };
 
 /* The metadata of an EXR. command is its own, to free(). */
 struct texts {
@@ -54,7 +54,9 @@ static bool make_texts(const struct output *o, uint32_t num_samples,
         {"assay:seconds", t->seconds},
         {"assay:rays", t->rays}};
     memcpy(t->attr, attrs, sizeof attrs);
-    t->num = NUM_TEXTS - (stats == NULL ? 2 : 0);
+    t->num = NUM_TEXTS - 1 - (stats == NULL ? 2 : 0);
+    if (o->ranges != NULL)
+        t->attr[t->num++] = (struct image_attr){"assay:ranges", o->ranges};
     return true;
 }
 

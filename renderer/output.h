@@ -9,6 +9,8 @@ struct output {
     const struct identity *id;
     const struct scene *scene;
     char accel[160]; /* what the rays are traced with, in words */
+    const char *
+        ranges; /* "0:4,4:9": sums of these sample ranges were added up; NULL: samples one by one */
     int argc;
     char **argv;
 };

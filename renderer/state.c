@@ -179,7 +179,7 @@ static bool counts_are_sane(const double *n, int num, uint32_t most)
     return true;
 }
 
-bool state_rows(const struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
+bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
                 struct err *e)
 {
     struct array a[MAX_ARRAYS];
@@ -187,6 +187,8 @@ bool state_rows(const struct state_file *s, int y, int num, struct film *f, int 
     int n = body_arrays(a, f);
     assert(at_x + s->width <= f->m.width && at_y + num <= f->m.height && y + num <= s->height);
     assert((f->first != NULL) == s->first_hits && (f->target == NULL || s->has_target));
+    if (s->f == NULL && (s->f = fopen(s->path, "rb")) == NULL)
+        return err_set(e, "%s: cannot read: %s", s->path, strerror(errno));
     for (int i = 0; i < n; i++) {
         long at = s->body + (long)(before + a[i].each * width * (size_t)y);
         if (fseek(s->f, at, SEEK_SET) != 0)

@@ -20,7 +20,7 @@ bool state_read(const char *path, const struct identity *id, struct film *f, str
 
 /* A state read by rows, for putting together a picture that is larger than memory. */
 struct state_file {
-    FILE *f;
+    FILE *f; /* NULL: closed */
     char path[4096];
     int width, height;
     bool first_hits, has_target;
@@ -32,8 +32,9 @@ bool state_open(struct state_file *s, const char *path, const struct identity *i
                 int height, bool first_hits, struct err *e) __attribute__((warn_unused_result));
 /* Rows y .. y+num-1 into a film that is at least as wide, from its pixel (at_x, at_y) on; the target too if the
  * film has one. Not film.num_samples. */
-bool state_rows(const struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
+bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
                 struct err *e) __attribute__((warn_unused_result));
+/* Gives the file back, until state_rows() wants it again: so any number of states can be read in turn. */
 void state_close(struct state_file *s);
 
 #endif

@@ -41,6 +41,7 @@ again "a cell" -s 5 -p 3 2 11 9 $scene
 again "sobol, light samples, roulette" -s 4 --sampler sobol -l 2 --roulette 0.7 --seed 18446744073709551615 $scene
 again "the assignment's adaptive rule" -s 24 -a 4 0.3 $scene
 again "a pilot" -s 24 --adaptive-unbiased 0.3 --pilot 4 $scene
+again "a pilot, without -s" --adaptive-unbiased 0.3 --pilot 4 $scene
 again "stopped by --time" --time 0.3s -r 16 12 $scene
 again "stopped by --error" --error 60% -s 200 $scene
 again "an environment" -s 4 -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae

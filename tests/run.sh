@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests and a fixed run of each fuzzer, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests, `make lint` and a fixed run of each fuzzer, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
 build=${1:?usage: tests/run.sh BUILD PROGRAM...}
@@ -32,6 +32,7 @@ export -f run_job
 # The longest first: as many as there are processors at a time.
 {
     echo tests/end_to_end.sh
+    echo tests/lint.sh
     echo tests/fuzz.sh
     long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
     printf '%s\n' "${programs[@]}" | grep -E "$long"
@@ -57,7 +58,7 @@ for program in "${programs[@]}"; do
 done
 
 # Lines "ok ...", "not ok ..." and "skip ...".
-for name in end_to_end fuzz; do
+for name in end_to_end lint fuzz; do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
     p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")

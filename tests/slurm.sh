@@ -155,6 +155,10 @@ cmp -s l2.png x2.png || why="another picture: $why"
 [ -e x2.exr.plan ] && why="$why the plan was left"
 tell "pathtracer --slurm" "$why"
 
+"$assay" slurm --parts 1 --ranges 3 pathtracer -q -r 64 64 -s 16 -f x3.exr "$scene" >"$tmp/out" 2>"$tmp/err" && "$assay" reproduce x3.exr >"$tmp/out" 2>>"$tmp/err" &&
+    grep -q "3 of 3 jobs made" "$tmp/err" && why="" || why="$(tail -n 2 "$tmp/out" "$tmp/err" | tr '\n' ' ')"
+tell "sample ranges are what their jobs make here" "$why"
+
 cd "$OLDPWD" || exit 1
 mkdir "$tmp/class"
 cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && cp "$pathtracer" "$tmp/class/again"
@@ -168,6 +172,9 @@ why=$("$assay" validate -q --slurm --only 12_point_plane --only 31_spot_plane --
 no_times() { sed -E 's/"(seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date)":/d' "$1"; }
 cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") && cmp -s <(grep -v index.html "$tmp/t1") <(grep -v index.html "$tmp/t2") && why="" || why="other results: $why"
 tell "a validation" "$why"
+why=$("$assay" slurm --by claim validate -q --only 12_point_plane --only 31_spot_plane --only 10_furnace_one --out "$tmp/v3" 2>&1 >"$tmp/t3")
+cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v3/results.json") && cmp -s <(grep -v index.html "$tmp/t1") <(grep -v index.html "$tmp/t3") && why="" || why="other results: $why"
+tell "a validation by claims" "$why"
 
 # References, each job some replicates of one, by Blender itself.
 if command -v blender >/dev/null; then

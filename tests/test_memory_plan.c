@@ -54,6 +54,7 @@ static int remove_place(void **state)
 static char *command[] = {"pathtracer", "-q", "-r", "8",     "32",
                           "-s",         "4",  "-f", picture, "reference/scenes/12_point_plane.dae",
                           NULL};
+static const struct plan_wishes wishes = {.parts = 2, .ranges = 1};
 enum { WORDS = sizeof command / sizeof command[0] - 1 };
 
 /* Writes the state of each job's cell where the script finds it, by its words: -p X Y W H. */
@@ -112,7 +113,7 @@ static bool make_plan(void *ctx, struct err *e)
 {
     char **right = ctx, path[200];
     struct plan p = {.dir = "", .head = NULL};
-    bool ok = plan_make(plan_dir, WORDS, command, 2, &p, e);
+    bool ok = plan_make(plan_dir, WORDS, command, &wishes, &p, e);
     alloc_fail_off();
     assert_int_equal(ok, p.head != NULL);
     snprintf(path, sizeof path, "%s/plan.jsonl", plan_dir);
@@ -194,7 +195,7 @@ static void plans(void **state)
     /* json_dumps() itself leaves out parts where it has no memory (2.14), so that what comes out is not looked at. */
     alloc_json(ALLOC_JSON_FAILS, NULL);
     alloc_fail_each("plan_make, jansson too", ALLOC_ALL, make_plan, NULL);
-    assert_true(plan_make(plan_dir, WORDS, command, 2, &p, &e));
+    assert_true(plan_make(plan_dir, WORDS, command, &wishes, &p, &e));
     alloc_fail_each("plan_read", ALLOC_ALL, read_plan, lines);
     free(lines);
     write_states(&p);

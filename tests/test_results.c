@@ -346,6 +346,9 @@ static void bad_file(void **state)
     json_object_del(root, "claims");
     expect_root_rejected(root, "'claims' is not an array with at least one claim");
     expect_root_rejected(results_of(0, NULL), "'claims' is not an array with at least one claim");
+    root = results_of(0, NULL);
+    set(root, "consistency", "[]");
+    expect_root_rejected(root, "'claims' is not an array with at least one claim");
 
     json_t *out = NULL;
     struct err e = {""};
@@ -399,6 +402,13 @@ static void exit_codes(void **state)
     json_t *root = results_of(2, (json_t *[]){parse(judged_claim), late});
     assert_int_equal(results_exit_code(root), 2);
     json_array_append_new(json_object_get(root, "claims"), claim_with("DIFFERENT", "EQUIVALENT"));
+    assert_int_equal(results_exit_code(root), 1);
+    json_decref(root);
+    /* Nothing but a claim of consistency. */
+    root = results_of(0, NULL);
+    set(root, "consistency", "[{\"verdict\": \"EQUIVALENT\"}]");
+    assert_int_equal(results_exit_code(root), 0);
+    set(root, "consistency", "[{\"verdict\": \"DIFFERENT\"}]");
     assert_int_equal(results_exit_code(root), 1);
     json_decref(root);
 }

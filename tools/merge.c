@@ -77,18 +77,6 @@ static void add_layers(float *dst, double nd, const float *src, double ns)
         dst[i] = (float)((nd * dst[i] + ns * src[i]) / (nd + ns));
 }
 
-/* A view of one pixel as moments of its own. */
-static struct moments pixel_of(const struct moments *m, size_t p)
-{
-    struct moments one = *m;
-    one.width = one.height = 1;
-    one.n += p;
-    one.mean += 3 * p;
-    one.m2 += 3 * p;
-    one.m3 += 3 * p;
-    return one;
-}
-
 /* A part of one of the shares. */
 struct piece {
     const struct share *share;
@@ -110,7 +98,7 @@ static bool add_moments(struct share *whole, size_t p, const struct share *s, co
 {
     double n = v[9], mean[3] = {v[0], v[1], v[2]}, m2[3] = {v[3], v[4], v[5]},
            m3[3] = {v[6], v[7], v[8]};
-    struct moments to = pixel_of(&whole->m, p);
+    struct moments to = moments_run(&whole->m, p, 1);
     struct moments from = {
         .width = 1, .height = 1, .n = &n, .mean = mean, .m2 = m2, .m3 = m3, .spp = s->m.spp};
     strcpy(from.unit, s->m.unit);

@@ -19,7 +19,7 @@
 
 static const struct {
     const char *name;
-    bool (*plan)(int argc, char **argv, int parts, struct plan *p, struct err *e);
+    bool (*plan)(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
     int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
 } kinds[] = {{"pathtracer", render_plan, render_gather},
              {"grade", grade_plan, grade_gather},
@@ -195,7 +195,25 @@ static int kind_of(const char *name)
     return i;
 }
 
-bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *out, struct err *e)
+static bool check_wishes(const char *kind, const struct plan_wishes *w, struct err *e)
+{
+    const struct {
+        bool given;
+        const char *name, *of, * or ;
+    } wish[] = {{w->parts > 0, "--parts", "pathtracer", "reference"},
+                {w->ranges > 0, "--ranges", "pathtracer", NULL},
+                {w->by != PLAN_BY_DEFAULT, "--by", "validate", NULL}};
+    for (size_t i = 0; i < sizeof wish / sizeof *wish; i++)
+        if (wish[i].given && strcmp(kind, wish[i].of) != 0 &&
+            (wish[i].or == NULL || strcmp(kind, wish[i].or) != 0))
+            return err_set(e, "%s says how %s%s%s is cut, not %s", wish[i].name, wish[i].of,
+                           wish[i].or != NULL ? " or " : "", wish[i].or != NULL ? wish[i].or : "",
+                           kind);
+    return true;
+}
+
+bool plan_make(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+               struct plan *out, struct err *e)
 {
     char cwd[PATH_MAX];
     struct plan p = {.dir = ""};
@@ -204,6 +222,8 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
         return err_set(
             e, "what to plan begins with pathtracer, grade, validate or reference, not '%s'",
             argc > 0 ? argv[0] : "");
+    if (!check_wishes(kinds[kind].name, w, e))
+        return false;
     for (int k = 1; k < argc; k++)
         if (argv[k][0] == '-' && isalpha((unsigned char)argv[k][1]) && argv[k][2] != '\0')
             return err_set(
@@ -220,7 +240,7 @@ bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *o
                        "run", "inputs");
     bool ok = (p.head != NULL || refuse(cwd, e)) &&
               add_words(json_object_get(p.head, "command"), (const char *const *)argv, argc, e) &&
-              kinds[kind].plan(argc, argv, parts, &p, e);
+              kinds[kind].plan(argc, argv, w, &p, e);
     if (ok)
         ok = (json_object_get(p.head, "ends") != NULL &&
               json_object_set_new(p.head, "jobs", json_integer(p.num)) == 0) ||

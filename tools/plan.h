@@ -27,10 +27,23 @@ struct plan {
     int num;
 };
 
-/* Plans the command argv[0 .. argc-1], whose first word is one of the kinds, into about `parts` jobs where that can be chosen, and
+enum { PLAN_PARTS = 64 };
+/* How a command is to be cut; zero: nothing was said. What is not of its kind is refused. */
+struct plan_wishes {
+    int parts; /* of a render: into about how many cells, of references: how many jobs (PLAN_PARTS) */
+    int ranges; /* of a render: into how many sample ranges each of them (1) */
+    enum {
+        PLAN_BY_DEFAULT,
+        PLAN_BY_SCENE,
+        PLAN_BY_CLAIM
+    } by;                   /* of a validation: what a job is of (a scene) */
+    const char *pathtracer; /* of a render: the program (the one beside this) */
+};
+
+/* Plans the command argv[0 .. argc-1], whose first word is one of the kinds, and
  * writes DIR/plan.jsonl by rename. dir NULL: OUTPUT.plan beside the output of the command. */
-bool plan_make(const char *dir, int argc, char **argv, int parts, struct plan *out, struct err *e)
-    __attribute__((warn_unused_result));
+bool plan_make(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+               struct plan *out, struct err *e) __attribute__((warn_unused_result));
 bool plan_read(const char *dir, struct plan *out, struct err *e)
     __attribute__((warn_unused_result));
 void plan_free(struct plan *p);

@@ -102,11 +102,11 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     return ok;
 }
 
-bool grade_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
 {
     struct grade_paths at;
     struct grade_settings s = grade_defaults(argc, &at);
-    (void)parts; /* a job for each submission */
+    (void)w; /* a job for each submission */
     bool ok = s.submission != NULL || err_set(e, "out of memory");
     ok = ok && grade_parse(argc, argv, &s, e);
     if (ok && (s.help || s.only_check || s.prepare || s.again))

@@ -32,13 +32,18 @@ bool plan_job(struct plan *p, const char *const *word, int num, const char *cons
               struct err *e) __attribute__((warn_unused_result));
 
 /* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
-bool render_plan(int argc, char **argv, int parts, struct plan *p, struct err *e);
+bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
+/* Without naming the pictures on stdout. */
+bool render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
+    __attribute__((warn_unused_result));
 int render_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool grade_plan(int argc, char **argv, int parts, struct plan *p, struct err *e);
+bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
 int grade_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool validate_plan(int argc, char **argv, int parts, struct plan *p, struct err *e);
+bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                   struct err *e);
 int validate_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool reference_plan(int argc, char **argv, int parts, struct plan *p, struct err *e);
+bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                    struct err *e);
 int reference_gather(const struct plan *p, int argc, char **argv, struct err *e);
 
 #endif

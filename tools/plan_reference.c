@@ -161,14 +161,15 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     return ok;
 }
 
-bool reference_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                    struct err *e)
 {
     struct reference_command c;
     struct planning g = {.c = &c};
     bool ok = reference_command_read(argc, argv, &c, e);
     if (ok)
         ok = c.help ? err_set(e, "--help cannot be planned")
-                    : plan_jobs(&g, argc, argv, parts, p, e);
+                    : plan_jobs(&g, argc, argv, w->parts > 0 ? w->parts : PLAN_PARTS, p, e);
     free(g.wanted);
     reference_command_free(&c);
     return ok;

@@ -1,13 +1,10 @@
-/* A render as jobs: cells of its picture, each with all samples of its pixels. What a pixel is depends on no other, so the parts
- * put beside each other are the picture of one render bit by bit, whatever the cells. */
-#include "../renderer/cli.h"
-#include "../renderer/collada.h"
+/* A render as jobs: cells of its picture. What a pixel is depends on no other, so cells with all samples of their pixels, put beside
+ * each other, are the picture of one render bit by bit, whatever the cells. --ranges: each cell in sample ranges, whose
+ * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
 #include "../renderer/fs.h"
-#include "../renderer/output.h"
-#include "../renderer/state.h"
+#include "../renderer/options.h"
 #include "command_words.h"
 #include "plan_kinds.h"
-#include "results.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,6 +14,20 @@
 static const struct option_words cells_and_threads[] = {{"-p", 4}, {"--cell", 4}, {0}};
 
 #define PRODUCT "cell.png.state"
+
+static bool check_ranges(const struct options *o, int ranges, struct err *e)
+{
+    if (ranges > o->last - o->first)
+        return err_set(e, "--ranges: %d of %d samples; at most one for each", ranges,
+                       o->last - o->first);
+    if (ranges > 1 && o->adaptive_batch > 0)
+        return err_set(e, "--ranges: not with --adaptive, whose rule stops a pixel by all of its "
+                          "samples (--adaptive-unbiased can be cut)");
+    if (ranges > 1 && o->keep_state)
+        return err_set(e, "--ranges: not with --keep-state, as who goes on with added sums makes a "
+                          "picture that no command makes again (assay merge adds samples)");
+    return true;
+}
 
 static bool check_options(const struct options *o, struct err *e)
 {
@@ -55,17 +66,25 @@ static void cell_of(const struct options *o, int parts, int k, int *num, int out
     out[3] = y1 - y0;
 }
 
-static bool add_words(struct plan *p, int argc, char **argv, const struct options *o, int threads,
-                      struct err *e)
+/* ranges: each job says its samples itself. Then -s has to be there, which without one would be the last of them. */
+static bool add_words(struct plan *p, int argc, char **argv, const struct options *o,
+                      const char *program, int threads, bool ranges, struct err *e)
 {
-    char program[4096], t[16], samples[64];
-    beside_program(program, sizeof program, "pathtracer");
+    char t[16], spp[16], samples[64];
     snprintf(t, sizeof t, "%d", threads);
+    snprintf(spp, sizeof spp, "%d", o->spp);
     snprintf(samples, sizeof samples, "%d:%d", o->first, o->last);
-    const char *const first[] = {
-        program,          "-q",    "-t",        t,      "--keep-state", "-f",
-        "{out}/cell.png", "{job}", "--samples", samples};
-    bool some = o->first > 0 || o->last < o->spp;
+    const char *const first[] = {program,
+                                 "-q",
+                                 "-t",
+                                 t,
+                                 "--keep-state",
+                                 "-f",
+                                 "{out}/cell.png",
+                                 "{job}",
+                                 ranges ? "-s" : "--samples",
+                                 ranges ? spp : samples};
+    bool some = ranges || o->first > 0 || o->last < o->spp;
     char **word = calloc((size_t)argc, sizeof *word);
     if (word == NULL)
         return err_set(e, "out of memory");
@@ -78,169 +97,50 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct option
     return ok;
 }
 
-bool render_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+/* Samples of range r of num. */
+static void range_of(const struct options *o, int num, int r, int out[2])
+{
+    long long all = o->last - o->first;
+    out[0] = o->first + (int)(all * r / num);
+    out[1] = o->first + (int)(all * (r + 1) / num);
+}
+
+/* "-p X Y DX DY", and with several ranges "--samples A:B". */
+static bool add_job(struct plan *p, const int cell[4], const int *range, struct err *e)
+{
+    char text[4][16], samples[32];
+    const char *word[7] = {"-p", text[0], text[1], text[2], text[3], "--samples", samples};
+    for (int i = 0; i < 4; i++)
+        snprintf(text[i], sizeof text[i], "%d", cell[i]);
+    if (range != NULL)
+        snprintf(samples, sizeof samples, "%d:%d", range[0], range[1]);
+    return plan_job(p, word, range != NULL ? 7 : 5, (const char *const[]){NULL}, e);
+}
+
+bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
 {
     struct options o;
-    if (!options_parse(argc, argv, &o, e) || !check_options(&o, e))
+    char beside[4096];
+    int ranges = w->ranges > 0 ? w->ranges : 1;
+    if (!options_parse(argc, argv, &o, e) || !check_options(&o, e) || !check_ranges(&o, ranges, e))
         return false;
-    parts = o.slurm > 0 ? o.slurm : parts;
+    beside_program(beside, sizeof beside, "pathtracer");
+    int parts = o.slurm > 0 ? o.slurm : w->parts > 0 ? w->parts : PLAN_PARTS;
     int threads = has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
     const char *const inputs[] = {o.scene, o.camera_file, o.environment_file};
-    bool ok =
-        plan_begin(p, o.output[0], PRODUCT, threads, e) && add_words(p, argc, argv, &o, threads, e);
+    bool ok = plan_begin(p, o.output[0], PRODUCT, threads, e) &&
+              add_words(p, argc, argv, &o, w->pathtracer != NULL ? w->pathtracer : beside, threads,
+                        ranges > 1, e);
     for (size_t i = 0; ok && i < sizeof inputs / sizeof *inputs; i++)
         ok = inputs[i] == NULL || plan_input(p, inputs[i], e);
     for (int k = 0; ok && k < num; k++) {
         int cell[4];
-        char text[4][16];
-        const char *word[5] = {"-p"};
         cell_of(&o, parts, k, &num, cell);
-        for (int i = 0; i < 4; i++) {
-            snprintf(text[i], sizeof text[i], "%d", cell[i]);
-            word[i + 1] = text[i];
-        }
-        ok = plan_job(p, word, 5, (const char *const[]){NULL}, e);
-    }
-    return ok;
-}
-
-/* A part, while its rows are needed. */
-struct part {
-    int x, y, width, height; /* in the picture, origin at the top left */
-    struct state_file state; /* f NULL: not open */
-};
-
-struct gathering {
-    const struct plan *plan;
-    const struct options *o;
-    struct identity id; /* of the whole */
-    struct part *part;
-    uint32_t
-        num_samples; /* the most of any part: pixels of an adaptive one may have stopped before */
-};
-
-static bool open_part(struct gathering *g, int k, struct err *e)
-{
-    struct part *part = &g->part[k];
-    const struct options *o = g->o;
-    char path[PLAN_PATH + 256];
-    struct identity id = g->id;
-    const int cell[4] = {o->cell[0] + part->x, o->cell[1] + o->cell[3] - part->y - part->height,
-                         part->width, part->height};
-    plan_artefact(g->plan, k, PRODUCT, path);
-    identity_cell(cell, o->width, o->height, id.cell);
-    return state_open(&part->state, path, &id, part->width, part->height, o->aov, e);
-}
-
-static bool find_parts(struct gathering *g, struct err *e)
-{
-    const struct options *o = g->o;
-    bool may_stop = o->adaptive_batch > 0 || o->pilot_tolerance >= 0;
-    json_t *job = NULL;
-    bool ok = true;
-    for (int k = 0; ok && k < g->plan->num; k++) {
-        int c[4] = {0};
-        job = json_loads(g->plan->line[k], 0, NULL);
-        for (size_t i = 0; i < 4; i++) {
-            const char *word =
-                json_string_value(json_array_get(json_object_get(job, "words"), i + 1));
-            ok = ok && word != NULL && cli_int("a cell", word, 0, 65535, &c[i], e);
-        }
-        json_decref(job);
-        g->part[k] = (struct part){.x = c[0] - o->cell[0],
-                                   .y = o->cell[1] + o->cell[3] - c[1] - c[3],
-                                   .width = c[2],
-                                   .height = c[3]};
-        if (ok && may_stop) {
-            ok = open_part(g, k, e);
-            if (ok && g->part[k].state.num_samples > g->num_samples)
-                g->num_samples = g->part[k].state.num_samples;
-            state_close(&g->part[k].state);
+        for (int r = 0; ok && r < ranges; r++) {
+            int range[2];
+            range_of(&o, ranges, r, range);
+            ok = add_job(p, cell, ranges > 1 ? range : NULL, e);
         }
     }
-    if (!may_stop)
-        g->num_samples = (uint32_t)(o->last - o->first);
     return ok;
-}
-
-/* Rows y .. y+num-1 of the picture, from all parts that have some of them. */
-static bool read_band(struct gathering *g, int y, int num, struct film *band, struct err *e)
-{
-    for (int k = 0; k < g->plan->num; k++) {
-        struct part *part = &g->part[k];
-        int from = part->y > y ? part->y : y,
-            to = part->y + part->height < y + num ? part->y + part->height : y + num;
-        if (from >= to)
-            continue;
-        if (part->state.f == NULL && !open_part(g, k, e))
-            return false;
-        if (!state_rows(&part->state, from - part->y, to - from, band, part->x, from - y, e))
-            return false;
-        if (to == part->y + part->height)
-            state_close(&part->state);
-    }
-    return true;
-}
-
-/* All rows by bands into the pictures; with --keep-state one band is all of it, which must fit into memory. */
-static bool write_whole(struct gathering *g, const struct output *out, struct err *e)
-{
-    const struct options *o = g->o;
-    int width = o->cell[2], height = o->cell[3];
-    int each = o->keep_state || height < IMAGE_BAND ? height : IMAGE_BAND;
-    struct film band = {0};
-    struct output_writer *w = output_open(out, width, height, g->num_samples, NULL, e);
-    if (w == NULL)
-        return false;
-    bool ok = film_alloc(&band, width, each, o->aov, e);
-    if (ok && o->keep_state && o->pilot_tolerance >= 0) {
-        band.target = calloc((size_t)width * (size_t)height, sizeof *band.target);
-        ok = band.target != NULL || err_set(e, "out of memory");
-    }
-    film_set_sampler(&band, (enum sampler_kind)o->sampler);
-    for (int y = 0; ok && y < height; y += each) {
-        band.m.height = height - y < each ? height - y : each;
-        ok = read_band(g, y, band.m.height, &band, e) && output_rows(w, &band, e);
-    }
-    if (ok) {
-        ok = output_close(w, e);
-    } else {
-        output_abandon(w);
-    }
-    if (ok && o->keep_state) {
-        char path[STATE_PATH];
-        band.num_samples = g->num_samples;
-        ok = output_state_path(out, NULL, path, e) && state_write(path, &g->id, &band, e);
-    }
-    film_free(&band);
-    return ok;
-}
-
-int render_gather(const struct plan *p, int argc, char **argv, struct err *e)
-{
-    struct options o;
-    struct scene scene = {0};
-    struct gathering g = {.plan = p, .o = &o};
-    struct output out = {.opt = &o, .id = &g.id, .scene = &scene};
-    char **word = calloc((size_t)argc + 1, sizeof *word);
-    g.part = calloc((size_t)p->num, sizeof *g.part);
-    bool ok = (word != NULL && g.part != NULL) || err_set(e, "out of memory");
-    /* As a render here would have been asked for. */
-    static const struct option_words slurm[] = {{"--slurm", 1}, {0}};
-    if (ok)
-        out.argc = words_kept(slurm, argc, argv, word);
-    out.argv = word;
-    ok = ok && options_parse(out.argc, word, &o, e) && identity_make(&o, &g.id, e) &&
-         collada_load(o.scene, (enum dialect)o.dialect, &scene, e);
-    if (ok)
-        snprintf(out.accel, sizeof out.accel, "%s: in %d parts", bvh_kind_names[o.accel], p->num);
-    ok = ok && find_parts(&g, e) && write_whole(&g, &out, e);
-    for (int k = 0; g.part != NULL && k < p->num; k++)
-        state_close(&g.part[k].state);
-    for (int i = 0; ok && i < o.num_outputs; i++)
-        printf("%s\n", o.output[i]);
-    scene_free(&scene);
-    free(g.part);
-    free(word);
-    return ok ? EXIT_EQUIVALENT : EXIT_NOT_JUDGED;
 }

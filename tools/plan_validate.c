@@ -1,4 +1,4 @@
-/* A validation as jobs: one for each scene, whose claims share their renders. */
+/* A validation as jobs: one for each scene, whose claims share their renders, or one for each claim, which renders what it needs. */
 #include "../reference/process.h"
 #include "../renderer/fs.h"
 #include "command_words.h"
@@ -53,13 +53,14 @@ struct planning {
 };
 
 /* The words of all jobs with the first, when the number of claims is known. */
-static bool plan_scene(void *ctx, const struct suite_scene *s, int num_claims, struct err *e)
+static bool plan_part(void *ctx, const struct validate_part *part, struct err *e)
 {
     struct planning *g = ctx;
+    const struct suite_scene *s = part->scene;
     char json[4096 + 8], from[4096 + 80], golden[4096 + 80], threads[16];
     const char *input[6], **next = input;
     snprintf(threads, sizeof threads, "%d", g->cpus);
-    if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, num_claims, e))
+    if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, part->num_claims, e))
         return false;
     snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
     snprintf(from, sizeof from, "%s/%s.json", g->opt->suite_dir, s->references_of);
@@ -73,11 +74,20 @@ static bool plan_scene(void *ctx, const struct suite_scene *s, int num_claims, s
     if (!g->opt->live && access(golden, F_OK) == 0)
         *next++ = golden;
     *next = NULL;
-    return plan_job(g->p, (const char *const[]){"--only", s->name}, 2, input, e);
+    const char **word = calloc(2 * (size_t)part->num_only, sizeof *word);
+    if (word == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < part->num_only; i++) {
+        word[2 * i] = "--only";
+        word[2 * i + 1] = part->only[i];
+    }
+    bool ok = plan_job(g->p, word, 2 * part->num_only, input, e);
+    free(word);
+    return ok;
 }
 
-static bool plan_jobs(struct validate_command *c, int argc, char **argv, struct plan *p,
-                      struct err *e)
+static bool plan_jobs(struct validate_command *c, int argc, char **argv, bool by_claim,
+                      struct plan *p, struct err *e)
 {
     const struct validate_options *o = &c->opt;
     struct planning g = {.p = p, .opt = o, .argc = argc, .argv = argv};
@@ -92,18 +102,34 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, struct 
     return plan_begin(p, o->out_dir, "results.json", g.cpus, e) &&
            plan_input(p, o->pathtracer, e) && (!o->live || plan_live_inputs(p, o->share_dir, e)) &&
            (o->engine == NULL || plan_input(p, o->engine->file, e)) &&
-           validate_parts(o, plan_scene, &g, e);
+           validate_parts(o, by_claim, plan_part, &g, e);
 }
 
-bool validate_plan(int argc, char **argv, int parts, struct plan *p, struct err *e)
+bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                   struct err *e)
 {
     struct validate_command c;
-    (void)parts; /* a job for each scene */
     if (!validate_command_read(argc, argv, &c, e))
         return false;
-    bool ok = c.help ? err_set(e, "--help cannot be planned") : plan_jobs(&c, argc, argv, p, e);
+    bool ok = c.help ? err_set(e, "--help cannot be planned")
+                     : plan_jobs(&c, argc, argv, w->by == PLAN_BY_CLAIM, p, e);
     engine_free(&c.engine);
     return ok;
+}
+
+/* What is said of a scene once, though each job of its claims has said it. */
+static void add_new(json_t *all, json_t *more)
+{
+    const json_t *last = json_array_get(all, json_array_size(all) - 1);
+    const char *scene = json_string_value(json_object_get(last, "scene"));
+    size_t i;
+    json_t *entry;
+    json_array_foreach(more, i, entry)
+    {
+        const char *of = json_string_value(json_object_get(entry, "scene"));
+        if (scene == NULL || of == NULL || strcmp(scene, of) != 0)
+            json_array_append(all, entry);
+    }
 }
 
 /* The lists of a job's results behind those of the jobs before. */
@@ -120,6 +146,8 @@ static bool add_results(const struct plan *p, int k, const char *out, json_t *re
         json_t *more = json_object_get(part, lists[i]), *all = json_object_get(results, lists[i]);
         if (more != NULL && all == NULL)
             json_object_set(results, lists[i], more);
+        else if (more != NULL && strcmp(lists[i], "claims") != 0)
+            add_new(all, more);
         else if (more != NULL)
             json_array_extend(all, more);
     }

@@ -7,6 +7,7 @@
 #include "../renderer/shell_words.h"
 #include "command_words.h"
 #include "merge.h"
+#include "plan_kinds.h"
 
 #include <assert.h>
 #include <stdio.h>
@@ -37,11 +38,14 @@ static bool check_scene(const char *path, const char *scene, const char *sha256,
                path, scene, sha256, now);
 }
 
-/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and 12 more. */
+enum { MORE_WORDS = 12, NUMBER = 16 };
+
+/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more. spp: room for a
+ * number, to live as long. */
 static bool command_of(const char *path, const struct image *im,
                        const struct reproduce_options *opt, char **word, int num,
-                       const char *samples, const char *threads, const char *out, const char **argv,
-                       struct err *e)
+                       const char *samples, const char *threads, const char *out, char spp[NUMBER],
+                       const char **argv, struct err *e)
 {
     struct options o;
     struct err why = {""};
@@ -55,6 +59,12 @@ static bool command_of(const char *path, const struct image *im,
         argv[i] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
     const char *more[] = {"-q", "-t", threads, "--samples", samples, "-f", out, NULL};
     memcpy(argv + n, more, sizeof more);
+    /* Where it was the default, the most that a pilot grants would now be the last of the samples. */
+    if (o.pilot_tolerance >= 0) {
+        snprintf(spp, NUMBER, "%d", o.spp);
+        const char *most[] = {"-s", spp, NULL};
+        memcpy(argv + n + sizeof more / sizeof *more - 1, most, sizeof most);
+    }
     return true;
 }
 
@@ -64,7 +74,7 @@ static bool check_same(const char *path, const struct image *a, const struct ima
 {
     static const char *const same[] = {"assay:unit",     "assay:spp",      "assay:scene",
                                        "assay:settings", "assay:adaptive", "assay:seed",
-                                       "assay:cell",     "assay:samples"};
+                                       "assay:cell",     "assay:samples",  "assay:ranges"};
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
         if (strcmp(attr(a, same[i]), attr(b, same[i])) != 0)
             return err_set(e, "%s: %s was '%.300s', and is '%.300s' of what its command makes now",
@@ -108,17 +118,56 @@ static bool remake_render(const char *path, const struct image *im, char **word,
                           const struct reproduce_options *opt, const char *to,
                           struct reproduced *out, struct err *e)
 {
-    char threads[16], log[MAX_PATH];
+    char threads[NUMBER], spp[NUMBER], log[MAX_PATH];
     snprintf(threads, sizeof threads, "%d", opt->threads);
     snprintf(log, sizeof log, "%s.log", to);
-    const char **argv = calloc((size_t)num + 12, sizeof *argv);
-    bool ok = (argv != NULL || err_set(e, "out of memory")) &&
-              command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, argv, e);
+    const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
+    bool ok =
+        (argv != NULL || err_set(e, "out of memory")) &&
+        command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, spp, argv, e);
     ok = ok && set_command(out, argv, e);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
     free(argv);
     return ok;
+}
+
+/* Jobs of sample ranges, run here one after the other and added up as they were. */
+static bool remake_ranges(const char *path, const struct image *im, char **word, int num,
+                          const struct reproduce_options *opt, const char *to,
+                          struct reproduced *out, struct err *e)
+{
+    enum { BEFORE = 6 }; /* words that plan it */
+    char threads[NUMBER], spp[NUMBER], ranges[NUMBER], dir[MAX_PATH];
+    struct plan p = {.dir = ""};
+    struct plan_wishes w = {.parts = 1, .ranges = 1, .pathtracer = opt->pathtracer};
+    for (const char *c = attr(im, "assay:ranges"); *c != '\0'; c++)
+        w.ranges += *c == ',';
+    snprintf(threads, sizeof threads, "%d", opt->threads);
+    snprintf(ranges, sizeof ranges, "%d", w.ranges);
+    snprintf(dir, sizeof dir, "%.4000s.plan", to);
+    const char **argv = calloc((size_t)num + BEFORE + MORE_WORDS, sizeof *argv);
+    if (argv == NULL)
+        return err_set(e, "out of memory");
+    const char *plan[BEFORE] = {"assay", "plan", "--parts", "1", "--ranges", ranges};
+    memcpy(argv, plan, sizeof plan);
+    const char **render = argv + BEFORE;
+    bool ok = command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, spp,
+                         render, e);
+    render[0] = "pathtracer";
+    char **words = (char **)render;
+    int count = 0;
+    while (render[count] != NULL)
+        count++;
+    ok = ok && set_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
+    for (int k = 0; ok && k < p.num; k++) {
+        bool made;
+        ok = plan_run_job(&p, k, &made, e);
+    }
+    ok = ok && render_gather_quietly(&p, count, words, e);
+    plan_free(&p);
+    free(argv);
+    return ok || err_prefix(e, "%s: made again", path);
 }
 
 static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
@@ -174,6 +223,8 @@ static bool remake(const char *path, const struct reproduce_options *opt, const 
     snprintf(out->made_by, sizeof out->made_by, "%s", attr(&im, "assay:version"));
     if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
         ok = remake_merge(path, word, num, opt, to, depth, out, e);
+    else if (ok && image_get_attr(&im, "assay:ranges") != NULL)
+        ok = remake_ranges(path, &im, word, num, opt, to, out, e);
     else if (ok)
         ok = remake_render(path, &im, word, num, opt, to, out, e);
     free(word);

@@ -296,7 +296,8 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
     const json_t *consistency = json_object_get(root, "consistency");
     if (consistency != NULL && !consistency_check(consistency, path, e))
         return false;
-    if (!json_is_array(claims) || (json_array_size(claims) == 0 && convergence == NULL))
+    if (!json_is_array(claims) ||
+        (json_array_size(claims) == 0 && convergence == NULL && json_array_size(consistency) == 0))
         return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
@@ -375,7 +376,8 @@ int results_exit_code(const json_t *results)
     const json_t *consistency = json_object_get(results, "consistency");
     for (size_t i = 0; i < json_array_size(consistency); i++)
         count[consistency_outcome(json_array_get(consistency, i))]++;
-    if (json_array_size(claims) + json_array_size(convergence) == 0 ||
+    if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) ==
+            0 ||
         count[OUTCOME_NOT_JUDGED] > 0)
         return EXIT_NOT_JUDGED;
     if (count[OUTCOME_OPPOSITE] > 0)

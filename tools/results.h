@@ -50,7 +50,7 @@
  * noise at all and so no test.
  *
  * A reader may rely on: assay, command, version, date, alpha, claims (at least one, or none where there
- * is convergence); of each claim
+ * is convergence or consistency); of each claim
  * scene, a, b, expected, passed; of each judged claim everything above except title, detects,
  * blind_to, class, direction, variance_ratio, n_a, n_b, unit_b, spp_b, seconds_a, seconds_b, rays_a, seed_a, seeds_b, version_b and
  * rerun, which are provenance and absent where the claim has none (two files compared). */

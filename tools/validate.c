@@ -189,6 +189,21 @@ static void validation_free(struct validation *v)
     suite_free(&v->suite);
 }
 
+/* The loader is not believed either: each selected scene, once. */
+static bool check_loader(const struct validation *v, const struct import_options *io,
+                         json_t **loader, struct err *e)
+{
+    const char **scene = calloc((size_t)v->suite.num_scenes, sizeof *scene);
+    int num = 0;
+    for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
+        if (scene_is_selected(v->opt, v->suite.scene[i].name))
+            scene[num++] = v->suite.scene[i].name;
+    bool ok = scene != NULL || err_set(e, "out of memory");
+    ok = ok && import_check_suite(&v->suite, scene, num, io, loader, e);
+    free(scene);
+    return ok;
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -212,11 +227,10 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     if (opt->engine != NULL)
         json_object_set(root, "not_expressible", cannot);
     if (opt->live) {
-        /* The loader is not believed either. */
         const struct import_options io = {
             .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};
         json_t *loader;
-        ok = import_check_suite(&v.suite, opt->only, opt->num_only, &io, &loader, e);
+        ok = check_loader(&v, &io, &loader, e);
         if (!ok)
             goto done;
         json_object_set_new(root, "loader", loader);
@@ -234,18 +248,38 @@ done:
     return ok;
 }
 
-bool validate_parts(const struct validate_options *opt,
-                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
-                                 struct err *e),
+/* Tasks first .. last-1, which are of one scene. */
+static bool call_part(const struct validation *v, int first, int last, bool by_claim,
+                      bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
+                      void *ctx, struct err *e)
+{
+    char name[MAX_CLAIMS][CLAIM_NAME];
+    const char *only[MAX_CLAIMS];
+    struct validate_part p = {
+        .scene = v->task[first].scene, .only = only, .num_claims = v->num_tasks};
+    if (!by_claim && scene_is_selected_whole(v->opt, p.scene->name))
+        only[p.num_only++] = p.scene->name;
+    else
+        for (int i = first; i < last; i++, p.num_only++) {
+            task_name(&v->task[i], name[p.num_only]);
+            only[p.num_only] = name[p.num_only];
+        }
+    return part(ctx, &p, e);
+}
+
+bool validate_parts(const struct validate_options *opt, bool by_claim,
+                    bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
                     void *ctx, struct err *e)
 {
     struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
     json_t *cannot = json_array();
     bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
               plan_tasks(&v, cannot, e);
-    for (int i = 0; ok && i < v.num_tasks; i++)
-        if (i == 0 || v.task[i].scene != v.task[i - 1].scene)
-            ok = part(ctx, v.task[i].scene, v.num_tasks, e);
+    for (int i = 0, end; ok && i < v.num_tasks; i = end) {
+        for (end = i + 1; !by_claim && end < v.num_tasks && v.task[end].scene == v.task[i].scene;)
+            end++;
+        ok = call_part(&v, i, end, by_claim, part, ctx, e);
+    }
     json_decref(cannot);
     validation_free(&v);
     return ok;

@@ -12,8 +12,10 @@ enum { MAX_ONLY = 64 };
 
 struct validate_options {
     const char *suite_dir, *golden_dir, *out_dir, *share_dir;
-    const char *pathtracer;     /* the program under test */
-    const char *only[MAX_ONLY]; /* scene names; none: all */
+    const char *pathtracer; /* the program under test */
+    /* SCENE, all claims of it, or SCENE/CLAIM, where CLAIM is the reference's name for pathtracer against it, the name of a
+     * variant of ours, "consistency", or A:B for any other pair; none: all. */
+    const char *only[MAX_ONLY];
     int num_only;
     bool live;     /* render the references now instead of reading the goldens */
     double alpha;  /* of the whole family of claims */
@@ -60,12 +62,16 @@ struct validate_options {
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e) __attribute__((warn_unused_result));
 
-/* The same in parts, a scene each, which together judge what one run does, with the same bits. Calls for each scene that
- * has claims, in the order of the results, with the number of all claims; stops where that returns false, and returns it.
- * Fails where validate() would before it judges. */
-bool validate_parts(const struct validate_options *opt,
-                    bool (*part)(void *ctx, const struct suite_scene *scene, int num_claims,
-                                 struct err *e),
+/* One of the parts that together judge what one run does, with the same bits: what of the scene to give as `only`. */
+struct validate_part {
+    const struct suite_scene *scene;
+    const char *const *only;
+    int num_only, num_claims; /* of the whole run */
+};
+/* Calls for each scene that has claims, or for each claim, in the order of the results; stops where that returns false, and
+ * returns it. Fails where validate() would before it judges. */
+bool validate_parts(const struct validate_options *opt, bool by_claim,
+                    bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
                     void *ctx, struct err *e) __attribute__((warn_unused_result));
 /* *results as validate() on the whole, with all lists empty. */
 bool validate_start(const struct validate_options *opt, int argc, char **argv, json_t **results,

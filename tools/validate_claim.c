@@ -26,13 +26,11 @@ static void rerun_command(const struct validation *v, const struct task *t, char
         snprintf(how, sizeof how, " --budget %gs", o->budget_s);
     else if (v->sequence != &sequence_single)
         snprintf(how, sizeof how, " --until-different");
-    if (v->stages != 1)
-        snprintf(how + strlen(how), sizeof how - strlen(how), " --stages %d", v->stages);
-    int claims = 0;
-    for (int i = 0; i < v->num_tasks; i++)
-        claims += v->task[i].scene == t->scene;
-    snprintf(out, size, "assay validate --only %s --alpha %.6g --seed %llu%s%s%s", t->scene->name,
-             v->alpha * claims, (unsigned long long)o->seed, live, engine, how);
+    char name[CLAIM_NAME];
+    task_name(t, name);
+    /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
+    snprintf(out, size, "assay validate --only %s --alpha %.6g --stages %d --seed %llu%s%s%s", name,
+             v->alpha, v->stages, (unsigned long long)o->seed, live, engine, how);
 }
 
 static struct claim_context context(const struct validation *v, const struct task *t,

@@ -8,7 +8,9 @@
 #include "sequence.h"
 #include "validate.h"
 
-enum { MAX_PATH = 8192, MAX_REFERENCES = 3, NUM_STAGES = 2 };
+enum { MAX_PATH = 8192, MAX_REFERENCES = 3, NUM_STAGES = 2, CLAIM_NAME = 256 };
+/* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants, consistency. */
+enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 2 };
 
 enum side_kind {
     SIDE_OURS,   /* the program under test, or a variant of it */
@@ -102,8 +104,13 @@ bool side_write(const struct validation *v, struct side *s, int stage, int look,
                 struct err *e) __attribute__((warn_unused_result));
 void side_free(struct side *s);
 
-/* Sides and tasks of all selected scenes; scenes that the further engine cannot express are appended to
- * `cannot`. Fails on an unknown name, and where the engine can express none. */
+/* Does --only want any, does it want all of a scene's claims? */
+bool scene_is_selected(const struct validate_options *o, const char *name);
+bool scene_is_selected_whole(const struct validate_options *o, const char *name);
+/* SCENE/CLAIM, as --only takes it: see validate.h. */
+void task_name(const struct task *t, char name[CLAIM_NAME]);
+/* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
+ * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
 bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
     __attribute__((warn_unused_result));
 /* Whether t->next is a look at which anything is new; else moves on to the next that is, or to

@@ -1,10 +1,26 @@
 #include "validate_parts.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool is_selected(const struct validate_options *o, const char *name)
+/* Is it SCENE or SCENE/CLAIM? */
+static bool is_of_scene(const char *only, const char *scene)
+{
+    size_t n = strcspn(only, "/");
+    return strlen(scene) == n && strncmp(only, scene, n) == 0;
+}
+
+bool scene_is_selected(const struct validate_options *o, const char *name)
+{
+    for (int i = 0; i < o->num_only; i++)
+        if (is_of_scene(o->only[i], name))
+            return true;
+    return o->num_only == 0;
+}
+
+bool scene_is_selected_whole(const struct validate_options *o, const char *name)
 {
     for (int i = 0; i < o->num_only; i++)
         if (strcmp(o->only[i], name) == 0)
@@ -12,12 +28,75 @@ static bool is_selected(const struct validate_options *o, const char *name)
     return o->num_only == 0;
 }
 
-static bool check_selection(const struct validation *v, struct err *e)
+void task_name(const struct task *t, char name[CLAIM_NAME])
 {
-    for (int i = 0; i < v->opt->num_only; i++)
-        if (suite_find(&v->suite, v->opt->only[i]) == NULL)
-            return err_set(e, "no scene '%s' in %s", v->opt->only[i], v->opt->suite_dir);
+    if (t->a == NULL)
+        snprintf(name, CLAIM_NAME, "%s/consistency", t->scene->name);
+    else if (t->a->kind == SIDE_OURS)
+        snprintf(name, CLAIM_NAME, "%s/%s", t->scene->name,
+                 t->a->variant != NULL ? t->a->name : t->ref.engine);
+    else
+        snprintf(name, CLAIM_NAME, "%s/%s:%s", t->scene->name, t->a->name, t->ref.engine);
+}
+
+static bool check_scenes(const struct validation *v, struct err *e)
+{
+    for (int i = 0; i < v->opt->num_only; i++) {
+        int k = 0;
+        while (k < v->suite.num_scenes && !is_of_scene(v->opt->only[i], v->suite.scene[k].name))
+            k++;
+        if (k == v->suite.num_scenes)
+            return err_set(e, "no scene '%.*s' in %s", (int)strcspn(v->opt->only[i], "/"),
+                           v->opt->only[i], v->opt->suite_dir);
+    }
     return true;
+}
+
+/* Each SCENE/CLAIM has to be one of the tasks, which are all those of the scenes. */
+static bool check_claims(const struct validation *v, struct err *e)
+{
+    for (int i = 0; i < v->opt->num_only; i++) {
+        const char *only = v->opt->only[i];
+        char name[CLAIM_NAME], names[sizeof e->msg] = "";
+        size_t n = 0;
+        bool found = strchr(only, '/') == NULL;
+        for (int k = 0; k < v->num_tasks && !found; k++) {
+            if (!is_of_scene(only, v->task[k].scene->name))
+                continue;
+            task_name(&v->task[k], name);
+            found = strcmp(name, only) == 0;
+            n += (size_t)snprintf(names + n, sizeof names - n, "%s%s", n > 0 ? ", " : "",
+                                  strchr(name, '/') + 1);
+            n = n < sizeof names ? n : sizeof names - 1;
+        }
+        if (!found)
+            return err_set(e, "--only: no claim '%s'; there are %s", only, names);
+    }
+    return true;
+}
+
+/* Leaves those of the tasks that were asked for. */
+static void keep_selected(struct validation *v)
+{
+    int kept = 0;
+    for (int k = 0; k < v->num_tasks; k++) {
+        struct task *t = &v->task[k];
+        char name[CLAIM_NAME];
+        bool keep = scene_is_selected_whole(v->opt, t->scene->name);
+        task_name(t, name);
+        for (int i = 0; i < v->opt->num_only && !keep; i++)
+            keep = strcmp(v->opt->only[i], name) == 0;
+        if (keep) {
+            v->task[kept++] = *t;
+            continue;
+        }
+        if (t->a != NULL) {
+            t->a->users--;
+            t->b->users--;
+        }
+        task_free(t);
+    }
+    v->num_tasks = kept;
 }
 
 /* Which of the selected scenes the further engine can express; appends the others to `cannot`. */
@@ -29,7 +108,7 @@ static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, st
         return true;
     for (int i = 0; i < v->suite.num_scenes; i++) {
         const struct suite_scene *s = &v->suite.scene[i];
-        if (!is_selected(o, s->name))
+        if (!scene_is_selected(o, s->name))
             continue;
         can[i] = engine_expresses(o->engine, s, o->out_dir, e);
         num_can += can[i];
@@ -37,7 +116,7 @@ static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, st
             json_array_append_new(cannot, json_pack("{ss,ss,ss}", "scene", s->name, "engine",
                                                     o->engine->name, "reason", e->msg));
     }
-    if (num_can == 0)
+    if (num_can == 0 && o->of_claims == 0) /* the larger run has other scenes */
         return err_prefix(e, "%s can express none of the scenes, of the last because",
                           o->engine->name);
     e->msg[0] = '\0';
@@ -150,7 +229,7 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
 bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
 {
     size_t num = (size_t)v->suite.num_scenes;
-    if (!check_selection(v, e))
+    if (!check_scenes(v, e))
         return false;
     v->sides = calloc(num, sizeof *v->sides);
     bool *can = calloc(num, sizeof *can);
@@ -160,14 +239,18 @@ bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
     }
     init_sides(v);
     bool ok = ask_engine(v, can, cannot, e);
-    int most = 0, all = MAX_REFERENCES * 3 + MAX_VARIANTS + 2;
+    int most = 0;
+    v->num_tasks = 0;
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
-        most += is_selected(v->opt, v->suite.scene[i].name) ? all : 0;
+        most += scene_is_selected(v->opt, v->suite.scene[i].name) ? MAX_CLAIMS : 0;
     v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
     ok = ok && (v->task != NULL || err_set(e, "out of memory"));
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
-        if (is_selected(v->opt, v->suite.scene[i].name))
+        if (scene_is_selected(v->opt, v->suite.scene[i].name))
             add_scene(v, &v->suite.scene[i], can[i]);
     free(can);
+    ok = ok && check_claims(v, e);
+    if (ok)
+        keep_selected(v);
     return ok;
 }

@@ -159,7 +159,7 @@ int verb_grade(int argc, char **argv, struct err *e)
             grade_print_help();
             code = 0;
         } else if (s.slurm) {
-            code = slurm_command(NULL, argc, argv, 1, e);
+            code = slurm_command(NULL, argc, argv, NULL, e);
         } else if (suite_load(s.suite, &suite, e) && rubric_read(s.rubric, &suite, r, &m, e) &&
                    print_mistakes(r, &m, e)) {
             if (s.only_check)

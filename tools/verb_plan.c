@@ -11,27 +11,56 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { OPT_DIR, OPT_PARTS, OPT_HELP };
+enum { OPT_DIR, OPT_PARTS, OPT_RANGES, OPT_BY, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_DIR] = {0, "plan", 1, "DIR", "where the plan and its jobs are kept (OUTPUT.plan)"},
     [OPT_PARTS] = {0, "parts", 1, "N",
-                   "into about how many jobs a render or references are cut (64)"},
+                   "into about how many cells a render is cut, or how many jobs\n"
+                   "references (64)"},
+    [OPT_RANGES] = {0, "ranges", 1, "R",
+                    "each cell into R sample ranges, a job each; at most one for each\n"
+                    "sample. Their sums are added up, so that the picture is that of\n"
+                    "one render to rounding, not to the bit; the same bits for the\n"
+                    "same R whatever the cells and the order; not with --adaptive and\n"
+                    "--keep-state (1)"},
+    [OPT_BY] = {0, "by", 1, "WHAT",
+                "a validation: scene, a job for each scene, whose claims share its\n"
+                "renders; claim, a job for each claim, each of which renders what it\n"
+                "needs itself (scene)"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 static const struct cli_option only_help[] = {{'h', "help", 0, "", "print this"}, {0}};
 
-struct wishes {
+struct words {
     const char *dir;
-    int parts, first; /* argv[first]: the command that is planned */
+    struct plan_wishes wish;
+    int first; /* argv[first]: the command that is planned */
     bool help;
 };
 
+static bool parse_option(int option, const char *value, struct words *w, struct err *e)
+{
+    static const char *const by[] = {"scene", "claim", NULL};
+    int which = 0;
+    switch (option) {
+    case OPT_DIR: w->dir = value; return true;
+    case OPT_PARTS: return cli_int("--parts", value, 1, 1000000, &w->wish.parts, e);
+    case OPT_RANGES: return cli_int("--ranges", value, 1, 1000000, &w->wish.ranges, e);
+    case OPT_BY:
+        if (!cli_choice("--by", value, by, &which, e))
+            return false;
+        w->wish.by = which == 0 ? PLAN_BY_SCENE : PLAN_BY_CLAIM;
+        return true;
+    default: return w->help = true;
+    }
+}
+
 /* Options end where the command begins. */
-static bool parse(int argc, char **argv, struct wishes *w, struct err *e)
+static bool parse(int argc, char **argv, struct words *w, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    *w = (struct wishes){.parts = 64, .first = argc};
+    *w = (struct words){.first = argc};
     for (int i; (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return false;
@@ -39,12 +68,10 @@ static bool parse(int argc, char **argv, struct wishes *w, struct err *e)
             w->first = c.next - 1;
             return true;
         }
-        if (i == OPT_HELP)
-            return w->help = true;
-        if (i == OPT_DIR)
-            w->dir = c.value[0];
-        else if (!cli_int("--parts", c.value[0], 1, 1000000, &w->parts, e))
+        if (!parse_option(i, c.value[0], w, e))
             return false;
+        if (w->help)
+            return true;
     }
     return true;
 }
@@ -58,7 +85,7 @@ static void print_help(const char *verb, const char *what)
 
 int verb_plan(int argc, char **argv, struct err *e)
 {
-    struct wishes w;
+    struct words w;
     struct plan p;
     if (!parse(argc, argv, &w, e))
         return EXIT_NOT_JUDGED;
@@ -70,7 +97,7 @@ int verb_plan(int argc, char **argv, struct err *e)
             "puts them together to what the command\nwould have left.\n");
         return 0;
     }
-    if (!plan_make(w.dir, argc - w.first, argv + w.first, w.parts, &p, e))
+    if (!plan_make(w.dir, argc - w.first, argv + w.first, &w.wish, &p, e))
         return EXIT_NOT_JUDGED;
     json_dumpf(p.head, stdout, JSON_COMPACT);
     for (int k = 0; k < p.num; k++)
@@ -157,11 +184,13 @@ int verb_gather(int argc, char **argv, struct err *e)
     return code;
 }
 
-int slurm_command(const char *dir, int argc, char **argv, int parts, struct err *e)
+int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                  struct err *e)
 {
+    static const struct plan_wishes none = {0};
     struct plan p;
     struct err ignored;
-    if (!plan_make(dir, argc, argv, parts, &p, e))
+    if (!plan_make(dir, argc, argv, w != NULL ? w : &none, &p, e))
         return EXIT_NOT_JUDGED;
     int code = EXIT_NOT_JUDGED;
     bool ok = slurm_make(&p, e);
@@ -176,7 +205,7 @@ int slurm_command(const char *dir, int argc, char **argv, int parts, struct err 
 
 int verb_slurm(int argc, char **argv, struct err *e)
 {
-    struct wishes w;
+    struct words w;
     if (!parse(argc, argv, &w, e))
         return EXIT_NOT_JUDGED;
     if (w.help) {
@@ -187,5 +216,5 @@ int verb_slurm(int argc, char **argv, struct err *e)
                    "Begun again it goes on.\n");
         return 0;
     }
-    return slurm_command(w.dir, argc - w.first, argv + w.first, w.parts, e);
+    return slurm_command(w.dir, argc - w.first, argv + w.first, &w.wish, e);
 }

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { JOBS = 64 }; /* of --slurm, about */
-
 static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
                      struct err *e)
 {
@@ -66,7 +64,7 @@ static int on_slurm(int argc, char **argv, struct err *e)
     }
     memcpy(word, argv, (size_t)argc * sizeof *word);
     word[0] = name;
-    int code = slurm_command(NULL, argc, word, JOBS, e);
+    int code = slurm_command(NULL, argc, word, NULL, e);
     free(word);
     return code;
 }

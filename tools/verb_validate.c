@@ -41,7 +41,10 @@ enum option {
 
 static const struct cli_option options[] = {
     [OPT_LIVE] = {0, "live", 0, "", "render the references now instead of reading the goldens"},
-    [OPT_ONLY] = {0, "only", 1, "SCENE", "judge only this scene; may be given again"},
+    [OPT_ONLY] = {0, "only", 1, "SCENE[/CLAIM]",
+                  "judge only this scene, or of it only this claim: the name of the\n"
+                  "reference that ours is held against, of a variant of ours, A:B\n"
+                  "of any other pair, or consistency; may be given again"},
     [OPT_ALPHA] = {0, "alpha", 1, "A",
                    "chance of any wrong verdict in the whole run, for wrong\n"
                    "DIFFERENT and for wrong EQUIVALENT each, down to 1e-12 (1e-3)"},
@@ -73,7 +76,9 @@ static const struct cli_option options[] = {
                              "first claim that differs where it should not"},
     [OPT_OF_CLAIMS] = {0, "of-claims", 1, "N",
                        "judge some of the N claims of a larger run, whose alpha it is (all)"},
-    [OPT_SLURM] = {0, "slurm", 0, "", "a job for each scene on a Slurm cluster"},
+    [OPT_SLURM] = {0, "slurm", 0, "",
+                   "a job for each scene on a Slurm cluster (assay slurm --by claim\n"
+                   "validate: for each claim)"},
     [OPT_PAGE_EVERY] = {0, "page-every", 1, "S",
                         "seconds after which the page of what is judged so far is\n"
                         "written, again and again, for assay watch (off)"},
@@ -105,7 +110,7 @@ static bool parse(int argc, char **argv, struct validate_options *o, struct vali
         case OPT_LIVE: o->live = true; break;
         case OPT_ONLY:
             if (o->num_only == MAX_ONLY)
-                return err_set(e, "--only: at most %d scenes", MAX_ONLY);
+                return err_set(e, "--only: at most %d scenes and claims", MAX_ONLY);
             o->only[o->num_only++] = v;
             break;
         case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &o->alpha, e); break;
@@ -190,7 +195,8 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     if (!json_write(json, results, e) || !results_write_junit(junit, results, e) ||
         !report_write(json, html, e))
         return false;
-    results_print_table(stdout, results, false);
+    if (json_array_size(json_object_get(results, "claims")) > 0)
+        results_print_table(stdout, results, false);
     consistency_print(stdout, json_object_get(results, "consistency"), false);
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
@@ -289,7 +295,7 @@ int verb_validate(int argc, char **argv, struct err *e)
     if (c.help)
         code = 0;
     else if (c.slurm)
-        code = slurm_command(NULL, argc, argv, 1, e);
+        code = slurm_command(NULL, argc, argv, NULL, e);
     else if (validate(&c.opt, argc, argv, &results, e))
         code = validate_command_finish(&c, results, e);
     json_decref(results);

@@ -24,7 +24,9 @@ int verb_gather(int argc, char **argv, struct err *e);
 int verb_slurm(int argc, char **argv, struct err *e);
 
 /* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
- * jobs on the cluster, gathers. parts: of a render or of references. */
-int slurm_command(const char *dir, int argc, char **argv, int parts, struct err *e);
+ * jobs on the cluster, gathers. w NULL: no wishes. */
+struct plan_wishes;
+int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                  struct err *e);
 
 #endif

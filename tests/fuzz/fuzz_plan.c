@@ -1,0 +1,80 @@
+/* plan.jsonl: as it is; and its jobs behind a head that is right, so that they are looked at too. */
+#include "../../renderer/version.h"
+#include "../../tools/plan.h"
+#include "fuzz.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static char dir[64];
+
+static void remove_dir(void)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/plan.jsonl", dir);
+    unlink(path);
+    rmdir(dir);
+}
+
+/* A directory whose plan.jsonl is the file. */
+static void plan_of(const char *file)
+{
+    char path[96];
+    if (dir[0] != '\0')
+        return;
+    snprintf(dir, sizeof dir, "%s.plan", file);
+    snprintf(path, sizeof path, "%s/plan.jsonl", dir);
+    fuzz_require((mkdir(dir, 0700) == 0 || errno == EEXIST) &&
+                     (symlink(file, path) == 0 || errno == EEXIST),
+                 "cannot make a plan's directory");
+    atexit(remove_dir);
+}
+
+static void look(void)
+{
+    struct plan p;
+    struct err e = {""};
+    if (!plan_read(dir, &p, &e)) {
+        fuzz_check_line(&e, dir);
+        return;
+    }
+    for (int k = 0; k < p.num; k++) {
+        char path[PLAN_PATH + 256];
+        fuzz_require(!plan_is_made(&p, k), "a job is made where nothing is");
+        plan_artefact(&p, k, NULL, path);
+        fuzz_require(strncmp(path, dir, strlen(dir)) == 0 && strstr(path, "..") == NULL,
+                     "an artefact outside the plan");
+        fuzz_require(!plan_verify(&p, k, &e), "a job is whole where nothing is");
+        fuzz_check_line(&e, NULL);
+    }
+    int num = 0;
+    char **word = plan_words(json_object_get(p.head, "command"), &num);
+    fuzz_require(word != NULL && word[num] == NULL, "a command without an end");
+    free(word);
+    plan_free(&p);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    plan_of(fuzz_file(data, size, ".jsonl"));
+    look();
+    int jobs = 1;
+    for (size_t i = 0; i < size; i++)
+        jobs += data[i] == '\n' && i + 1 < size;
+    char *whole = malloc(size + 512);
+    fuzz_require(whole != NULL, "out of memory");
+    int n = snprintf(whole, 512,
+                     "{\"assay_plan\":1,\"kind\":\"pathtracer\",\"version\":\"%s\",\"cwd\":\"/\","
+                     "\"jobs\":%d,\"command\":[\"pathtracer\"],\"output\":\"x\",\"product\":\"x\","
+                     "\"ends\":[0],\"cpus\":1,\"run\":[\"x\"],\"inputs\":{}}\n",
+                     assay_version, jobs);
+    memcpy(whole + n, data, size);
+    fuzz_file((const uint8_t *)whole, (size_t)n + size, ".jsonl");
+    free(whole);
+    look();
+    return 0;
+}
