@@ -6,6 +6,7 @@
 #include "../renderer/fs.h"
 #include "../renderer/identity.h"
 #include "../renderer/options.h"
+#include "../renderer/sha256.h"
 #include "../renderer/state.h"
 #include "../tools/claim.h"
 #include "../tools/plan.h"
@@ -24,63 +25,58 @@
 #include <cmocka.h>
 
 static char dir[] = "/tmp/test_memory_plan_XXXXXX";
-static char picture[128], plan_dir[128], program[4096];
-static bool is_our_program;
+static char picture[128], plan_dir[128], program[128];
 
-/* `assay plan` takes the pathtracer beside the program that runs. */
 static int make_place(void **state)
 {
     (void)state;
     struct err e;
-    alloc_json(ALLOC_JSON_FAILS, NULL);
     if (mkdtemp(dir) == NULL)
         return -1;
     snprintf(picture, sizeof picture, "%s/out/x.png", dir);
     snprintf(plan_dir, sizeof plan_dir, "%s/plan", dir);
-    beside_program(program, sizeof program, "pathtracer");
-    is_our_program = access(program, F_OK) != 0;
-    return make_parent_dirs(picture, &e) && is_our_program ? 0 : -1;
+    snprintf(program, sizeof program, "%s/program", dir);
+    return make_parent_dirs(picture, &e) ? 0 : -1;
 }
 
 static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    if (is_our_program)
-        unlink(program);
     return remove_tree(dir, &e) ? 0 : -1;
 }
 
 static char *command[] = {"pathtracer", "-q", "-r", "8",     "32",
                           "-s",         "4",  "-f", picture, "reference/scenes/12_point_plane.dae",
                           NULL};
-static const struct plan_wishes wishes = {.parts = 2, .ranges = 1};
+static const struct plan_wishes wishes = {.parts = 2, .ranges = 2, .pathtracer = program};
 enum { WORDS = sizeof command / sizeof command[0] - 1 };
 
-/* Writes the state of each job's cell where the script finds it, by its words: -p X Y W H. */
+/* Writes the state that each job would leave where the script finds it, by its words. */
 static void write_states(const struct plan *p)
 {
-    struct options o;
-    struct identity id;
-    struct err e = {0};
-    assert_true(options_parse(WORDS, command, &o, &e) && identity_make(&o, &id, &e));
     for (int k = 0; k < p->num; k++) {
-        json_t *job = json_loads(p->line[k], 0, NULL), *words = json_object_get(job, "words");
-        int cell[4];
-        char path[256];
+        json_t *job = json_loads(p->line[k], 0, NULL);
+        int num;
+        char **more = plan_words(json_object_get(job, "words"), &num), *argv[WORDS + 16], path[256];
+        struct options o;
+        struct identity id;
         struct film f;
-        for (size_t i = 0; i < 4; i++)
-            cell[i] = atoi(json_string_value(json_array_get(words, i + 1)));
-        json_decref(job);
-        identity_cell(cell, o.width, o.height, id.cell);
-        assert_true(film_alloc(&f, cell[2], cell[3], false, &e));
-        for (size_t i = 0; i < (size_t)(cell[2] * cell[3]); i++)
-            for (int n = 0; n < 4; n++)
-                moments_add(&f.m, i, (double[3]){cell[1], 0.5, n});
-        f.num_samples = 4;
-        snprintf(path, sizeof path, "%s/%d_%d.state", dir, cell[0], cell[1]);
+        struct err e = {0};
+        assert_true(num <= 16);
+        memcpy(argv, command, sizeof command);
+        memcpy(argv + WORDS, more, (size_t)(num + 1) * sizeof *more);
+        assert_true(options_parse(WORDS + num, argv, &o, &e) && identity_make(&o, &id, &e) &&
+                    film_alloc(&f, o.cell[2], o.cell[3], false, &e));
+        f.num_samples = (uint32_t)(o.last - o.first);
+        for (size_t i = 0; i < (size_t)(o.cell[2] * o.cell[3]); i++)
+            for (int n = o.first; n < o.last; n++)
+                moments_add(&f.m, i, (double[3]){o.cell[1], 0.5, n});
+        snprintf(path, sizeof path, "%s/%d_%d:%d.state", dir, o.cell[1], o.first, o.last);
         assert_true(state_write(path, &id, &f, &e));
         film_free(&f);
+        free(more);
+        json_decref(job);
     }
 }
 
@@ -90,8 +86,8 @@ static void write_program(void)
     assert_non_null(f);
     fprintf(
         f,
-        "#!/bin/sh\nwhile [ $# -gt 0 ]; do case $1 in -f) out=$2;; -p) from=$2_$3;; esac; shift; "
-        "done\ncp '%s'/$from.state \"$out.state\"\n",
+        "#!/bin/sh\nwhile [ $# -gt 0 ]; do case $1 in -f) out=$2;; -p) y=$3;; --samples) n=$2;; "
+        "esac; shift; done\ncp '%s'/${y}_$n.state \"$out.state\"\n",
         dir);
     assert_int_equal(fclose(f), 0);
     assert_int_equal(chmod(program, 0755), 0);
@@ -127,7 +123,7 @@ static bool make_plan(void *ctx, struct err *e)
     if (ok) {
         plan_free(&p);
         assert_true(plan_read(plan_dir, &p, e));
-        assert_int_equal(p.num, 2);
+        assert_int_equal(p.num, 4);
         plan_free(&p);
     }
     alloc_fail_output(path, ok);
@@ -177,6 +173,14 @@ static bool gather(void *ctx, struct err *e)
     int code = plan_gather(ctx, e);
     alloc_fail_off();
     assert_int_equal(code == 0, access(picture, F_OK) == 0);
+    static char right[65];
+    char hex[65];
+    if (code == 0) {
+        assert_true(sha256_file(picture, hex, e));
+        if (right[0] == '\0')
+            strcpy(right, hex);
+        assert_string_equal(hex, right);
+    }
     alloc_fail_output(picture, code == 0);
     xmlResetLastError();
     return code == 0;
@@ -202,7 +206,8 @@ static void plans(void **state)
     /* A job that cannot be read in whole is none: here the program ends instead (tools/main.c). */
     alloc_json(ALLOC_JSON_ENDS, NULL);
     alloc_fail_each("plan_run_job", ALLOC_ALL, do_job, &p);
-    assert_true(plan_run_job(&p, 0, &made, &e) && plan_run_job(&p, 1, &made, &e));
+    for (int k = 0; k < p.num; k++)
+        assert_true(plan_run_job(&p, k, &made, &e));
     alloc_fail_each("plan_is_made, plan_verify", ALLOC_ALL, verify_job, &p);
     int out = dup(STDOUT_FILENO), nowhere = open("/dev/null", O_WRONLY);
     assert_true(out >= 0 && nowhere >= 0 && fflush(stdout) == 0);
