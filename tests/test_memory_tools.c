@@ -29,7 +29,7 @@ enum { SIDE = 16 };
 #define RESULTS "tests/fuzz/seeds/results.json"
 
 static char dir[] = "/tmp/test_memory_tools_XXXXXX";
-static char path_text[4][128], json_output[128];
+static char path_text[4][256], json_output[256];
 
 static const char *file(int slot, const char *name)
 {
