@@ -12,25 +12,30 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Loaded for good at the first call; it is found again at the others. */
-static const struct oiio_table *load(struct err *e)
+bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e)
 {
     /* Beside the programs; beside the directory of the tests; where `make install` puts it. */
     static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so"};
-    char path[4096];
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-        beside_program(path, sizeof path, places[i]);
-        if (access(path, R_OK) != 0)
-            continue;
-        void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
-        const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
-        if (table == NULL)
-            err_set(e, "cannot load what reads pictures: %s", dlerror());
-        return table;
+        beside_program(path, IMAGE_OIIO_PATH, places[i]);
+        if (access(path, R_OK) == 0)
+            return true;
     }
-    beside_program(path, sizeof path, places[0]);
-    err_set(e, "cannot load what reads pictures: %s is not there", path);
-    return NULL;
+    beside_program(path, IMAGE_OIIO_PATH, places[0]);
+    return err_set(e, "cannot load what reads pictures: %s is not there", path);
+}
+
+/* Loaded for good at the first call; it is found again at the others. */
+static const struct oiio_table *load(struct err *e)
+{
+    char path[IMAGE_OIIO_PATH];
+    if (!image_oiio_file(path, e))
+        return NULL;
+    void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
+    const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
+    if (table == NULL)
+        err_set(e, "cannot load what reads pictures: %s", dlerror());
+    return table;
 }
 
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */

@@ -30,6 +30,10 @@ struct image_info {
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
     __attribute__((warn_unused_result));
 
+/* The file that it is loaded from. */
+enum { IMAGE_OIIO_PATH = 4096 };
+bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e) __attribute__((warn_unused_result));
+
 /* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */
 const char *image_oiio_version(struct err *e);
 

@@ -681,5 +681,10 @@ fi
 cd "$tmp" || exit 1
 expect "the installed programs work" 0 "EQUIVALENT" \
     "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace
+expect "installed, it reads pictures from elsewhere" 1 "^DIFFERENT" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+mv "$tmp/usr/lib/assay/oiio.so" "$tmp/oiio.so"
+expect "without OpenImageIO: a line" 3 "cannot load what reads pictures: .*oiio.so is not there" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+echo garbage >"$tmp/usr/lib/assay/oiio.so"
+expect "with a damaged one: a line" 3 "cannot load what reads pictures: .*oiio.so" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
 
 [ $failures -eq 0 ]

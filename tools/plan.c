@@ -1,5 +1,6 @@
 #include "plan.h"
 
+#include "../reference/image_oiio.h"
 #include "../renderer/fs.h"
 #include "../renderer/sha256.h"
 #include "../renderer/version.h"
@@ -92,13 +93,24 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
            refuse(output, e);
 }
 
+/* And what assay loads while it runs. */
+static bool add_program(struct plan *p, const char *program, struct err *e)
+{
+    char module[IMAGE_OIIO_PATH];
+    const char *slash = strrchr(program, '/');
+    if (!plan_input(p, program, e))
+        return false;
+    return strcmp(slash != NULL ? slash + 1 : program, "assay") != 0 ||
+           (image_oiio_file(module, e) && plan_input(p, module, e));
+}
+
 bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)
 {
     json_t *run = json_object_get(p->head, "run");
     for (int i = 0; user && i < num; i++)
         if (strcmp(word[i], "{job}") == 0 || strncmp(word[i], "{out}", 5) == 0)
             return err_set(e, "'%s' means something else in a plan", word[i]);
-    if (json_array_size(run) == 0 && !plan_input(p, word[0], e))
+    if (json_array_size(run) == 0 && !add_program(p, word[0], e))
         return false;
     return add_words(run, word, num, e);
 }

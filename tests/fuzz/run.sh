@@ -26,6 +26,7 @@ fixed_executions() {
     case $1 in
     collada) echo 20000 ;;
     picture) echo 4000 ;;
+    plan) echo 10000 ;;
     rubric) echo 30000 ;;
     results) echo 50000 ;;
     moments) echo 200000 ;;
