@@ -4,6 +4,7 @@
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
+#include "picture_texts.h"
 #include "starter.h"
 #include "state.h"
 
@@ -157,6 +158,22 @@ static bool finish(struct session *s, const struct film *f, const struct render_
     return true;
 }
 
+static bool write_heatmap(const struct output *out, const struct bvh *bvh, const struct camera *c,
+                          const struct render_options *opt, struct err *e)
+{
+    const char *path = out->opt->heatmap;
+    struct picture_texts t;
+    uint64_t most;
+    if (!picture_texts_make(out, PICTURE_HEATMAP, 0, &t))
+        return err_set(e, "%s: out of memory", path);
+    bool ok = heatmap_write(path, bvh, c, opt->x, opt->y, opt->width, opt->height, t.attr, t.num,
+                            &most, e);
+    if (ok)
+        printf("%s: at most %llu nodes visited\n", path, (unsigned long long)most);
+    picture_texts_free(&t);
+    return ok;
+}
+
 static bool run(struct session *s, struct err *e)
 {
     const struct options *o = s->out.opt;
@@ -181,12 +198,8 @@ static bool run(struct session *s, struct err *e)
     if (!output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
         goto done;
     const struct render_options opt = render_options_of(o);
-    if (o->heatmap != NULL) {
-        uint64_t most;
-        if (!heatmap_write(o->heatmap, bvh, &camera, opt.x, opt.y, opt.width, opt.height, &most, e))
-            goto done;
-        printf("%s: at most %llu nodes visited\n", o->heatmap, (unsigned long long)most);
-    }
+    if (o->heatmap != NULL && !write_heatmap(&s->out, bvh, &camera, &opt, e))
+        goto done;
     const struct render_control control = {.max_seconds = o->max_seconds,
                                            .max_error = o->max_error,
                                            .write_every = o->write_every,

@@ -1,5 +1,6 @@
 #include "output.h"
 
+#include "picture_texts.h"
 #include "shell_words.h"
 #include "tone.h"
 #include "version.h"
@@ -65,6 +66,7 @@ struct output_writer {
     const struct render_stats *stats;
     int width, height, y; /* y: the next row */
     uint32_t num_samples;
+    double most;                             /* samples of a pixel, so far */
     struct moments_writer *exr[MAX_OUTPUTS]; /* NULL: a PNG, or not begun */
     uint8_t *rgb8, *rates;                   /* NULL: no PNG, not adaptive */
 };
@@ -129,10 +131,27 @@ bool output_rows(struct output_writer *w, const struct film *band, struct err *e
         return false;
     for (size_t i = 0; w->rgb8 != NULL && i < 3 * pixels; i++)
         w->rgb8[at + i] = tone_map(curve, band->m.mean[i]);
+    for (size_t p = 0; p < pixels; p++)
+        w->most = band->m.n[p] > w->most ? band->m.n[p] : w->most;
     for (size_t p = 0; w->rates != NULL && p < pixels; p++)
         rate_colour(band->m.n[p] / (w->o->opt->last - w->o->opt->first), w->rates + at + 3 * p);
     w->y += band->m.height;
     return true;
+}
+
+/* A render alone and one in jobs look at other times whether all pixels of an adaptive picture have enough, so it is said how many
+ * samples were taken. Of ranges, how they were cut counts. */
+static bool write_png(const struct output_writer *w, const char *path, enum picture_kind kind,
+                      const uint8_t *rgb8, struct err *e)
+{
+    struct picture_texts t;
+    bool cut = kind == PICTURE_IMAGE && w->o->ranges != NULL;
+    uint32_t num = cut || w->most == 0 ? w->num_samples : (uint32_t)w->most;
+    if (!picture_texts_make(w->o, kind, num, &t))
+        return err_set(e, "%s: out of memory", path);
+    bool ok = image_write_png_texts(path, w->width, w->height, rgb8, t.attr, t.num, e);
+    picture_texts_free(&t);
+    return ok;
 }
 
 static bool write_rates(const struct output_writer *w, const char *png, struct err *e)
@@ -141,7 +160,7 @@ static bool write_rates(const struct output_writer *w, const char *png, struct e
     if (strlen(png) + sizeof "_rate" > sizeof path)
         return err_set(e, "%.64s...: path too long", png);
     snprintf(path, sizeof path, "%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
-    return image_write_png(path, w->width, w->height, w->rates, e);
+    return write_png(w, path, PICTURE_RATES, w->rates, e);
 }
 
 bool output_close(struct output_writer *w, struct err *e)
@@ -154,7 +173,7 @@ bool output_close(struct output_writer *w, struct err *e)
             w->exr[i] = NULL;
             continue;
         }
-        ok = image_write_png(opt->output[i], w->width, w->height, w->rgb8, e) &&
+        ok = write_png(w, opt->output[i], PICTURE_IMAGE, w->rgb8, e) &&
              (w->rates == NULL || write_rates(w, opt->output[i], e));
     }
     output_abandon(w);

@@ -271,7 +271,7 @@ static bool write_heatmap(void *ctx, struct err *e)
 {
     const struct rendered *r = ctx;
     uint64_t most;
-    bool ok = heatmap_write(out, r->bvh, &r->c, 0, 0, WIDTH, HEIGHT, &most, e);
+    bool ok = heatmap_write(out, r->bvh, &r->c, 0, 0, WIDTH, HEIGHT, NULL, 0, &most, e);
     alloc_fail_off();
     alloc_fail_output(out, ok);
     return ok;

@@ -2,7 +2,7 @@
 #define _GNU_SOURCE
 #include "../reference/process.h"
 #include "../renderer/fs.h"
-#include "command_words.h"
+#include "../renderer/command_words.h"
 #include "grade_options.h"
 #include "plan_kinds.h"
 #include "results.h"

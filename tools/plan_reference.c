@@ -4,7 +4,7 @@
  *                   "job": of its first pictures, "jobs": how many}] */
 #include "../reference/process.h"
 #include "../renderer/fs.h"
-#include "command_words.h"
+#include "../renderer/command_words.h"
 #include "plan_kinds.h"
 #include "reference_command.h"
 #include "results.h"

@@ -3,7 +3,7 @@
  * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
 #include "../renderer/fs.h"
 #include "../renderer/options.h"
-#include "command_words.h"
+#include "../renderer/command_words.h"
 #include "plan_kinds.h"
 
 #include <stdio.h>

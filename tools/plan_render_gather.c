@@ -3,7 +3,7 @@
 #include "../renderer/collada.h"
 #include "../renderer/output.h"
 #include "../renderer/state.h"
-#include "command_words.h"
+#include "../renderer/command_words.h"
 #include "plan_kinds.h"
 #include "results.h"
 

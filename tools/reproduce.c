@@ -1,13 +1,14 @@
 #include "reproduce.h"
 
 #include "../reference/process.h"
+#include "../renderer/command_words.h"
 #include "../renderer/fs.h"
 #include "../renderer/options.h"
 #include "../renderer/sha256.h"
 #include "../renderer/shell_words.h"
-#include "command_words.h"
 #include "merge.h"
 #include "plan_kinds.h"
+#include "reproduce_png.h"
 
 #include <assert.h>
 #include <stdio.h>
@@ -40,8 +41,8 @@ static bool check_scene(const char *path, const char *scene, const char *sha256,
 
 enum { MORE_WORDS = 12, NUMBER = 16 };
 
-/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more. spp: room for a
- * number, to live as long. */
+/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more, two of which are
+ * left. spp: room for a number, to live as long. */
 static bool command_of(const char *path, const struct image *im,
                        const struct reproduce_options *opt, char **word, int num,
                        const char *samples, const char *threads, const char *out, char spp[NUMBER],
@@ -82,8 +83,8 @@ static bool check_same(const char *path, const struct image *a, const struct ima
     return true;
 }
 
-static bool compare(const char *path, const struct image *a, const struct image *b,
-                    struct reproduced *out, struct err *e)
+bool reproduce_compare(const char *path, const struct image *a, const struct image *b,
+                       struct reproduced *out, struct err *e)
 {
     if (a->width != b->width || a->height != b->height || a->channels != b->channels)
         return err_set(e, "%s: %d x %d x %d values, made again %d x %d x %d", path, a->width,
@@ -114,17 +115,23 @@ static bool set_command(struct reproduced *out, const char *const *word, struct 
     return out->command != NULL || err_set(e, "out of memory");
 }
 
-static bool remake_render(const char *path, const struct image *im, char **word, int num,
-                          const struct reproduce_options *opt, const char *to,
-                          struct reproduced *out, struct err *e)
+bool reproduce_render(const char *path, const struct image *im, char **word, int num,
+                      const char *samples, const struct reproduce_options *opt, const char *to,
+                      const char *heatmap, struct reproduced *out, struct err *e)
 {
     char threads[NUMBER], spp[NUMBER], log[MAX_PATH];
     snprintf(threads, sizeof threads, "%d", opt->threads);
     snprintf(log, sizeof log, "%s.log", to);
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
-    bool ok =
-        (argv != NULL || err_set(e, "out of memory")) &&
-        command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, spp, argv, e);
+    bool ok = (argv != NULL || err_set(e, "out of memory")) &&
+              command_of(path, im, opt, word, num, samples, threads, to, spp, argv, e);
+    if (ok && heatmap != NULL) {
+        int n = 0;
+        while (argv[n] != NULL)
+            n++;
+        argv[n] = "--heatmap";
+        argv[n + 1] = heatmap;
+    }
     ok = ok && set_command(out, argv, e);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
@@ -132,10 +139,9 @@ static bool remake_render(const char *path, const struct image *im, char **word,
     return ok;
 }
 
-/* Jobs of sample ranges, run here one after the other and added up as they were. */
-static bool remake_ranges(const char *path, const struct image *im, char **word, int num,
-                          const struct reproduce_options *opt, const char *to,
-                          struct reproduced *out, struct err *e)
+bool reproduce_ranges(const char *path, const struct image *im, char **word, int num,
+                      const struct reproduce_options *opt, const char *to, struct reproduced *out,
+                      struct err *e)
 {
     enum { BEFORE = 6 }; /* words that plan it */
     char threads[NUMBER], spp[NUMBER], ranges[NUMBER], dir[MAX_PATH];
@@ -224,9 +230,10 @@ static bool remake(const char *path, const struct reproduce_options *opt, const 
     if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
         ok = remake_merge(path, word, num, opt, to, depth, out, e);
     else if (ok && image_get_attr(&im, "assay:ranges") != NULL)
-        ok = remake_ranges(path, &im, word, num, opt, to, out, e);
+        ok = reproduce_ranges(path, &im, word, num, opt, to, out, e);
     else if (ok)
-        ok = remake_render(path, &im, word, num, opt, to, out, e);
+        ok = reproduce_render(path, &im, word, num, attr(&im, "assay:samples"), opt, to, NULL, out,
+                              e);
     free(word);
     image_free(&im);
     return ok;
@@ -245,6 +252,8 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
     struct err ignored;
     char dir[] = "/tmp/assay-reproduce.XXXXXX", to[MAX_PATH];
     *out = (struct reproduced){0};
+    if (image_is_png(path))
+        return reproduce_png(path, opt, out, e);
     if (!image_read_exr(path, &then, NULL, e))
         return false;
     if (mkdtemp(dir) == NULL) {
@@ -253,7 +262,7 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
     }
     snprintf(to, sizeof to, "%s/again.exr", dir);
     bool ok = remake(path, opt, to, 0, out, e) && image_read_exr(to, &now, NULL, e) &&
-              check_same(path, &then, &now, e) && compare(path, &then, &now, out, e);
+              check_same(path, &then, &now, e) && reproduce_compare(path, &then, &now, out, e);
     if (ok && opt->keep != NULL)
         ok = image_write_exr(opt->keep, &now, e);
     image_free(&then);
