@@ -22,14 +22,13 @@ static char *canonical_command(const struct output *o, enum picture_kind kind)
     char **word = calloc((size_t)num + 4, sizeof *word), *command = NULL;
     if (apart != NULL && word != NULL) {
         word[0] = program;
-        n += words_kept(render_how, num - 1, apart + 1, word + 1);
-        n = 1 + words_kept(said_apart, n - 1, word + 1, word + 1);
         if (o->opt->pilot_tolerance >= 0 && kind != PICTURE_HEATMAP) {
             snprintf(spp, sizeof spp, "%d", o->opt->spp);
             word[n++] = most;
             word[n++] = spp;
         }
-        word[n] = NULL;
+        int kept = words_kept(render_how, num - 1, apart + 1, word + n);
+        word[n + words_kept(said_apart, kept, word + n, word + n)] = NULL;
         command = shell_join(NULL, (const char *const *)word);
     }
     free(apart);

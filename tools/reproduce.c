@@ -41,12 +41,12 @@ static bool check_scene(const char *path, const char *scene, const char *sha256,
 
 enum { MORE_WORDS = 12, NUMBER = 16 };
 
-/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more, two of which are
- * left. spp: room for a number, to live as long. */
+/* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more. Ours come
+ * first, as "--" may end the options. heatmap: NULL for none. spp: room for a number, to live as long. */
 static bool command_of(const char *path, const struct image *im,
                        const struct reproduce_options *opt, char **word, int num,
-                       const char *samples, const char *threads, const char *out, char spp[NUMBER],
-                       const char **argv, struct err *e)
+                       const char *samples, const char *threads, const char *out,
+                       const char *heatmap, char spp[NUMBER], const char **argv, struct err *e)
 {
     struct options o;
     struct err why = {""};
@@ -54,18 +54,22 @@ static bool command_of(const char *path, const struct image *im,
         return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
     if (!check_scene(path, opt->scene != NULL ? opt->scene : o.scene, attr(im, "assay:scene"), e))
         return false;
-    int n = 1 + words_kept(render_how, num - 1, word + 1, word + 1);
-    argv[0] = opt->pathtracer;
-    for (int i = 1; i < n; i++)
-        argv[i] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
-    const char *more[] = {"-q", "-t", threads, "--samples", samples, "-f", out, NULL};
-    memcpy(argv + n, more, sizeof more);
+    const char *ours[] = {opt->pathtracer, "-q", "-t", threads, "--samples", samples, "-f", out};
+    int n = (int)(sizeof ours / sizeof *ours);
+    memcpy(argv, ours, sizeof ours);
+    if (heatmap != NULL) {
+        argv[n++] = "--heatmap";
+        argv[n++] = heatmap;
+    }
     /* Where it was the default, the most that a pilot grants would now be the last of the samples. */
     if (o.pilot_tolerance >= 0) {
         snprintf(spp, NUMBER, "%d", o.spp);
-        const char *most[] = {"-s", spp, NULL};
-        memcpy(argv + n + sizeof more / sizeof *more - 1, most, sizeof most);
+        argv[n++] = "-s";
+        argv[n++] = spp;
     }
+    int kept = words_kept(render_how, num - 1, word + 1, word + 1);
+    for (int i = 1; i <= kept; i++)
+        argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
     return true;
 }
 
@@ -124,14 +128,7 @@ bool reproduce_render(const char *path, const struct image *im, char **word, int
     snprintf(log, sizeof log, "%s.log", to);
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     bool ok = (argv != NULL || err_set(e, "out of memory")) &&
-              command_of(path, im, opt, word, num, samples, threads, to, spp, argv, e);
-    if (ok && heatmap != NULL) {
-        int n = 0;
-        while (argv[n] != NULL)
-            n++;
-        argv[n] = "--heatmap";
-        argv[n + 1] = heatmap;
-    }
+              command_of(path, im, opt, word, num, samples, threads, to, heatmap, spp, argv, e);
     ok = ok && set_command(out, argv, e);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
@@ -158,8 +155,8 @@ bool reproduce_ranges(const char *path, const struct image *im, char **word, int
     const char *plan[BEFORE] = {"assay", "plan", "--parts", "1", "--ranges", ranges};
     memcpy(argv, plan, sizeof plan);
     const char **render = argv + BEFORE;
-    bool ok = command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, spp,
-                         render, e);
+    bool ok = command_of(path, im, opt, word, num, attr(im, "assay:samples"), threads, to, NULL,
+                         spp, render, e);
     render[0] = "pathtracer";
     char **words = (char **)render;
     int count = 0;

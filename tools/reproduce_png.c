@@ -65,6 +65,8 @@ static bool rates_of(const char *path, const struct image *then, const char *exr
 static bool read_command(const char *path, const struct image *im, enum picture_kind *kind,
                          char ***word, int *num, struct err *e)
 {
+    /* An output has to be there to be left out. */
+    static const char program[] = "pathtracer ", output[] = "-f again.png ";
     int k;
     const char *command = image_get_attr(im, "assay:command");
     if (command == NULL)
@@ -72,11 +74,12 @@ static bool read_command(const char *path, const struct image *im, enum picture_
     if (!cli_choice("assay:picture", attr(im, "assay:picture"), picture_kind_names, &k, e))
         return err_prefix(e, "%s", path);
     *kind = (enum picture_kind)k;
-    static const char output[] = " -f again.png"; /* one has to be there, and is left out again */
+    if (strncmp(command, program, strlen(program)) != 0)
+        return err_set(e, "%s: its command is none of this program", path);
     char *text = malloc(strlen(command) + sizeof output);
     if (text == NULL)
         return err_set(e, "out of memory");
-    stpcpy(stpcpy(text, command), output);
+    stpcpy(stpcpy(stpcpy(text, program), output), command + strlen(program));
     *word = shell_split(text, num, e);
     free(text);
     return *word != NULL || err_prefix(e, "%s", path);
