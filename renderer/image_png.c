@@ -7,17 +7,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* libpng comes back by longjmp() after this: so all that is to be freed lies with those who call the function with the setjmp(). */
+/* libpng comes back by longjmp() after this, so all that is to be freed lies with those who call the function with the setjmp(). */
 static void failed(png_structp png, png_const_charp message)
 {
     err_set(png_get_error_ptr(png), "%s", message);
     png_longjmp(png, 1);
 }
 
+/* A failure too, but told when libpng is done: for want of memory it may lose a text with no more than a warning. */
 static void warned(png_structp png, png_const_charp message)
 {
-    (void)png;
-    (void)message;
+    struct err *why = png_get_error_ptr(png);
+    if (why->msg[0] == '\0')
+        err_set(why, "%s", message);
+}
+
+/* The line about a file, of what is known of why. */
+static bool refuse(const char *path, const char *verb, const struct err *why, struct err *e)
+{
+    return err_set(e, "%s: cannot %s: %s", path, verb,
+                   why->msg[0] != '\0' ? why->msg : "out of memory");
 }
 
 /* Texts with other letters than ASCII have to say that they are UTF-8. */
@@ -65,7 +74,7 @@ bool image_write_png_texts(const char *path, int width, int height, const uint8_
                            const struct image_attr *attr, int num_attrs, struct err *e)
 {
     struct out_file file;
-    struct err why = {"out of memory"};
+    struct err why = {""};
     if (!out_open(&file, path, e))
         return false;
     png_text *text = texts_of(attr, num_attrs);
@@ -75,10 +84,10 @@ bool image_write_png_texts(const char *path, int width, int height, const uint8_
               write_to(png, info, file.f, width, height, rgb8, text, num_attrs);
     png_destroy_write_struct(&png, &info);
     free(text);
-    if (ok)
+    if (ok && why.msg[0] == '\0')
         return out_commit(&file, e);
     out_abandon(&file);
-    return err_set(e, "%s: cannot write: %s", path, why.msg);
+    return refuse(path, "write", &why, e);
 }
 
 bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8, struct err *e)
@@ -170,7 +179,7 @@ static bool read_texts(png_structp png, png_infop info, struct image *im, struct
 
 bool image_read_png(const char *path, struct image *out, struct err *e)
 {
-    struct err why = {"out of memory"};
+    struct err why = {""};
     *out = (struct image){0};
     FILE *f = fopen(path, "rb");
     if (f == NULL)
@@ -186,10 +195,10 @@ bool image_read_png(const char *path, struct image *out, struct err *e)
     png_destroy_read_struct(&png, &info, NULL);
     free(row);
     fclose(f);
-    if (ok)
+    if (ok && why.msg[0] == '\0')
         return true;
     image_free(out);
-    return err_set(e, "%s: cannot read: %s", path, why.msg);
+    return refuse(path, "read", &why, e);
 }
 
 const char *image_library_version(void)

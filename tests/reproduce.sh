@@ -58,7 +58,74 @@ render "$tmp/c.exr" --samples 9:11 $scene
 "$assay" merge "$tmp/ab.exr" "$tmp/a.exr" "$tmp/b.exr" >/dev/null && "$assay" merge "$tmp/abc.exr" "$tmp/c.exr" "$tmp/ab.exr" >/dev/null
 expect "a merge of a merge" 0 "the same bits in all" --keep "$tmp/kept.exr" "$tmp/abc.exr"
 
+again "a scene after --" -s 2 -- $scene
+
+# PNG: an image, the rates of an adaptive one, a heat map. --accel sah: the scene is so small that wide tests it without nodes.
+pngs() { # NAME ARGUMENT...: the image and its rates, if any
+    local name=$1 file
+    shift
+    rm -f "$tmp"/p*.png
+    render "$tmp/p.png" "$@"
+    for file in "$tmp"/p*.png; do expect "PNG, $name: $(basename "$file")" 0 "the same bits in all" "$file"; done
+}
+tell() { if [ -z "$2" ]; then echo "ok reproduce: $1"; else echo "not ok reproduce: $1: $2" && failures=$((failures + 1)); fi; }
+rule=(--accel sah -s 24 -a 4 0.3)
+render "$tmp/p.png" "${rule[@]}" --heatmap "$tmp/heat.png" $scene
+for file in p p_rate heat; do
+    expect "PNG, the assignment's rule: $file" 0 "the same bits in all 1152 values" "$tmp/$file.png"
+done
+"$pathtracer" -f "$tmp/other.exr" -t3 --aov -r 24 16 "${rule[@]}" --keep-state --heatmap "$tmp/other_heat.png" -f "$tmp/another.png" $scene >/dev/null 2>&1
+why=$(cmp "$tmp/p.png" "$tmp/another.png" 2>&1; cmp "$tmp/p_rate.png" "$tmp/another_rate.png" 2>&1; cmp "$tmp/heat.png" "$tmp/other_heat.png" 2>&1)
+tell "PNG: the same bytes by another name, on other threads, beside other outputs" "$why"
+pngs "a pilot" -s 24 --adaptive-unbiased 0.3 --pilot 4 $scene
+pngs "a pilot, without -s, a scene after --" --adaptive-unbiased 0.3 --pilot 4 -- $scene
+pngs "a rule that --time stopped" --time 0.2s -a 4 0.01 $scene
+pngs "some samples of a cell, sobol" -s 9 --samples 3:7 -p 3 2 11 9 --sampler sobol $scene
+pngs "an environment" -s 4 -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae
+cp $scene "$tmp/it's scène.dae"
+render "$tmp/utf.png" -s 2 "$tmp/it's scène.dae"
+expect "PNG, a name with quotes and letters beyond ASCII" 0 "the same bits in all" "$tmp/utf.png"
+rm -f "$tmp"/p*.png
+"$assay" plan --plan "$tmp/plan" --parts 1 --ranges 3 pathtracer -q -r 24 16 -s 24 --adaptive-unbiased 0.3 --pilot 4 -f "$tmp/p.png" $scene >/dev/null &&
+    "$assay" run-job "$tmp/plan" 0 1 2 >/dev/null && "$assay" gather "$tmp/plan" >/dev/null
+expect "PNG, of sample ranges" 0 "the same bits in all" "$tmp/p.png"
+expect "PNG, of sample ranges: its rates" 0 "the same bits in all" "$tmp/p_rate.png"
+
 # What is not the same.
+rm -f "$tmp"/p*.png
+render "$tmp/p.png" -s 24 -a 4 0.3 --accel sah --heatmap "$tmp/p_heat.png" $scene
+if command -v oiiotool >/dev/null; then
+    # claim NAME STATUS PATTERN ARGUMENT...: of what oiiotool makes by the arguments
+    claim() {
+        local name=$1 status=$2 pattern=$3
+        shift 3
+        rm -f "$tmp/other.png"
+        oiiotool "$@" -o "$tmp/other.png" >"$tmp/err" 2>&1 || tell "$name" "oiiotool: $(cat "$tmp/err")"
+        expect "$name" "$status" "$pattern" "$tmp/other.png"
+    }
+    for file in p p_rate p_heat; do
+        claim "PNG: a pixel was changed: $file" 1 "[123] of 1152 values DIFFER, first [RGB] at pixel 5,6: [0-9]* there, [0-9]* now" \
+            "$tmp/$file.png" --fill:color=0.2,0.3,0.4 1x1+5+6
+    done
+    claim "PNG: another seed is claimed" 3 "assay:seed was '2', and is '1'" "$tmp/p.png" --sattrib assay:seed 2
+    claim "PNG: rates of other samples are claimed" 1 "values DIFFER" "$tmp/p_rate.png" --sattrib assay:most 12
+    claim "PNG: rates of no number" 3 "assay:most: 'no'" "$tmp/p_rate.png" --sattrib assay:most no
+    claim "PNG: another kind of picture" 3 "assay:picture: 'portrait' is none of" "$tmp/p.png" --sattrib assay:picture portrait
+    claim "PNG: another program's command" 3 "none of this program" "$tmp/p.png" --sattrib assay:command 'rm -r /'
+    claim "PNG: a command that a shell would act on" 3 "not a plain command" "$tmp/p.png" --sattrib assay:command 'pathtracer $(reboot) x.dae'
+    claim "PNG: of another program" 3 "other.png: does not say by what command it was made" --create 24x16 3 -d uint8
+    claim "PNG: of another program, with alpha" 3 "not 8-bit RGB" --create 24x16 4 -d uint8
+fi
+head -c 600 "$tmp/p.png" >"$tmp/other.png"
+expect "PNG: cut short" 3 "other.png: cannot read: " "$tmp/other.png"
+sed 's/assay:seed/assay:sead/' "$tmp/p.png" >"$tmp/other.png"
+expect "PNG: a text was changed by hand" 3 "other.png: cannot read: .*CRC" "$tmp/other.png"
+sed -i 's/0\.8/0.7/' "$tmp/it's scène.dae"
+expect "PNG: the scene was changed" 3 "is not the file that it was made of" "$tmp/utf.png"
+rm "$tmp/it's scène.dae"
+expect "PNG: the scene is gone" 3 "is not here" "$tmp/utf.png"
+expect "PNG: the scene is elsewhere" 0 "the same bits" --keep "$tmp/kept.png" --scene $scene "$tmp/utf.png"
+tell "PNG: kept, it has the same pixels" "$(idiff -q -fail 0 -warn 0 "$tmp/utf.png" "$tmp/kept.png" 2>&1)"
 if command -v oiiotool >/dev/null; then
     oiiotool "$tmp/a.exr" --addc 0,0,0,0,0,0,0,0,0.0001,0 -o "$tmp/other.exr" && expect "one channel was changed" 1 "384 of 3840 values DIFFER, first M3" "$tmp/other.exr"
     oiiotool "$tmp/a.exr" --sattrib assay:seed 2 -o "$tmp/other.exr" && expect "another seed is claimed" 3 "assay:seed was '2', and is '1'" "$tmp/other.exr"

@@ -213,6 +213,44 @@ static void png_round_trip(void **state)
     assert_non_null(strstr(e.msg, "/nowhere/a.png: cannot write: "));
 }
 
+/* Texts of ASCII, of UTF-8 and long ones, read back by libpng and by OpenImageIO. */
+static void png_texts(void **state)
+{
+    (void)state;
+    char path[256];
+    static char words[20000];
+    memset(words, 'w', sizeof words - 1);
+    const struct image_attr text[] = {
+        {"assay:command", "pathtracer 'it'\\''s a scene.dae'"},
+        {"assay:scene", "sc\xc3\xa8ne \xe2\x82\xac"},
+        {"assay:settings", words},
+    };
+    enum { NUM = sizeof text / sizeof text[0] };
+    uint8_t pixel[WIDTH * HEIGHT * 3];
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof pixel; i++)
+        pixel[i] = (uint8_t)(i * 11 + i / 70);
+    if (!image_write_png_texts(path_of(path, "texts.png"), WIDTH, HEIGHT, pixel, text, NUM, &e))
+        fail_msg("%s", e.msg);
+    assert_true(image_is_png(path));
+    for (int k = 0; k < 2; k++) {
+        struct image got;
+        if (!(k == 0 ? image_read_png(path, &got, &e) : image_read(path, &got, NULL, &e)))
+            fail_msg("%s", e.msg);
+        assert_true(got.width == WIDTH && got.height == HEIGHT && got.channels == 3);
+        for (size_t i = 0; i < sizeof pixel; i++)
+            assert_int_equal(lroundf(got.data[i] * (k == 0 ? 1 : 255)), pixel[i]);
+        for (size_t i = 0; i < NUM; i++) {
+            assert_non_null(image_get_attr(&got, text[i].name));
+            assert_string_equal(image_get_attr(&got, text[i].name), text[i].value);
+        }
+        assert_null(image_get_attr(&got, "assay:seed"));
+        image_free(&got);
+    }
+    assert_false(image_is_png(path_of(path, "source.exr")));
+    assert_false(image_is_png(path_of(path, "none")));
+}
+
 static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, struct err *e)
 {
     char path[256];
@@ -221,8 +259,9 @@ static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, stru
     assert_non_null(f);
     assert_int_equal(fwrite(bytes, 1, size, f), size);
     assert_int_equal(fclose(f), 0);
-    bool ok = strstr(name, ".hdr") != NULL ? image_read_hdr(path, &im, e)
-                                           : image_read_exr(path, &im, NULL, e);
+    bool ok = strstr(name, ".hdr") != NULL   ? image_read_hdr(path, &im, e)
+              : strstr(name, ".png") != NULL ? image_read_png(path, &im, e)
+                                             : image_read_exr(path, &im, NULL, e);
     if (ok)
         image_free(&im);
     return ok;
@@ -233,7 +272,7 @@ static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, stru
 static void damaged_files(void **state)
 {
     (void)state;
-    static const char *const names[] = {"source.exr", "tiled.exr", "other.hdr"};
+    static const char *const names[] = {"source.exr", "tiled.exr", "other.hdr", "texts.png"};
     static const char *const tiles[] = {"--compression", "zip", "--tile", "16", "8", NULL};
     oiiotool(tiles, "tiled.exr");
     static uint8_t bytes[MAX_FILE];
@@ -244,7 +283,8 @@ static void damaged_files(void **state)
         assert_non_null(f);
         size_t size = fread(bytes, 1, MAX_FILE, f);
         assert_true(size > 100 && size < MAX_FILE && fclose(f) == 0);
-        const char *name = k < 2 ? "damaged.exr" : "damaged.hdr";
+        char name[16];
+        snprintf(name, sizeof name, "damaged%s", strrchr(names[k], '.'));
         assert_true(read_bytes(name, bytes, size, &e));
         for (size_t end = 0; end < size; end += 1 + size / 97) {
             e.msg[0] = '\0';
@@ -285,7 +325,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exr_round_trip),         cmocka_unit_test(exr_of_any_shape),
         cmocka_unit_test(exr_as_others_write_it), cmocka_unit_test(hdr_as_others_write_it),
-        cmocka_unit_test(png_round_trip),         cmocka_unit_test(damaged_files),
+        cmocka_unit_test(png_round_trip),         cmocka_unit_test(png_texts),
+        cmocka_unit_test(damaged_files),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
