@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/reproduce.sh BUILD: `assay reproduce` makes pictures again, however they were made, and sees what is not the same.
+# tests/reproduce.sh BUILD: `assay reproduce` makes pictures, stored references and results again, and sees what is not the same.
 # Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/reproduce.sh BUILD}")
@@ -140,6 +140,52 @@ expect "the scene is gone" 3 "is not here" "$tmp/x.exr"
 expect "the scene is elsewhere" 0 "the same bits" --scene $scene "$tmp/x.exr"
 rm "$tmp/b.exr"
 expect "a share is gone" 3 "share.*is not here" "$tmp/abc.exr"
-expect "a stored reference" 3 "manifest.json says it" golden/41_cornell/cycles.exr
 expect "no picture" 3 "cannot read" README.md
+
+# Results: of a validation, a comparison, a convergence and a grade; then with a value that no run of it has.
+altered() { # FILE NAME: every number of that name with another first digit
+    sed -E "s/(\"$2\": -?)[0-9]/\\17/" "$1" >"$1.new" && mv "$1.new" "$1"
+}
+"$assay" validate -q --only 12_point_plane -o "$tmp/report" >/dev/null
+expect "a validation" 0 "the same bits in all [0-9]\{3\}" "$tmp/report/results.json"
+altered "$tmp/report/results.json" mdb_global
+expect "a validation with a value changed" 1 "values DIFFER, first claims.0..mdb_global: 7" "$tmp/report/results.json"
+"$assay" validate -q --only 12_point_plane --budget 1s -o "$tmp/budget" >/dev/null
+expect "a validation that depended on the time it had" 3 "depends on the time there was" "$tmp/budget/results.json"
+"$pathtracer" -q -r 32 32 -s 16 --seed 1 -f "$tmp/one.exr" $scene >/dev/null && "$pathtracer" -q -r 32 32 -s 16 --seed 2 -f "$tmp/two.exr" $scene >/dev/null
+"$assay" compare -q --margin 0.5 --margin-tile 0.9 --json "$tmp/claim.json" "$tmp/one.exr" "$tmp/two.exr" >/dev/null
+expect "a comparison" 0 "the same bits in all" "$tmp/claim.json"
+"$pathtracer" -q -r 32 32 -s 16 --seed 3 -f "$tmp/two.exr" $scene >/dev/null
+expect "a comparison of which one side is another now" 1 "values DIFFER, first claims.0." "$tmp/claim.json"
+rm "$tmp/two.exr"
+expect "a comparison of which one side is gone" 3 "two.exr" "$tmp/claim.json"
+"$assay" converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16 --alpha 0.01 -o "$tmp/converge" 41_cornell >/dev/null 2>&1
+expect "a convergence, but for its times" 0 "the same bits in all" "$tmp/converge/results.json"
+expect "results and the scene of a picture" 3 "are for pictures" --scene $scene "$tmp/claim.json"
+echo '{"assay": 1}' >"$tmp/none.json" && echo '{"command": "rm -rf x"}' >"$tmp/other.json" && echo '[]' >"$tmp/class.json"
+expect "results that do not say how" 3 "does not say by what command" "$tmp/none.json"
+expect "results of another program" 3 "made by no command of assay" "$tmp/other.json"
+expect "grades of a class" 3 "made again by itself" "$tmp/class.json"
+mkdir "$tmp/subs" && cp "$pathtracer" "$tmp/subs/right"
+"$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" >"$tmp/out" 2>&1
+if grep -q "no sandbox" "$tmp/out"; then echo "skip reproduce: grades ($(cat "$tmp/out"))"; else
+    expect "a grade" 0 "the same bits in all" "$tmp/grades/right/grade.json"
+    altered "$tmp/grades/right/grade.json" points
+    expect "a grade with other points" 1 "values DIFFER, first points: 7" "$tmp/grades/right/grade.json"
+fi
+
+# Stored references, by their engines.
+mkdir -p "$tmp/golden/12_point_plane" && cp golden/12_point_plane/* "$tmp/golden/12_point_plane"
+cp golden/12_point_plane/cycles.exr "$tmp/moved.exr"
+expect "a reference that is not where it was stored" 3 "made again where it is stored" "$tmp/moved.exr"
+if env PATH=/nowhere "$assay" reproduce golden/12_point_plane/cycles.exr >"$tmp/out" 2>&1 || ! grep -q 'blender: no such program' "$tmp/out"; then
+    echo "not ok reproduce: a reference without its engine: $(cat "$tmp/out")" && failures=$((failures + 1))
+else
+    echo "ok reproduce: a reference without its engine"
+fi
+if command -v blender >/dev/null; then
+    expect "a reference by Cycles" 0 "the same bits in all" "$tmp/golden/12_point_plane/cycles.exr"
+else
+    echo "skip reproduce: a reference by Cycles (no blender)"
+fi
 [ $failures -eq 0 ]

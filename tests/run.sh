@@ -29,7 +29,7 @@ run_job() {
 }
 export -f run_job
 
-# The longest first: as many as there are processors at a time.
+# The longest first: one more than there are processors at a time, since some wait for other programs.
 {
     echo tests/end_to_end.sh
     echo tests/lint.sh
@@ -37,7 +37,7 @@ export -f run_job
     long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
     printf '%s\n' "${programs[@]}" | grep -E "$long"
     printf '%s\n' "${programs[@]}" | grep -vE "$long"
-} | xargs -I{} -P "$(nproc)" bash -c 'run_job "$0" {} "$1"' "$log" "$build"
+} | xargs -I{} -P "$(($(nproc) + 1))" bash -c 'run_job "$0" {} "$1"' "$log" "$build"
 
 for program in "${programs[@]}"; do
     name=$(basename "$program")

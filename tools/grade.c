@@ -3,6 +3,7 @@
 #include "../reference/json_file.h"
 #include "../renderer/fs.h"
 #include "../renderer/sha256.h"
+#include "../renderer/shell_words.h"
 #include "../renderer/version.h"
 
 #include <errno.h>
@@ -220,6 +221,24 @@ static bool is_done(const char *path, const char *key, json_t **grade)
     return false;
 }
 
+/* NULL where there is none to say. */
+static json_t *command_of(const struct grade_job *job, const char *path)
+{
+    int num = 0;
+    while (job->word != NULL && job->word[num] != NULL)
+        num++;
+    const char **word = num > 0 ? calloc((size_t)num + 2, sizeof *word) : NULL;
+    if (word == NULL)
+        return NULL;
+    memcpy(word, job->word, (size_t)num * sizeof *word);
+    word[num] = path;
+    char *text = shell_join("assay", word);
+    json_t *command = text != NULL ? json_string(text) : NULL;
+    free(text);
+    free(word);
+    return command;
+}
+
 static bool grade_one(const struct grade_job *job, const char *path, const char *work,
                       json_t **grade, struct err *e)
 {
@@ -235,11 +254,11 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     if (!remove_tree(out, e) || !make_dirs(out, e) ||
         !submission_build(job->rubric, job->sandbox, work, log, &s, e))
         return false;
-    *grade =
-        json_pack("{si, ss, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id", s.id, "kind",
-                  submission_kind_name[s.kind], "key", key, "rubric", job->rubric->title, "sandbox",
-                  !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
-                  "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
+    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
+                       s.id, "kind", submission_kind_name[s.kind], "command", command_of(job, path),
+                       "version", assay_version, "key", key, "rubric", job->rubric->title,
+                       "sandbox", !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha",
+                       job->alpha, "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
     if (*grade != NULL && grade_made(job, &s, work, out, *grade, e) && json_write(file, *grade, e))
         return true;
     json_decref(*grade);

@@ -14,6 +14,7 @@ struct grade_job {
     const char *stage;       /* submission_stage() */
     const char *out;         /* OUT/ID/grade.json and what else there is of it */
     const char *const *path; /* of the submissions */
+    const char *const *word; /* grade_words(), for "command" of a grade; NULL: not said */
     int num, jobs, threads;
     double alpha;                            /* of one check */
     const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the pictures */
@@ -26,7 +27,7 @@ struct grade_job {
 };
 
 /* grade.json:
- *   { "assay_grade": 1, "id": , "kind": "program", "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
+ *   { "assay_grade": 1, "id": , "kind": "program", "command": | null (grades this one again), "version": , "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
  *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
  *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
  *     "chance": of any check's points being others in another run, at most (the sum of theirs),

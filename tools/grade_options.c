@@ -1,7 +1,8 @@
-#include "../renderer/fs.h"
 #include "grade_options.h"
 
 #include "../renderer/cli.h"
+#include "../renderer/command_words.h"
+#include "../renderer/fs.h"
 #include "places.h"
 
 #include <stdio.h>
@@ -97,6 +98,30 @@ bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
         return err_set(e, "--%s takes no submissions", s->only_check ? "check-rubric" : "prepare");
     return s->only_check || s->prepare || s->num > 0 ||
            err_set(e, "no submission given (see --help)");
+}
+
+char **grade_words(int argc, char **argv, const struct grade_settings *s, int *num)
+{
+    static const struct option_words how[] = {
+        {"-o", 1},      {"--out", 1}, {"-j", 1},      {"--jobs", 1},  {"--references", 1},
+        {"--slurm", 0}, {"-q", 0},    {"--quiet", 0}, {"--again", 0}, {0}};
+    char **word = cli_apart(options, argc, argv);
+    if (word == NULL)
+        return NULL;
+    int all = 0;
+    while (word[all] != NULL)
+        all++;
+    all = words_kept(how, all, word, word);
+    *num = 0;
+    for (int i = 0; i < all; i++) {
+        bool is_submission = false;
+        for (int k = 0; k < s->num; k++)
+            is_submission = is_submission || s->submission[k] == word[i];
+        if (!is_submission)
+            word[(*num)++] = word[i];
+    }
+    word[*num] = NULL;
+    return word;
 }
 
 void grade_print_help(void)

@@ -25,6 +25,10 @@ struct grade_settings grade_defaults(int argc, struct grade_paths *at);
 /* On top of the defaults. */
 bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
     __attribute__((warn_unused_result));
+/* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go and how many at a
+ * time: a NULL-terminated array of num words, to free(). NULL out of memory. */
+char **grade_words(int argc, char **argv, const struct grade_settings *s, int *num)
+    __attribute__((warn_unused_result));
 void grade_print_help(void);
 
 #endif

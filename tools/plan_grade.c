@@ -2,7 +2,6 @@
 #define _GNU_SOURCE
 #include "../reference/process.h"
 #include "../renderer/fs.h"
-#include "../renderer/command_words.h"
 #include "grade_options.h"
 #include "plan_kinds.h"
 #include "results.h"
@@ -14,25 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-/* What every job says itself, or nobody needs in a job. */
-static const struct option_words not_of_a_job[] = {
-    {"-o", 1}, {"--out", 1},   {"-j", 1}, {"--jobs", 1}, {"--references", 1}, {"--slurm", 0},
-    {"-q", 0}, {"--quiet", 0}, {0}};
-
-/* Into to[], with room for argc, the words that every job has of the command: its options and the rubric. */
-static int words_of_a_job(int argc, char **argv, const struct grade_settings *s, char **to)
-{
-    int num = 0, all = words_kept(not_of_a_job, argc - 1, argv + 1, to);
-    for (int i = 0; i < all; i++) {
-        bool is_submission = false;
-        for (int k = 0; k < s->num; k++)
-            is_submission = is_submission || s->submission[k] == to[i];
-        if (!is_submission)
-            to[num++] = to[i];
-    }
-    return num;
-}
 
 /* The references are made here and now: all jobs need the same. */
 static bool prepare(const char *references, char *const *words, int num, struct err *e)
@@ -83,16 +63,16 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
                       struct err *e)
 {
     char assay[4096], references[PLAN_PATH + 16];
-    char **words = calloc((size_t)argc, sizeof *words);
+    int num = 0;
+    char **words = grade_words(argc, argv, s, &num);
     bool ok = words != NULL || err_set(e, "out of memory");
-    int num = ok ? words_of_a_job(argc, argv, s, words) : 0;
     beside_program(assay, sizeof assay, "assay");
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
     snprintf(references, sizeof references, "%s/references", p->dir);
     const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
-    ok = ok && prepare(references, words, num, e) &&
+    ok = ok && prepare(references, words + 1, num - 1, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
-         plan_run_words(p, (const char *const *)words, num, true, e) &&
+         plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
          plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
          plan_input(p, s->pathtracer, e) && rubric_inputs(p, s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */

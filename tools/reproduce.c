@@ -8,7 +8,9 @@
 #include "../renderer/shell_words.h"
 #include "merge.h"
 #include "plan_kinds.h"
+#include "reproduce_golden.h"
 #include "reproduce_png.h"
+#include "reproduce_results.h"
 
 #include <assert.h>
 #include <stdio.h>
@@ -216,11 +218,7 @@ static bool remake(const char *path, const struct reproduce_options *opt, const 
         return false;
     const char *command = image_get_attr(&im, "assay:command");
     char **word = NULL;
-    bool ok =
-        command != NULL || err_set(e, "%s: does not say by what command it was made%s", path,
-                                   image_get_attr(&im, "assay:engine") != NULL
-                                       ? ": a stored reference, of which its manifest.json says it"
-                                       : "");
+    bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
     if (ok && (word = shell_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     snprintf(out->made_by, sizeof out->made_by, "%s", attr(&im, "assay:version"));
@@ -242,28 +240,52 @@ void reproduced_free(struct reproduced *r)
     *r = (struct reproduced){0};
 }
 
-bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
-               struct err *e)
+static bool reproduce_picture(const char *path, const struct reproduce_options *opt,
+                              const char *dir, struct reproduced *out, struct err *e)
 {
     struct image then = {0}, now = {0};
-    struct err ignored;
-    char dir[] = "/tmp/assay-reproduce.XXXXXX", to[MAX_PATH];
-    *out = (struct reproduced){0};
+    struct reproduce_options with = *opt;
+    char to[MAX_PATH], beside[4096];
+    beside_program(beside, sizeof beside, "pathtracer");
+    if (with.pathtracer == NULL)
+        with.pathtracer = beside;
     if (image_is_png(path))
-        return reproduce_png(path, opt, out, e);
+        return reproduce_png(path, &with, dir, out, e);
     if (!image_read_exr(path, &then, NULL, e))
         return false;
-    if (mkdtemp(dir) == NULL) {
-        image_free(&then);
-        return err_set(e, "%s: cannot make a directory", dir);
-    }
     snprintf(to, sizeof to, "%s/again.exr", dir);
-    bool ok = remake(path, opt, to, 0, out, e) && image_read_exr(to, &now, NULL, e) &&
-              check_same(path, &then, &now, e) && reproduce_compare(path, &then, &now, out, e);
+    bool ok = image_get_attr(&then, "assay:engine") != NULL
+                  ? reproduce_golden(path, &then, opt, dir, to, out, e)
+                  : remake(path, &with, to, 0, out, e);
+    ok = ok && image_read_exr(to, &now, NULL, e) && check_same(path, &then, &now, e) &&
+         reproduce_compare(path, &then, &now, out, e);
     if (ok && opt->keep != NULL)
         ok = image_write_exr(opt->keep, &now, e);
     image_free(&then);
     image_free(&now);
+    return ok;
+}
+
+/* JSON is told by its first byte. */
+static bool is_results(const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    int first = f != NULL ? getc(f) : EOF;
+    if (f != NULL)
+        fclose(f);
+    return first == '{' || first == '[';
+}
+
+bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
+               struct err *e)
+{
+    struct err ignored;
+    char dir[] = "/tmp/assay-reproduce.XXXXXX";
+    *out = (struct reproduced){0};
+    if (mkdtemp(dir) == NULL)
+        return err_set(e, "%s: cannot make a directory", dir);
+    bool ok = is_results(path) ? reproduce_results(path, opt, dir, out, e)
+                               : reproduce_picture(path, opt, dir, out, e);
     if (!ok)
         reproduced_free(out);
     bool removed = remove_tree(dir, &ignored);

@@ -1,7 +1,6 @@
 #include "reproduce_png.h"
 
 #include "../renderer/cli.h"
-#include "../renderer/fs.h"
 #include "../renderer/moments.h"
 #include "../renderer/picture_texts.h"
 #include "../renderer/shell_words.h"
@@ -125,31 +124,23 @@ static bool keep(const char *path, const struct image *im, struct err *e)
     return ok;
 }
 
-bool reproduce_png(const char *path, const struct reproduce_options *opt, struct reproduced *out,
-                   struct err *e)
+bool reproduce_png(const char *path, const struct reproduce_options *opt, const char *dir,
+                   struct reproduced *out, struct err *e)
 {
     struct image then, now = {0};
-    struct err ignored;
     enum picture_kind kind = PICTURE_IMAGE;
-    char dir[] = "/tmp/assay-reproduce.XXXXXX", **word = NULL;
+    char **word = NULL;
     int num = 0;
-    *out = (struct reproduced){0};
     if (!image_read_png(path, &then, e))
         return false;
-    bool ok = read_command(path, &then, &kind, &word, &num, e);
-    bool made = ok && mkdtemp(dir) != NULL;
-    if (ok && !made)
-        ok = err_set(e, "%s: cannot make a directory", dir);
     snprintf(out->made_by, sizeof out->made_by, "%s", attr(&then, "assay:version"));
-    ok = ok && remake(path, &then, kind, word, num, opt, dir, &now, out, e) &&
-         check_same(path, kind, &then, &now, e) && reproduce_compare(path, &then, &now, out, e) &&
-         (opt->keep == NULL || keep(opt->keep, &now, e));
+    bool ok = read_command(path, &then, &kind, &word, &num, e) &&
+              remake(path, &then, kind, word, num, opt, dir, &now, out, e) &&
+              check_same(path, kind, &then, &now, e) &&
+              reproduce_compare(path, &then, &now, out, e) &&
+              (opt->keep == NULL || keep(opt->keep, &now, e));
     free(word);
     image_free(&then);
     image_free(&now);
-    if (!ok)
-        reproduced_free(out);
-    bool removed = !made || remove_tree(dir, &ignored);
-    (void)removed; /* it is in /tmp */
     return ok;
 }

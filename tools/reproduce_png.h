@@ -6,9 +6,9 @@
 #include "reproduce.h"
 
 /* As reproduce(): an image, the rates of an adaptive one or a heat map (renderer/picture_texts.h); all 8-bit codes are compared, and the
- * texts about what was rendered. */
-bool reproduce_png(const char *path, const struct reproduce_options *opt, struct reproduced *out,
-                   struct err *e) __attribute__((warn_unused_result));
+ * texts about what was rendered. Works in the directory `dir`, which exists; opt->pathtracer is there. */
+bool reproduce_png(const char *path, const struct reproduce_options *opt, const char *dir,
+                   struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
 
 /* Renders the samples "A:B" again by the words of a command, whose scene has to have the hash that the image says, into the
  * picture `to` and, unless it is NULL, a heat map. Sets out->command. `path` names the image in messages. */

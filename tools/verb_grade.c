@@ -63,7 +63,7 @@ static bool needs_staff(const json_t *grades)
 
 static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const struct suite *suite, const struct answers *answers,
-                     const struct sandbox *box, struct err *e)
+                     const char *const *word, const struct sandbox *box, struct err *e)
 {
     char stage[512], views[512];
     struct progress p = {s->num, s->quiet};
@@ -75,6 +75,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                             .stage = stage,
                             .out = s->out,
                             .path = s->submission,
+                            .word = word,
                             .num = s->num,
                             .jobs = s->jobs == 0 ? cli_processors() : s->jobs,
                             .threads = s->threads,
@@ -108,7 +109,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
 }
 
 static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
-                 struct err *e)
+                 int argc, char **argv, struct err *e)
 {
     char cache[4400], pathtracer[PATH_MAX];
     struct answers *answers = calloc(1, sizeof *answers);
@@ -133,8 +134,12 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
             printf("references of %s: %s\n", r->path, cache);
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
                             &box, e)) {
-        if (make_dirs(cache, e) && answers_make(r, &opt, answers, e))
-            code = run_batch(s, r, suite, answers, &box, e);
+        int num;
+        char **word = grade_words(argc, argv, s, &num);
+        bool ok = word != NULL || err_set(e, "out of memory");
+        if (ok && make_dirs(cache, e) && answers_make(r, &opt, answers, e))
+            code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
+        free(word);
         sandbox_close(&box);
     } else if (!s->unsafe) {
         err_prefix(e, "programs are not run (--unsafe-no-sandbox)");
@@ -165,7 +170,7 @@ int verb_grade(int argc, char **argv, struct err *e)
             if (s.only_check)
                 printf("%s: %d checks in %d parts, %g points\n", r->path, r->num_checks,
                        r->num_parts, rubric_points(r));
-            code = s.only_check ? 0 : grade(&s, r, &suite, e);
+            code = s.only_check ? 0 : grade(&s, r, &suite, argc, argv, e);
         }
     }
     suite_free(&suite);

@@ -1,5 +1,4 @@
 #include "../renderer/cli.h"
-#include "../renderer/fs.h"
 #include "../renderer/version.h"
 #include "reproduce.h"
 #include "results.h"
@@ -20,25 +19,27 @@ static const struct cli_option options[] = {
 static void print_help(void)
 {
     puts(
-        "usage: assay reproduce [options] PICTURE.exr\n\n"
-        "Renders again what made a picture of pathtracer or of `assay merge`, by the command, samples and\n"
-        "hashes in its metadata, and compares all values bit by bit. Exit code 0: the same, 1: not.\n");
+        "usage: assay reproduce [options] FILE\n\n"
+        "Makes an output again by what it says of its origin, and compares.\n"
+        "  a picture of pathtracer or of `assay merge` (EXR): all values bit by bit\n"
+        "  a PNG of pathtracer: image, sampling rates, heat map: all 8-bit codes\n"
+        "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine; it must be installed\n"
+        "  results.json of validate, compare, converge, and DIR/ID/grade.json: all values but dates and times\n"
+        "Exit code: 0 the same, 1 not, 3 cannot be made again (one line on stderr).\n");
     cli_print_options(stdout, options);
 }
 
 int verb_reproduce(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    char beside[4096];
-    struct reproduce_options opt = {.pathtracer = beside};
+    struct reproduce_options opt = {0};
     const char *path = NULL;
-    beside_program(beside, sizeof beside, "pathtracer");
     for (int i; (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return EXIT_NOT_JUDGED;
         bool ok = true;
         if (i == CLI_POSITIONAL) {
-            ok = path == NULL || err_set(e, "reproduce takes one picture");
+            ok = path == NULL || err_set(e, "reproduce takes one file");
             path = c.value[0];
         } else if (i == OPT_SCENE) {
             opt.scene = c.value[0];
@@ -56,7 +57,7 @@ int verb_reproduce(int argc, char **argv, struct err *e)
             return EXIT_NOT_JUDGED;
     }
     if (path == NULL) {
-        err_set(e, "reproduce needs a picture (see --help)");
+        err_set(e, "reproduce needs a file (see --help)");
         return EXIT_NOT_JUDGED;
     }
     struct reproduced r;
@@ -69,8 +70,10 @@ int verb_reproduce(int argc, char **argv, struct err *e)
         printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r.num_different, r.num_values,
                r.first);
     printf("made again by: %s\n", r.command);
-    if (strcmp(r.made_by, assay_version) != 0)
-        printf("the picture is of version %s, this is %s\n", r.made_by, assay_version);
+    if (r.made_by[0] != '\0' && strcmp(r.made_by, assay_version) != 0)
+        printf("it is of version %s, this is %s\n", r.made_by, assay_version);
+    if (r.note[0] != '\0')
+        puts(r.note);
     reproduced_free(&r);
     return same ? 0 : 1;
 }

@@ -1,0 +1,18 @@
+/* Results made again (reproduce.h): the JSON that validate, compare, converge and grade write. */
+#ifndef ASSAY_REPRODUCE_RESULTS_H
+#define ASSAY_REPRODUCE_RESULTS_H
+
+#include "reproduce.h"
+
+#include <jansson.h>
+
+/* Runs the command that the file names again, from the current directory, its outputs into `dir`, which exists, and compares every
+ * value but those of the run itself: command, date, machine, version, and what was timed. False if it cannot be judged: no
+ * command, one whose results depend on the time it had, files that are gone, a program that fails. */
+bool reproduce_results(const char *path, const struct reproduce_options *opt, const char *dir,
+                       struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
+
+/* Adds what two of them have in values to out, the first that differs by its place: "claims[3].difference". */
+void results_differ(const json_t *then, const json_t *now, struct reproduced *out);
+
+#endif
