@@ -34,8 +34,8 @@ static bool check_same(const char *path, enum picture_kind kind, const struct im
     return true;
 }
 
-/* The samples of each pixel, which an EXR has, in the colours of rates. A render that was stopped asked for more samples than it
- * has, so its command alone would not give these colours. */
+/* The samples of each pixel, which an EXR has, in the colours of rates. A render that was stopped had asked for more samples than
+ * are made again, so the rates of that one have other colours. */
 static bool rates_of(const char *path, const struct image *then, const char *exr, struct image *now,
                      struct err *e)
 {

@@ -63,6 +63,8 @@ int verb_reproduce(int argc, char **argv, struct err *e)
     struct reproduced r;
     if (!reproduce(path, &opt, &r, e))
         return EXIT_NOT_JUDGED;
+    err_hide_controls(r.command); /* these are texts of the file */
+    err_hide_controls(r.made_by);
     bool same = r.num_different == 0;
     if (same)
         printf("%s: the same bits in all %.0f values\n", path, r.num_values);
