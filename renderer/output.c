@@ -243,14 +243,22 @@ void print_summary(const struct output *o, const struct film *f, const struct re
 
 void print_how_to_resume(const struct output *o, const struct film *f)
 {
-    const char *const picture[] = {o->opt->output[0], NULL};
-    char *command = shell_join(NULL, (const char *const *)o->argv);
-    char *more = o->opt->resume == NULL ? shell_join("--resume", picture) : NULL;
-    fprintf(stderr,
-            "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s%s%s\n",
+    /* Right behind the program: "--" may end the options. */
+    const char **word = calloc((size_t)o->argc + 3, sizeof *word);
+    char *command = NULL;
+    int n = 0;
+    if (word != NULL) {
+        word[n++] = o->argv[0];
+        if (o->opt->resume == NULL) {
+            word[n++] = "--resume";
+            word[n++] = o->opt->output[0];
+        }
+        memcpy(word + n, o->argv + 1, (size_t)(o->argc - 1) * sizeof *word);
+        command = shell_join(NULL, word);
+    }
+    fprintf(stderr, "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s\n",
             (unsigned long)f->num_samples, o->opt->last - o->opt->first,
-            command != NULL ? command : "the same command", more != NULL ? " " : "",
-            more != NULL ? more : "");
+            command != NULL ? command : "the same command, with --resume");
     free(command);
-    free(more);
+    free(word);
 }

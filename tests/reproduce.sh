@@ -188,4 +188,14 @@ if command -v blender >/dev/null; then
 else
     echo "skip reproduce: a reference by Cycles (no blender)"
 fi
+
+# What an interrupted render says to go on with, also behind a "--".
+interrupted() { timeout --preserve-status -s INT 1 "$@" 2>&1 >/dev/null; }
+said=$(interrupted "$pathtracer" -q -r 16 16 -s 100000000 -f "$tmp/long.exr" -- $scene)
+# It is one line of words that a shell reads.
+again=$(interrupted bash -c "exec $(echo "$said" | tail -n 1)")
+before=$(echo "$said" | sed -n 's/.*interrupted after \([0-9]*\) .*/\1/p') after=$(echo "$again" | sed -n 's/.*interrupted after \([0-9]*\) .*/\1/p')
+if [ "${before:-0}" -gt 0 ] && [ "${after:-0}" -gt "$before" ]; then echo "ok reproduce: an interrupted render says how to go on"; else
+    echo "not ok reproduce: an interrupted render says how to go on: $said; $again" && failures=$((failures + 1))
+fi
 [ $failures -eq 0 ]

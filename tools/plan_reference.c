@@ -3,8 +3,8 @@
  *   "references": [{"scene": , "engine": , "seed": , "key": reference_key(), "binary_sha256": of the engine,
  *                   "job": of its first pictures, "jobs": how many}] */
 #include "../reference/process.h"
-#include "../renderer/fs.h"
 #include "../renderer/command_words.h"
+#include "../renderer/fs.h"
 #include "plan_kinds.h"
 #include "reference_command.h"
 #include "results.h"

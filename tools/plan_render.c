@@ -1,9 +1,9 @@
 /* A render as jobs: cells of its picture. What a pixel is depends on no other, so cells with all samples of their pixels, put beside
  * each other, are the picture of one render bit by bit, whatever the cells. --ranges: each cell in sample ranges, whose
  * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
+#include "../renderer/command_words.h"
 #include "../renderer/fs.h"
 #include "../renderer/options.h"
-#include "../renderer/command_words.h"
 #include "plan_kinds.h"
 
 #include <stdio.h>

@@ -1,9 +1,9 @@
 /* The parts of a render (plan_render.c) put together, 16 rows at a time, from the sums of their states. */
 #include "../renderer/cli.h"
 #include "../renderer/collada.h"
+#include "../renderer/command_words.h"
 #include "../renderer/output.h"
 #include "../renderer/state.h"
-#include "../renderer/command_words.h"
 #include "plan_kinds.h"
 #include "results.h"
 

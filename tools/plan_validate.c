@@ -1,7 +1,7 @@
 /* A validation as jobs: one for each scene, whose claims share their renders, or one for each claim, which renders what it needs. */
 #include "../reference/process.h"
-#include "../renderer/fs.h"
 #include "../renderer/command_words.h"
+#include "../renderer/fs.h"
 #include "plan_kinds.h"
 #include "results.h"
 #include "validate_command.h"
