@@ -191,7 +191,7 @@ fi
 
 # What an interrupted render says to go on with, also behind a "--".
 interrupted() { timeout --preserve-status -s INT 1 "$@" 2>&1 >/dev/null; }
-said=$(interrupted "$pathtracer" -q -r 16 16 -s 100000000 -f "$tmp/long.exr" -- $scene)
+said=$(interrupted "$pathtracer" -q -r 16 16 -s 16777216 -f "$tmp/long.exr" -- $scene)
 # It is one line of words that a shell reads.
 again=$(interrupted bash -c "exec $(echo "$said" | tail -n 1)")
 before=$(echo "$said" | sed -n 's/.*interrupted after \([0-9]*\) .*/\1/p') after=$(echo "$again" | sed -n 's/.*interrupted after \([0-9]*\) .*/\1/p')
