@@ -38,6 +38,23 @@ static const struct oiio_table *load(struct err *e)
     return table;
 }
 
+/* Whether no chunk of a PNG says that it is longer than what is left of its `size` bytes [PNG 5.3]: the library reserves what a chunk says it is long, up to 2 GiB,
+ * before it looks. f: after the signature. */
+static bool png_chunks_fit(FILE *f, long size)
+{
+    enum { AROUND = 12 }; /* length, name, checksum */
+    unsigned char head[8];
+    for (long at = 8; at <= size - AROUND;) {
+        if (fseek(f, at, SEEK_SET) != 0 || fread(head, 1, sizeof head, f) != sizeof head)
+            return false;
+        long length = (long)head[0] << 24 | (long)head[1] << 16 | (long)head[2] << 8 | head[3];
+        if (length > size - at - AROUND)
+            return false;
+        at += AROUND + length;
+    }
+    return true;
+}
+
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
 static const char *format_of(const char *path, double *size, struct err *e)
 {
@@ -58,7 +75,9 @@ static const char *format_of(const char *path, double *size, struct err *e)
             format = "openexr";
         why = "the file ends within its header";
     } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
-        format = "png";
+        if (png_chunks_fit(f, (long)st.st_size))
+            format = "png";
+        why = "the file ends within one of its chunks";
     } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
         format = "hdr";
     } else if (n >= 3 && head[0] == 'P' && strchr("123456Ff", head[1]) != NULL &&

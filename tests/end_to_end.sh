@@ -145,7 +145,7 @@ expect "resume: damaged state" 3 "damaged" \
 # on with for two samples more than it has.
 interrupt() {
     rm -f "$tmp/long.exr" "$tmp/long.exr.state"
-    expect "$1 ends with $2 and says how to resume" "$2" "long.exr --resume $tmp/long.exr" \
+    expect "$1 ends with $2 and says how to resume" "$2" "pathtracer --resume $tmp/long.exr " \
         timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')

@@ -12,7 +12,7 @@
 
 /* Measured; see SCALE.md for how. */
 static const double start_s =
-    0.33; /* CPU s of a job that does nothing: run-job, hashes, the program's start */
+    0.012; /* CPU s of a job that does nothing: run-job, hashes, the program's start */
 static const double controller_s = 0.0021; /* of slurmctld for a task */
 static const double launch_s = 0.5; /* from one task's end to the next one's begin on a slot */
 

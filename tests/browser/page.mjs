@@ -283,6 +283,8 @@ await column("Against", 4, String, (a, b) => (a < b ? -1 : a > b ? 1 : 0));
 await page.getByRole("button", { name: "Fold all", exact: true }).click();
 check("evidence is folded", !await article.locator(".maps").isVisible());
 await page.locator("#claims a[href='#" + await article.getAttribute("id") + "']").click();
+// By an event, which comes when the browser finds time.
+await article.locator(".maps").waitFor({ state: "visible", timeout: 10000 }).catch(() => {});
 check("a row's link unfolds its evidence", await article.locator(".maps").isVisible());
 await page.getByRole("button", { name: "Unfold all evidence" }).click();
 check("all evidence is unfolded", await page.locator(".evidence:not([open])").count() === 0);
