@@ -192,7 +192,7 @@ help:
 	@echo 'make scale-live live references and validations in jobs, with Blender and POV-Ray (minutes)'
 	@echo 'make large      a picture of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)'
 	@echo 'make scale      simulate a class, a suite and a large picture on up to 1000 nodes (tools/SCALE.md)'
-	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (40 minutes)'
+	@echo 'make coverage   lines of renderer/, reference/ and tools/ that the tests reach (12 minutes)'
 	@echo 'make mutants    build each known bug into a renderer and see the suite find it (many minutes)'
 	@echo 'make anchors    what our gate and the rules of other renderers find on the same pictures'
 	@echo '                (tests/anchors; 20 CPU minutes, 900 MB)'
