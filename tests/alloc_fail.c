@@ -306,3 +306,13 @@ int alloc_fail_sum(void **state)
         sum.cases, sum.allocations, sum.lines, sum.right, sum.json);
     return 0;
 }
+
+long alloc_fail_file_size(const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    assert_int_equal(fseek(f, 0, SEEK_END), 0);
+    long size = ftell(f);
+    fclose(f);
+    return size;
+}

@@ -38,4 +38,7 @@ int alloc_fail_tell(void **state);
 /* A teardown of a group: one line with the number of cases, allocations, and how the calls ended. Returns 0. */
 int alloc_fail_sum(void **state);
 
+/* Bytes of a file that is there. */
+long alloc_fail_file_size(const char *path);
+
 #endif

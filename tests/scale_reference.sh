@@ -9,21 +9,8 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 
-tell() { # NAME WHY: not ok where WHY says something
-    if [ -z "$2" ]; then echo "ok references in jobs: $1"; else
-        echo "not ok references in jobs: $1: $2"
-        failures=$((failures + 1))
-    fi
-}
-expect() { # NAME STATUS PATTERN COMMAND...: a status of 3 comes with one line on stderr
-    local name=$1 status=$2 pattern=$3 why=""
-    shift 3
-    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
-    local got=$?
-    [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ "$status" -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; } ||
-        why="status $got, no '$pattern' or more than a line: $(head -c 1000 "$tmp/out" "$tmp/err")"
-    tell "$name" "$why"
-}
+what="references in jobs"
+. tests/expect.sh
 
 # A suite of one scene, which both engines have noise in.
 mkdir "$tmp/suite" "$tmp/bin"

@@ -115,6 +115,18 @@ bool plan_run_words(struct plan *p, const char *const *word, int num, bool user,
     return add_words(run, word, num, e);
 }
 
+bool plan_user_words(struct plan *p, const struct option_words *leave_out, int num, char **word,
+                     struct err *e)
+{
+    char **kept = calloc((size_t)num + 1, sizeof *kept);
+    if (kept == NULL)
+        return err_set(e, "out of memory");
+    int n = words_kept(leave_out, num, word, kept);
+    bool ok = plan_run_words(p, (const char *const *)kept, n, true, e);
+    free(kept);
+    return ok;
+}
+
 void plan_may_end(struct plan *p, int code)
 {
     /* Without them plan_make() fails. */

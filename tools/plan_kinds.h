@@ -2,6 +2,7 @@
 #ifndef ASSAY_PLAN_KINDS_H
 #define ASSAY_PLAN_KINDS_H
 
+#include "../renderer/command_words.h"
 #include "plan.h"
 
 #include <stdint.h>
@@ -15,6 +16,9 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
  * refused. */
 bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)
     __attribute__((warn_unused_result));
+/* Those of the user's command that the table does not leave out. */
+bool plan_user_words(struct plan *p, const struct option_words *leave_out, int num, char **word,
+                     struct err *e) __attribute__((warn_unused_result));
 /* An exit code besides 0. */
 void plan_may_end(struct plan *p, int code);
 /* A file or directory that all jobs read. */

@@ -32,14 +32,8 @@ static bool add_words(struct plan *p, int argc, char **argv, int threads, struct
     beside_program(assay, sizeof assay, "assay");
     snprintf(t, sizeof t, "%d", threads);
     const char *const first[] = {assay, "reference", "-t", t, "--out", "{out}", "{job}"};
-    char **word = calloc((size_t)argc, sizeof *word);
-    if (word == NULL)
-        return err_set(e, "out of memory");
-    int num = words_kept(not_of_a_job, argc - 1, argv + 1, word);
-    bool ok = plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
-              plan_run_words(p, (const char *const *)word, num, true, e);
-    free(word);
-    return ok;
+    return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+           plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }
 
 bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,

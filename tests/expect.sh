@@ -1,0 +1,18 @@
+# For `source`, from the root of the checkout: lines "ok $what: NAME" and "not ok $what: NAME: why", the latter counted in $failures. Uses $tmp.
+# shellcheck shell=bash disable=SC2154
+
+tell() { # NAME WHY: not ok where WHY says something
+    if [ -z "$2" ]; then echo "ok $what: $1"; else
+        echo "not ok $what: $1: $2"
+        failures=$((failures + 1))
+    fi
+}
+expect() { # NAME STATUS PATTERN COMMAND...: a status of 3 comes with one line on stderr
+    local name=$1 status=$2 pattern=$3 why=""
+    shift 3
+    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+    local got=$?
+    [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ "$status" -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; } ||
+        why="status $got, no '$pattern' or more than a line: $(head -c 1000 "$tmp/out" "$tmp/err")"
+    tell "$name" "$why"
+}
