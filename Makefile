@@ -282,6 +282,7 @@ $(foreach b,$(TREES),$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
 $(TREES:%=%/oiio.so): %/oiio.so: %/reference/oiio.cc.o
 	$(call say,LINK,$@)
 	$(Q)$(CXX) $(OPT) -shared -o $@ $< $(shell pkg-config --libs OpenImageIO)
+$(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/asan_options.c.o
 $(BUILD)/pathtracer: $(call obj,$(BUILD),renderer/main.c $(RENDERER))
 	$(link)
 $(BUILD)/assay: $(call obj,$(BUILD),tools/main.c $(HARNESS) $(RENDERER))
@@ -355,7 +356,7 @@ $(BUILD)/clang/libassay.a: $(call obj,$(BUILD)/clang,$(HARNESS) $(RENDERER))
 	$(archive)
 $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): TEST_LIBS := -fsanitize=fuzzer
 $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): $(BUILD)/clang/fuzz_%: \
-  $(BUILD)/clang/tests/fuzz/fuzz_%.c.o $(BUILD)/clang/tests/fuzz/fuzz.c.o $(BUILD)/clang/libassay.a | $(BUILD)/clang/oiio.so
+  $(BUILD)/clang/tests/fuzz/fuzz_%.c.o $(call obj,$(BUILD)/clang,tests/fuzz/fuzz.c tests/asan_options.c) $(BUILD)/clang/libassay.a | $(BUILD)/clang/oiio.so
 	$(link)
 programs-fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ))
 fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))

@@ -122,6 +122,15 @@ if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
     not_ok "another seed, another picture" "PNG files are the same"
 else ok "another seed, another picture"; fi
 
+# What tests/asan_options.c turns off is on without it: else a search for leaks now and then dies of where a variable happens to lie.
+sky=reference/scenes/46_sky.exr
+late_variables() { # ASAN_OPTIONS: those of libraries loaded late that the sanitizer took note of
+    ASAN_OPTIONS=$1 "$san_assay" compare $sky $sky 2>&1 | grep -c '__tls_get_addr: 0x'
+}
+if [ "$(late_variables verbosity=2)" -eq 0 ] && [ "$(late_variables verbosity=2:intercept_tls_get_addr=1)" -gt 0 ]; then
+    ok "the search for leaks keeps to what it knows"
+else not_ok "the search for leaks keeps to what it knows" "looked at $(late_variables verbosity=2) variables it should not, $(late_variables verbosity=2:intercept_tls_get_addr=1) that it should"; fi
+
 # Stopping and going on. --keep-state leaves every sum to the last bit, so equal states are equal renders.
 box="$pathtracer -q -r 48 32 --aov $scene"
 $box -s 40 --keep-state -f "$tmp/whole.exr" >/dev/null || not_ok "--keep-state" "failed"
