@@ -30,7 +30,8 @@ pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
 # --as-needed: pathtracer starts at once, without the libraries that only the harness uses.
 LIBS       = -Wl,--as-needed $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
-SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
+# -g1: file and line are all that a finding says, and -g doubles the time that the kernels take to compile.
+SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
 OPT      := -O3 -g -fno-math-errno -fno-trapping-math
 WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
 WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
@@ -276,6 +277,8 @@ $(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
 	$$(compile_c)
 endef
 TREES := $(BUILD) $(BUILD)/san $(BUILD)/clang $(BUILD)/tsan $(BUILD)/cov
+# No fuzzer traces a ray; the tests do, in san/.
+$(patsubst %,$(BUILD)/clang/%.o,$(filter-out renderer/wide_split%,$(KERNELS))): OPT := -O1
 $(foreach b,$(TREES),$(foreach k,$(BY_ISA),$(foreach i,$(ISAS), \
   $(eval $(call kernel_object,$(b),$(k),$(i))))))
 
