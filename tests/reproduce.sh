@@ -174,6 +174,56 @@ if grep -q "no sandbox" "$tmp/out"; then echo "skip reproduce: grades ($(cat "$t
     expect "a grade with other points" 1 "values DIFFER, first points: 7" "$tmp/grades/right/grade.json"
 fi
 
+# Pages and tables, of the results beside them.
+bytes() { # NAME FILE: it is made again; a byte more is seen
+    expect "$1" 0 "the same bits in all [0-9]* bytes" "$2"
+    cp "$2" "$tmp/was" && sed -i '$s/$/ /' "$2"
+    expect "$1, a byte more" 1 "the bytes DIFFER, first at line" "$2"
+    cp "$tmp/was" "$2"
+}
+"$assay" validate -q --only 12_point_plane -o "$tmp/report" >/dev/null
+bytes "the page of a validation" "$tmp/report/index.html"
+bytes "its JUnit file" "$tmp/report/junit.xml"
+bytes "the page of a convergence" "$tmp/converge/index.html"
+"$assay" report --converge "$tmp/converge/results.json" -o "$tmp/report/both.html" "$tmp/report/results.json" >/dev/null
+bytes "a page of both" "$tmp/report/both.html"
+mkdir -p "$tmp/runs/a line
+and 'quotes'" && cp "$tmp/report/results.json" "$tmp/runs/a line
+and 'quotes'/" && "$assay" report --history "$tmp/runs" >/dev/null
+bytes "a history" "$tmp/runs/history.html"
+"$pathtracer" -q -r 32 32 -s 16 --seed 2 -f "$tmp/its two
+lines.exr" $scene >/dev/null
+"$assay" compare -q --margin 0.5 --margin-tile 0.9 -r "$tmp/claim.html" "$tmp/one.exr" "$tmp/its two
+lines.exr" >/dev/null
+bytes "the page of a comparison" "$tmp/claim.html"
+"$pathtracer" -q -r 32 32 -s 16 --seed 3 -f "$tmp/its two
+lines.exr" $scene >/dev/null
+expect "the page of a comparison of which one side is another now" 1 "the bytes DIFFER, first at line" "$tmp/claim.html"
+sed 's/assay compare/rm -r/' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page of another program" 3 "other.html: made by no command of assay" "$tmp/other.html"
+sed '/assay:command/d' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page that does not say how" 3 "other.html: does not say by what command" "$tmp/other.html"
+sed 's/assay compare/assay `reboot`/' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page with a command that a shell would act on" 3 "not a plain command" "$tmp/other.html"
+altered "$tmp/report/results.json" mdb_global
+expect "a page of other results" 1 "the bytes DIFFER, first at line" "$tmp/report/index.html"
+expect "JUnit of other results" 1 "the bytes DIFFER, first at line" "$tmp/report/junit.xml"
+rm "$tmp/report/results.json"
+expect "a page whose results are gone" 3 "are not beside it" "$tmp/report/index.html"
+expect "JUnit whose results are gone" 3 "are not beside it" "$tmp/report/junit.xml"
+if [ -e "$tmp/grades/grades.json" ]; then
+    rm "$tmp/grades/right/grade.json" && "$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" >/dev/null
+    for file in grades.csv grades.tap junit.xml index.html right/index.html right/results.json; do
+        bytes "of grades: $file" "$tmp/grades/$file"
+    done
+    for file in grades.json right/grade.json; do altered "$tmp/grades/$file" points && altered "$tmp/grades/$file" cpu_s; done
+    for file in grades.csv grades.tap junit.xml index.html right/index.html right/results.json; do
+        expect "of other grades: $file" 1 "the bytes DIFFER, first at line" "$tmp/grades/$file"
+    done
+    rm "$tmp/grades/grades.json"
+    expect "of grades: they are gone" 3 "grades.csv: cannot read" "$tmp/grades/grades.csv"
+fi
+
 # Stored references, by their engines.
 mkdir -p "$tmp/golden/12_point_plane" && cp golden/12_point_plane/* "$tmp/golden/12_point_plane"
 cp golden/12_point_plane/cycles.exr "$tmp/moved.exr"

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_PATH = 4096 + 64, MORE_WORDS = 8 };
+enum { MAX_PATH = RESULTS_PATH, MORE_WORDS = 8 };
 
 /* Words that are not repeated: where outputs go, and how it was run. */
 static const struct option_words how[] = {
@@ -133,8 +133,8 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
     return 0;
 }
 
-static bool run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
-                      char product[MAX_PATH], struct reproduced *out, struct err *e)
+bool results_run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
+                       char product[MAX_PATH], struct reproduced *out, struct err *e)
 {
     static const struct option_words none[] = {{0}}, seed[] = {{"--reference-seed", 1}, {0}};
     char assay[4096], log[MAX_PATH], file[MAX_PATH], text[MAX_PATH];
@@ -197,7 +197,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
         ok = err_set(e, "%s: --scene and --pathtracer are for pictures", path);
     if (ok && (word = shell_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
-    ok = ok && run_again(path, then, num, word, dir, product, out, e);
+    ok = ok && results_run_again(path, then, num, word, dir, product, out, e);
     if (ok && (now = json_load_file(product, 0, &je)) == NULL)
         ok = err_set(e, "%s: made again: %s:%d: %s", path, product, je.line, je.text);
     if (ok) {

@@ -12,6 +12,12 @@
 bool reproduce_results(const char *path, const struct reproduce_options *opt, const char *dir,
                        struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
 
+/* The first half: runs the command, `num` words, again; product: the file of results, in `dir`. then: what is known of them. */
+enum { RESULTS_PATH = 4096 + 64 };
+bool results_run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
+                       char product[RESULTS_PATH], struct reproduced *out, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* Adds what two of them have in values to out, the first that differs by its place: "claims[3].difference". */
 void results_differ(const json_t *then, const json_t *now, struct reproduced *out);
 
