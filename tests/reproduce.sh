@@ -150,8 +150,12 @@ altered() { # FILE NAME: every number of that name with another first digit
 expect "a validation" 0 "the same bits in all [0-9]\{3\}" "$tmp/report/results.json"
 altered "$tmp/report/results.json" mdb_global
 expect "a validation with a value changed" 1 "values DIFFER, first claims.0..mdb_global: 7" "$tmp/report/results.json"
-"$assay" validate -q --only 12_point_plane --budget 1s -o "$tmp/budget" >/dev/null
-expect "a validation that depended on the time it had" 3 "depends on the time there was" "$tmp/budget/results.json"
+"$assay" validate -q --only 12_point_plane --budget 60s -o "$tmp/budget" >/dev/null
+expect "a validation that was decided within its budget" 0 "the same bits in all" "$tmp/budget/results.json"
+sed -i 's/--budget 60s/--budget 0.001s/' "$tmp/budget/results.json"
+expect "a validation for which there is less time now" 3 "made again: its --budget was over" "$tmp/budget/results.json"
+"$assay" validate -q --only 12_point_plane --budget 0.001s -o "$tmp/budget" >/dev/null
+expect "a validation that ran out of time" 3 "results.json: its --budget was over before all was decided" "$tmp/budget/results.json"
 "$pathtracer" -q -r 32 32 -s 16 --seed 1 -f "$tmp/one.exr" $scene >/dev/null && "$pathtracer" -q -r 32 32 -s 16 --seed 2 -f "$tmp/two.exr" $scene >/dev/null
 "$assay" compare -q --margin 0.5 --margin-tile 0.9 --json "$tmp/claim.json" "$tmp/one.exr" "$tmp/two.exr" >/dev/null
 expect "a comparison" 0 "the same bits in all" "$tmp/claim.json"
@@ -165,11 +169,16 @@ expect "results and the scene of a picture" 3 "are for pictures" --scene $scene 
 echo '{"assay": 1}' >"$tmp/none.json" && echo '{"command": "rm -rf x"}' >"$tmp/other.json" && echo '[]' >"$tmp/class.json"
 expect "results that do not say how" 3 "does not say by what command" "$tmp/none.json"
 expect "results of another program" 3 "made by no command of assay" "$tmp/other.json"
-expect "grades of a class" 3 "made again by itself" "$tmp/class.json"
-mkdir "$tmp/subs" && cp "$pathtracer" "$tmp/subs/right"
-"$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" >"$tmp/out" 2>&1
+expect "no grades" 3 "no grades" "$tmp/class.json"
+mkdir "$tmp/subs" && cp "$pathtracer" "$tmp/subs/right" && cp "$pathtracer" "$tmp/subs/copy"
+"$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" "$tmp/subs/copy" >"$tmp/out" 2>&1
 if grep -q "no sandbox" "$tmp/out"; then echo "skip reproduce: grades ($(cat "$tmp/out"))"; else
     expect "a grade" 0 "the same bits in all" "$tmp/grades/right/grade.json"
+    expect "grades of a class" 0 "the same bits in all" "$tmp/grades/grades.json"
+    sed 's/"cpu_s": .*/"alike": [],/; s/"id": "copy"/"id": "copied"/' "$tmp/grades/grades.json" >"$tmp/grades/other.json"
+    expect "grades of a class, of another name" 1 "values DIFFER, first .1..id: .copied. there, .copy. now" "$tmp/grades/other.json"
+    sed '0,/"command"/! s,tests/quick,tests//quick,' "$tmp/grades/grades.json" >"$tmp/grades/other.json"
+    expect "grades of a class, by more than one command" 3 "graded by more than one command" "$tmp/grades/other.json"
     altered "$tmp/grades/right/grade.json" points
     expect "a grade with other points" 1 "values DIFFER, first points: 7" "$tmp/grades/right/grade.json"
 fi
@@ -212,7 +221,7 @@ rm "$tmp/report/results.json"
 expect "a page whose results are gone" 3 "are not beside it" "$tmp/report/index.html"
 expect "JUnit whose results are gone" 3 "are not beside it" "$tmp/report/junit.xml"
 if [ -e "$tmp/grades/grades.json" ]; then
-    rm "$tmp/grades/right/grade.json" && "$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" >/dev/null
+    rm "$tmp/grades/right/grade.json" && "$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" "$tmp/subs/copy" >/dev/null
     for file in grades.csv grades.tap junit.xml index.html right/index.html right/results.json; do
         bytes "of grades: $file" "$tmp/grades/$file"
     done
