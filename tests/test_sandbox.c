@@ -77,7 +77,7 @@ static int open_sandbox(void **state)
     if (!has_sandbox)
         printf("skipped: %s\n", e.msg);
     else
-        snprintf(out_dir, sizeof out_dir, "%s/out", box.dir);
+        snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
     return 0;
 }
 
@@ -217,7 +217,7 @@ static void links_lead_nowhere(void **state)
     if (!has_sandbox)
         skip();
     char secret[600], script[4096];
-    snprintf(secret, sizeof secret, "%s/secret", box.dir);
+    snprintf(secret, sizeof secret, "%s/secret", box.dir.path);
     FILE *f = fopen(secret, "w");
     assert_non_null(f);
     fputs("the golden\n", f);
@@ -238,8 +238,8 @@ static void links_lead_nowhere(void **state)
     /* Links in the submission itself. */
     char tree[600], dir[600], command[4096];
     struct err e;
-    snprintf(dir, sizeof dir, "%s/submission", box.dir);
-    snprintf(tree, sizeof tree, "%s/tree.tar", box.dir);
+    snprintf(dir, sizeof dir, "%s/submission", box.dir.path);
+    snprintf(tree, sizeof tree, "%s/tree.tar", box.dir.path);
     snprintf(command, sizeof command,
              "mkdir %s && ln -s %s %s/out.png && ln -s / %s/scene && echo own >%s/second", dir,
              secret, dir, dir, dir);
@@ -357,7 +357,7 @@ static void a_tree_goes_from_one_run_to_the_next(void **state)
     assert_true(sandbox_run(&box, &job, &r, &e));
     assert_int_equal(r.end, SANDBOX_OK);
     snprintf(built, sizeof built, "%s/tree.tar", out_dir);
-    snprintf(moved, sizeof moved, "%s/built.tar", box.dir);
+    snprintf(moved, sizeof moved, "%s/built.tar", box.dir.path);
     assert_int_equal(rename(built, moved), 0);
     r = run_with("./d/program >out.png", small, moved);
     assert_int_equal(r.end, SANDBOX_OK);
@@ -365,9 +365,9 @@ static void a_tree_goes_from_one_run_to_the_next(void **state)
     /* 100 MB of submission are not unpacked into 32, and cost nothing but this submission. */
     char command[2000];
     snprintf(command, sizeof command, "mkdir %s/large && head -c 40M /dev/urandom >%s/large/f",
-             box.dir, box.dir);
+             box.dir.path, box.dir.path);
     assert_int_equal(system(command), 0);
-    snprintf(command, sizeof command, "%s/large", box.dir);
+    snprintf(command, sizeof command, "%s/large", box.dir.path);
     assert_true(sandbox_pack(command, moved, (size_t)64 * MIB, &e));
     assert_int_equal(run_with("true", small, moved).end, SANDBOX_UNPACK);
     assert_false(sandbox_pack(command, moved, MIB, &e));
@@ -383,8 +383,8 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
     struct sandbox_result r;
     char out[600], script[1400];
     assert_true(sandbox_open(true, NULL, &s, &e));
-    snprintf(out, sizeof out, "%s/out", s.dir);
-    snprintf(script, sizeof script, "test -d %s && printf hello >out.png", s.dir);
+    snprintf(out, sizeof out, "%s/out", s.dir.path);
+    snprintf(script, sizeof script, "test -d %s && printf hello >out.png", s.dir.path);
     struct sandbox_job job = {.argv = (const char *const[]){"sh", "-c", script, NULL},
                               .keep = (const char *const[]){"out.png", NULL},
                               .out = out,
@@ -398,7 +398,7 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
     assert_int_equal(r.end, SANDBOX_FILE_SIZE);
     /* Of root only that is left that nobody has: no file of ours, and no way back. */
     char secret[600];
-    snprintf(secret, sizeof secret, "%s/secret", s.dir);
+    snprintf(secret, sizeof secret, "%s/secret", s.dir.path);
     FILE *f = fopen(secret, "w");
     assert_true(f != NULL && fchmod(fileno(f), 0600) == 0 && fputs("mine", f) >= 0);
     fclose(f);
@@ -411,8 +411,8 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
     assert_true(sandbox_run(&s, &job, &r, &e));
     assert_int_equal(r.end, geteuid() == 0 ? SANDBOX_FAILED : SANDBOX_OK);
     sandbox_close(&s);
-    assert_int_not_equal(access(s.dir, F_OK), 0);
-    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir);
+    assert_int_not_equal(access(s.dir.path, F_OK), 0);
+    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
 }
 
 /* Without bwrap in PATH there is a line, not a run. */

@@ -288,14 +288,14 @@ static void *work(void *ctx)
     struct batch *b = ctx;
     const struct grade_job *job = b->job;
     for (;;) {
-        char dir[512];
+        char dir[sizeof job->sandbox->dir.path + 24];
         struct err e = {""}, ignored;
         pthread_mutex_lock(&b->lock);
         int i = b->next++;
         pthread_mutex_unlock(&b->lock);
         if (i >= job->num)
             return NULL;
-        snprintf(dir, sizeof dir, "%.400s/work-%d", job->sandbox->dir, i);
+        snprintf(dir, sizeof dir, "%s/work-%d", job->sandbox->dir.path, i);
         if (!grade_one(job, job->path[i], dir, &b->grade[i], &e))
             b->grade[i] = trouble_json(job, job->path[i], e.msg);
         bool removed = remove_tree(dir, &ignored);

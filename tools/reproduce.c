@@ -13,6 +13,7 @@
 #include "reproduce_page.h"
 #include "reproduce_png.h"
 #include "reproduce_results.h"
+#include "temp_dir.h"
 
 #include <assert.h>
 #include <stdio.h>
@@ -282,17 +283,17 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
                struct err *e)
 {
     struct err ignored;
-    char dir[] = "/tmp/assay-reproduce.XXXXXX";
+    struct temp_dir dir;
     *out = (struct reproduced){0};
-    if (mkdtemp(dir) == NULL)
-        return err_set(e, "%s: cannot make a directory", dir);
-    bool ok = reproduce_is_of_class(path) ? reproduce_class(path, opt, dir, out, e)
-              : reproduce_is_page(path)   ? reproduce_page(path, opt, dir, out, e)
-              : is_results(path)          ? reproduce_results(path, opt, dir, out, e)
-                                          : reproduce_picture(path, opt, dir, out, e);
+    if (!temp_dir_open(&dir, "reproduce", e))
+        return false;
+    bool ok = reproduce_is_of_class(path) ? reproduce_class(path, opt, dir.path, out, e)
+              : reproduce_is_page(path)   ? reproduce_page(path, opt, dir.path, out, e)
+              : is_results(path)          ? reproduce_results(path, opt, dir.path, out, e)
+                                          : reproduce_picture(path, opt, dir.path, out, e);
     if (!ok)
         reproduced_free(out);
-    bool removed = remove_tree(dir, &ignored);
-    (void)removed; /* it is in /tmp */
+    bool removed = temp_dir_close(&dir, &ignored);
+    (void)removed; /* the next run does it */
     return ok;
 }

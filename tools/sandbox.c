@@ -329,12 +329,12 @@ static bool make_out(const struct sandbox *s, const char *out, struct err *e)
 bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct sandbox_result *out,
                  struct err *e)
 {
-    char keep[4096], box[sizeof s->dir + 16] = "";
+    char keep[4096], box[sizeof s->dir.path + 16] = "";
     struct line *l = calloc(1, sizeof *l);
     bool ok = (l != NULL || err_set(e, "out of memory")) &&
               join_names(job->keep, keep, sizeof keep, e) && make_out(s, job->out, e);
     if (ok && s->unsafe) {
-        snprintf(box, sizeof box, "%s/box.XXXXXX", s->dir);
+        snprintf(box, sizeof box, "%s/box.XXXXXX", s->dir.path);
         ok = (mkdtemp(box) != NULL && (!s->drop || chown(box, ALSO_NOBODY, ALSO_NOBODY) == 0)) ||
              err_set(e, "%s: %s", box, strerror(errno));
     }
@@ -378,17 +378,14 @@ static bool add_hidden(struct sandbox *s, const char *const *hidden, struct err 
 
 bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
 {
-    const char *temp = getenv("TMPDIR");
     *out = (struct sandbox){.unsafe = unsafe, .drop = geteuid() == 0};
     if (!add_hidden(out, hidden, e))
         return false;
-    int n = snprintf(out->dir, sizeof out->dir, "%s/assay-sandbox.XXXXXX",
-                     temp != NULL ? temp : "/tmp");
-    if (n < 0 || (size_t)n >= sizeof out->dir || mkdtemp(out->dir) == NULL)
-        return err_set(e, "no temporary directory like %s", out->dir);
-    chmod(out->dir, 0755);
-    char probe[sizeof out->dir + 16];
-    snprintf(probe, sizeof probe, "%s/probe", out->dir);
+    if (!temp_dir_open(&out->dir, "sandbox", e))
+        return false;
+    chmod(out->dir.path, 0755);
+    char probe[sizeof out->dir.path + 16];
+    snprintf(probe, sizeof probe, "%s/probe", out->dir.path);
     struct sandbox_result r = {0};
     const struct sandbox_job job = {
         .argv = (const char *const[]){"true", NULL}, .out = probe, .limit = sandbox_default};
@@ -406,8 +403,8 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
 void sandbox_close(struct sandbox *s)
 {
     struct err ignored;
-    if (s->dir[0] != '\0' && !remove_tree(s->dir, &ignored))
-        s->dir[0] = '\0';
+    bool removed = temp_dir_close(&s->dir, &ignored);
+    (void)removed; /* what stays is removed by the next run */
 }
 
 bool sandbox_pack(const char *path, const char *tar, size_t most, struct err *e)

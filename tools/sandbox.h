@@ -13,16 +13,15 @@
 #ifndef ASSAY_SANDBOX_H
 #define ASSAY_SANDBOX_H
 
-#include "../renderer/err.h"
+#include "temp_dir.h"
 
 #include <stddef.h>
 
 struct sandbox {
     bool
         unsafe; /* no bubblewrap: limits of time, memory a process and file size; else only what `drop` does */
-    bool drop; /* we are root: run as nobody */
-    char dir
-        [256]; /* for what runs read and write: below TMPDIR or /tmp, readable by everybody, ours */
+    bool drop;           /* we are root: run as nobody */
+    struct temp_dir dir; /* for what runs read and write, readable by everybody */
     char hidden[4][512]; /* directories that must not be seen though they lie below /usr */
     int num_hidden;
 };

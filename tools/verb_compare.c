@@ -1,8 +1,8 @@
 #include "../renderer/cli.h"
-#include "../renderer/fs.h"
 #include "comparing.h"
 #include "region.h"
 #include "report.h"
+#include "temp_dir.h"
 #include "results.h"
 #include "verbs.h"
 
@@ -188,14 +188,15 @@ static void print_result(const struct compared *c, bool exchangeable)
 static bool write_report(const struct settings *s, const struct compared *c, int argc, char **argv,
                          struct err *e)
 {
-    char dir[] = "/tmp/assay_compare_XXXXXX", results[64];
-    if (mkdtemp(dir) == NULL)
-        return err_set(e, "%s: cannot make a temporary directory", dir);
-    snprintf(results, sizeof results, "%s/results.json", dir);
+    struct temp_dir dir;
+    char results[sizeof dir.path + 16];
+    if (!temp_dir_open(&dir, "compare", e))
+        return false;
+    snprintf(results, sizeof results, "%s/results.json", dir.path);
     bool ok = compared_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
               report_write(results, s->report, e);
     struct err ignored = {0};
-    return remove_tree(dir, ok ? e : &ignored) && ok;
+    return temp_dir_close(&dir, ok ? e : &ignored) && ok;
 }
 
 int verb_compare(int argc, char **argv, struct err *e)

@@ -5,6 +5,7 @@
 #include "diagnose_print.h"
 #include "places.h"
 #include "results.h"
+#include "temp_dir.h"
 #include "verbs.h"
 
 #include <stdio.h>
@@ -140,15 +141,16 @@ static bool run(const struct settings *s, const struct gather_options *g, struct
 
 static int look(const struct settings *s, const struct catalogue *c, struct err *e)
 {
-    char work[4096];
-    const char *temp = getenv("TMPDIR");
+    struct temp_dir work;
     struct suite suite;
     struct diagnosis d;
     struct clue *clue = calloc((size_t)c->num_views, sizeof *clue);
-    snprintf(work, sizeof work, "%s/assay-diagnose.XXXXXX", temp != NULL ? temp : "/tmp");
-    if (clue == NULL || mkdtemp(work) == NULL) {
+    if (clue == NULL) {
+        err_set(e, "out of memory");
+        return EXIT_NOT_JUDGED;
+    }
+    if (!temp_dir_open(&work, "diagnose", e)) {
         free(clue);
-        err_set(e, "no temporary directory like %s", work);
         return EXIT_NOT_JUDGED;
     }
     const struct gather_options g = {.catalogue = c,
@@ -157,7 +159,7 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
                                      .seed = s->seed,
                                      .threads = s->threads == 0 ? cli_processors() : s->threads,
                                      .timeout_s = s->timeout_s,
-                                     .work_dir = work};
+                                     .work_dir = work.path};
     bool ok = suite_load(s->suite_dir, &suite, e);
     if (ok) {
         ok = run(s, &g, clue, &d, e);
@@ -165,7 +167,7 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
     }
     free(clue);
     struct err removing;
-    if (!remove_tree(work, &removing) && ok)
+    if (!temp_dir_close(&work, &removing) && ok)
         ok = err_set(e, "%s", removing.msg);
     return !ok ? EXIT_NOT_JUDGED : d.finding == FINDING_CORRECT ? EXIT_EQUIVALENT : EXIT_DIFFERENT;
 }

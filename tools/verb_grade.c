@@ -65,7 +65,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const struct suite *suite, const struct answers *answers,
                      const char *const *word, const struct sandbox *box, struct err *e)
 {
-    char stage[512], views[512];
+    char stage[sizeof box->dir.path + 16], views[sizeof stage];
     struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
@@ -86,8 +86,8 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                             .ctx = &p};
     json_t *grades = NULL;
     int code = EXIT_NOT_JUDGED;
-    snprintf(stage, sizeof stage, "%.400s/stage", box->dir);
-    snprintf(views, sizeof views, "%.400s/views", box->dir);
+    snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
+    snprintf(views, sizeof views, "%s/views", box->dir.path);
     bool ok = (bugs != NULL || err_set(e, "out of memory")) && submission_stage(r, stage, e);
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
