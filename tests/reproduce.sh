@@ -150,8 +150,12 @@ altered() { # FILE NAME: every number of that name with another first digit
 expect "a validation" 0 "the same bits in all [0-9]\{3\}" "$tmp/report/results.json"
 altered "$tmp/report/results.json" mdb_global
 expect "a validation with a value changed" 1 "values DIFFER, first claims.0..mdb_global: 7" "$tmp/report/results.json"
-"$assay" validate -q --only 12_point_plane --budget 1s -o "$tmp/budget" >/dev/null
-expect "a validation that depended on the time it had" 3 "depends on the time there was" "$tmp/budget/results.json"
+"$assay" validate -q --only 12_point_plane --budget 60s -o "$tmp/budget" >/dev/null
+expect "a validation that was decided within its budget" 0 "the same bits in all" "$tmp/budget/results.json"
+sed -i 's/--budget 60s/--budget 0.001s/' "$tmp/budget/results.json"
+expect "a validation for which there is less time now" 3 "made again: its --budget was over" "$tmp/budget/results.json"
+"$assay" validate -q --only 12_point_plane --budget 0.001s -o "$tmp/budget" >/dev/null
+expect "a validation that ran out of time" 3 "results.json: its --budget was over before all was decided" "$tmp/budget/results.json"
 "$pathtracer" -q -r 32 32 -s 16 --seed 1 -f "$tmp/one.exr" $scene >/dev/null && "$pathtracer" -q -r 32 32 -s 16 --seed 2 -f "$tmp/two.exr" $scene >/dev/null
 "$assay" compare -q --margin 0.5 --margin-tile 0.9 --json "$tmp/claim.json" "$tmp/one.exr" "$tmp/two.exr" >/dev/null
 expect "a comparison" 0 "the same bits in all" "$tmp/claim.json"
@@ -165,13 +169,68 @@ expect "results and the scene of a picture" 3 "are for pictures" --scene $scene 
 echo '{"assay": 1}' >"$tmp/none.json" && echo '{"command": "rm -rf x"}' >"$tmp/other.json" && echo '[]' >"$tmp/class.json"
 expect "results that do not say how" 3 "does not say by what command" "$tmp/none.json"
 expect "results of another program" 3 "made by no command of assay" "$tmp/other.json"
-expect "grades of a class" 3 "made again by itself" "$tmp/class.json"
-mkdir "$tmp/subs" && cp "$pathtracer" "$tmp/subs/right"
-"$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" >"$tmp/out" 2>&1
+expect "no grades" 3 "no grades" "$tmp/class.json"
+mkdir "$tmp/subs" && cp "$pathtracer" "$tmp/subs/right" && cp "$pathtracer" "$tmp/subs/copy"
+"$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" "$tmp/subs/copy" >"$tmp/out" 2>&1
 if grep -q "no sandbox" "$tmp/out"; then echo "skip reproduce: grades ($(cat "$tmp/out"))"; else
     expect "a grade" 0 "the same bits in all" "$tmp/grades/right/grade.json"
+    expect "grades of a class" 0 "the same bits in all" "$tmp/grades/grades.json"
+    sed 's/"cpu_s": .*/"alike": [],/; s/"id": "copy"/"id": "copied"/' "$tmp/grades/grades.json" >"$tmp/grades/other.json"
+    expect "grades of a class, of another name" 1 "values DIFFER, first .1..id: .copied. there, .copy. now" "$tmp/grades/other.json"
+    sed '0,/"command"/! s,tests/quick,tests//quick,' "$tmp/grades/grades.json" >"$tmp/grades/other.json"
+    expect "grades of a class, by more than one command" 3 "graded by more than one command" "$tmp/grades/other.json"
     altered "$tmp/grades/right/grade.json" points
     expect "a grade with other points" 1 "values DIFFER, first points: 7" "$tmp/grades/right/grade.json"
+fi
+
+# Pages and tables, of the results beside them.
+bytes() { # NAME FILE: it is made again; a byte more is seen
+    expect "$1" 0 "the same bits in all [0-9]* bytes" "$2"
+    cp "$2" "$tmp/was" && sed -i '$s/$/ /' "$2"
+    expect "$1, a byte more" 1 "the bytes DIFFER, first at line" "$2"
+    cp "$tmp/was" "$2"
+}
+"$assay" validate -q --only 12_point_plane -o "$tmp/report" >/dev/null
+bytes "the page of a validation" "$tmp/report/index.html"
+bytes "its JUnit file" "$tmp/report/junit.xml"
+bytes "the page of a convergence" "$tmp/converge/index.html"
+"$assay" report --converge "$tmp/converge/results.json" -o "$tmp/report/both.html" "$tmp/report/results.json" >/dev/null
+bytes "a page of both" "$tmp/report/both.html"
+mkdir -p "$tmp/runs/a line
+and 'quotes'" && cp "$tmp/report/results.json" "$tmp/runs/a line
+and 'quotes'/" && "$assay" report --history "$tmp/runs" >/dev/null
+bytes "a history" "$tmp/runs/history.html"
+"$pathtracer" -q -r 32 32 -s 16 --seed 2 -f "$tmp/its two
+lines.exr" $scene >/dev/null
+"$assay" compare -q --margin 0.5 --margin-tile 0.9 -r "$tmp/claim.html" "$tmp/one.exr" "$tmp/its two
+lines.exr" >/dev/null
+bytes "the page of a comparison" "$tmp/claim.html"
+"$pathtracer" -q -r 32 32 -s 16 --seed 3 -f "$tmp/its two
+lines.exr" $scene >/dev/null
+expect "the page of a comparison of which one side is another now" 1 "the bytes DIFFER, first at line" "$tmp/claim.html"
+sed 's/assay compare/rm -r/' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page of another program" 3 "other.html: made by no command of assay" "$tmp/other.html"
+sed '/assay:command/d' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page that does not say how" 3 "other.html: does not say by what command" "$tmp/other.html"
+sed 's/assay compare/assay `reboot`/' "$tmp/claim.html" >"$tmp/other.html"
+expect "a page with a command that a shell would act on" 3 "not a plain command" "$tmp/other.html"
+altered "$tmp/report/results.json" mdb_global
+expect "a page of other results" 1 "the bytes DIFFER, first at line" "$tmp/report/index.html"
+expect "JUnit of other results" 1 "the bytes DIFFER, first at line" "$tmp/report/junit.xml"
+rm "$tmp/report/results.json"
+expect "a page whose results are gone" 3 "are not beside it" "$tmp/report/index.html"
+expect "JUnit whose results are gone" 3 "are not beside it" "$tmp/report/junit.xml"
+if [ -e "$tmp/grades/grades.json" ]; then
+    rm "$tmp/grades/right/grade.json" && "$assay" grade -q -o "$tmp/grades" tests/quick.rubric "$tmp/subs/right" "$tmp/subs/copy" >/dev/null
+    for file in grades.csv grades.tap junit.xml index.html right/index.html right/results.json; do
+        bytes "of grades: $file" "$tmp/grades/$file"
+    done
+    for file in grades.json right/grade.json; do altered "$tmp/grades/$file" points && altered "$tmp/grades/$file" cpu_s; done
+    for file in grades.csv grades.tap junit.xml index.html right/index.html right/results.json; do
+        expect "of other grades: $file" 1 "the bytes DIFFER, first at line" "$tmp/grades/$file"
+    done
+    rm "$tmp/grades/grades.json"
+    expect "of grades: they are gone" 3 "grades.csv: cannot read" "$tmp/grades/grades.csv"
 fi
 
 # Exported scenes: as they were, by other names, by names that must not get out of their comment; then with a byte changed.
@@ -189,7 +248,7 @@ for kind in json pov xml pbrt; do
     expect "an export: .$kind" 0 "the same bits in all" --keep "$tmp/kept/one.$kind" "$tmp/x/one.$kind"
     tell "an export: .$kind is kept" "$(cmp "$tmp/x/one.$kind" "$tmp/kept/one.$kind" 2>&1)"
     sed -i "$change" "$tmp/kept/one.$kind"
-    expect "an export with a byte changed: .$kind" 1 "1 of [0-9]* values DIFFER, first one.$kind, line [0-9]*, byte [0-9]*: '.' there, '.' now" "$tmp/kept/one.$kind"
+    expect "an export with a byte changed: .$kind" 1 "the bytes DIFFER, first at line [0-9]*, byte [0-9]* of it$" "$tmp/kept/one.$kind"
     [ $kind = xml ] && continue
     export_to "$tmp/x/another.$kind" -d2.50 -b ${lens/0.125/1.25e-1} --resolution 64 48 -- $scene
     tell "an export: .$kind is the same by another name, its options otherwise" "$(cmp "$tmp/x/one.$kind" "$tmp/x/another.$kind" 2>&1)"
@@ -202,9 +261,9 @@ mv "$tmp/x/one.xml" "$tmp/x/renamed.xml"
 expect "an export that was renamed, but not its meshes" 0 "made again by: assay export .* -o one.xml " "$tmp/x/renamed.xml"
 mesh=$tmp/x/one_object_0.ply
 printf X | dd of="$mesh" bs=1 seek=220 conv=notrunc 2>/dev/null
-expect "an export of which a mesh was changed" 1 "1 of [0-9]* values DIFFER, first one_object_0.ply, line [0-9]*, byte 220: 'X' there" "$tmp/x/renamed.xml"
+expect "an export of which a mesh was changed" 1 "the bytes DIFFER, first in 'one_object_0.ply' at line [0-9]*, byte [0-9]* of it$" "$tmp/x/renamed.xml"
 truncate -s 200 "$mesh"
-expect "an export of which a mesh was cut short" 1 "byte 200: its end there" "$tmp/x/renamed.xml"
+expect "an export of which a mesh was cut short" 1 "first in 'one_object_0.ply' at line [0-9]*, byte [0-9]* of it: there it ends" "$tmp/x/renamed.xml"
 rm "$mesh"
 expect "an export of which a mesh is gone" 3 "'one_object_0.ply' is not beside it" "$tmp/x/renamed.xml"
 cp reference/scenes/46_sky.dae reference/scenes/46_sky.exr "$tmp/odd"
@@ -243,7 +302,7 @@ pov "of another program" 3 "other.pov: does not say by what command it was made"
 pov "a command that a shell would act on" 3 "not a plain command" 's/export/export $(reboot)/'
 pov "another command of this program" 3 "its command is no export" 's/export/merge/'
 pov "another seed is claimed" 3 "its command is no export: .*--seed" 's/export/export --seed 2/'
-pov "other settings are claimed" 1 "values DIFFER" 's/-m 5/-m 4/'
+pov "other settings are claimed" 1 "the bytes DIFFER" 's/-m 5/-m 4/'
 pov "another scene is claimed" 3 "is not the file that it was made of" 's/assay:scene ./&0/'
 pov "an output elsewhere" 3 "is no plain name" 's/export/export -o ..\/x.pov/'
 pov "no hash of its scene" 3 "does not say the hash of its scene" '/assay:scene/d'

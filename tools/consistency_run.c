@@ -145,7 +145,7 @@ json_t *consistency_run(const struct validate_options *opt, const struct suite_s
     if (!ok && now_seconds() >= deadline)
         return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
                          "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
-                         "budget spent before its renders were done");
+                         BUDGET_SPENT " before its renders were done");
     return ok ? judged(s, alpha, &f, seconds)
               : json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
                           "error", e.msg);

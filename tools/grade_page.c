@@ -204,7 +204,7 @@ bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     json_t *p, *c;
     bool ok = true, left_out = false;
     fputs(grade_page_head, f);
-    fputs("<title>", f);
+    fputs("<meta name=\"generator\" content=\"" GRADE_ORIGIN "\">\n<title>", f);
     html_text(f, grade_text(grade, "id"));
     fputs("</title>\n<h1>", f);
     html_text(f, grade_text(grade, "id"));

@@ -94,6 +94,7 @@ static json_t *gradescope(const json_t *grade)
     json_object_set_new(root, "test_output_format", json_string("text"));
     json_object_set_new(root, "visibility", json_string("visible"));
     json_object_set_new(root, "stdout_visibility", json_string("hidden"));
+    json_object_set_new(root, "extra_data", json_pack("{ss}", "assay", GRADE_ORIGIN));
     if (json_array_size(tests) > 0) {
         json_object_set_new(root, "tests", tests);
     } else {
@@ -164,7 +165,7 @@ static void write_tap(FILE *f, const json_t *grades)
         size_t checks = json_array_size(json_object_get(g, "checks"));
         num += checks > 0 ? checks : 1;
     }
-    fprintf(f, "TAP version 13\n1..%zu\n", num);
+    fprintf(f, "TAP version 13\n# " GRADE_CLASS_ORIGIN "\n1..%zu\n", num);
     num = 0;
     json_array_foreach(grades, i, g)
     {
@@ -198,7 +199,9 @@ static void write_junit(FILE *f, const json_t *grades)
 {
     size_t i, k;
     json_t *g, *c;
-    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
+    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- " GRADE_CLASS_ORIGIN
+          " -->\n<testsuites>\n",
+          f);
     json_array_foreach(grades, i, g)
     {
         size_t failures = 0, errors = grade_text(g, "trouble")[0] != '\0',
@@ -239,16 +242,43 @@ static void write_junit(FILE *f, const json_t *grades)
     fputs("</testsuites>\n", f);
 }
 
-static bool write_file(const char *dir, const char *name, const json_t *grades,
-                       void (*write)(FILE *, const json_t *), struct err *e)
+static bool write_json(const char *path, json_t *root, struct err *e)
 {
-    char path[MAX_PATH];
+    bool ok = (root != NULL || err_set(e, "out of memory")) && json_write(path, root, e);
+    json_decref(root);
+    return ok;
+}
+
+/* Of a class. */
+static bool write_text(const json_t *grades, const char *name, FILE *f, struct err *e)
+{
+    if (strcmp(name, "grades.csv") == 0)
+        write_csv(f, grades);
+    else if (strcmp(name, "junit.xml") == 0)
+        write_junit(f, grades);
+    else if (strcmp(name, "grades.tap") == 0)
+        write_tap(f, grades);
+    else
+        return grade_overview(f, grades, e);
+    return true;
+}
+
+const char *const grade_class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
+                                         NULL};
+const char *const grade_files[] = {"results.json", "index.html", NULL};
+
+bool grade_write_file(const char *dir, const json_t *grades, const char *name, const char *to,
+                      struct err *e)
+{
     struct out_file o;
-    snprintf(path, sizeof path, "%.4000s/%s", dir, name);
-    if (!out_open(&o, path, e))
+    if (strcmp(name, "results.json") == 0)
+        return write_json(to, gradescope(grades), e);
+    if (!make_parent_dirs(to, e) || !out_open(&o, to, e))
         return false;
-    write(o.f, grades);
-    return out_commit(&o, e);
+    if (json_is_array(grades) ? write_text(grades, name, o.f, e) : grade_page(o.f, dir, grades, e))
+        return out_commit(&o, e);
+    out_abandon(&o);
+    return false;
 }
 
 bool grade_write(const char *out, const json_t *grades, struct err *e)
@@ -259,41 +289,16 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
     bool ok = true;
     json_array_foreach(grades, i, g)
     {
-        json_t *results = gradescope(g);
-        snprintf(path, sizeof path, "%.4000s/%s/results.json", out, grade_text(g, "id"));
-        ok = ok && (results != NULL || err_set(e, "out of memory")) && json_write(path, results, e);
-        json_decref(results);
+        for (int k = 0; ok && grade_files[k] != NULL; k++) {
+            snprintf(path, sizeof path, "%.4000s/%s/%s", out, grade_text(g, "id"), grade_files[k]);
+            ok = grade_write_file(out, g, grade_files[k], path, e);
+        }
     }
     snprintf(path, sizeof path, "%.4000s/grades.json", out);
-    return ok && json_write(path, grades, e) &&
-           write_file(out, "grades.csv", grades, write_csv, e) &&
-           write_file(out, "junit.xml", grades, write_junit, e) &&
-           write_file(out, "grades.tap", grades, write_tap, e);
-}
-
-bool grade_pages(const char *out, const json_t *grades, struct err *e)
-{
-    char path[MAX_PATH];
-    struct out_file o;
-    size_t i;
-    json_t *g;
-    json_array_foreach(grades, i, g)
-    {
-        snprintf(path, sizeof path, "%.4000s/%s/index.html", out, grade_text(g, "id"));
-        if (!make_parent_dirs(path, e) || !out_open(&o, path, e))
-            return false;
-        if (!grade_page(o.f, out, g, e)) {
-            out_abandon(&o);
-            return false;
-        }
-        if (!out_commit(&o, e))
-            return false;
+    ok = ok && json_write(path, grades, e);
+    for (int k = 0; ok && grade_class_files[k] != NULL; k++) {
+        snprintf(path, sizeof path, "%.4000s/%s", out, grade_class_files[k]);
+        ok = grade_write_file(out, grades, grade_class_files[k], path, e);
     }
-    snprintf(path, sizeof path, "%.4000s/index.html", out);
-    if (!out_open(&o, path, e))
-        return false;
-    if (grade_overview(o.f, grades, e))
-        return out_commit(&o, e);
-    out_abandon(&o);
-    return false;
+    return ok;
 }

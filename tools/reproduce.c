@@ -8,8 +8,10 @@
 #include "../renderer/shell_words.h"
 #include "merge.h"
 #include "plan_kinds.h"
+#include "reproduce_class.h"
 #include "reproduce_export.h"
 #include "reproduce_golden.h"
+#include "reproduce_page.h"
 #include "reproduce_png.h"
 #include "reproduce_results.h"
 
@@ -287,9 +289,11 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
         return err_set(e, "%s: cannot make a directory", dir);
     bool export = false;
     bool ok = reproduce_is_export(path, &export, e) &&
-              (export             ? reproduce_export(path, opt, dir, out, e)
-               : is_results(path) ? reproduce_results(path, opt, dir, out, e)
-                                  : reproduce_picture(path, opt, dir, out, e));
+              (export                        ? reproduce_export(path, opt, dir, out, e)
+               : reproduce_is_of_class(path) ? reproduce_class(path, opt, dir, out, e)
+               : reproduce_is_page(path)     ? reproduce_page(path, opt, dir, out, e)
+               : is_results(path)            ? reproduce_results(path, opt, dir, out, e)
+                                             : reproduce_picture(path, opt, dir, out, e));
     if (!ok)
         reproduced_free(out);
     bool removed = remove_tree(dir, &ignored);

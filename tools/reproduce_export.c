@@ -4,6 +4,7 @@
 #include "../renderer/sha256.h"
 #include "../renderer/shell_words.h"
 #include "exporting.h"
+#include "reproduce_bytes.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -62,42 +63,18 @@ static bool settings_of(const char *path, const struct export_said *said,
             check_input(path, "environment", s->environment, said->environment, "", e));
 }
 
-/* Where two files differ first. */
-static void tell(const char *name, size_t byte, size_t line, int a, int b, struct reproduced *out)
+/* A file beside the scene. */
+static bool compare_beside(const char *name, const char *then, const char *now,
+                           struct reproduced *out, struct err *e)
 {
-    char value[2][16] = {"its end", "its end"};
-    const int at[2] = {a, b};
-    for (int i = 0; i < 2; i++)
-        if (at[i] != EOF)
-            snprintf(value[i], sizeof value[i], at[i] > ' ' && at[i] <= '~' ? "'%c'" : "0x%02x",
-                     at[i]);
-    snprintf(out->first, sizeof out->first, "%.200s, line %zu, byte %zu: %s there, %s now", name,
-             line, byte, value[0], value[1]);
-}
-
-static bool compare_files(const char *name, const char *then, const char *now,
-                          struct reproduced *out, struct err *e)
-{
-    FILE *f = fopen(then, "rb"), *g = fopen(now, "rb");
-    bool ok = (f != NULL || err_set(e, "%s: %s", then, strerror(errno))) &&
-              (g != NULL || err_set(e, "%s: %s", now, strerror(errno)));
-    size_t line = 1, byte = 0;
-    for (int a = 0, b = 0; ok; byte++) {
-        a = a != EOF ? getc(f) : EOF;
-        b = b != EOF ? getc(g) : EOF;
-        if (a == EOF && b == EOF)
-            break;
-        out->num_values++;
-        if (a != b && out->num_different++ == 0)
-            tell(name, byte, line, a, b, out);
-        line += a == '\n';
-    }
-    ok = ok && ((!ferror(f) && !ferror(g)) || err_set(e, "%s: cannot read", then));
-    if (f != NULL)
-        fclose(f);
-    if (g != NULL)
-        fclose(g);
-    return ok;
+    bool same = out->num_different == 0;
+    if (!reproduce_bytes(then, now, out, e))
+        return false;
+    char where[sizeof out->first];
+    memcpy(where, out->first, sizeof where);
+    if (same && out->num_different > 0)
+        snprintf(out->first, sizeof out->first, "in '%.150s' %.140s", name, where);
+    return true;
 }
 
 static bool join(char to[MAX_PATH], const char *dir, const char *name, struct err *e)
@@ -114,8 +91,7 @@ static bool compare_all(const char *path, const char *made, const char *name,
     const char *slash = strrchr(path, '/');
     snprintf(beside, sizeof beside, "%.*s", slash != NULL ? (int)(slash - path) + 1 : 2,
              slash != NULL ? path : "./");
-    if (!join(now, made, name, e) ||
-        !compare_files(slash != NULL ? slash + 1 : path, path, now, out, e))
+    if (!join(now, made, name, e) || !reproduce_bytes(path, now, out, e))
         return false;
     DIR *d = opendir(made);
     bool ok = d != NULL || err_set(e, "%s: %s", made, strerror(errno));
@@ -125,7 +101,7 @@ static bool compare_all(const char *path, const char *made, const char *name,
             ok = join(then, beside, f->d_name, e) && join(now, made, f->d_name, e) &&
                  (access(then, R_OK) == 0 ||
                   err_set(e, "%s: '%s' is not beside it", path, f->d_name)) &&
-                 compare_files(f->d_name, then, now, out, e);
+                 compare_beside(f->d_name, then, now, out, e);
     if (d != NULL)
         closedir(d);
     return ok;

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_PATH = 4096 + 64, MORE_WORDS = 8 };
+enum { MAX_PATH = RESULTS_PATH, MORE_WORDS = 8 };
 
 /* Words that are not repeated: where outputs go, and how it was run. */
 static const struct option_words how[] = {
@@ -90,16 +90,20 @@ void results_differ(const json_t *then, const json_t *now, struct reproduced *ou
 }
 
 /* Where the command is told to put what is compared, and as what: option and file of the words; product: the file. */
-static bool choose_output(const char *path, const json_t *then, int num, char **word,
-                          const char *dir, const char **option, char file[MAX_PATH],
-                          char product[MAX_PATH], struct err *e)
+static bool choose_output(const char *path, const json_t *then, char **word, const char *dir,
+                          const char **option, char file[MAX_PATH], char product[MAX_PATH],
+                          struct err *e)
 {
     const char *verb = word[1];
     *option = "--out";
     snprintf(file, MAX_PATH, "%s", dir);
     snprintf(product, MAX_PATH, "%.4000s/results.json", dir);
     if (strcmp(verb, "grade") == 0) {
-        snprintf(product, MAX_PATH, "%.3000s/%.900s/grade.json", dir, member_text(then, "id"));
+        const char *id = member_text(then, "id");
+        if (id != NULL)
+            snprintf(product, MAX_PATH, "%.3000s/%.900s/grade.json", dir, id);
+        else
+            snprintf(product, MAX_PATH, "%.4000s/grades.json", dir);
     } else if (strcmp(verb, "compare") == 0) {
         *option = "--json";
         snprintf(file, MAX_PATH, "%.3000s/%.900s", dir, base_of(path));
@@ -107,8 +111,6 @@ static bool choose_output(const char *path, const json_t *then, int num, char **
     } else if (strcmp(verb, "validate") != 0 && strcmp(verb, "converge") != 0) {
         return err_set(e, "%s: made by 'assay %s', which is not made again", path, verb);
     }
-    if (has_word(num, word, "--budget", "--budget"))
-        return err_set(e, "%s: with --budget, what was seen depends on the time there was", path);
     return true;
 }
 
@@ -123,8 +125,9 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
         argv[1] = text;
         return 2;
     }
-    /* OUT/ID/grade.json */
-    snprintf(text, MAX_PATH, "%.*s../.references", (int)(base_of(path) - path), path);
+    /* OUT/ID/grade.json, OUT/grades.json */
+    snprintf(text, MAX_PATH, "%.*s%s.references", (int)(base_of(path) - path), path,
+             json_object_get(then, "id") != NULL ? "../" : "");
     if (strcmp(verb, "grade") == 0 && access(text, R_OK) == 0) {
         argv[0] = "--references";
         argv[1] = text;
@@ -133,8 +136,8 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
     return 0;
 }
 
-static bool run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
-                      char product[MAX_PATH], struct reproduced *out, struct err *e)
+bool results_run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
+                       char product[MAX_PATH], struct reproduced *out, struct err *e)
 {
     static const struct option_words none[] = {{0}}, seed[] = {{"--reference-seed", 1}, {0}};
     char assay[4096], log[MAX_PATH], file[MAX_PATH], text[MAX_PATH];
@@ -146,7 +149,7 @@ static bool run_again(const char *path, const json_t *then, int num, char **word
         if (word[i][0] == '-' && isalpha((unsigned char)word[i][1]) && word[i][2] != '\0')
             return err_set(e, "%s: of '%s' in its command it is not known what is an argument",
                            path, word[i]);
-    if (!choose_output(path, then, num, word, dir, &option, file, product, e))
+    if (!choose_output(path, then, word, dir, &option, file, product, e))
         return false;
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     if (argv == NULL)
@@ -175,6 +178,50 @@ static bool run_again(const char *path, const json_t *then, int num, char **word
     return ok;
 }
 
+/* {"command": } that grades all of a class: that of the first, with what is graded by each. */
+static json_t *command_of_class(const char *path, const json_t *grades, struct err *e)
+{
+    const char **word = NULL;
+    char ***one = calloc(json_array_size(grades) + 1, sizeof *one);
+    json_t *g, *command = NULL;
+    size_t i;
+    int num = 0, first = 0;
+    bool ok = one != NULL || err_set(e, "out of memory");
+    json_array_foreach(grades, i, g)
+    {
+        const char *text = member_text(g, "command");
+        if (ok && text == NULL)
+            ok = err_set(e, "%s: does not say by what command it was made", path);
+        if (ok && (one[i] = shell_split(text, &num, e)) == NULL)
+            ok = err_prefix(e, "%s", path);
+        if (ok && i == 0) {
+            first = num;
+            word = calloc((size_t)num + json_array_size(grades) + 1, sizeof *word);
+            ok = word != NULL || err_set(e, "out of memory");
+            for (int k = 0; ok && k < num; k++)
+                word[k] = one[0][k];
+        }
+        for (int k = 0; ok && k + 1 < first; k++)
+            if (num != first || strcmp(one[i][k], one[0][k]) != 0)
+                ok = err_set(e, "%s: graded by more than one command", path);
+        if (ok && num > 0)
+            word[first - 1 + (int)i] = one[i][num - 1];
+    }
+    if (ok && first > 0) {
+        char *text = shell_join(NULL, word);
+        ok = text != NULL || err_set(e, "out of memory");
+        command = ok ? json_pack("{ss}", "command", text) : NULL;
+        free(text);
+    } else if (ok) {
+        err_set(e, "%s: no grades", path);
+    }
+    for (i = 0; one != NULL && i < json_array_size(grades); i++)
+        free(one[i]);
+    free(one);
+    free(word);
+    return command;
+}
+
 bool reproduce_results(const char *path, const struct reproduce_options *opt, const char *dir,
                        struct reproduced *out, struct err *e)
 {
@@ -184,22 +231,28 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
     json_t *now = NULL, *then = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
     if (then == NULL)
         return err_set(e, "%s:%d: %s", path, je.line, je.text);
-    if (json_is_array(then)) {
-        json_decref(then);
-        return err_set(e, "%s: of a class; each of its ID/grade.json is made again by itself",
-                       path);
-    }
-    const char *command = json_string_value(json_object_get(then, "command")),
-               *version = json_string_value(json_object_get(then, "version"));
+    json_t *class = json_is_array(then) ? command_of_class(path, then, e) : NULL;
+    const json_t *origin = json_is_array(then) ? class : then;
+    const char *command = member_text(origin, "command"),
+               *version =
+                   member_text(json_is_array(then) ? json_array_get(then, 0) : then, "version");
     char **word = NULL;
-    bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
+    bool ok = origin != NULL;
+    if (ok && command == NULL)
+        ok = err_set(e, "%s: does not say by what command it was made", path);
+    if (ok && results_lack_time(then))
+        ok = err_set(
+            e, "%s: its --budget was over before all was decided: that depends on the machine",
+            path);
     if (ok && (opt->scene != NULL || opt->pathtracer != NULL))
         ok = err_set(e, "%s: --scene and --pathtracer are for pictures", path);
     if (ok && (word = shell_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
-    ok = ok && run_again(path, then, num, word, dir, product, out, e);
+    ok = ok && results_run_again(path, origin, num, word, dir, product, out, e);
     if (ok && (now = json_load_file(product, 0, &je)) == NULL)
         ok = err_set(e, "%s: made again: %s:%d: %s", path, product, je.line, je.text);
+    if (ok && results_lack_time(now))
+        ok = err_set(e, "%s: made again: its --budget was over before all was decided", path);
     if (ok) {
         snprintf(out->made_by, sizeof out->made_by, "%s", version != NULL ? version : "");
         results_differ(then, now, out);
@@ -208,6 +261,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
     }
     free(word);
     json_decref(now);
+    json_decref(class);
     json_decref(then);
     return ok;
 }

@@ -359,6 +359,28 @@ bool claim_lacks_time(const json_t *claim)
            strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
 }
 
+static bool any_lacks_time(const json_t *list)
+{
+    static const char *const told[] = {"reason", "error"};
+    size_t i;
+    json_t *c;
+    json_array_foreach(list, i, c)
+    {
+        for (int k = 0; k < 2; k++) {
+            const char *text = member_text(c, told[k]);
+            if (text != NULL && strncmp(text, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0)
+                return true;
+        }
+    }
+    return false;
+}
+
+bool results_lack_time(const json_t *results)
+{
+    return any_lacks_time(json_object_get(results, "claims")) ||
+           any_lacks_time(json_object_get(results, "consistency"));
+}
+
 int results_exit_code(const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims");

@@ -81,6 +81,10 @@ enum outcome claim_outcome(const json_t *claim);
  * like any that was not judged, but counts as INCONCLUSIVE. */
 bool claim_lacks_time(const json_t *claim);
 
+/* How the reason or the error begins of what was not decided when the time of --budget was over; and whether anything was not. */
+#define BUDGET_SPENT "budget spent"
+bool results_lack_time(const json_t *results);
+
 /* 0 if every claim and every engine of the convergence passed; else 3 if any could not be judged, else 1 if any verdict was the
  * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
 int results_exit_code(const json_t *results);

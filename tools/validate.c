@@ -135,8 +135,7 @@ static bool take_looks(struct validation *v, const json_t *root, struct err *e)
     for (int i = 0; i < v->num_tasks; i++) {
         struct task *t = &v->task[i];
         if (t->result == NULL && (t->seen || !found))
-            task_give_up(v, t,
-                         found ? "stopped at the difference of another claim" : "budget spent");
+            task_give_up(v, t, found ? "stopped at the difference of another claim" : BUDGET_SPENT);
     }
     return ok;
 }

@@ -283,7 +283,7 @@ void task_give_up(struct validation *v, struct task *t, const char *why)
     else if (t->seen)
         finish(v, t, why);
     else
-        finish_unseen(v, t, "budget spent before a first look was possible", true);
+        finish_unseen(v, t, BUDGET_SPENT " before a first look was possible", true);
 }
 
 bool task_differs(const struct task *t)

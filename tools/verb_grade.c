@@ -98,7 +98,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
         job.diagnosis = &diagnosis;
     }
     ok = ok && grade_all(&job, &grades, e) && grade_alike(s->out, r, answers, grades, e);
-    if (ok && grade_write(s->out, grades, e) && grade_pages(s->out, grades, e))
+    if (ok && grade_write(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
     diagnosis_close(&diagnosis);

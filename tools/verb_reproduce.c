@@ -25,7 +25,9 @@ static void print_help(void)
         "  a PNG of pathtracer: image, sampling rates, heat map: all 8-bit codes\n"
         "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine; it must be installed\n"
         "  a scene of `assay export` (.json, .pov, .xml, .pbrt): all bytes, those of the files beside it too\n"
-        "  results.json of validate, compare, converge, and DIR/ID/grade.json: all values but dates and times\n"
+        "  results.json of validate, compare, converge, grades.json and ID/grade.json: all values but dates and times\n"
+        "  a page or junit.xml of these, a history, beside its results: all bytes\n"
+        "  grades.csv, grades.tap, junit.xml and pages of a class and its submissions, beside the grades: all bytes\n"
         "Exit code: 0 the same, 1 not, 3 cannot be made again (one line on stderr).\n");
     cli_print_options(stdout, options);
 }
@@ -68,7 +70,10 @@ int verb_reproduce(int argc, char **argv, struct err *e)
     err_hide_controls(r.made_by);
     bool same = r.num_different == 0;
     if (same)
-        printf("%s: the same bits in all %.0f values\n", path, r.num_values);
+        printf("%s: the same bits in all %.0f %s\n", path, r.num_values,
+               r.is_text ? "bytes" : "values");
+    else if (r.is_text)
+        printf("%s: the bytes DIFFER, first %s\n", path, r.first);
     else
         printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r.num_different, r.num_values,
                r.first);
