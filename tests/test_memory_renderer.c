@@ -176,10 +176,11 @@ static void environments(void **state)
 static bool words(void *ctx, struct err *e)
 {
     const char *const *word = ctx;
-    char *text = shell_join("first", word), **back = NULL;
+    char *text = shell_join("first", word), *ascii = NULL, **back = NULL;
     int num = 0;
-    bool ok = (text != NULL || err_set(e, "out of memory")) &&
-              (back = shell_split(text, &num, e)) != NULL;
+    bool ok =
+        ((text != NULL && (ascii = shell_ascii(text)) != NULL) || err_set(e, "out of memory")) &&
+        (back = shell_split(ascii, &num, e)) != NULL;
     alloc_fail_off();
     if (ok) {
         assert_int_equal(num, 3);
@@ -187,6 +188,7 @@ static bool words(void *ctx, struct err *e)
         assert_string_equal(back[2], word[1]);
     }
     free(text);
+    free(ascii);
     free(back);
     return ok;
 }
@@ -216,8 +218,8 @@ static bool command_line(void *ctx, struct err *e)
 static void command_lines(void **state)
 {
     (void)state;
-    static const char *word[] = {"two words", "it's", NULL};
-    alloc_fail_each("shell_join and shell_split", ALLOC_ALL, words, word);
+    static const char *word[] = {"two words", "it's\n", NULL};
+    alloc_fail_each("shell_join, shell_ascii, shell_split", ALLOC_ALL, words, word);
     alloc_fail_each("options, identity, camera file", ALLOC_ALL, command_line,
                     "reference/scenes/11_furnace.dae");
 }

@@ -9,12 +9,15 @@
 #include "../renderer/fs.h"
 #include "../tools/claim.h"
 #include "../tools/comparing.h"
+#include "../tools/exporting.h"
 #include "../tools/history.h"
 #include "../tools/report.h"
+#include "../tools/reproduce_export.h"
 #include "../tools/results.h"
 #include "../tools/rubric.h"
 #include "../tools/tree_hash.h"
 
+#include <libxml/xmlerror.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -272,6 +275,57 @@ static void histories(void **state)
     alloc_fail_each("history_read, history_write_page", ALLOC_ALL, read_history, NULL);
 }
 
+static bool export_scene(void *ctx, struct err *e)
+{
+    const char *out = ctx;
+    char *argv[] = {"export", "-o", ctx, "reference/scenes/12_point_plane.dae", NULL};
+    struct exporting s;
+    bool ok = exporting_parse(4, argv, &s, e) && exporting_run(&s, e);
+    alloc_fail_off();
+    xmlResetLastError();
+    alloc_fail_output(out, ok);
+    return ok;
+}
+
+static bool make_again(void *ctx, struct err *e)
+{
+    const char *path = ctx, *keep = file(1, "kept/x");
+    const struct reproduce_options opt = {.keep = keep};
+    struct reproduced r = {0};
+    struct err ignored;
+    bool is = false,
+         ok = reproduce_is_export(path, &is, e) && reproduce_export(path, &opt, dir, &r, e);
+    alloc_fail_off();
+    xmlResetLastError();
+    if (ok) {
+        assert_true(is && r.num_different == 0);
+        assert_true(r.num_values >= (double)alloc_fail_file_size(path));
+    }
+    assert_true(ok || access(keep, F_OK) != 0);
+    reproduced_free(&r);
+    assert_true(remove_tree(file(2, "again"), &ignored) && remove_tree(file(2, "kept"), &ignored));
+    return ok;
+}
+
+static void exports(void **state)
+{
+    (void)state;
+    static const char *const name[] = {"exports/x.json", "exports/x.pov", "exports/x.xml"};
+    struct err e = {0};
+    assert_true(make_parent_dirs(file(0, name[0]), &e));
+    alloc_json(ALLOC_JSON_ENDS, NULL);
+    alloc_fail_each("exporting_run", ALLOC_ALL, export_scene, (void *)file(0, name[1]));
+    for (int i = 0; i < 3; i++) {
+        char *argv[] = {"export", "-o", (char *)file(0, name[i]),
+                        "reference/scenes/12_point_plane.dae", NULL};
+        struct exporting s;
+        assert_true(exporting_parse(4, argv, &s, &e) && exporting_run(&s, &e));
+        /* libxml2's writer loses blocks where its lists fail. */
+        alloc_fail_each("reproduce_export", i == 2 ? ALLOC_LOSSY : ALLOC_ALL, make_again,
+                        (void *)file(0, name[i]));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -279,6 +333,7 @@ int main(void)
         cmocka_unit_test_teardown(results, alloc_fail_tell),
         cmocka_unit_test_teardown(comparisons_and_reports, alloc_fail_tell),
         cmocka_unit_test_teardown(histories, alloc_fail_tell),
+        cmocka_unit_test_teardown(exports, alloc_fail_tell),
     };
     return cmocka_run_group_tests(tests, make_place, remove_place);
 }

@@ -9,6 +9,7 @@
 #include "merge.h"
 #include "plan_kinds.h"
 #include "reproduce_class.h"
+#include "reproduce_export.h"
 #include "reproduce_golden.h"
 #include "reproduce_page.h"
 #include "reproduce_png.h"
@@ -285,12 +286,14 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
     struct err ignored;
     struct temp_dir dir;
     *out = (struct reproduced){0};
-    if (!temp_dir_open(&dir, "reproduce", e))
+    bool is_export = false;
+    if (!reproduce_is_export(path, &is_export, e) || !temp_dir_open(&dir, "reproduce", e))
         return false;
-    bool ok = reproduce_is_of_class(path) ? reproduce_class(path, opt, dir.path, out, e)
-              : reproduce_is_page(path)   ? reproduce_page(path, opt, dir.path, out, e)
-              : is_results(path)          ? reproduce_results(path, opt, dir.path, out, e)
-                                          : reproduce_picture(path, opt, dir.path, out, e);
+    bool ok = is_export                     ? reproduce_export(path, opt, dir.path, out, e)
+              : reproduce_is_of_class(path) ? reproduce_class(path, opt, dir.path, out, e)
+              : reproduce_is_page(path)     ? reproduce_page(path, opt, dir.path, out, e)
+              : is_results(path)            ? reproduce_results(path, opt, dir.path, out, e)
+                                            : reproduce_picture(path, opt, dir.path, out, e);
     if (!ok)
         reproduced_free(out);
     bool removed = temp_dir_close(&dir, &ignored);

@@ -90,9 +90,9 @@ void results_differ(const json_t *then, const json_t *now, struct reproduced *ou
 }
 
 /* Where the command is told to put what is compared, and as what: option and file of the words; product: the file. */
-static bool choose_output(const char *path, const json_t *then, char **word,
-                          const char *dir, const char **option, char file[MAX_PATH],
-                          char product[MAX_PATH], struct err *e)
+static bool choose_output(const char *path, const json_t *then, char **word, const char *dir,
+                          const char **option, char file[MAX_PATH], char product[MAX_PATH],
+                          struct err *e)
 {
     const char *verb = word[1];
     *option = "--out";
