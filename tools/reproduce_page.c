@@ -56,8 +56,7 @@ static json_t *origin_of(const xmlNode *html)
     return origin;
 }
 
-/* The elements <meta name="assay:..."> of a page's head; NULL with a line. */
-static json_t *read_origin(const char *path, struct err *e)
+json_t *reproduce_page_origin(const char *path, struct err *e)
 {
     char *head = malloc(HEAD);
     FILE *f = fopen(path, "rb");
@@ -148,7 +147,7 @@ static bool of_page(const char *path, const char *dir, const char *to, struct re
                     struct err *e)
 {
     int num = 0;
-    json_t *origin = read_origin(path, e);
+    json_t *origin = reproduce_page_origin(path, e);
     if (origin == NULL)
         return false;
     const char *version = member_text(origin, "version");
