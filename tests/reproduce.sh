@@ -150,6 +150,9 @@ altered() { # FILE NAME: every number of that name with another first digit
 expect "a validation" 0 "the same bits in all [0-9]\{3\}" "$tmp/report/results.json"
 altered "$tmp/report/results.json" mdb_global
 expect "a validation with a value changed" 1 "values DIFFER, first claims.0..mdb_global: 7" "$tmp/report/results.json"
+"$assay" validate "-qo$tmp/together" -qt2 --only 12_point_plane >/dev/null && cp "$tmp/together/results.json" "$tmp/was"
+expect "a validation, short options together" 0 "the same bits in all [0-9]\{3\}" "$tmp/together/results.json"
+tell "what it said is as it was" "$(cmp "$tmp/together/results.json" "$tmp/was" 2>&1)"
 "$assay" validate -q --only 12_point_plane --budget 60s -o "$tmp/budget" >/dev/null
 expect "a validation that was decided within its budget" 0 "the same bits in all" "$tmp/budget/results.json"
 sed -i 's/--budget 60s/--budget 0.001s/' "$tmp/budget/results.json"

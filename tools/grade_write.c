@@ -6,6 +6,7 @@
 #include "report_html.h"
 #include "results.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -258,8 +259,10 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
         write_junit(f, grades);
     else if (strcmp(name, "grades.tap") == 0)
         write_tap(f, grades);
-    else
+    else {
+        assert(strcmp(name, "index.html") == 0);
         return grade_overview(f, grades, e);
+    }
     return true;
 }
 

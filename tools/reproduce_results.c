@@ -7,7 +7,6 @@
 #include "../renderer/shell_words.h"
 #include "results.h"
 
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -136,6 +135,24 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
     return 0;
 }
 
+/* The same of options written together, "-qt2": of the verbs' letters only -q, which is given anyway, stands before others. */
+static int together_kept(int num, char **word)
+{
+    int n = 0;
+    for (int i = 0; i < num; i++) {
+        char *w = word[i];
+        while (w[0] == '-' && w[1] == 'q' && w[2] != '\0')
+            *++w = '-';
+        bool dropped = false;
+        for (const struct option_words *o = how; o->name != NULL; o++)
+            dropped = dropped || (o->args == 1 && o->name[1] != '-' &&
+                                  strncmp(w, o->name, 2) == 0 && w[2] != '\0');
+        if (!dropped)
+            word[n++] = w;
+    }
+    return n;
+}
+
 bool results_run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
                        char product[MAX_PATH], struct reproduced *out, struct err *e)
 {
@@ -145,10 +162,6 @@ bool results_run_again(const char *path, const json_t *then, int num, char **wor
     struct process_usage usage = {.exit_status = -1};
     if (num < 2 || strcmp(base_of(word[0]), "assay") != 0)
         return err_set(e, "%s: made by no command of assay", path);
-    for (int i = 2; i < num; i++)
-        if (word[i][0] == '-' && isalpha((unsigned char)word[i][1]) && word[i][2] != '\0')
-            return err_set(e, "%s: of '%s' in its command it is not known what is an argument",
-                           path, word[i]);
     if (!choose_output(path, then, word, dir, &option, file, product, e))
         return false;
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
@@ -157,7 +170,8 @@ bool results_run_again(const char *path, const json_t *then, int num, char **wor
     beside_program(assay, sizeof assay, "assay");
     snprintf(log, sizeof log, "%.4000s/log", dir);
     /* Those of a grade are without them. */
-    int n = words_kept(strcmp(verb, "grade") == 0 ? none : how, num - 2, word + 2, word + 2);
+    int n = together_kept(num - 2, word + 2);
+    n = words_kept(strcmp(verb, "grade") == 0 ? none : how, n, word + 2, word + 2);
     if (json_object_get(then, "reference_seed") != NULL)
         n = words_kept(seed, n, word + 2, word + 2);
     argv[0] = assay;
