@@ -6,6 +6,17 @@
 #include <stdio.h>
 #include <string.h>
 
+const char *base_of(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+void beside_file(const char *path, const char *name, char *out, size_t size)
+{
+    snprintf(out, size, "%.*s%s", (int)(base_of(path) - path), path, name);
+}
+
 static bool compare(FILE *a, FILE *b, struct reproduced *out)
 {
     out->is_text = true;

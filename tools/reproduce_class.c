@@ -11,21 +11,10 @@
 
 enum { MAX_PATH = 4096 + 64 };
 
-static const char *base_of(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
-static void beside(const char *path, const char *name, char out[MAX_PATH])
-{
-    snprintf(out, MAX_PATH, "%.*s%s", (int)(base_of(path) - path), path, name);
-}
-
 static bool is_one(const char *path, const char *const *names, const char *grades,
                    char source[MAX_PATH])
 {
-    beside(path, grades, source);
+    beside_file(path, grades, source, MAX_PATH);
     for (int i = 0; names[i] != NULL; i++)
         if (strcmp(base_of(path), names[i]) == 0)
             return access(source, F_OK) == 0;
@@ -47,7 +36,7 @@ bool reproduce_is_of_class(const char *path)
 /* OUT of OUT/grades.json and of OUT/ID/grade.json. */
 static void directory_of(const char *source, const json_t *grades, char out[MAX_PATH])
 {
-    beside(source, json_is_array(grades) ? "." : "..", out);
+    beside_file(source, json_is_array(grades) ? "." : "..", out, MAX_PATH);
 }
 
 bool reproduce_class(const char *path, const struct reproduce_options *opt, const char *dir,

@@ -96,9 +96,8 @@ static bool of_results(const char *path, const json_t *origin, const char *to,
                        struct reproduced *out, struct err *e)
 {
     char results[MAX_PATH];
-    const char *slash = strrchr(path, '/'), *converge = member_text(origin, "converge");
-    snprintf(results, sizeof results, "%.*sresults.json",
-             slash != NULL ? (int)(slash - path) + 1 : 0, path);
+    const char *converge = member_text(origin, "converge");
+    beside_file(path, "results.json", results, sizeof results);
     if (access(results, R_OK) != 0)
         return err_set(e, "%s: the results that it shows are not beside it: %s", path, results);
     if (converge != NULL && access(converge, R_OK) != 0)
@@ -113,9 +112,7 @@ static bool of_directory(const char *path, const char *to, struct reproduced *ou
 {
     char dir[MAX_PATH];
     struct history h;
-    const char *slash = strrchr(path, '/');
-    snprintf(dir, sizeof dir, "%.*s", slash != NULL ? (int)(slash - path) : 1,
-             slash != NULL ? path : ".");
+    beside_file(path, ".", dir, sizeof dir);
     const char *const word[] = {"assay", "report", "--history", dir, NULL};
     if (!told(out, word, e) || !history_read(dir, history_alpha, &h, e))
         return false;
@@ -154,8 +151,7 @@ static bool of_page(const char *path, const char *dir, const char *to, struct re
     snprintf(out->made_by, sizeof out->made_by, "%s", version != NULL ? version : "");
     char **word = shell_split(member_text(origin, "command"), &num, e);
     bool ok = word != NULL || err_prefix(e, "%s", path);
-    const char *slash = ok && num > 1 ? strrchr(word[0], '/') : NULL;
-    if (ok && (num < 2 || strcmp(slash != NULL ? slash + 1 : word[0], "assay") != 0))
+    if (ok && (num < 2 || strcmp(base_of(word[0]), "assay") != 0))
         ok = err_set(e, "%s: made by no command of assay", path);
     if (ok && num > 2 && strcmp(word[1], "report") == 0 && strcmp(word[2], "--history") == 0)
         ok = of_directory(path, to, out, e);
@@ -172,9 +168,7 @@ static bool of_junit(const char *path, const char *to, struct reproduced *out, s
 {
     char results[MAX_PATH];
     json_t *root;
-    const char *slash = strrchr(path, '/');
-    snprintf(results, sizeof results, "%.*sresults.json",
-             slash != NULL ? (int)(slash - path) + 1 : 0, path);
+    beside_file(path, "results.json", results, sizeof results);
     if (access(results, R_OK) != 0)
         return err_set(e, "%s: the results that it lists are not beside it: %s", path, results);
     const char *const word[] = {"assay", "validate,", "of", results, NULL};

@@ -5,6 +5,7 @@
 #include "../renderer/command_words.h"
 #include "../renderer/fs.h"
 #include "../renderer/shell_words.h"
+#include "reproduce_bytes.h"
 #include "results.h"
 
 #include <stdio.h>
@@ -18,12 +19,6 @@ enum { MAX_PATH = RESULTS_PATH, MORE_WORDS = 8 };
 static const struct option_words how[] = {
     {"-o", 1}, {"--out", 1},   {"--json", 1},    {"-r", 1},      {"--report", 1},     {"-q", 0},
     {"-t", 1}, {"--quiet", 0}, {"--threads", 1}, {"--slurm", 0}, {"--page-every", 1}, {0}};
-
-static const char *base_of(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
 
 /* What another run of the same has otherwise. */
 static bool is_of_the_run(const char *key)
@@ -125,8 +120,8 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
         return 2;
     }
     /* OUT/ID/grade.json, OUT/grades.json */
-    snprintf(text, MAX_PATH, "%.*s%s.references", (int)(base_of(path) - path), path,
-             json_object_get(then, "id") != NULL ? "../" : "");
+    beside_file(path, json_object_get(then, "id") != NULL ? "../.references" : ".references", text,
+                MAX_PATH);
     if (strcmp(verb, "grade") == 0 && access(text, R_OK) == 0) {
         argv[0] = "--references";
         argv[1] = text;
