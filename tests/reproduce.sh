@@ -141,6 +141,10 @@ expect "the scene is elsewhere" 0 "the same bits" --scene $scene "$tmp/x.exr"
 rm "$tmp/b.exr"
 expect "a share is gone" 3 "share.*is not here" "$tmp/abc.exr"
 expect "no picture" 3 "cannot read" README.md
+expect "no file" 3 "needs a file"
+expect "two files" 3 "takes one file" README.md README.md
+expect "a file that is not there" 3 "nowhere.html: cannot read" "$tmp/nowhere.html"
+expect "a number of threads that is none" 3 "--threads" -t x README.md
 
 # Results: of a validation, a comparison, a convergence and a grade; then with a value that no run of it has.
 altered() { # FILE NAME: every number of that name with another first digit
@@ -195,6 +199,9 @@ bytes() { # NAME FILE: it is made again; a byte more is seen
 }
 "$assay" validate -q --only 12_point_plane -o "$tmp/report" >/dev/null
 bytes "the page of a validation" "$tmp/report/index.html"
+expect "the page of a validation, kept" 0 "the same bits" --keep "$tmp/kept.html" -t 2 "$tmp/report/index.html"
+tell "the page that was kept is the same" "$(cmp "$tmp/kept.html" "$tmp/report/index.html" 2>&1)"
+expect "the page of a validation, kept where nothing can be" 3 "/nonexistent/x.html" --keep /nonexistent/x.html "$tmp/report/index.html"
 bytes "its JUnit file" "$tmp/report/junit.xml"
 bytes "the page of a convergence" "$tmp/converge/index.html"
 "$assay" report --converge "$tmp/converge/results.json" -o "$tmp/report/both.html" "$tmp/report/results.json" >/dev/null
