@@ -102,6 +102,17 @@ bool remove_tree(const char *path, struct err *e)
     return true;
 }
 
+const char *base_of(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+void beside_file(const char *path, const char *name, char *beside, size_t size)
+{
+    snprintf(beside, size, "%.*s%s", (int)(base_of(path) - path), path, name);
+}
+
 void beside_program(char *path, size_t size, const char *name)
 {
     char self[3072];

@@ -167,12 +167,10 @@ static bool with_origin(const struct exporting *s, const struct scene *scene,
                         const struct camera *camera, struct err *e)
 {
     char hash[65], environment[65];
-    const char *slash = strrchr(s->out, '/');
     if (!sha256_file(s->scene, hash, e) ||
         (s->environment != NULL && !sha256_file(s->environment, environment, e)))
         return false;
-    char *command = exporting_command(s, NULL),
-         *named = exporting_command(s, slash != NULL ? slash + 1 : s->out);
+    char *command = exporting_command(s, NULL), *named = exporting_command(s, base_of(s->out));
     const struct export_origin origin = {.version = s->version != NULL ? s->version : assay_version,
                                          .command = s->command != NULL ? s->command : command,
                                          .named = s->command != NULL ? s->command : named,

@@ -4,7 +4,6 @@
 #include "../renderer/command_words.h"
 #include "../renderer/fs.h"
 #include "../renderer/options.h"
-#include "../renderer/sha256.h"
 #include "../renderer/shell_words.h"
 #include "merge.h"
 #include "plan_kinds.h"
@@ -12,6 +11,7 @@
 #include "reproduce_export.h"
 #include "reproduce_golden.h"
 #include "reproduce_page.h"
+#include "reproduce_parts.h"
 #include "reproduce_png.h"
 #include "reproduce_results.h"
 #include "temp_dir.h"
@@ -30,21 +30,6 @@ static const char *attr(const struct image *im, const char *name)
     return value != NULL ? value : "";
 }
 
-static bool check_scene(const char *path, const char *scene, const char *sha256, struct err *e)
-{
-    char now[65];
-    if (access(scene, R_OK) != 0)
-        return err_set(e, "%s: its scene '%s' is not here: give --scene, or go where it was made",
-                       path, scene);
-    if (!sha256_file(scene, now, e))
-        return false;
-    return strcmp(now, sha256) == 0 ||
-           err_set(
-               e,
-               "%s: %s is not the file that it was made of (SHA-256 %.12s... then, %.12s... now)",
-               path, scene, sha256, now);
-}
-
 enum { MORE_WORDS = 12, NUMBER = 16 };
 
 /* The words of the render, as they are to be run; memory of the caller's, as long as `word` and MORE_WORDS more. Ours come
@@ -58,7 +43,8 @@ static bool command_of(const char *path, const struct image *im,
     struct err why = {""};
     if (!options_parse(num, word, &o, &why) || o.action != ACTION_RENDER)
         return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
-    if (!check_scene(path, opt->scene != NULL ? opt->scene : o.scene, attr(im, "assay:scene"), e))
+    if (!reproduce_input(path, "scene", opt->scene != NULL ? opt->scene : o.scene,
+                         attr(im, "assay:scene"), "give --scene, or ", e))
         return false;
     const char *ours[] = {opt->pathtracer, "-q", "-t", threads, "--samples", samples, "-f", out};
     int n = (int)(sizeof ours / sizeof *ours);
@@ -118,13 +104,6 @@ bool reproduce_compare(const char *path, const struct image *a, const struct ima
     return true;
 }
 
-static bool set_command(struct reproduced *out, const char *const *word, struct err *e)
-{
-    free(out->command);
-    out->command = shell_join(NULL, word);
-    return out->command != NULL || err_set(e, "out of memory");
-}
-
 bool reproduce_render(const char *path, const struct image *im, char **word, int num,
                       const char *samples, const struct reproduce_options *opt, const char *to,
                       const char *heatmap, struct reproduced *out, struct err *e)
@@ -135,7 +114,7 @@ bool reproduce_render(const char *path, const struct image *im, char **word, int
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     bool ok = (argv != NULL || err_set(e, "out of memory")) &&
               command_of(path, im, opt, word, num, samples, threads, to, heatmap, spp, argv, e);
-    ok = ok && set_command(out, argv, e);
+    ok = ok && reproduced_command(out, argv, e);
     const struct process p = {.argv = argv, .log = log};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
     free(argv);
@@ -168,7 +147,7 @@ bool reproduce_ranges(const char *path, const struct image *im, char **word, int
     int count = 0;
     while (render[count] != NULL)
         count++;
-    ok = ok && set_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
+    ok = ok && reproduced_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
     for (int k = 0; ok && k < p.num; k++) {
         bool made;
         ok = plan_run_job(&p, k, &made, e);
@@ -206,7 +185,7 @@ static bool remake_merge(const char *path, char **word, int num,
         share_free(&share[i]);
     free(share);
     share_free(&whole);
-    return ok && set_command(out, (const char *const *)word, e);
+    return ok && reproduced_command(out, (const char *const *)word, e);
 }
 
 /* Into the file `to`. */
@@ -280,20 +259,47 @@ static bool is_results(const char *path)
     return first == '{' || first == '[';
 }
 
+enum kind { EXPORT, OF_CLASS, PAGE, RESULTS, PICTURE };
+
+static bool kind_of(const char *path, enum kind *kind, struct err *e)
+{
+    bool is_export = false;
+    if (!reproduce_is_export(path, &is_export, e))
+        return false;
+    *kind = is_export                     ? EXPORT
+            : reproduce_is_of_class(path) ? OF_CLASS
+            : reproduce_is_page(path)     ? PAGE
+            : is_results(path)            ? RESULTS
+                                          : PICTURE;
+    return true;
+}
+
+static bool remake_kind(enum kind kind, const char *path, const struct reproduce_options *opt,
+                        const char *dir, struct reproduced *out, struct err *e)
+{
+    bool for_picture = opt->scene != NULL || opt->pathtracer != NULL;
+    if (for_picture && kind != EXPORT && kind != PICTURE)
+        return err_set(e, "%s: --scene and --pathtracer are for pictures", path);
+    switch (kind) {
+    case EXPORT: return reproduce_export(path, opt, dir, out, e);
+    case OF_CLASS: return reproduce_class(path, opt, dir, out, e);
+    case PAGE: return reproduce_page(path, opt, dir, out, e);
+    case RESULTS: return reproduce_results(path, opt, dir, out, e);
+    case PICTURE: return reproduce_picture(path, opt, dir, out, e);
+    }
+    return false;
+}
+
 bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
                struct err *e)
 {
     struct err ignored;
     struct temp_dir dir;
+    enum kind kind;
     *out = (struct reproduced){0};
-    bool is_export = false;
-    if (!reproduce_is_export(path, &is_export, e) || !temp_dir_open(&dir, "reproduce", e))
+    if (!kind_of(path, &kind, e) || !temp_dir_open(&dir, "reproduce", e))
         return false;
-    bool ok = is_export                     ? reproduce_export(path, opt, dir.path, out, e)
-              : reproduce_is_of_class(path) ? reproduce_class(path, opt, dir.path, out, e)
-              : reproduce_is_page(path)     ? reproduce_page(path, opt, dir.path, out, e)
-              : is_results(path)            ? reproduce_results(path, opt, dir.path, out, e)
-                                            : reproduce_picture(path, opt, dir.path, out, e);
+    bool ok = remake_kind(kind, path, opt, dir.path, out, e);
     if (!ok)
         reproduced_free(out);
     bool removed = temp_dir_close(&dir, &ignored);

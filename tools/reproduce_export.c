@@ -1,10 +1,10 @@
 #include "reproduce_export.h"
 
 #include "../reference/export_origin.h"
-#include "../renderer/sha256.h"
+#include "../renderer/fs.h"
 #include "../renderer/shell_words.h"
 #include "exporting.h"
-#include "reproduce_bytes.h"
+#include "reproduce_parts.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -24,22 +24,12 @@ bool reproduce_is_export(const char *path, bool *is, struct err *e)
     return ok;
 }
 
-/* what: "scene", "environment"; then: NULL where the file does not say. */
+/* then: NULL where the file does not say. */
 static bool check_input(const char *path, const char *what, const char *file, const char *then,
                         const char *otherwise, struct err *e)
 {
-    char now[65];
-    if (then == NULL)
-        return err_set(e, "%s: does not say the hash of its %s", path, what);
-    if (access(file, R_OK) != 0)
-        return err_set(e, "%s: its %s '%s' is not here: %sgo where it was made", path, what, file,
-                       otherwise);
-    return sha256_file(file, now, e) &&
-           (strcmp(now, then) == 0 ||
-            err_set(e,
-                    "%s: %s is not the file that it was made of (SHA-256 %.12s... then, %.12s... "
-                    "now)",
-                    path, file, then, now));
+    return then != NULL ? reproduce_input(path, what, file, then, otherwise, e)
+                        : err_set(e, "%s: does not say the hash of its %s", path, what);
 }
 
 static bool settings_of(const char *path, const struct export_said *said,
@@ -87,21 +77,20 @@ static bool join(char to[MAX_PATH], const char *dir, const char *name, struct er
 static bool compare_all(const char *path, const char *made, const char *name,
                         struct reproduced *out, struct err *e)
 {
-    char then[MAX_PATH], now[MAX_PATH], beside[MAX_PATH];
-    const char *slash = strrchr(path, '/');
-    snprintf(beside, sizeof beside, "%.*s", slash != NULL ? (int)(slash - path) + 1 : 2,
-             slash != NULL ? path : "./");
+    char then[2 * MAX_PATH], now[MAX_PATH];
     if (!join(now, made, name, e) || !reproduce_bytes(path, now, out, e))
         return false;
     DIR *d = opendir(made);
     bool ok = d != NULL || err_set(e, "%s: %s", made, strerror(errno));
     for (const struct dirent *f; ok && (f = readdir(d)) != NULL;)
         if (strcmp(f->d_name, name) != 0 && strcmp(f->d_name, ".") != 0 &&
-            strcmp(f->d_name, "..") != 0)
-            ok = join(then, beside, f->d_name, e) && join(now, made, f->d_name, e) &&
+            strcmp(f->d_name, "..") != 0) {
+            beside_file(path, f->d_name, then, sizeof then);
+            ok = join(now, made, f->d_name, e) &&
                  (access(then, R_OK) == 0 ||
                   err_set(e, "%s: '%s' is not beside it", path, f->d_name)) &&
                  compare_beside(f->d_name, then, now, out, e);
+        }
     if (d != NULL)
         closedir(d);
     return ok;

@@ -2,8 +2,8 @@
 
 #include "../reference/reference.h"
 #include "../renderer/cli.h"
-#include "../renderer/shell_words.h"
 #include "places.h"
+#include "reproduce_parts.h"
 #include "results.h"
 
 #include <errno.h>
@@ -43,8 +43,7 @@ static bool set_command(struct reproduced *out, const char *scene, const char *e
 {
     const char *const word[] = {"assay",    "reference", "--fresh", "--only", scene,
                                 "--engine", engine,      "--seed",  seed,     NULL};
-    out->command = shell_join(NULL, word);
-    return out->command != NULL || err_set(e, "out of memory");
+    return reproduced_command(out, word, e);
 }
 
 /* By which engine it was made then, where it is another one now: that may be why it differs. */

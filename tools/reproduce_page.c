@@ -1,10 +1,11 @@
 #include "reproduce_page.h"
 
 #include "../reference/json_file.h"
+#include "../renderer/fs.h"
 #include "../renderer/shell_words.h"
 #include "history.h"
 #include "report.h"
-#include "reproduce_bytes.h"
+#include "reproduce_parts.h"
 #include "reproduce_results.h"
 #include "results.h"
 
@@ -85,13 +86,6 @@ json_t *reproduce_page_origin(const char *path, struct err *e)
     return origin;
 }
 
-static bool told(struct reproduced *out, const char *const *word, struct err *e)
-{
-    free(out->command);
-    out->command = shell_join(NULL, word);
-    return out->command != NULL || err_set(e, "out of memory");
-}
-
 static bool of_results(const char *path, const json_t *origin, const char *to,
                        struct reproduced *out, struct err *e)
 {
@@ -105,7 +99,7 @@ static bool of_results(const char *path, const json_t *origin, const char *to,
                        converge);
     const char *const word[] = {"assay",  "report", results, converge != NULL ? "--converge" : NULL,
                                 converge, NULL};
-    return told(out, word, e) && report_write_with(results, converge, to, e);
+    return reproduced_command(out, word, e) && report_write_with(results, converge, to, e);
 }
 
 static bool of_directory(const char *path, const char *to, struct reproduced *out, struct err *e)
@@ -114,7 +108,7 @@ static bool of_directory(const char *path, const char *to, struct reproduced *ou
     struct history h;
     beside_file(path, ".", dir, sizeof dir);
     const char *const word[] = {"assay", "report", "--history", dir, NULL};
-    if (!told(out, word, e) || !history_read(dir, history_alpha, &h, e))
+    if (!reproduced_command(out, word, e) || !history_read(dir, history_alpha, &h, e))
         return false;
     bool ok = history_write_page(&h, to, e);
     history_free(&h);
@@ -172,7 +166,7 @@ static bool of_junit(const char *path, const char *to, struct reproduced *out, s
     if (access(results, R_OK) != 0)
         return err_set(e, "%s: the results that it lists are not beside it: %s", path, results);
     const char *const word[] = {"assay", "validate,", "of", results, NULL};
-    if (!told(out, word, e) || !results_read(results, &root, e))
+    if (!reproduced_command(out, word, e) || !results_read(results, &root, e))
         return false;
     bool ok = results_write_junit(to, root, e);
     json_decref(root);
@@ -183,8 +177,6 @@ bool reproduce_page(const char *path, const struct reproduce_options *opt, const
                     struct reproduced *out, struct err *e)
 {
     char to[MAX_PATH];
-    if (opt->scene != NULL || opt->pathtracer != NULL)
-        return err_set(e, "%s: --scene and --pathtracer are for pictures", path);
     if (strlen(path) >= 4000)
         return err_set(e, "%.64s...: path too long", path);
     bool is_junit = begins(path, junit_begin);

@@ -5,7 +5,7 @@
 #include "../renderer/command_words.h"
 #include "../renderer/fs.h"
 #include "../renderer/shell_words.h"
-#include "reproduce_bytes.h"
+#include "reproduce_parts.h"
 #include "results.h"
 
 #include <stdio.h>
@@ -46,6 +46,7 @@ static void tell(const char *at, const json_t *then, const json_t *now, struct r
     free(b);
 }
 
+/* Adds what two of them have in values to out, the first that differs by its place: "claims[3].difference". */
 static void walk(const char *at, const json_t *then, const json_t *now, struct reproduced *out)
 {
     char path[120];
@@ -76,11 +77,6 @@ static void walk(const char *at, const json_t *then, const json_t *now, struct r
     out->num_values++;
     if (then == NULL || !json_equal(then, now))
         tell(at, then, now, out);
-}
-
-void results_differ(const json_t *then, const json_t *now, struct reproduced *out)
-{
-    walk("", then, now, out);
 }
 
 /* Where the command is told to put what is compared, and as what: option and file of the words; product: the file. */
@@ -176,10 +172,9 @@ bool results_run_again(const char *path, const json_t *then, int num, char **wor
     argv[4] = file;
     int more = 5 + more_words(path, verb, then, text, argv + 5);
     memcpy(argv + more, word + 2, (size_t)n * sizeof *argv);
-    out->command = shell_join(NULL, argv);
     struct err why = {""};
     const struct process p = {.argv = argv, .log = log};
-    bool ok = out->command != NULL || err_set(e, "out of memory");
+    bool ok = reproduced_command(out, argv, e);
     if (ok && !process_run(&p, &usage, &why) &&
         (usage.exit_status < EXIT_DIFFERENT || usage.exit_status > EXIT_INCONCLUSIVE))
         ok = err_set(e, "%s: made again: %s", path, why.msg);
@@ -253,8 +248,6 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
         ok = err_set(
             e, "%s: its --budget was over before all was decided: that depends on the machine",
             path);
-    if (ok && (opt->scene != NULL || opt->pathtracer != NULL))
-        ok = err_set(e, "%s: --scene and --pathtracer are for pictures", path);
     if (ok && (word = shell_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     ok = ok && results_run_again(path, origin, num, word, dir, product, out, e);
@@ -264,7 +257,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
         ok = err_set(e, "%s: made again: its --budget was over before all was decided", path);
     if (ok) {
         snprintf(out->made_by, sizeof out->made_by, "%s", version != NULL ? version : "");
-        results_differ(then, now, out);
+        walk("", then, now, out);
         if (opt->keep != NULL)
             ok = json_write(opt->keep, now, e);
     }

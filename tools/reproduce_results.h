@@ -18,7 +18,4 @@ bool results_run_again(const char *path, const json_t *then, int num, char **wor
                        char product[RESULTS_PATH], struct reproduced *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Adds what two of them have in values to out, the first that differs by its place: "claims[3].difference". */
-void results_differ(const json_t *then, const json_t *now, struct reproduced *out);
-
 #endif

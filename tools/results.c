@@ -361,16 +361,14 @@ bool claim_lacks_time(const json_t *claim)
 
 static bool any_lacks_time(const json_t *list)
 {
-    static const char *const told[] = {"reason", "error"};
     size_t i;
     json_t *c;
     json_array_foreach(list, i, c)
     {
-        for (int k = 0; k < 2; k++) {
-            const char *text = member_text(c, told[k]);
-            if (text != NULL && strncmp(text, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0)
-                return true;
-        }
+        const char *reason = member_text(c, "reason");
+        if (claim_lacks_time(c) ||
+            (reason != NULL && strncmp(reason, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0))
+            return true;
     }
     return false;
 }

@@ -81,7 +81,8 @@ enum outcome claim_outcome(const json_t *claim);
  * like any that was not judged, but counts as INCONCLUSIVE. */
 bool claim_lacks_time(const json_t *claim);
 
-/* How the reason or the error begins of what was not decided when the time of --budget was over; and whether anything was not. */
+/* How the reason begins of what was not decided when the time of --budget was over; and whether there is such a claim or one that
+ * lacks time. */
 #define BUDGET_SPENT "budget spent"
 bool results_lack_time(const json_t *results);
 

@@ -83,9 +83,12 @@ bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e)
 
 bool temp_dir_close(struct temp_dir *d, struct err *e)
 {
-    bool ok = d->path[0] == '\0' || remove_tree(d->path, e);
-    if (d->path[0] != '\0' && d->lock >= 0)
-        close(d->lock);
+    bool ok = true;
+    if (d->path[0] != '\0') {
+        ok = remove_tree(d->path, e);
+        if (d->lock >= 0)
+            close(d->lock);
+    }
     *d = (struct temp_dir){.lock = -1};
     return ok;
 }

@@ -2,8 +2,8 @@
 #include "comparing.h"
 #include "region.h"
 #include "report.h"
-#include "temp_dir.h"
 #include "results.h"
+#include "temp_dir.h"
 #include "verbs.h"
 
 #include <math.h>

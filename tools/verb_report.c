@@ -1,4 +1,5 @@
 #include "../renderer/cli.h"
+#include "../renderer/fs.h"
 #include "annotations.h"
 #include "consistency_run.h"
 #include "convergence.h"
@@ -115,14 +116,6 @@ static int write_history(const char *dir, const char *out, struct err *e)
     return code;
 }
 
-/* index.html in the directory of the results. */
-static void page_beside(const char *results, char *path, size_t size)
-{
-    const char *slash = strrchr(results, '/');
-    int n = slash ? (int)(slash - results) + 1 : 0;
-    snprintf(path, size, "%.*sindex.html", n, results);
-}
-
 int verb_report(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
@@ -188,7 +181,7 @@ int verb_report(int argc, char **argv, struct err *e)
     }
     char beside[4096];
     if (out == NULL) {
-        page_beside(results, beside, sizeof beside);
+        beside_file(results, "index.html", beside, sizeof beside);
         out = beside;
     }
     if (!report_write_with(results, converge, out, e))

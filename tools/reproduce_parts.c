@@ -1,20 +1,35 @@
-#include "reproduce_bytes.h"
+#include "reproduce_parts.h"
 
 #include "../renderer/fs.h"
+#include "../renderer/sha256.h"
+#include "../renderer/shell_words.h"
 
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-const char *base_of(const char *path)
+bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
 {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
+    free(out->command);
+    out->command = shell_join(NULL, word);
+    return out->command != NULL || err_set(e, "out of memory");
 }
 
-void beside_file(const char *path, const char *name, char *out, size_t size)
+bool reproduce_input(const char *path, const char *what, const char *file, const char *then,
+                     const char *otherwise, struct err *e)
 {
-    snprintf(out, size, "%.*s%s", (int)(base_of(path) - path), path, name);
+    char now[65];
+    if (access(file, R_OK) != 0)
+        return err_set(e, "%s: its %s '%s' is not here: %sgo where it was made", path, what, file,
+                       otherwise);
+    return sha256_file(file, now, e) &&
+           (strcmp(now, then) == 0 ||
+            err_set(e,
+                    "%s: %s is not the file that it was made of (SHA-256 %.12s... then, %.12s... "
+                    "now)",
+                    path, file, then, now));
 }
 
 static bool compare(FILE *a, FILE *b, struct reproduced *out)
