@@ -31,8 +31,8 @@ export -f run_job
 
 # The longest first: one more than there are processors at a time, since some wait for other programs.
 {
-    echo tests/end_to_end.sh
-    echo tests/lint.sh
+    echo tests/end_to_end/end_to_end.sh
+    echo tests/end_to_end/lint.sh
     echo tests/fuzz.sh
     long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
     printf '%s\n' "${programs[@]}" | grep -E "$long"

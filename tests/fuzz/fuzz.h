@@ -3,7 +3,7 @@
 #ifndef ASSAY_TESTS_FUZZ_H
 #define ASSAY_TESTS_FUZZ_H
 
-#include "../../renderer/err.h"
+#include "renderer/base/err.h"
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* Camera files of the assignment, and that the rays of a camera which was read are rays. */
-#include "../../renderer/camera.h"
+#include "renderer/scene/camera.h"
 #include "fuzz.h"
 
 #include <math.h>

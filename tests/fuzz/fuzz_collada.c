@@ -1,6 +1,6 @@
 /* COLLADA files, and that a scene which loaded is one that a renderer may trust. */
-#include "../../renderer/camera.h"
-#include "../../renderer/collada.h"
+#include "renderer/scene/camera.h"
+#include "renderer/collada/collada.h"
 #include "fuzz.h"
 
 #include <math.h>

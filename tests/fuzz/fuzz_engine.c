@@ -1,5 +1,5 @@
 /* Descriptions of other renderers (reference/ENGINES.md). */
-#include "../../reference/engine.h"
+#include "reference/external/engine_description.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,5 +1,5 @@
 /* EXR files with moments: OpenEXR's C library, and what we make of it. */
-#include "../../renderer/moments.h"
+#include "renderer/image/moments.h"
 #include "fuzz.h"
 
 #include <math.h>

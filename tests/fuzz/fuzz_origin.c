@@ -1,7 +1,7 @@
 /* What exported scenes and pages say of how they were made, and that a command that can be read can be written and read again. */
-#include "../../reference/export_origin.h"
-#include "../../renderer/shell_words.h"
-#include "../../tools/reproduce_page.h"
+#include "reference/base/export_provenance.h"
+#include "renderer/base/shell_quote.h"
+#include "tools/reproduce/reproduce_page.h"
 #include "fuzz.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Pictures from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies and our own PNGs by our readers. */
-#include "../../reference/image_oiio.h"
+#include "reference/base/image_oiio.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

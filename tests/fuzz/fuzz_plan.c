@@ -1,6 +1,6 @@
 /* plan.jsonl: as it is; and its jobs behind a head that is right, so that they are looked at too. */
-#include "../../renderer/version.h"
-#include "../../tools/plan.h"
+#include "renderer/base/version.h"
+#include "tools/jobs/plan.h"
 #include "fuzz.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* results.json, and that whatever was read can be shown. */
-#include "../../tools/results.h"
+#include "tools/results/results.h"
 #include "fuzz.h"
 
 #include <jansson.h>

@@ -1,5 +1,5 @@
 /* The .json of a scene of the suite, of both kinds: to be equal, and to differ (9x). */
-#include "../../reference/suite_json.h"
+#include "reference/suite/suite_json.h"
 #include "fuzz.h"
 
 #include <jansson.h>

@@ -1,0 +1,178 @@
+#include "image_oiio.h"
+
+#include "renderer/image/exr_header.h"
+#include "renderer/base/fs.h"
+#include "oiio.h"
+
+#include <ctype.h>
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e)
+{
+    /* Beside the programs; beside the directory of the tests; where `make install` puts it. */
+    static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so"};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        beside_program(path, IMAGE_OIIO_PATH, places[i]);
+        if (access(path, R_OK) == 0)
+            return true;
+    }
+    beside_program(path, IMAGE_OIIO_PATH, places[0]);
+    return err_set(e, "cannot load what reads pictures: %s is not there", path);
+}
+
+/* Loaded for good at the first call; it is found again at the others. */
+static const struct oiio_table *load(struct err *e)
+{
+    char path[IMAGE_OIIO_PATH];
+    if (!image_oiio_file(path, e))
+        return NULL;
+    void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
+    const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
+    if (table == NULL)
+        err_set(e, "cannot load what reads pictures: %s", dlerror());
+    return table;
+}
+
+/* Whether no chunk of a PNG says that it is longer than what is left of its `size` bytes [PNG 5.3]: the library reserves what a chunk says it is long, up to 2 GiB,
+ * before it looks. f: after the signature. */
+static bool png_chunks_fit(FILE *f, long size)
+{
+    enum { AROUND = 12 }; /* length, name, checksum */
+    unsigned char head[8];
+    for (long at = 8; at <= size - AROUND;) {
+        if (fseek(f, at, SEEK_SET) != 0 || fread(head, 1, sizeof head, f) != sizeof head)
+            return false;
+        long length = (long)head[0] << 24 | (long)head[1] << 16 | (long)head[2] << 8 | head[3];
+        if (length > size - at - AROUND)
+            return false;
+        at += AROUND + length;
+    }
+    return true;
+}
+
+/* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
+static const char *format_of(const char *path, double *size, struct err *e)
+{
+    struct stat st;
+    FILE *f = fopen(path, "rb");
+    if (f == NULL || fstat(fileno(f), &st) != 0 || S_ISDIR(st.st_mode)) {
+        err_set(e, "%s: cannot read: %s", path, strerror(f != NULL ? EISDIR : errno));
+        if (f != NULL)
+            fclose(f);
+        return NULL;
+    }
+    *size = (double)st.st_size;
+    unsigned char head[8] = {0};
+    size_t n = fread(head, 1, sizeof head, f);
+    const char *format = NULL, *why = "not an OpenEXR, Radiance, PNG or PFM file";
+    if (n == 8 && memcmp(head, "\x76\x2f\x31\x01", 4) == 0) {
+        if (exr_header_is_whole(f, head[4] | (unsigned)head[5] << 8, (long)st.st_size - 8))
+            format = "openexr";
+        why = "the file ends within its header";
+    } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
+        if (png_chunks_fit(f, (long)st.st_size))
+            format = "png";
+        why = "the file ends within one of its chunks";
+    } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
+        format = "hdr";
+    } else if (n >= 3 && head[0] == 'P' && strchr("123456Ff", head[1]) != NULL &&
+               isspace(head[2])) {
+        format = "pnm";
+    }
+    fclose(f);
+    if (format == NULL)
+        err_set(e, "%s: cannot read: %s", path, why);
+    return format;
+}
+
+static bool check_size(const char *path, const struct image_info *i, int depth, double bytes,
+                       double size, struct err *e)
+{
+    if (i->width < 1 || i->height < 1 || i->width > IMAGE_MAX_SIDE || i->height > IMAGE_MAX_SIDE ||
+        i->channels < 1 || i->channels > IMAGE_MAX_CHANNELS || depth > 1 ||
+        (double)i->width * i->height * i->channels > IMAGE_MAX_FLOATS)
+        return err_set(e, "%s: an image of %d x %d x %d is more than this program takes", path,
+                       i->width, i->height, i->channels);
+    return bytes <= IMAGE_MAX_EXPANSION * size ||
+           err_set(e, "%s: an image of %d x %d x %d cannot be in %.0f bytes", path, i->width,
+                   i->height, i->channels, size);
+}
+
+/* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
+static struct oiio_picture *open_picture(const char *path, const struct oiio_table **with,
+                                         struct image_info *out, struct err *e)
+{
+    double size = 0, bytes = 0;
+    int depth = 0;
+    char why[800];
+    const char *format = format_of(path, &size, e);
+    *with = format != NULL ? load(e) : NULL;
+    if (*with == NULL)
+        return NULL;
+    struct oiio_picture *p = (*with)->open(path, format, why, sizeof why);
+    if (p == NULL || !(*with)->head(p, out, &depth, &bytes, why, sizeof why))
+        err_set(e, "%s: %s", path, why);
+    else if (check_size(path, out, depth, bytes, size, e))
+        return p;
+    if (p != NULL)
+        (*with)->close(p);
+    return NULL;
+}
+
+/* The shape with its names, and room for the pixels. */
+static bool alloc_like(const struct oiio_table *oiio, const struct oiio_picture *p,
+                       const struct image_info *info, struct image *im, struct err *e)
+{
+    const char *names[IMAGE_MAX_CHANNELS];
+    for (int c = 0; c < info->channels; c++)
+        names[c] = oiio->channel(p, c);
+    return image_alloc(im, info->width, info->height, info->channels, names, e);
+}
+
+bool image_read(const char *path, struct image *out, bool *half, struct err *e)
+{
+    struct image_info info;
+    struct image im = {0};
+    const struct oiio_table *oiio;
+    struct err inner;
+    char why[800];
+    const char *name, *value;
+    struct oiio_picture *p = open_picture(path, &oiio, &info, e);
+    if (p == NULL)
+        return false;
+    bool ok = alloc_like(oiio, p, &info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
+    ok = ok && (oiio->read(p, im.data, why, sizeof why) || err_set(e, "%s: %s", path, why));
+    for (int k = 0; ok && oiio->text(p, k, &name, &value); k++)
+        ok = image_set_attr(&im, name, value, &inner) || err_set(e, "%s: %s", path, inner.msg);
+    oiio->close(p);
+    if (!ok) {
+        image_free(&im);
+        return false;
+    }
+    *out = im;
+    if (half != NULL)
+        *half = info.bytes < 4;
+    return true;
+}
+
+bool image_inspect(const char *path, struct image_info *out, struct err *e)
+{
+    const struct oiio_table *oiio;
+    struct oiio_picture *p = open_picture(path, &oiio, out, e);
+    if (p == NULL)
+        return false;
+    out->parts = oiio->parts(p);
+    oiio->close(p);
+    return true;
+}
+
+const char *image_oiio_version(struct err *e)
+{
+    const struct oiio_table *oiio = load(e);
+    return oiio != NULL ? oiio->version : NULL;
+}

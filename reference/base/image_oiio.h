@@ -1,0 +1,40 @@
+/* Pictures from elsewhere, by OpenImageIO. That library brings 230 others along and takes a fifth of a second to load, so it is in a
+ * file of its own, oiio.so, which is loaded when the first picture is read; without it every call fails with a line. */
+#ifndef ASSAY_IMAGE_OIIO_H
+#define ASSAY_IMAGE_OIIO_H
+
+#include "renderer/image/image.h"
+
+/* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
+ * colour conversion. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+bool image_read(const char *path, struct image *out, bool *half, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
+enum image_type {
+    IMAGE_INT8,
+    IMAGE_INT16,
+    IMAGE_HALF,
+    IMAGE_FLOAT,
+    IMAGE_OTHER /* fewer than 8 bits, 32-bit integers, doubles */
+};
+struct image_info {
+    char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
+    enum image_type type; /* the smallest of its channels */
+    int bytes;            /* of one value of that channel */
+    int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
+    int parts;            /* pictures in one file (EXR parts), 1 .. */
+    int width, height, channels;
+    bool is_cropped; /* the file holds another rectangle than the picture shown */
+};
+bool image_inspect(const char *path, struct image_info *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* The file that it is loaded from. */
+enum { IMAGE_OIIO_PATH = 4096 };
+bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e) __attribute__((warn_unused_result));
+
+/* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */
+const char *image_oiio_version(struct err *e);
+
+#endif

@@ -1,0 +1,13 @@
+/* JSON files that appear whole. */
+#ifndef ASSAY_JSON_FILE_H
+#define ASSAY_JSON_FILE_H
+
+#include "renderer/base/err.h"
+
+#include <jansson.h>
+
+/* Writes by rename, indented, with a final newline; makes the directories above it. */
+bool json_write(const char *path, const json_t *root, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

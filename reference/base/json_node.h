@@ -1,0 +1,37 @@
+/* Reading a JSON object strictly: every error names the file and the member. */
+#ifndef ASSAY_JSON_NODE_H
+#define ASSAY_JSON_NODE_H
+
+#include "renderer/base/err.h"
+
+#include <jansson.h>
+
+#include <stddef.h>
+
+/* An object of a .json file under inspection: `at` is "" or "references.cycles.", so that
+ * "<file>: key '<at><key>' ..." names any member. Borrows everything. */
+struct json_node {
+    const char *file, *at;
+    json_t *object;
+};
+
+/* Fails on a member that is not in the NULL-terminated list. */
+bool json_only_keys(const struct json_node *n, const char *const *allowed, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Each fails if the member is missing, of another type, or out of range. */
+bool json_get(const struct json_node *n, const char *key, json_t **out, struct err *e)
+    __attribute__((warn_unused_result));
+bool json_get_object(const struct json_node *n, const char *key, json_t **out, struct err *e)
+    __attribute__((warn_unused_result));
+/* lo <= *out <= hi */
+bool json_get_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
+                  struct err *e) __attribute__((warn_unused_result));
+/* lo < *out < hi */
+bool json_get_number(const struct json_node *n, const char *key, double lo, double hi, double *out,
+                     struct err *e) __attribute__((warn_unused_result));
+/* One line of text, neither empty nor longer than the buffer. */
+bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
+                   struct err *e) __attribute__((warn_unused_result));
+
+#endif

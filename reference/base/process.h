@@ -1,0 +1,36 @@
+/* Runs other people's programs: own process group, time limit, last lines of output kept. */
+#ifndef ASSAY_PROCESS_H
+#define ASSAY_PROCESS_H
+
+#include "renderer/base/err.h"
+
+#include <stddef.h>
+
+struct process {
+    const char *const *argv; /* argv[0] looked up in PATH; NULL-terminated */
+    const char *cwd;         /* NULL: the current one */
+    const char *log;         /* file that receives stdout and stderr, at most 64 MiB; NULL: none */
+    double timeout_s;        /* wall time; 0: none */
+    /* Called a few times a second while it runs (progress); may be NULL. */
+    void (*tick)(void *ctx);
+    void *tick_ctx;
+};
+
+struct process_usage {
+    double wall_s, cpu_s; /* of the child and of those of its descendants that were waited for */
+    int exit_status;      /* -1: it did not end by itself */
+};
+
+/* Runs to the end. True if it exited with status 0. Otherwise the line says: not found / killed by
+ * signal N / exit status N / no end after N s, then the last lines it printed, joined by " | "
+ * (ASCII only). At the time limit the whole process group gets SIGTERM, 2 s later SIGKILL. When
+ * this returns, and when the calling process dies of anything, every process of the group has been
+ * killed. stdin is /dev/null. usage may be NULL; it is filled whenever the program was started. May
+ * be called from several threads. Linux only (PR_SET_PDEATHSIG). */
+bool process_run(const struct process *p, struct process_usage *usage, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* True if argv0 can be found in PATH; fills its absolute path. An argv0 with a slash is a path. */
+bool process_find(const char *argv0, char *path, size_t size);
+
+#endif

@@ -1,0 +1,226 @@
+/* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
+#define _GNU_SOURCE
+#include "reference/replicates/engine_driver.h"
+
+#include "export_cycles.h"
+#include "reference/replicates/independence.h"
+#include "reference/base/process.h"
+
+#include "renderer/base/sha256.h"
+#include "renderer/base/fs.h"
+#include "reference/base/json_file.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATH_SIZE = 4096 + 64 };
+
+/* Of replicates first .. last-1; NULL out of memory. */
+static json_t *seeds_of(const struct reference_job *job, int first, int last)
+{
+    json_t *seeds = json_array();
+    for (int k = first; k < last; k++)
+        if (json_array_append_new(
+                seeds,
+                json_integer(replicate_seed(job->opt->seed, job->opt->first_replicate + k))) != 0) {
+            json_decref(seeds);
+            return NULL;
+        }
+    return seeds;
+}
+
+static bool write_seeds(const struct reference_job *job, int first, int last, struct err *e)
+{
+    char path[PATH_SIZE];
+    snprintf(path, sizeof path, "%s/seeds.json", job->dir);
+    json_t *seeds = seeds_of(job, first, last);
+    bool ok = seeds != NULL ? json_write(path, seeds, e) : err_set(e, "out of memory");
+    json_decref(seeds);
+    return ok;
+}
+
+/* What cycles.py says at the very end: "ASSAY OK {...}". */
+static bool read_report(const char *log, json_t **report, struct err *e)
+{
+    static const char mark[] = "ASSAY OK ";
+    FILE *f = fopen(log, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", log, strerror(errno));
+    char *line = NULL;
+    size_t size = 0;
+    *report = NULL;
+    while (*report == NULL && getline(&line, &size, f) > 0)
+        if (strncmp(line, mark, sizeof mark - 1) == 0)
+            *report = json_loads(line + sizeof mark - 1, 0, NULL);
+    free(line);
+    fclose(f);
+    const char *version = json_string_value(json_object_get(*report, "version"));
+    if (version != NULL && json_is_object(json_object_get(*report, "settings")))
+        return true;
+    json_decref(*report);
+    *report = NULL;
+    return err_set(e, "blender: ended without the OK line of cycles.py");
+}
+
+static bool is_constant(const float *pixels_rgb, size_t pixels)
+{
+    for (size_t i = 3; i < 3 * pixels; i++)
+        if (pixels_rgb[i] != pixels_rgb[i - 3])
+            return false;
+    return true;
+}
+
+/* All replicates into *out. Two that are the same betray a seed that was ignored. The exception is
+ * light without noise: every pixel has random numbers of its own, so if all pixels of all
+ * replicates agree to the bit, no random number matters, and the answer is exact. */
+static bool fold_replicates(const struct reference_job *job, const struct pictures *pictures,
+                            struct moments *out, json_t *manifest, struct err *e)
+{
+    int width = job->suite->width, height = job->suite->height;
+    int count = job->ref->replicates, num_constant = 0, num_first = 0, same = -1;
+    size_t pixels = (size_t)width * (size_t)height;
+    struct moments m = {0};
+    struct replicates all = {0};
+    struct repeats repeats = {0};
+    bool ok = repeats_alloc(&repeats, count, e) && moments_alloc(&m, width, height, e) &&
+              replicates_alloc(&all, width, height, count, e);
+    strcpy(m.unit, "replicate");
+    m.spp = job->ref->spp;
+    for (int k = 0; ok && k < count; k++) {
+        char path[PICTURE_PATH];
+        pictures->path_of(pictures->ctx, k, path);
+        float *px = pictures_read(path, width, height, false, e);
+        ok = px != NULL;
+        if (!ok)
+            break;
+        int first = repeats_add(&repeats, px, 3 * pixels);
+        same = first < k ? k : same;
+        num_first += first == 0;
+        num_constant += is_constant(px, pixels);
+        moments_add_image(&m, px);
+        if (job->opt->on_replicate != NULL)
+            job->opt->on_replicate(job->opt->on_replicate_ctx, k, px);
+        replicates_add(&all, px);
+        free(px);
+    }
+    if (ok && num_constant == count && num_first == count) {
+        strcpy(m.unit, "exact");
+        for (size_t p = 0; p < pixels; p++)
+            m.n[p] = 1;
+    } else if (ok && same >= 0) {
+        ok = err_set(
+            e, "Cycles: replicate %d is the same image as an earlier one: the seed has no effect",
+            same);
+    } else if (ok) {
+        ok = independence_check(&all, manifest, e) || err_prefix(e, "Cycles");
+    }
+    replicates_free(&all);
+    repeats_free(&repeats);
+    if (ok)
+        *out = m;
+    else
+        moments_free(&m);
+    return ok;
+}
+
+static bool fold(const struct reference_job *job, const struct pictures *pictures,
+                 const json_t *said, struct moments *out, json_t *manifest, struct err *e)
+{
+    static const char *const told[] = {"version", "settings", "binary_sha256", "command"};
+    if (!fold_replicates(job, pictures, out, manifest, e))
+        return false;
+    bool ok = true;
+    for (size_t i = 0; ok && i < sizeof told / sizeof *told; i++)
+        ok = json_object_set(manifest, told[i], json_object_get(said, told[i])) == 0;
+    ok = ok && json_object_set_new(manifest, "seeds", seeds_of(job, 0, job->ref->replicates)) == 0;
+    if (!ok) {
+        err_set(e, "Cycles manifest: out of memory");
+        moments_free(out);
+    }
+    return ok;
+}
+
+static bool count(const struct reference_job *job, int *num, struct err *e)
+{
+    (void)e;
+    *num = job->ref->replicates;
+    return true;
+}
+
+/* Picture first + i is replicate_<i>.exr, as cycles.py names it. */
+static bool render(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e)
+{
+    char blender[4096], sha256[65], dump[PATH_SIZE], log[PATH_SIZE], relative[PATH_SIZE];
+    char spp[16], threads[16], command[512] = "";
+    json_t *report = NULL;
+    char *script = NULL;
+    bool ok = false;
+    assert(last > first && job->ref->spp > 0 && job->opt->threads > 0);
+    if (strlen(job->dir) >= 4096 || strlen(job->opt->share_dir) >= 4096)
+        return err_set(e, "%.64s...: path too long", job->dir);
+    if (!process_find("blender", blender, sizeof blender))
+        return err_set(e, "blender: no such program in PATH (Blender 3.4 with Cycles)");
+    snprintf(relative, sizeof relative, "%s/cycles/cycles.py", job->opt->share_dir);
+    script = realpath(relative, NULL);
+    if (script == NULL)
+        return err_set(e, "%s: %s", relative, strerror(errno));
+    snprintf(dump, sizeof dump, "%s/scene.json", job->dir);
+    snprintf(log, sizeof log, "%s/blender.log", job->dir);
+    if (!sha256_file(blender, sha256, e) ||
+        !export_cycles(job->scene, job->camera, job->suite->depth, NULL, dump, e) ||
+        !write_seeds(job, first, last, e))
+        goto out;
+
+    snprintf(spp, sizeof spp, "%d", job->ref->spp);
+    snprintf(threads, sizeof threads, "%d", job->opt->threads);
+    const char *const argv[] = {"blender",
+                                "-b",
+                                "--factory-startup",
+                                "-noaudio",
+                                "--python-exit-code",
+                                "3",
+                                "-P",
+                                script,
+                                "--",
+                                "--scene",
+                                "scene.json",
+                                "--spp",
+                                spp,
+                                "--threads",
+                                threads,
+                                "--seeds",
+                                "seeds.json",
+                                NULL};
+    if (!process_run(
+            &(struct process){
+                .argv = argv, .cwd = job->dir, .log = log, .timeout_s = job->opt->timeout_s},
+            NULL, e) ||
+        !read_report(log, &report, e))
+        goto out;
+
+    for (int i = 0; argv[i] != NULL; i++)
+        snprintf(command + strlen(command), sizeof command - strlen(command), "%s%s",
+                 i > 0 ? " " : "", argv[i] == script ? "cycles.py" : argv[i]);
+    ok = (json_object_set(said, "version", json_object_get(report, "version")) == 0 &&
+          json_object_set(said, "settings", json_object_get(report, "settings")) == 0 &&
+          json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0 &&
+          json_object_set_new(said, "command", json_string(command)) == 0) ||
+         err_set(e, "out of memory");
+out:
+    json_decref(report);
+    free(script);
+    return ok;
+}
+
+const struct driver cycles_driver = {
+    .engine = "cycles", .prefix = "replicate", .count = count, .render = render, .fold = fold};
+
+bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
+                   struct err *e)
+{
+    return driver_render(&cycles_driver, job, out, manifest, e);
+}

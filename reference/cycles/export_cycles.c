@@ -1,0 +1,148 @@
+#include "export_cycles.h"
+
+#include "renderer/base/fs.h"
+#include "export_cycles_internal.h"
+#include "reference/suite/features.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_DEPTH = 1025 }; /* Blender's limit of 1024 bounces is one less than ours */
+
+/* Blender's range of focal lengths for a 36 mm sensor, mm. */
+#define LENS_MIN 1.0
+#define LENS_MAX 5000.0
+
+static json_t *numbers3(double x, double y, double z)
+{
+    return json_pack("[fff]", x, y, z);
+}
+json_t *cycles_vec3(vec3 v)
+{
+    return numbers3(v.x, v.y, v.z);
+}
+json_t *cycles_rgb(rgb c)
+{
+    return numbers3(c.r, c.g, c.b);
+}
+
+json_t *cycles_name(const char *name)
+{
+    /* A name that was cut may end inside a UTF-8 sequence. */
+    char ascii[64];
+    size_t n = strnlen(name, sizeof ascii - 1);
+    for (size_t i = 0; i < n; i++)
+        ascii[i] = name[i] >= ' ' && name[i] <= '~' ? name[i] : '?';
+    ascii[n] = '\0';
+    return json_string(ascii);
+}
+
+void cycles_push(json_t **array, json_t *value)
+{
+    if (json_array_append_new(*array, value) == 0)
+        return;
+    json_decref(*array);
+    *array = NULL;
+}
+
+static json_t *camera_json(const struct scene *s, const struct camera *c, struct err *e)
+{
+    if (c->lens_radius > 0 && !(c->focal_distance > 0)) {
+        err_set(e, "Cycles: a lens that focuses at distance %g", (double)c->focal_distance);
+        return NULL;
+    }
+    double tan_h = c->tan_h, lens = 18 / tan_h, square = tan_h * c->height / c->width;
+    if (!(fabs(c->tan_v / square - 1) < 1e-5)) {
+        err_set(e, "Cycles: the camera's pixels are not square (tan_h %g, tan_v %g, %d x %d)",
+                tan_h, (double)c->tan_v, c->width, c->height);
+        return NULL;
+    }
+    if (!(lens >= LENS_MIN && lens <= LENS_MAX)) {
+        err_set(e,
+                "Cycles: horizontal angle of view out of Blender's range (tan of its half is %g)",
+                tan_h);
+        return NULL;
+    }
+    /* Blender keeps a rotation, not a matrix. */
+    dvec3 right = cycles_wide(c->right), up = cycles_wide(c->up), back = cycles_wide(c->backward);
+    if (!(d3_length(d3_sub(d3_cross(right, up), back)) < 1e-5 && fabs(d3_dot(right, up)) < 1e-5)) {
+        err_set(e, "Cycles: the camera's axes are not orthogonal");
+        return NULL;
+    }
+    double nearest, furthest;
+    scene_distances(s, c->eye, &nearest, &furthest);
+    nearest -= (double)c->lens_radius; /* where a ray may start */
+    furthest += (double)c->lens_radius;
+    if (!(nearest > c->near && nearest > 0)) {
+        err_set(e, "Cycles: geometry at distance %g from the eye, the near plane is at %g", nearest,
+                (double)c->near);
+        return NULL;
+    }
+    if (!(furthest < c->far)) {
+        err_set(e, "Cycles: geometry at distance %g from the eye, the far plane is at %g", furthest,
+                (double)c->far);
+        return NULL;
+    }
+    /* Cycles clips by depth, we by distance: take planes that clip nothing in either. */
+    double corner = sqrt(1 + tan_h * tan_h + square * square);
+    return json_pack("{so,so,so,so,sf,s[ff],sf,sf}", "right", cycles_vec3(c->right), "up",
+                     cycles_vec3(c->up), "backward", cycles_vec3(c->backward), "eye",
+                     cycles_vec3(c->eye), "tan_h", tan_h, "clip", 0.5 * nearest / corner,
+                     2 * furthest, "lens_radius", (double)c->lens_radius, "focal_distance",
+                     (double)c->focal_distance);
+}
+
+static bool write_json(const json_t *root, const char *path, struct err *e)
+{
+    struct out_file o;
+    if (!out_open(&o, path, e))
+        return false;
+    if (json_dumpf(root, o.f, JSON_COMPACT | JSON_REAL_PRECISION(9)) != 0 ||
+        fputc('\n', o.f) == EOF) {
+        out_abandon(&o);
+        return err_set(e, "%s: cannot write", path);
+    }
+    return out_commit(&o, e);
+}
+
+bool export_cycles(const struct scene *s, const struct camera *c, int depth,
+                   const struct export_origin *origin, const char *path, struct err *e)
+{
+    const struct export_origin none = {.version = NULL}, *o = origin != NULL ? origin : &none;
+    assert(depth >= 0 && c->width > 0 && c->height > 0);
+    double extent = d3_length(d3_sub(cycles_wide(s->bounds_max), cycles_wide(s->bounds_min)));
+    json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL, *root = NULL;
+    struct err why = {"out of memory"};
+    char image[4096 + 8];
+    bool image_written = false;
+    if (depth > MAX_DEPTH)
+        return err_set(e, "Cycles: depth %d, at most %d are possible", depth, MAX_DEPTH);
+    if (strlen(path) >= sizeof image - 4)
+        return err_set(e, "%.64s...: path too long", path);
+    snprintf(image, sizeof image, "%s.exr", path);
+    bool ok = (materials = cycles_materials(s, &why)) != NULL &&
+              (camera = camera_json(s, c, &why)) != NULL &&
+              (meshes = cycles_meshes(s, &why)) != NULL &&
+              (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
+    if (ok) {
+        root = json_pack("{si,ss*,ss*,ss*,ss*,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2,
+                         "assay:version", o->version, "assay:command",
+                         image_written ? o->named : o->command, "assay:scene", o->scene,
+                         "assay:environment", o->environment, "depth", depth, "width", c->width,
+                         "height", c->height, "extent", extent, "camera", camera, "materials",
+                         materials, "meshes", meshes, "spheres", cycles_spheres(s, c->eye),
+                         "lights", cycles_lights(s), "environment", environment);
+        ok = root != NULL && write_json(root, path, &why);
+    }
+    if (!ok && image_written)
+        unlink(image);
+    json_decref(root);
+    json_decref(camera);
+    json_decref(materials);
+    json_decref(meshes);
+    json_decref(environment);
+    return ok || err_set(e, "%s", why.msg);
+}

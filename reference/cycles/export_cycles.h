@@ -1,0 +1,51 @@
+/* The scene as a neutral dump that cycles.py builds in Blender: world space, linear Rec. 709, our
+ * units, nothing left to interpret. Why each of its numbers gives the same picture in Cycles, and
+ * the probe that shows it, is in MATCH_CYCLES.md.
+ *
+ * JSON, in one object:
+ *   "assay_cycles": 2           version of this format
+ *   "assay:version", "assay:command", "assay:scene", "assay:environment": how it was made (export_provenance.h), where that
+ *                               was given; nothing reads them but `assay reproduce`
+ *   "depth": m                  as the assignment counts: 0 = emission seen directly
+ *   "width", "height"           pixels
+ *   "extent"                    diagonal of the box around the scene
+ *   "camera": {"right", "up", "backward", "eye": [x,y,z],
+ *              "tan_h": half width of the image plane at distance 1,
+ *              "clip": [near, far],     planar distances that cut nothing of the scene
+ *              "lens_radius" (0: pinhole), "focal_distance"}
+ *   "materials": [{"name", "kind": "diffuse", "mirror", "refraction", "glass" or "microfacet",
+ *                  "reflectance": [r,g,b] (of both sides), "radiance": [r,g,b],
+ *                  "both_sides": emits from the back too,
+ *                  refraction and glass: "transmittance": [r,g,b], "ior" (as struct material has it),
+ *                                        "schlick",
+ *                  microfacet: "distribution": "ggx" or "beckmann", "alpha", "separable",
+ *                              "eta", "k": [r,g,b] or null (then reflectance at any angle),
+ *                              "facets": true: by random facets; false: Blender's own closure does}]
+ *   "meshes": [{"name", "material": index, "positions": [9 numbers a triangle],
+ *               "normals": [9 numbers a triangle], on the geometric normal's side, or null: flat}]
+ *   "spheres": [{"name", "material", "centre": [x,y,z], "radius", "normal_out": +1 or -1,
+ *                "exact": true: seen from outside only, opaque and dark, so an analytic point will
+ *                         do; false: needs a mesh}]
+ *   "lights": [{"kind": "point", "position", "value": [r,g,b], "attenuation": [a,b,c]} |
+ *              {"kind": "spot", as point, "axis", "cos_cutoff", "exponent"} |
+ *              {"kind": "directional", "to_light", "irradiance": [r,g,b] (W/m2)}]
+ *   "environment": null | {"kind": "constant" or "upper_half", "radiance": [r,g,b]} |
+ *                  {"kind": "image", "file": a float32 EXR beside the dump}
+ * Emitting meshes and spheres are lights by their material. */
+#ifndef ASSAY_EXPORT_CYCLES_H
+#define ASSAY_EXPORT_CYCLES_H
+
+#include "renderer/scene/camera.h"
+#include "reference/base/export_provenance.h"
+
+/* Writes the dump, with its origin unless that is NULL, and an environment's image to <path>.exr, each by rename. Fails on a write error,
+ * and with a line that starts with "Cycles: " on what our recipe for Cycles cannot express: pixels
+ * that are not square, an angle of view out of Blender's range, clipping planes that cut geometry, a
+ * depth above 1025, shading normals of one triangle on both of its sides, a microfacet that takes
+ * facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
+ * no ray runs into: point, spot, directional, the assignment's ambient light. */
+bool export_cycles(const struct scene *s, const struct camera *c, int depth,
+                   const struct export_origin *origin, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,37 @@
+/* What the files of the Cycles exporter share. */
+#ifndef ASSAY_EXPORT_CYCLES_INTERNAL_H
+#define ASSAY_EXPORT_CYCLES_INTERNAL_H
+
+#include "renderer/math/mat4.h"
+#include "renderer/scene/scene.h"
+
+#include <jansson.h>
+
+static inline dvec3 cycles_wide(vec3 v)
+{
+    return d3(v.x, v.y, v.z);
+}
+/* Twice the triangle's area along its geometric normal. */
+static inline dvec3 cycles_area_normal(const vec3 *p)
+{
+    return d3_cross(d3_sub(cycles_wide(p[1]), cycles_wide(p[0])),
+                    d3_sub(cycles_wide(p[2]), cycles_wide(p[0])));
+}
+
+json_t *cycles_vec3(vec3 v);
+json_t *cycles_rgb(rgb c);
+/* Names are only labels here; other bytes than ASCII's become '?'. */
+json_t *cycles_name(const char *name);
+/* json_array_append_new() that remembers a failure: *array is then NULL. */
+void cycles_push(json_t **array, json_t *value);
+
+/* Parts of the dump; NULL with a line in *e if the recipe cannot express them. */
+json_t *cycles_materials(const struct scene *s, struct err *e);
+json_t *cycles_meshes(const struct scene *s, struct err *e);
+json_t *cycles_spheres(const struct scene *s, vec3 eye);
+json_t *cycles_lights(const struct scene *s);
+/* An image goes to image_path, by rename; *image_written tells if so. */
+json_t *cycles_environment(const struct scene *s, const char *image_path, bool *image_written,
+                           struct err *e);
+
+#endif

@@ -1,0 +1,173 @@
+#include "export_cycles_internal.h"
+
+#include "renderer/scene/environment.h"
+
+#include <math.h>
+
+/* Normals closer than this to the geometric one are the geometric one: text with six digits. */
+#define FLAT 1e-5
+
+/* The Glossy BSDF of 3.4 is GGX with separable Smith shadowing and one colour at all angles, of
+ * roughness 1 at most; it takes small ones for a mirror, and its formula loses digits before. Every
+ * other microfacet is made of random facets (cycles_material.py). */
+static bool needs_facets(const struct material *m)
+{
+    return m->kind == MATERIAL_MICROFACET && (m->microfacet != MICROFACET_GGX || !m->separable ||
+                                              m->conductor || m->alpha > 1 || m->alpha < 0.01f);
+}
+
+static const char *unsampled_light(const struct scene *s)
+{
+    for (uint32_t i = 0; i < s->num_lights; i++)
+        switch (s->lights[i].kind) {
+        case LIGHT_POINT: return "a point light";
+        case LIGHT_SPOT: return "a spot light";
+        case LIGHT_DIRECTIONAL: return "a directional light";
+        case LIGHT_ENVIRONMENT:
+            if (environment_is_hidden(s->environment))
+                return "the ambient light";
+            break;
+        case LIGHT_TRIANGLES:
+        case LIGHT_SPHERE: break;
+        }
+    return NULL;
+}
+
+static json_t *reflection(const struct material *m)
+{
+    static const char *const KIND[] = {"diffuse", "mirror", "refraction", "glass", "microfacet"};
+    json_t *o = json_pack("{so,ss,so,so,sb}", "name", cycles_name(m->name), "kind", KIND[m->kind],
+                          "reflectance", cycles_rgb(m->reflectance), "radiance",
+                          cycles_rgb(m->radiance), "both_sides", m->radiance_both_sides);
+    json_t *more = NULL;
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE:
+    case MATERIAL_MIRROR: return o;
+    case MATERIAL_REFRACTION:
+    case MATERIAL_GLASS:
+        more = json_pack("{so,sf,sb}", "transmittance", cycles_rgb(m->transmittance), "ior",
+                         (double)m->ior, "schlick", m->schlick);
+        break;
+    case MATERIAL_MICROFACET:
+        more = json_pack("{ss,sf,sb,sb,so,so}", "distribution",
+                         m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann", "alpha",
+                         (double)m->alpha, "separable", m->separable, "facets", needs_facets(m),
+                         "eta", m->conductor ? cycles_rgb(m->eta) : json_null(), "k",
+                         m->conductor ? cycles_rgb(m->k) : json_null());
+        break;
+    }
+    if (json_object_update_missing(o, more) != 0) {
+        json_decref(o);
+        o = NULL;
+    }
+    json_decref(more);
+    return o;
+}
+
+json_t *cycles_materials(const struct scene *s, struct err *e)
+{
+    json_t *out = json_array();
+    const char *light = unsampled_light(s);
+    for (uint32_t i = 0; i < s->num_materials; i++) {
+        const struct material *m = &s->materials[i];
+        if (needs_facets(m) && light != NULL) {
+            err_set(
+                e,
+                "Cycles: material '%s': %s cannot light a microfacet that is not GGX, separable, "
+                "of constant reflectance and of alpha 0.01 to 1",
+                m->name, light);
+            json_decref(out);
+            return NULL;
+        }
+        cycles_push(&out, reflection(m));
+    }
+    return out;
+}
+
+static void push3(json_t **array, vec3 v, float sign)
+{
+    cycles_push(array, json_real(sign * v.x));
+    cycles_push(array, json_real(sign * v.y));
+    cycles_push(array, json_real(sign * v.z));
+}
+
+/* A triangle's shading normals: +1 all on the geometric normal's side, -1 all on the other (the
+ * renderer turns them), 0 mixed. *flat: they are the geometric normal, of either sign. */
+static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
+{
+    dvec3 ng = cycles_area_normal(p);
+    ng = d3_scale(ng, 1 / d3_length(ng));
+    int positive = 0;
+    double worst = 0;
+    for (int k = 0; k < 3; k++) {
+        double cosine = d3_dot(cycles_wide(n[k]), ng);
+        positive += cosine > 0;
+        worst =
+            fmax(worst, d3_length(d3_sub(cycles_wide(n[k]), d3_scale(ng, cosine > 0 ? 1 : -1))));
+    }
+    *flat = worst < FLAT && positive % 3 == 0;
+    return positive == 3 ? 1 : positive == 0 ? -1 : 0;
+}
+
+/* The flat or the smooth triangles of one object; appended if there are any. */
+static bool push_mesh(json_t **out, const struct scene *s, const struct object *o, bool smooth,
+                      struct err *e)
+{
+    json_t *positions = json_array(), *normals = json_array();
+    bool ok = true;
+    for (uint32_t i = o->first_triangle; ok && i < o->first_triangle + o->num_triangles; i++) {
+        const vec3 *p = s->position + 3 * (size_t)i, *n = s->normal + 3 * (size_t)i;
+        bool flat;
+        int side = normals_side(p, n, &flat);
+        if (side == 0)
+            ok = err_set(
+                e, "Cycles: object '%s': triangle %u has shading normals on both of its sides",
+                o->name, i - o->first_triangle);
+        for (int k = 0; ok && flat != smooth && k < 3; k++) {
+            push3(&positions, p[k], 1);
+            if (smooth)
+                push3(&normals, n[k], (float)side);
+        }
+    }
+    if (ok && (positions == NULL || json_array_size(positions) > 0))
+        cycles_push(out, json_pack("{so,si,sO,sO}", "name", cycles_name(o->name), "material",
+                                   (int)o->material, "positions", positions, "normals",
+                                   smooth ? normals : json_null()));
+    json_decref(positions);
+    json_decref(normals);
+    return ok;
+}
+
+json_t *cycles_meshes(const struct scene *s, struct err *e)
+{
+    json_t *out = json_array();
+    for (uint32_t i = 0; i < s->num_objects; i++) {
+        const struct object *o = &s->objects[i];
+        if (!push_mesh(&out, s, o, false, e) || !push_mesh(&out, s, o, true, e)) {
+            json_decref(out);
+            return NULL;
+        }
+    }
+    return out;
+}
+
+json_t *cycles_spheres(const struct scene *s, vec3 eye)
+{
+    json_t *out = json_array();
+    for (uint32_t i = 0; i < s->num_spheres; i++) {
+        const struct sphere *sp = &s->spheres[i];
+        const struct material *m = &s->materials[s->sphere_material[i]];
+        /* Analytic spheres are invisible from inside and no lights; an opaque sphere is seen from
+         * inside only by an eye that is there. */
+        bool opaque = m->kind != MATERIAL_REFRACTION && m->kind != MATERIAL_GLASS;
+        bool inside = d3_length(d3_sub(cycles_wide(eye), cycles_wide(sp->centre))) < sp->radius;
+        bool dark = rgb_is_zero(m->radiance);
+        cycles_push(&out,
+                    json_pack("{so,si,so,sf,si,sb}", "name",
+                              cycles_name(s->objects[s->sphere_object[i]].name), "material",
+                              (int)s->sphere_material[i], "centre", cycles_vec3(sp->centre),
+                              "radius", (double)sp->radius, "normal_out",
+                              sp->normal_out > 0 ? 1 : -1, "exact", opaque && dark && !inside));
+    }
+    return out;
+}

@@ -1,0 +1,299 @@
+/* Reading an engine's description; engine_run.c does what it says. */
+#include "engine_description.h"
+
+#include "reference/suite/features.h"
+#include "reference/base/json_node.h"
+
+#include <errno.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const format_names[] = {"mitsuba", "pbrt", "povray", "cycles", "dae", NULL};
+static const char *const output_names[] = {"mean", "exact", "moments", NULL};
+static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
+
+/* What a placeholder may be called in each of the arrays. */
+static const char *const in_command[] = {"scene", "out",    "spp",     "seed", "depth",
+                                         "width", "height", "threads", "here", NULL};
+static const char *const in_version[] = {"here", NULL};
+static const char *const in_lens[] = {"lens_radius", "focal_distance", NULL};
+static const char *const in_environment[] = {"environment", NULL};
+
+static int find(const char *const *words, const char *text, size_t length)
+{
+    for (int i = 0; words[i] != NULL; i++)
+        if (strlen(words[i]) == length && memcmp(words[i], text, length) == 0)
+            return i;
+    return -1;
+}
+
+static bool get_word(const struct json_node *n, const char *key, const char *const *words, int *out,
+                     struct err *e)
+{
+    char text[32], list[256] = "";
+    if (!json_get_text(n, key, text, sizeof text, e))
+        return false;
+    *out = find(words, text, strlen(text));
+    for (int i = 0; words[i] != NULL; i++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i > 0 ? ", " : "",
+                 words[i]);
+    return *out >= 0 || err_set(e, "%s: '%s' is '%s', none of: %s", n->file, key, text, list);
+}
+
+/* The piece of `text` that a brace begins: its length, or 0 where the braces do not match. "{{" and
+ * "}}" have two bytes. */
+static size_t brace_length(const char *text)
+{
+    if (text[1] == text[0])
+        return 2;
+    size_t n = strcspn(text + 1, "{}");
+    return text[0] == '{' && text[1 + n] == '}' ? n + 2 : 0;
+}
+
+/* One argument: printable, and only known placeholders. `used` collects them as bits. */
+static bool check_argument(const struct json_node *n, const char *key, size_t index,
+                           const char *text, const char *const *names, unsigned *used,
+                           struct err *e)
+{
+    for (const char *c = text; *c != '\0'; c++) {
+        if ((unsigned char)*c < ' ')
+            return err_set(e, "%s: '%s' [%zu] is not one line", n->file, key, index);
+        if (*c != '{' && *c != '}')
+            continue;
+        size_t length = brace_length(c);
+        if (length == 0)
+            return err_set(e, "%s: '%s' [%zu]: a brace without its partner in '%s' ({{ is a brace)",
+                           n->file, key, index, text);
+        if (length > 2 || c[1] != c[0]) {
+            int at = find(names, c + 1, length - 2);
+            if (at < 0)
+                return err_set(e, "%s: '%s' [%zu]: unknown placeholder '%.*s'", n->file, key, index,
+                               (int)length, c);
+            *used |= 1u << at;
+        }
+        c += length - 1;
+    }
+    return true;
+}
+
+static bool check_arguments(const struct json_node *n, const char *key, const char *const *names,
+                            unsigned *used, struct err *e)
+{
+    json_t *array, *value;
+    size_t index;
+    *used = 0;
+    if (!json_get(n, key, &array, e))
+        return false;
+    if (!json_is_array(array) || json_array_size(array) == 0 || json_array_size(array) > 256)
+        return err_set(e, "%s: '%s' is not a list of 1 to 256 texts", n->file, key);
+    json_array_foreach(array, index, value)
+    {
+        const char *text = json_string_value(value);
+        if (text == NULL || (index == 0 && text[0] == '\0'))
+            return err_set(e, "%s: '%s' [%zu] is not a text", n->file, key, index);
+        if (!check_argument(n, key, index, text, names, used, e))
+            return false;
+    }
+    return true;
+}
+
+static bool read_command(const struct json_node *n, const struct engine *en, struct err *e)
+{
+    unsigned used;
+    if (!check_arguments(n, "command", in_command, &used, e))
+        return false;
+    const bool scene = used & 1, out = used & 2, seed = used & 8;
+    if (!scene || !out)
+        return err_set(e, "%s: 'command' has no {%s}", n->file, scene ? "out" : "scene");
+    if (en->output == OUTPUT_MEAN && !seed)
+        return err_set(e,
+                       "%s: 'command' has no {seed}, so no two pictures would be independent; a "
+                       "picture without noise has \"output\": \"exact\"",
+                       n->file);
+    if (en->output == OUTPUT_EXACT && seed)
+        return err_set(e, "%s: 'command' has a {seed}, but 'output' is 'exact'", n->file);
+    return true;
+}
+
+static bool read_features(const struct json_node *n, struct engine *en, struct err *e)
+{
+    json_t *array, *value;
+    size_t index;
+    if (!json_get(n, "expresses", &array, e))
+        return false;
+    if (!json_is_array(array))
+        return err_set(e, "%s: 'expresses' is not a list", n->file);
+    json_array_foreach(array, index, value)
+    {
+        const char *text = json_string_value(value);
+        int at = text != NULL ? find(feature_names, text, strlen(text)) : -1;
+        if (at < 0)
+            return err_set(e, "%s: 'expresses' [%zu]: '%s' is no feature (see ENGINES.md)", n->file,
+                           index, text != NULL ? text : "not a text");
+        en->feature |= 1u << at;
+    }
+    return true;
+}
+
+/* Lens and environment are in every exported file; for a .dae they are on the command line. */
+static bool read_extra(const struct json_node *n, const struct engine *en, const char *key,
+                       const char *const *names, enum feature feature, struct err *e)
+{
+    unsigned used;
+    bool has = json_object_get(n->object, key) != NULL;
+    bool wants = en->format == FORMAT_DAE && (en->feature & 1u << feature);
+    if (has && en->format != FORMAT_DAE)
+        return err_set(e, "%s: '%s' is for \"format\": \"dae\" only", n->file, key);
+    if (has != wants)
+        return err_set(e, "%s: '%s' and the feature '%s' come together with \"format\": \"dae\"",
+                       n->file, key, feature_names[feature]);
+    if (has && !check_arguments(n, key, names, &used, e))
+        return false;
+    for (int i = 0; has && names[i] != NULL; i++)
+        if (!(used & 1u << i))
+            return err_set(e, "%s: '%s' has no {%s}", n->file, key, names[i]);
+    return true;
+}
+
+static bool read_optional_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
+                              struct err *e)
+{
+    return json_object_get(n->object, key) == NULL || json_get_int(n, key, lo, hi, out, e);
+}
+
+static bool read_name(const struct json_node *n, struct engine *en, struct err *e)
+{
+    static const char *const taken[] = {"truth", "cycles", "povray", "pathtracer", NULL};
+    if (!json_get_text(n, "name", en->name, sizeof en->name, e))
+        return false;
+    if (en->name[strspn(en->name, "abcdefghijklmnopqrstuvwxyz0123456789_-")] != '\0')
+        return err_set(e, "%s: 'name' is '%s'; a-z, 0-9, _ and - may be in it", n->file, en->name);
+    if (find(taken, en->name, strlen(en->name)) >= 0)
+        return err_set(e, "%s: 'name' is '%s', which this program uses itself", n->file, en->name);
+    return true;
+}
+
+static bool read_engine(const char *path, struct engine *en, struct err *e)
+{
+    static const char *const keys[] = {
+        "name",       "comment",   "format",           "command", "output",
+        "image",      "expresses", "depth_offset",     "spp",     "version",
+        "replicates", "lens_args", "environment_args", NULL};
+    struct json_node n = {path, "", en->json};
+    int word, image = 0;
+    unsigned used;
+    if (!json_is_object(en->json))
+        return err_set(e, "%s: not an object", path);
+    if (!json_only_keys(&n, keys, e) || !read_name(&n, en, e) ||
+        !get_word(&n, "format", format_names, &word, e))
+        return false;
+    en->format = (enum engine_format)word;
+    if (!get_word(&n, "output", output_names, &word, e))
+        return false;
+    en->output = (enum engine_output)word;
+    if (json_object_get(en->json, "image") != NULL &&
+        !get_word(&n, "image", image_names, &image, e))
+        return false;
+    strcpy(en->image, image_names[image]);
+    if (en->output == OUTPUT_MOMENTS && image != 0)
+        return err_set(e, "%s: moments are in an exr, not in a %s", path, en->image);
+    if (json_object_get(en->json, "version") != NULL &&
+        !check_arguments(&n, "version", in_version, &used, e))
+        return false;
+    return read_features(&n, en, e) && read_command(&n, en, e) &&
+           read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
+           read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
+           read_optional_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
+           read_extra(&n, en, "lens_args", in_lens, FEATURE_LENS, e) &&
+           read_extra(&n, en, "environment_args", in_environment, FEATURE_ENVIRONMENT, e);
+}
+
+bool engine_load(const char *path, struct engine *out, struct err *e)
+{
+    struct engine en = {.spp = 64, .replicates = 16};
+    char full[PATH_MAX];
+    json_error_t why;
+    if (realpath(path, full) == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    if (strlen(full) >= sizeof en.file)
+        return err_set(e, "%.64s...: path too long", path);
+    strcpy(en.file, full);
+    strcpy(en.here, dirname(full));
+    en.json = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
+    if (en.json == NULL && why.line < 1)
+        return err_set(e, "%s: %s", path, why.text);
+    if (en.json == NULL)
+        return err_set(e, "%s:%d: %s", path, why.line, why.text);
+    if (!read_engine(path, &en, e)) {
+        engine_free(&en);
+        return false;
+    }
+    *out = en;
+    return true;
+}
+
+void engine_free(struct engine *en)
+{
+    json_decref(en->json);
+    *en = (struct engine){0};
+}
+
+/* Appends the argument with its placeholders replaced; what does not fit is only counted. */
+static size_t fill_in(const char *text, const char *const *values, char *out, size_t room,
+                      const char **missing)
+{
+    size_t n = 0;
+    for (const char *c = text; *c != '\0';) {
+        const char *piece = c;
+        size_t length = 1, step = 1;
+        if (*c == '{' || *c == '}') {
+            step = brace_length(c);
+            if (step > 2) {
+                const char *const *v = values;
+                while (*v != NULL &&
+                       (strlen(v[0]) != step - 2 || memcmp(v[0], c + 1, step - 2) != 0))
+                    v += 2;
+                if (*v == NULL)
+                    *missing = c;
+                piece = *v != NULL ? v[1] : "";
+                length = strlen(piece);
+            }
+        }
+        for (size_t i = 0; i < length; i++, n++)
+            if (n < room)
+                out[n] = piece[i];
+        c += step;
+    }
+    if (n < room)
+        out[n] = '\0';
+    return n + 1;
+}
+
+bool engine_argv(const struct engine *en, const char *key, const char *const *values, char ***argv,
+                 struct err *e)
+{
+    const json_t *array = json_object_get(en->json, key);
+    size_t num = json_array_size(array), bytes = 0;
+    const char *missing = NULL;
+    for (size_t i = 0; i < num; i++)
+        bytes += fill_in(json_string_value(json_array_get(array, i)), values, NULL, 0, &missing);
+    if (missing != NULL)
+        return err_set(e, "%s: '%s': no value for '%.*s'", en->file, key,
+                       (int)strcspn(missing, "}") + 1, missing);
+    *argv = malloc((num + 1) * sizeof **argv + bytes);
+    if (*argv == NULL)
+        return err_set(e, "%s: out of memory", en->file);
+    char *at = (char *)(*argv + num + 1);
+    for (size_t i = 0; i < num; i++) {
+        (*argv)[i] = at;
+        size_t n =
+            fill_in(json_string_value(json_array_get(array, i)), values, at, bytes, &missing);
+        at += n;
+        bytes -= n;
+    }
+    (*argv)[num] = NULL;
+    return true;
+}

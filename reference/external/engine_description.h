@@ -1,0 +1,81 @@
+/* Any renderer, by a small JSON file that says how to call it and what it can do (ENGINES.md):
+ *
+ *   {
+ *     "name": "mitsuba",            a-z, 0-9, _ and -; names files and claims
+ *     "comment": "...",             (optional, for people)
+ *     "format": "mitsuba",          what {scene} is: "mitsuba", "pbrt", "povray" or "cycles" (what
+ *                                   `assay export` writes), or "dae" (the suite's own file)
+ *     "command": ["mitsuba", "-D", "spp={spp}", "-D", "seed={seed}", "-o", "{out}", "{scene}"],
+ *     "output": "mean",             "mean": a picture of radiance for each seed; "exact": one picture
+ *                                   without noise; "moments": one moments EXR (renderer/image/moments.h)
+ *     "image": "exr",               (optional) ending of {out}: "exr", "hdr" or "pfm"
+ *     "expresses": ["diffuse", "area", ...],    features.h
+ *     "depth_offset": 1,            (optional, -1 .. 1) {depth} is our -m plus this
+ *     "spp": 64, "replicates": 16,  (optional) what is asked for unless the user says otherwise
+ *     "version": ["mitsuba", "--help"],         (optional) its first line of output is the version
+ *     "lens_args": ["-b", "{lens_radius}", "-d", "{focal_distance}"],  (with "dae" only) added to the
+ *     "environment_args": ["-e", "{environment}"]                      command for scenes that have one
+ *   }
+ *
+ * Commands run without a shell. The program is looked up in PATH; with a slash in its name and no
+ * slash in front it is relative to the directory of the description, which is also {here}. Other
+ * placeholders: {scene} {out} (absolute paths) {spp} {seed} {depth} {width} {height} {threads};
+ * {{ and }} are braces. */
+#ifndef ASSAY_ENGINE_DESCRIPTION_H
+#define ASSAY_ENGINE_DESCRIPTION_H
+
+#include "renderer/image/moments.h"
+#include "reference/suite/suite.h"
+
+enum engine_format { FORMAT_MITSUBA, FORMAT_PBRT, FORMAT_POVRAY, FORMAT_CYCLES, FORMAT_DAE };
+enum engine_output { OUTPUT_MEAN, OUTPUT_EXACT, OUTPUT_MOMENTS };
+
+struct engine {
+    char file[4096]; /* the description */
+    char here[4096]; /* its directory, absolute */
+    char name[32];
+    enum engine_format format;
+    enum engine_output output;
+    char image[8];    /* "exr" */
+    unsigned feature; /* bits, features.h */
+    int depth_offset, spp, replicates;
+    json_t *json; /* owned; arrays of texts that were checked */
+};
+
+struct engine_options {
+    int spp, replicates; /* 0: the description's */
+    uint32_t seed;       /* replicate k's own seed is a hash of (seed, k) */
+    int threads;
+    double timeout_s;     /* of one process; it is killed (whole process group) after that */
+    const char *work_dir; /* exists; gets a sub-directory, removed on success */
+};
+
+/* Fails, naming file and key, on anything that is not as above: unknown keys and placeholders, values
+ * of the wrong type, a command without {scene} or {out}, "mean" without {seed}. */
+bool engine_load(const char *path, struct engine *out, struct err *e)
+    __attribute__((warn_unused_result));
+void engine_free(struct engine *en);
+
+/* argv of a key ("command", "version", ...), placeholders filled in from `values`: pairs of name and
+ * value that end with NULL. A placeholder without a value fails. *argv is one block of memory that the
+ * caller frees, NULL-terminated; absent keys give an empty argv. */
+bool engine_argv(const struct engine *en, const char *key, const char *const *values, char ***argv,
+                 struct err *e) __attribute__((warn_unused_result));
+
+/* True if the engine can render the scene: it has all features, and the scene can be written in its
+ * format. Else `why` is one line. Tries it in a directory below dir, which exists. */
+bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
+                      struct err *why) __attribute__((warn_unused_result));
+
+/* Renders. *out (unit "replicate", "exact" or "sample") and *manifest (a new reference) belong to the
+ * caller; the manifest's members are those of reference_render.h, with "description_sha256" and "files" (the
+ * hash of each file of {here} that the command names). "mean": K runs with seeds of their own, folded.
+ * Fails, with the program's own last lines, when it is not there, dies, hangs or writes no picture, a
+ * picture of another size, without R, G and B, with pixels that are not finite, or the same picture
+ * for two seeds (unless no pixel of it has any noise: then it is "exact"). What it left is then kept,
+ * and the line names the directory. */
+bool engine_render(const struct engine *en, const struct suite_scene *scene,
+                   const struct engine_options *opt, struct moments *out, json_t **manifest,
+                   struct err *e) __attribute__((warn_unused_result));
+
+#endif

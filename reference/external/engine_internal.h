@@ -1,0 +1,34 @@
+/* What engine_run.c, engine_scene.c and engine_manifest.c share; of no interest elsewhere. */
+#ifndef ASSAY_ENGINE_INTERNAL_H
+#define ASSAY_ENGINE_INTERNAL_H
+
+#include "engine_description.h"
+
+enum { PATH_SIZE = 4096 + 128 };
+
+/* One rendering job: everything that is the same for all its processes. */
+struct engine_job {
+    const struct engine *en;
+    const struct suite_scene *suite;
+    const struct engine_options *opt;
+    const char *dir; /* absolute */
+    char scene[PATH_SIZE], program[4096];
+    int spp, replicates;
+    bool half; /* some picture had fewer than 32 bits */
+    double cpu_s;
+};
+
+/* Checks that the engine can, and writes the scene to `path`; for a .dae only fills path. */
+bool engine_write_scene(const struct engine *en, const struct suite_scene *suite, const char *dir,
+                        char path[PATH_SIZE], struct err *e) __attribute__((warn_unused_result));
+
+/* Full path of the program of a key ("command", "version"). A name with a slash is relative to the
+ * description, not to where we run. */
+bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
+                    struct err *e) __attribute__((warn_unused_result));
+
+/* The manifest of what was rendered, a new reference. */
+bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
+                     json_t **manifest, struct err *e) __attribute__((warn_unused_result));
+
+#endif

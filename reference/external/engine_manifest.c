@@ -1,0 +1,145 @@
+/* What was run: programs, versions, hashes. */
+#define _GNU_SOURCE
+#include "engine_internal.h"
+
+#include "reference/replicates/engine_driver.h"
+#include "reference/base/process.h"
+
+#include "renderer/base/sha256.h"
+#include "renderer/base/shell_quote.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static bool find_program(const struct engine *en, const char *argv0, char *path, size_t size,
+                         struct err *e)
+{
+    char name[PATH_SIZE];
+    bool relative = argv0[0] != '/' && strchr(argv0, '/') != NULL;
+    snprintf(name, sizeof name, "%s%s%s", relative ? en->here : "", relative ? "/" : "", argv0);
+    return process_find(name, path, size) ||
+           err_set(e, "%s: no such program%s", name, strchr(name, '/') != NULL ? "" : " in PATH");
+}
+
+bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
+                    struct err *e)
+{
+    const char *const values[] = {"here",   en->here, "scene",   "",      "out", "",      "spp",
+                                  "",       "seed",   "",        "depth", "",    "width", "",
+                                  "height", "",       "threads", "",      NULL};
+    char **argv;
+    if (!engine_argv(en, key, values, &argv, e))
+        return false;
+    bool ok = find_program(en, argv[0], path, size, e);
+    free(argv);
+    return ok;
+}
+
+/* The first line with something in it, printable ASCII. */
+static bool read_version(const struct engine_job *j, char line[256], struct err *e)
+{
+    char program[4096], log[PATH_SIZE];
+    const char *const values[] = {"here", j->en->here, NULL};
+    char **argv = NULL;
+    strcpy(line, "unknown");
+    if (json_object_get(j->en->json, "version") == NULL)
+        return true;
+    snprintf(log, sizeof log, "%s/version.log", j->dir);
+    bool ok = engine_program(j->en, "version", program, sizeof program, e) &&
+              engine_argv(j->en, "version", values, &argv, e);
+    if (ok) {
+        argv[0] = program;
+        ok = process_run(&(struct process){.argv = (const char *const *)argv,
+                                           .cwd = j->dir,
+                                           .log = log,
+                                           .timeout_s = j->opt->timeout_s},
+                         NULL, e);
+    }
+    free(argv);
+    FILE *f = ok ? fopen(log, "r") : NULL;
+    if (ok && f == NULL)
+        ok = err_set(e, "%s: cannot read: %s", log, strerror(errno));
+    bool found = false;
+    while (ok && !found && fgets(line, 256, f) != NULL) {
+        line[strcspn(line, "\r\n")] = '\0';
+        found = line[strspn(line, " \t")] != '\0';
+    }
+    if (f != NULL)
+        fclose(f);
+    for (char *c = line; *c != '\0'; c++)
+        *c = *c >= ' ' && *c <= '~' ? *c : '?';
+    return ok && (found || err_set(e, "%s: no version in what it prints", program));
+}
+
+/* Hashes of the files of {here} that the command names: a script is not its interpreter. */
+static bool hash_files(const struct engine *en, json_t *files, struct err *e)
+{
+    const json_t *command = json_object_get(en->json, "command");
+    for (size_t i = 0; i < json_array_size(command); i++) {
+        const char *arg = json_string_value(json_array_get(command, i));
+        char path[PATH_SIZE], hash[65];
+        if (strncmp(arg, "{here}/", 7) != 0 || strchr(arg + 7, '{') != NULL)
+            continue;
+        snprintf(path, sizeof path, "%s/%s", en->here, arg + 7);
+        if (access(path, F_OK) != 0)
+            continue;
+        if (!sha256_file(path, hash, e))
+            return false;
+        if (json_object_set_new(files, arg, json_string(hash)) != 0)
+            return err_set(e, "out of memory");
+    }
+    return true;
+}
+
+static json_t *seeds_of(const struct engine_job *j)
+{
+    json_t *seeds = json_array();
+    for (int k = 0; j->en->output != OUTPUT_EXACT && k < j->replicates; k++)
+        json_array_append_new(seeds, json_integer(replicate_seed(j->opt->seed, k)));
+    return seeds;
+}
+
+/* In words that shell_split() reads back. */
+static char *command_line(const json_t *args)
+{
+    size_t num = json_array_size(args);
+    const char **word = calloc(num + 1, sizeof *word);
+    for (size_t i = 0; word != NULL && i < num; i++)
+        word[i] = json_string_value(json_array_get(args, i));
+    char *text = word != NULL ? shell_join(NULL, word) : NULL;
+    free(word);
+    return text;
+}
+
+bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
+                     json_t **manifest, struct err *e)
+{
+    char version[256], binary[65], description[65], date[32];
+    json_t *files = json_object();
+    time_t now = time(NULL);
+    struct tm tm;
+    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
+    char *command = command_line(json_object_get(j->en->json, "command"));
+    bool ok = (command != NULL || err_set(e, "out of memory")) && read_version(j, version, e) &&
+              sha256_file(j->program, binary, e) && sha256_file(j->en->file, description, e) &&
+              hash_files(j->en, files, e);
+    *manifest =
+        !ok ? NULL
+            : json_pack("{ss,ss,ss,ss,ss,sf,si,si,si,si,si,sf,sf,ss,ss,ss,ss,sO,s{sO,sb},so}",
+                        "scene", j->suite->name, "scene_sha256", j->suite->sha256, "engine",
+                        j->en->name, "date", date, "unit", m->unit, "spp_of_unit", m->spp, "width",
+                        m->width, "height", m->height, "depth", j->suite->depth, "replicates",
+                        j->replicates, "spp", j->spp, "cpu_s", j->cpu_s, "wall_s", wall_s,
+                        "version", version, "binary_sha256", binary, "description_sha256",
+                        description, "command", command, "files", files, "settings", "description",
+                        j->en->json, "half_floats", j->half, "seeds", seeds_of(j));
+    json_decref(files);
+    free(command);
+    if (ok && *manifest == NULL)
+        ok = err_set(e, "out of memory");
+    return ok;
+}

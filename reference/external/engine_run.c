@@ -1,0 +1,239 @@
+/* Runs an engine as its description says: the scene file, the processes, the pictures. */
+#define _GNU_SOURCE
+#include "engine_internal.h"
+
+#include "reference/replicates/engine_driver.h"
+#include "reference/base/process.h"
+
+#include "reference/base/image_oiio.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <nettle/sha2.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { NUMBER = 32 };
+
+/* The command of one process; *argv is one block for each of three, argv itself another. */
+static bool command_line(const struct engine_job *j, uint32_t seed, const char *out,
+                         char **block[3], const char ***argv, struct err *e)
+{
+    char number[8][NUMBER];
+    snprintf(number[0], NUMBER, "%d", j->spp);
+    snprintf(number[1], NUMBER, "%u", seed);
+    snprintf(number[2], NUMBER, "%d", j->suite->depth + j->en->depth_offset);
+    snprintf(number[3], NUMBER, "%d", j->suite->width);
+    snprintf(number[4], NUMBER, "%d", j->suite->height);
+    snprintf(number[5], NUMBER, "%d", j->opt->threads);
+    snprintf(number[6], NUMBER, "%.9g", j->suite->lens_radius);
+    snprintf(number[7], NUMBER, "%.9g", j->suite->focal_distance);
+    char environment[4096] = "";
+    if (j->suite->environment[0] != '\0' && realpath(j->suite->environment, environment) == NULL)
+        return err_set(e, "%s: %s", j->suite->environment, strerror(errno));
+    const char *const values[] = {"spp",         number[0],     "seed",
+                                  number[1],     "depth",       number[2],
+                                  "width",       number[3],     "height",
+                                  number[4],     "threads",     number[5],
+                                  "scene",       j->scene,      "out",
+                                  out,           "here",        j->en->here,
+                                  "lens_radius", number[6],     "focal_distance",
+                                  number[7],     "environment", environment,
+                                  NULL};
+    const char *const key[3] = {"command", j->suite->lens_radius > 0 ? "lens_args" : "",
+                                environment[0] != '\0' ? "environment_args" : ""};
+    size_t num = 0, k = 0;
+    for (int i = 0; i < 3; i++) {
+        if (!engine_argv(j->en, key[i], values, &block[i], e))
+            return false;
+        while (block[i][k] != NULL)
+            k++;
+        num += k;
+        k = 0;
+    }
+    *argv = malloc((num + 1) * sizeof **argv);
+    if (*argv == NULL)
+        return err_set(e, "%s: out of memory", j->en->name);
+    for (int i = 0; i < 3; i++)
+        for (char **arg = block[i]; *arg != NULL; arg++)
+            (*argv)[k++] = *arg;
+    (*argv)[num] = NULL;
+    (*argv)[0] = j->program;
+    return true;
+}
+
+static bool run_process(struct engine_job *j, uint32_t seed, const char *out, struct err *e)
+{
+    char **block[3] = {NULL, NULL, NULL}, log[PATH_SIZE];
+    const char **argv = NULL;
+    struct process_usage usage = {0};
+    snprintf(log, sizeof log, "%s/engine.log", j->dir);
+    bool ok = command_line(j, seed, out, block, &argv, e) &&
+              process_run(
+                  &(struct process){
+                      .argv = argv, .cwd = j->dir, .log = log, .timeout_s = j->opt->timeout_s},
+                  &usage, e);
+    j->cpu_s += usage.cpu_s;
+    for (int i = 0; i < 3; i++)
+        free(block[i]);
+    free(argv);
+    return ok;
+}
+
+/* RGB of a picture, packed; the caller frees. Values may be negative: a renderer of spectra has
+ * colours outside the gamut, and only their mean has to make sense. */
+static float *read_picture(struct engine_job *j, const char *path, struct err *e)
+{
+    struct image im = {0};
+    bool half;
+    float *out = NULL;
+    if (!image_read(path, &im, &half, e))
+        return NULL;
+    j->half = j->half || half;
+    int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
+    size_t values = 3 * (size_t)im.width * (size_t)im.height, bad = values;
+    if (im.width != j->suite->width || im.height != j->suite->height)
+        err_set(e, "%s: %d x %d pixels, not %d x %d", path, im.width, im.height, j->suite->width,
+                j->suite->height);
+    else if (at[0] < 0 || at[1] < 0 || at[2] < 0)
+        err_set(e, "%s: no channels R, G and B", path);
+    else if ((out = malloc(values * sizeof *out)) == NULL)
+        err_set(e, "%s: out of memory", path);
+    for (size_t i = 0; out != NULL && i < values; i++) {
+        out[i] = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
+        if (!isfinite(out[i]) && bad == values)
+            bad = i;
+    }
+    if (out != NULL && bad < values) {
+        err_set(e, "%s: pixel %zu,%zu is not finite", path, bad / 3 % (size_t)im.width,
+                bad / 3 / (size_t)im.width);
+        free(out);
+        out = NULL;
+    }
+    image_free(&im);
+    return out;
+}
+
+static bool is_constant(const float *rgb_values, size_t pixels)
+{
+    for (size_t i = 3; i < 3 * pixels; i++)
+        if (rgb_values[i] != rgb_values[i - 3])
+            return false;
+    return true;
+}
+
+static void make_exact(struct moments *m)
+{
+    strcpy(m->unit, "exact");
+    m->spp = 0;
+    for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
+        m->n[p] = 1;
+}
+
+/* Runs, reads and folds. Equal pictures betray a seed that was ignored, unless all pixels are equal as
+ * well: each has random numbers of its own, so then none of them mattered. */
+static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    uint8_t(*digest)[SHA256_DIGEST_SIZE] = malloc((size_t)j->replicates * sizeof *digest);
+    int same = -1, num_constant = 0, num_first = 0;
+    bool ok = digest != NULL || err_set(e, "out of memory");
+    for (int k = 0; ok && k < j->replicates; k++) {
+        char path[PATH_SIZE];
+        snprintf(path, sizeof path, "%s/replicate_%04d.%s", j->dir, k, j->en->image);
+        float *px = run_process(j, replicate_seed(j->opt->seed, k), path, e)
+                        ? read_picture(j, path, e)
+                        : NULL;
+        ok = px != NULL;
+        if (!ok)
+            break;
+        struct sha256_ctx ctx;
+        sha256_init(&ctx);
+        sha256_update(&ctx, 3 * pixels * sizeof *px, (const uint8_t *)px);
+        sha256_digest(&ctx, SHA256_DIGEST_SIZE, digest[k]);
+        for (int i = 0; i < k && same < 0; i++)
+            if (memcmp(digest[i], digest[k], sizeof digest[k]) == 0)
+                same = k;
+        num_first += memcmp(digest[0], digest[k], sizeof digest[k]) == 0;
+        num_constant += is_constant(px, pixels);
+        bool alike = num_constant == k + 1 && num_first == k + 1;
+        if (j->en->output == OUTPUT_MEAN && same >= 0 && !alike)
+            ok = err_set(
+                e, "replicate %d is the same picture as an earlier one: the seed has no effect",
+                same);
+        moments_add_image(m, px);
+        free(px);
+        unlink(path);
+    }
+    free(digest);
+    if (ok && (j->en->output == OUTPUT_EXACT || num_first == j->replicates))
+        make_exact(m);
+    return ok;
+}
+
+static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
+{
+    char path[PATH_SIZE];
+    struct moments m = {0};
+    bool ok;
+    if (j->en->output == OUTPUT_MOMENTS) {
+        snprintf(path, sizeof path, "%s/moments.exr", j->dir);
+        ok = run_process(j, replicate_seed(j->opt->seed, 0), path, e) &&
+             moments_read(path, &m, NULL, e);
+        if (ok && (m.width != j->suite->width || m.height != j->suite->height))
+            ok = err_set(e, "%s: %d x %d pixels, not %d x %d", path, m.width, m.height,
+                         j->suite->width, j->suite->height);
+    } else {
+        ok = moments_alloc(&m, j->suite->width, j->suite->height, e);
+        strcpy(m.unit, "replicate");
+        m.spp = j->spp;
+        ok = ok && fold_runs(j, &m, e);
+    }
+    if (ok)
+        *out = m;
+    else
+        moments_free(&m);
+    return ok;
+}
+
+bool engine_render(const struct engine *en, const struct suite_scene *scene,
+                   const struct engine_options *opt, struct moments *out, json_t **manifest,
+                   struct err *e)
+{
+    char dir[PATH_SIZE], work[PATH_MAX];
+    struct engine_job j = {.en = en, .suite = scene, .opt = opt, .dir = dir};
+    double start = now_seconds();
+    assert(opt->threads > 0);
+    j.spp = opt->spp > 0 ? opt->spp : en->spp;
+    j.replicates = en->output != OUTPUT_MEAN ? 1
+                   : opt->replicates > 0     ? opt->replicates
+                                             : en->replicates;
+    if (realpath(opt->work_dir, work) == NULL)
+        return err_set(e, "%s: %s", opt->work_dir, strerror(errno));
+    if (snprintf(dir, sizeof dir, "%s/%s-%s-XXXXXX", work, scene->name, en->name) >=
+        (int)sizeof dir)
+        return err_set(e, "%.64s...: path too long", work);
+    if (mkdtemp(dir) == NULL)
+        return err_set(e, "%s: cannot make a directory in it: %s", work, strerror(errno));
+    *manifest = NULL;
+    bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
+                    engine_write_scene(en, scene, dir, j.scene, e) && run_all(&j, out, e);
+    bool ok = rendered && engine_describe(&j, out, now_seconds() - start, manifest, e) &&
+              remove_tree(dir, e);
+    if (ok)
+        return true;
+    if (rendered)
+        moments_free(out);
+    json_decref(*manifest);
+    *manifest = NULL;
+    struct err what = *e;
+    bool kept = rmdir(dir) != 0;
+    return err_set(e, "%s, %s: %.800s%s%s%s", scene->name, en->name, what.msg, kept ? " (see " : "",
+                   kept ? dir : "", kept ? ")" : "");
+}

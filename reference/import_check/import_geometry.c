@@ -1,0 +1,293 @@
+#include "import_geometry.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { LARGEST_POLYGON = 16384 };
+static const uint32_t none = UINT32_MAX;
+
+void import_differ(struct import_pair *pair, const char *fmt, ...)
+{
+    if (!pair->out->agrees)
+        return;
+    va_list args;
+    va_start(args, fmt);
+    vsnprintf(pair->out->what, sizeof pair->out->what, fmt, args);
+    va_end(args);
+    pair->out->agrees = false;
+}
+
+/* Everything of one comparison. Corners of our triangles are welded to vertices: those nearer than the
+ * tolerance are one. */
+struct check {
+    struct import_pair *pair;
+    double tolerance;
+    uint32_t *corner_vertex; /* per corner of ours */
+    point *vertex;
+    uint32_t num_vertices;
+    uint32_t *bucket, *next; /* hash grid over vertices */
+    uint32_t num_buckets;
+    uint32_t *first_use, *next_use; /* per vertex: chain over the corners at it */
+    bool *found;                    /* per triangle of ours; the caller's */
+};
+
+/* Blender turns each file to Z up, we turn it to Y up (DIALECT.md); from its axes to ours:
+ * file (x,y,z)    Blender     ours
+ *   Y_UP         (x,-z,y)   (x,y,z)
+ *   Z_UP         (x,y,z)    (-x,z,y)
+ *   X_UP         (-z,y,x)   (y,x,-z) */
+point import_point(const struct import_pair *pair, point b)
+{
+    switch (pair->axis) {
+    case 'Z': return (point){-b.x, b.z, b.y};
+    case 'X': return (point){b.y, b.z, b.x};
+    default: return (point){b.x, b.z, -b.y};
+    }
+}
+
+static uint32_t bucket_of(const struct check *c, int64_t i, int64_t j, int64_t k)
+{
+    uint64_t h = (uint64_t)i * 0x9e3779b97f4a7c15u ^ (uint64_t)j * 0xc2b2ae3d27d4eb4fu ^
+                 (uint64_t)k * 0x165667b19e3779f9u;
+    return (uint32_t)((h ^ h >> 29) % c->num_buckets);
+}
+
+/* The nearest vertex within the tolerance, or none. Cells are two tolerances wide. */
+static uint32_t find_vertex(const struct check *c, point p)
+{
+    double cell = 2 * c->tolerance, best = c->tolerance;
+    int64_t i0 = (int64_t)floor(p.x / cell), j0 = (int64_t)floor(p.y / cell),
+            k0 = (int64_t)floor(p.z / cell);
+    uint32_t nearest = none;
+    for (int64_t n = 0; n < 27; n++) {
+        uint32_t b = bucket_of(c, i0 + n % 3 - 1, j0 + n / 3 % 3 - 1, k0 + n / 9 - 1);
+        for (uint32_t v = c->bucket[b]; v != none; v = c->next[v]) {
+            double d = point_length(point_sub(c->vertex[v], p));
+            if (d <= best) {
+                best = d;
+                nearest = v;
+            }
+        }
+    }
+    return nearest;
+}
+
+static uint32_t add_vertex(struct check *c, point p)
+{
+    uint32_t v = find_vertex(c, p);
+    if (v != none)
+        return v;
+    v = c->num_vertices++;
+    double cell = 2 * c->tolerance;
+    uint32_t b = bucket_of(c, (int64_t)floor(p.x / cell), (int64_t)floor(p.y / cell),
+                           (int64_t)floor(p.z / cell));
+    c->vertex[v] = p;
+    c->next[v] = c->bucket[b];
+    c->bucket[b] = v;
+    c->first_use[v] = none;
+    return v;
+}
+
+static bool weld(struct check *c, struct err *e)
+{
+    size_t corners = 3 * (size_t)c->pair->s->num_triangles + 1;
+    c->num_buckets = 2 * (uint32_t)corners;
+    c->corner_vertex = malloc(corners * sizeof *c->corner_vertex);
+    c->vertex = malloc(corners * sizeof *c->vertex);
+    c->next = malloc(corners * sizeof *c->next);
+    c->first_use = malloc(corners * sizeof *c->first_use);
+    c->next_use = malloc(corners * sizeof *c->next_use);
+    c->bucket = malloc(c->num_buckets * sizeof *c->bucket);
+    if (c->corner_vertex == NULL || c->vertex == NULL || c->next == NULL || c->first_use == NULL ||
+        c->next_use == NULL || c->bucket == NULL)
+        return err_set(e, "import check: out of memory");
+    for (uint32_t b = 0; b < c->num_buckets; b++)
+        c->bucket[b] = none;
+    for (uint32_t k = 0; k < 3 * c->pair->s->num_triangles; k++) {
+        uint32_t v = c->corner_vertex[k] = add_vertex(c, point_of(c->pair->s->position[k]));
+        c->next_use[k] = c->first_use[v];
+        c->first_use[v] = k;
+    }
+    return true;
+}
+
+static void check_free(struct check *c)
+{
+    free(c->corner_vertex);
+    free(c->vertex);
+    free(c->next);
+    free(c->first_use);
+    free(c->next_use);
+    free(c->bucket);
+}
+
+/* One polygon of Blender's. */
+struct polygon {
+    const char *object;
+    size_t n, index;
+    point *corners, *normals; /* normals: NULL where Blender made its own */
+    double normal_tolerance;
+    uint32_t *vertex;
+};
+
+static void check_normal(struct check *c, uint32_t corner, point theirs, double tolerance)
+{
+    point ours = point_of(c->pair->s->normal[corner]);
+    double angle = point_angle(ours, theirs);
+    c->pair->out->normal_error = fmax(c->pair->out->normal_error, angle);
+    c->pair->out->normals++;
+    if (!(angle <= tolerance))
+        import_differ(c->pair, "normal at (%.4f, %.4f, %.4f): %.4f rad from Blender's",
+                      (double)c->pair->s->position[corner].x,
+                      (double)c->pair->s->position[corner].y,
+                      (double)c->pair->s->position[corner].z, angle);
+}
+
+static size_t corner_of(const struct polygon *p, uint32_t vertex)
+{
+    for (size_t i = 0; i < p->n; i++)
+        if (p->vertex[i] == vertex)
+            return i;
+    return p->n;
+}
+
+static point vector_area(const struct check *c, uint32_t triangle)
+{
+    point a = c->vertex[c->corner_vertex[3 * triangle]],
+          b = c->vertex[c->corner_vertex[3 * triangle + 1]],
+          d = c->vertex[c->corner_vertex[3 * triangle + 2]];
+    point n = point_cross(point_sub(b, a), point_sub(d, a));
+    return (point){n.x / 2, n.y / 2, n.z / 2};
+}
+
+/* Triangle of ours, not found before, inside the polygon and to the same side. */
+static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, point area)
+{
+    return !c->found[t] && point_dot(vector_area(c, t), area) > 0 &&
+           corner_of(p, c->corner_vertex[3 * t]) < p->n &&
+           corner_of(p, c->corner_vertex[3 * t + 1]) < p->n &&
+           corner_of(p, c->corner_vertex[3 * t + 2]) < p->n;
+}
+
+/* Takes our triangles that make up the polygon. For three corners that is one. */
+static void match_polygon(struct check *c, const struct polygon *p)
+{
+    point area = {0}, covered = {0};
+    double around = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        point a = p->corners[i], b = p->corners[(i + 1) % p->n];
+        point n = point_cross(point_sub(a, p->corners[0]), point_sub(b, p->corners[0]));
+        area = point_add(area, (point){n.x / 2, n.y / 2, n.z / 2});
+        around += point_length(point_sub(b, a));
+        p->vertex[i] = find_vertex(c, a);
+        if (p->vertex[i] == none) {
+            import_differ(
+                c->pair,
+                "%s, polygon %zu: Blender has a corner at (%.5f, %.5f, %.5f), we have none",
+                p->object, p->index, a.x, a.y, a.z);
+            return;
+        }
+        c->pair->out->place_error =
+            fmax(c->pair->out->place_error,
+                 point_length(point_sub(c->vertex[p->vertex[i]], a)) / c->pair->extent);
+    }
+    double tolerance = c->tolerance * around;
+    size_t taken = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        if (taken > 0 && point_length(point_sub(area, covered)) <= tolerance)
+            break;
+        for (uint32_t k = c->first_use[p->vertex[i]]; k != none; k = c->next_use[k]) {
+            uint32_t t = k / 3;
+            if (!belongs(c, p, t, area))
+                continue;
+            point with = point_add(covered, vector_area(c, t));
+            if (point_length(point_sub(area, with)) > point_length(point_sub(area, covered)))
+                continue;
+            covered = with;
+            c->found[t] = true;
+            taken++;
+            for (uint32_t m = 3 * t; m < 3 * t + 3; m++)
+                if (p->normals != NULL)
+                    check_normal(c, m, p->normals[corner_of(p, c->corner_vertex[m])],
+                                 p->normal_tolerance);
+                else
+                    c->pair->out->unread_normals++;
+        }
+    }
+    c->pair->out->triangles += taken;
+    c->pair->out->polygons++;
+    if (!(point_length(point_sub(area, covered)) <= tolerance))
+        import_differ(
+            c->pair, "%s, polygon %zu: our triangles do not make it up, by %.3g of its area",
+            p->object, p->index, point_length(point_sub(area, covered)) / point_length(area));
+}
+
+bool import_read_point(const json_t *array, size_t at, point *out)
+{
+    const json_t *v[3];
+    for (size_t i = 0; i < 3; i++) {
+        v[i] = json_array_get(array, at + i);
+        if (!json_is_number(v[i]))
+            return false;
+    }
+    *out = (point){json_number_value(v[0]), json_number_value(v[1]), json_number_value(v[2])};
+    return true;
+}
+
+static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
+{
+    const json_t *sizes = json_object_get(mesh, "sizes"),
+                 *corners = json_object_get(mesh, "corners");
+    const json_t *normals = json_object_get(mesh, "normals");
+    bool custom = json_is_true(json_object_get(mesh, "custom"));
+    const char *name = json_string_value(json_object_get(mesh, "name"));
+    if (name == NULL || !json_is_array(sizes) || !json_is_array(corners))
+        return err_set(e, "blender_import.py: a mesh without its members");
+    point *places = malloc(LARGEST_POLYGON * sizeof *places);
+    point *directions = malloc(LARGEST_POLYGON * sizeof *directions);
+    uint32_t *vertex = malloc(LARGEST_POLYGON * sizeof *vertex);
+    bool ok = (places != NULL && directions != NULL && vertex != NULL) ||
+              err_set(e, "import check: out of memory");
+    size_t at = 0;
+    for (size_t i = 0; ok && i < json_array_size(sizes); i++) {
+        json_int_t n = json_integer_value(json_array_get(sizes, i));
+        ok = n >= 3 && n <= LARGEST_POLYGON;
+        for (size_t k = 0; ok && k < (size_t)n; k++, at += 3) {
+            ok = import_read_point(corners, at, &places[k]) &&
+                 (!json_is_array(normals) || import_read_point(normals, at, &directions[k]));
+            places[k] = import_point(c->pair, places[k]);
+            directions[k] = import_point(c->pair, directions[k]);
+        }
+        if (!ok) {
+            err_set(e, "blender_import.py: mesh '%s', polygon %zu: not numbers", name, i);
+            break;
+        }
+        match_polygon(c, &(struct polygon){.object = name,
+                                           .index = i,
+                                           .n = (size_t)n,
+                                           .corners = places,
+                                           .normals = json_is_array(normals) ? directions : NULL,
+                                           .normal_tolerance = custom ? IMPORT_CUSTOM_TOLERANCE
+                                                                      : IMPORT_NORMAL_TOLERANCE,
+                                           .vertex = vertex});
+    }
+    free(places);
+    free(directions);
+    free(vertex);
+    return ok;
+}
+
+bool import_compare_meshes(struct import_pair *pair, const json_t *meshes, bool *found,
+                           struct err *e)
+{
+    struct check c = {
+        .pair = pair, .tolerance = IMPORT_PLACE_TOLERANCE * pair->extent, .found = found};
+    bool ok = weld(&c, e);
+    for (size_t i = 0; ok && i < json_array_size(meshes); i++)
+        ok = check_mesh(&c, json_array_get(meshes, i), e);
+    check_free(&c);
+    return ok;
+}

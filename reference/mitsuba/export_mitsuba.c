@@ -1,0 +1,375 @@
+#include "export_mitsuba.h"
+
+#include "reference/suite/features.h"
+#include "mitsuba_xml.h"
+
+#include "renderer/scene/environment.h"
+#include "renderer/base/fs.h"
+#include "renderer/image/image.h"
+
+#include <assert.h>
+#include <gsl/gsl_math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATH_SIZE = 4096 };
+
+/* What the writers below share. */
+struct writer {
+    struct mitsuba_xml *xml;
+    const struct scene *s;
+    const struct camera *c;
+    const char *stem; /* path without its ending */
+    const char *base; /* the same without its directory */
+    bool named;       /* the scene names files beside it */
+};
+
+/* The reference to a file beside the scene. */
+static void filename(struct writer *w, const char *ending)
+{
+    char name[PATH_SIZE];
+    snprintf(name, sizeof name, "%s_%s", w->base, ending);
+    mitsuba_text(w->xml, "string", "filename", name);
+    w->named = true;
+}
+
+static bool write_picture(const struct writer *w, const char *ending, const struct image *im,
+                          struct err *e)
+{
+    char path[PATH_SIZE];
+    if (snprintf(path, sizeof path, "%s_%s", w->stem, ending) >= (int)sizeof path)
+        return err_set(e, "%.64s...: path too long", w->stem);
+    return image_write_exr(path, im, e);
+}
+
+static const char *const RGB_NAMES[3] = {"R", "G", "B"};
+
+/* The camera looks along +Z with +X to the left. */
+static void put_camera(struct writer *w)
+{
+    const struct camera *c = w->c;
+    mitsuba_begin(w->xml, "sensor", c->lens_radius > 0 ? "thinlens" : "perspective", NULL, NULL);
+    mitsuba_real(w->xml, "float", "fov", 2 * atan((double)c->tan_h) * 180 / M_PI);
+    mitsuba_text(w->xml, "string", "fov_axis", "x");
+    /* Depths, not distances along the ray; nothing is cut (check_exportable()). */
+    double corner = sqrt(1 + (double)c->tan_h * c->tan_h + (double)c->tan_v * c->tan_v);
+    mitsuba_real(w->xml, "float", "near_clip", (double)c->near / corner);
+    mitsuba_real(w->xml, "float", "far_clip", (double)c->far);
+    if (c->lens_radius > 0) {
+        mitsuba_real(w->xml, "float", "aperture_radius", (double)c->lens_radius);
+        mitsuba_real(w->xml, "float", "focus_distance", (double)c->focal_distance);
+    }
+    mitsuba_transform(w->xml, neg(c->right), c->up, neg(c->backward), c->eye);
+    mitsuba_begin(w->xml, "sampler", "independent", NULL, NULL);
+    mitsuba_text(w->xml, "integer", "sample_count", "$spp");
+    mitsuba_text(w->xml, "integer", "seed", "$seed");
+    mitsuba_end(w->xml);
+    mitsuba_begin(w->xml, "film", "hdrfilm", NULL, NULL);
+    mitsuba_integer(w->xml, "width", c->width);
+    mitsuba_integer(w->xml, "height", c->height);
+    mitsuba_text(w->xml, "string", "pixel_format", "rgb");
+    mitsuba_text(w->xml, "string", "component_format", "float32");
+    mitsuba_begin(w->xml, "rfilter", "box", NULL, NULL);
+    mitsuba_end(w->xml);
+    mitsuba_end(w->xml);
+    mitsuba_end(w->xml);
+}
+
+/* An index of refraction: rgb values outside a lamp may not be above 1, a picture's may. */
+static bool put_index(struct writer *w, const char *name, uint32_t material, rgb value,
+                      struct err *e)
+{
+    if (value.r == value.g && value.g == value.b) {
+        mitsuba_real(w->xml, "spectrum", name, (double)value.r);
+        return true;
+    }
+    char ending[64];
+    struct image im;
+    snprintf(ending, sizeof ending, "material_%u_%s.exr", material, name);
+    if (!image_alloc(&im, 2, 2, 3, RGB_NAMES, e))
+        return false;
+    for (size_t i = 0; i < 4; i++)
+        memcpy(im.data + 3 * i, &(float[3]){value.r, value.g, value.b}, 3 * sizeof *im.data);
+    bool ok = write_picture(w, ending, &im, e);
+    image_free(&im);
+    mitsuba_begin(w->xml, "texture", "bitmap", "name", name);
+    filename(w, ending);
+    mitsuba_text(w->xml, "string", "filter_type", "nearest");
+    mitsuba_text(w->xml, "boolean", "raw", "true");
+    mitsuba_end(w->xml);
+    return ok;
+}
+
+static bool put_rough_metal(struct writer *w, uint32_t index, struct err *e)
+{
+    const struct material *m = &w->s->materials[index];
+    mitsuba_begin(w->xml, "bsdf", "roughconductor", NULL, NULL);
+    mitsuba_text(w->xml, "string", "distribution",
+                 m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann");
+    mitsuba_real(w->xml, "float", "alpha", (double)m->alpha);
+    bool ok = true;
+    if (m->conductor) {
+        ok = put_index(w, "eta", index, m->eta, e) && put_index(w, "k", index, m->k, e);
+    } else {
+        mitsuba_text(w->xml, "string", "material", "none");
+        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
+    }
+    mitsuba_end(w->xml);
+    return ok;
+}
+
+static bool check_material(const struct material *m, struct err *e)
+{
+    const char *why = NULL;
+    if (m->kind == MATERIAL_REFRACTION)
+        why = "a boundary that only refracts";
+    else if (m->kind == MATERIAL_GLASS && m->schlick)
+        why = "Schlick's approximation";
+    else if (m->kind == MATERIAL_MICROFACET && !m->separable)
+        why = "shadowing and masking that are correlated";
+    else if (!rgb_is_zero(m->radiance) && m->radiance_both_sides)
+        why = "emission on both sides";
+    return why == NULL || err_set(e, "Mitsuba does not have %s (material '%s')", why, m->name);
+}
+
+static bool put_material(struct writer *w, uint32_t index, struct err *e)
+{
+    const struct material *m = &w->s->materials[index];
+    char id[32];
+    bool ok = true;
+    if (!check_material(m, e))
+        return false;
+    snprintf(id, sizeof id, "material_%u", index);
+    mitsuba_begin(w->xml, "bsdf", m->kind == MATERIAL_GLASS ? "dielectric" : "twosided", "id", id);
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE:
+        mitsuba_begin(w->xml, "bsdf", "diffuse", NULL, NULL);
+        mitsuba_rgb(w->xml, "reflectance", m->reflectance);
+        mitsuba_end(w->xml);
+        break;
+    case MATERIAL_MIRROR:
+        mitsuba_begin(w->xml, "bsdf", "conductor", NULL, NULL);
+        mitsuba_text(w->xml, "string", "material", "none");
+        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
+        mitsuba_end(w->xml);
+        break;
+    case MATERIAL_GLASS:
+        mitsuba_real(w->xml, "float", "int_ior", (double)m->ior);
+        mitsuba_real(w->xml, "float", "ext_ior", 1);
+        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
+        mitsuba_rgb(w->xml, "specular_transmittance", m->transmittance);
+        break;
+    case MATERIAL_MICROFACET: ok = put_rough_metal(w, index, e); break;
+    case MATERIAL_REFRACTION: assert(false); break; /* refused above */
+    }
+    mitsuba_end(w->xml);
+    return ok;
+}
+
+/* Binary PLY of an object: three vertices of its own for each triangle. */
+static bool write_mesh(const struct writer *w, const struct object *o, const char *ending,
+                       bool smooth, struct err *e)
+{
+    char path[PATH_SIZE];
+    struct out_file out;
+    if (snprintf(path, sizeof path, "%s_%s", w->stem, ending) >= (int)sizeof path)
+        return err_set(e, "%.64s...: path too long", w->stem);
+    if (!out_open(&out, path, e))
+        return false;
+    fprintf(out.f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty float x\n"
+            "property float y\nproperty float z\n%selement face %u\n"
+            "property list uchar int vertex_indices\nend_header\n",
+            3 * o->num_triangles,
+            smooth ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
+            o->num_triangles);
+    for (size_t i = 3 * (size_t)o->first_triangle;
+         i < 3 * ((size_t)o->first_triangle + o->num_triangles); i++) {
+        const vec3 p = w->s->position[i], n = w->s->normal[i];
+        const float v[6] = {p.x, p.y, p.z, n.x, n.y, n.z};
+        fwrite(v, sizeof *v, smooth ? 6 : 3, out.f);
+    }
+    for (uint32_t i = 0; i < o->num_triangles; i++) {
+        const uint32_t v[3] = {3 * i, 3 * i + 1, 3 * i + 2};
+        fputc(3, out.f);
+        fwrite(v, sizeof *v, 3, out.f);
+    }
+    return out_commit(&out, e);
+}
+
+static void put_surface(struct writer *w, const struct object *o)
+{
+    const struct material *m = &w->s->materials[o->material];
+    char id[32];
+    snprintf(id, sizeof id, "material_%u", o->material);
+    mitsuba_begin(w->xml, "ref", NULL, "id", id);
+    mitsuba_end(w->xml);
+    if (!rgb_is_zero(m->radiance)) {
+        mitsuba_begin(w->xml, "emitter", "area", NULL, NULL);
+        mitsuba_rgb(w->xml, "radiance", m->radiance);
+        mitsuba_end(w->xml);
+    }
+}
+
+static bool put_object(struct writer *w, uint32_t index, struct err *e)
+{
+    const struct object *o = &w->s->objects[index];
+    const struct material *m = &w->s->materials[o->material];
+    char ending[32];
+    bool smooth = false;
+    for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++)
+        smooth = smooth || !triangle_is_flat(w->s, i);
+    /* The side that glows is the geometric normal's for us, the shading normal's for Mitsuba. */
+    if (smooth && !rgb_is_zero(m->radiance)) {
+        smooth = false;
+        if (m->kind != MATERIAL_DIFFUSE || !rgb_is_zero(m->reflectance))
+            return err_set(e, "Mitsuba: object '%s' glows, reflects and is smooth", o->name);
+    }
+    if (o->num_triangles > 0) {
+        snprintf(ending, sizeof ending, "object_%u.ply", index);
+        if (!write_mesh(w, o, ending, smooth, e))
+            return false;
+        mitsuba_begin(w->xml, "shape", "ply", NULL, NULL);
+        filename(w, ending);
+        mitsuba_text(w->xml, "boolean", "face_normals", smooth ? "false" : "true");
+        put_surface(w, o);
+        mitsuba_end(w->xml);
+    }
+    for (uint32_t i = o->first_sphere; i < o->first_sphere + o->num_spheres; i++) {
+        const struct sphere *b = &w->s->spheres[i];
+        mitsuba_begin(w->xml, "shape", "sphere", NULL, NULL);
+        mitsuba_point(w->xml, "point", "center", b->centre);
+        mitsuba_real(w->xml, "float", "radius", (double)b->radius);
+        mitsuba_text(w->xml, "boolean", "flip_normals", b->normal_out < 0 ? "true" : "false");
+        put_surface(w, o);
+        mitsuba_end(w->xml);
+    }
+    return true;
+}
+
+/* Mitsuba's picture: columns in the other direction around, rows at theta = pi r/(H-1). With two rows
+ * for each of ours every kink of our interpolation falls on a row or column, and the two agree. */
+static bool put_sky_picture(struct writer *w, int width, int height, struct err *e)
+{
+    struct image im;
+    if (!image_alloc(&im, width, 2 * height + 1, 3, RGB_NAMES, e))
+        return false;
+    for (int y = 0; y < im.height; y++)
+        for (int x = 0; x < width; x++) {
+            /* Next to the poles, where our interpolation is constant, directions keep their
+             * longitude. */
+            double row = fmin(fmax(y, 0.5), im.height - 1.5), theta = M_PI * row / (im.height - 1);
+            double phi = 2 * M_PI * (width - 1 - x + 0.5) / width;
+            vec3 d = v3((float)(-cos(phi) * sin(theta)), (float)cos(theta),
+                        (float)(sin(phi) * sin(theta)));
+            rgb l = environment_radiance(w->s->environment, d);
+            memcpy(im.data + 3 * ((size_t)y * (size_t)width + (size_t)x),
+                   &(float[3]){l.r, l.g, l.b}, 3 * sizeof *im.data);
+        }
+    bool ok = write_picture(w, "environment.exr", &im, e);
+    image_free(&im);
+    mitsuba_begin(w->xml, "emitter", "envmap", NULL, NULL);
+    filename(w, "environment.exr");
+    mitsuba_transform(w->xml, v3(0, 0, -1), v3(0, 1, 0), v3(1, 0, 0), v3(0, 0, 0));
+    mitsuba_end(w->xml);
+    return ok;
+}
+
+static bool put_sky(struct writer *w, struct err *e)
+{
+    struct environment_parts sky = environment_parts(w->s->environment);
+    if (environment_is_hidden(w->s->environment))
+        return err_set(e, "Mitsuba has no ambient light that only rough surfaces receive");
+    if (sky.kind == ENVIRONMENT_IMAGE)
+        return put_sky_picture(w, (int)sky.width, (int)sky.height, e);
+    mitsuba_begin(w->xml, "emitter", "constant", NULL, NULL);
+    mitsuba_rgb(w->xml, "radiance", sky.radiance);
+    mitsuba_end(w->xml);
+    return true;
+}
+
+static bool put_light(struct writer *w, uint32_t index, struct err *e)
+{
+    const struct light *l = &w->s->lights[index];
+    bool delta = l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT;
+    const float *a = l->attenuation;
+    if (delta && (a[0] != 0 || a[1] != 0 || !(a[2] > 0)))
+        return err_set(
+            e, "Mitsuba: light %u: falloff 1/(%g + %g d + %g d^2) is not the inverse square", index,
+            (double)a[0], (double)a[1], (double)a[2]);
+    switch (l->kind) {
+    case LIGHT_POINT:
+        mitsuba_begin(w->xml, "emitter", "point", NULL, NULL);
+        mitsuba_point(w->xml, "point", "position", l->position);
+        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / a[2]));
+        mitsuba_end(w->xml);
+        return true;
+    case LIGHT_SPOT: {
+        if (l->exponent != 0)
+            return err_set(
+                e, "Mitsuba: light %u: no spot light that falls off as a power of the cosine",
+                index);
+        double angle = acos((double)l->cos_cutoff) * 180 / M_PI;
+        frame f = frame_from_normal(l->axis);
+        mitsuba_begin(w->xml, "emitter", "spot", NULL, NULL);
+        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / a[2]));
+        mitsuba_real(w->xml, "float", "cutoff_angle", angle);
+        mitsuba_real(w->xml, "float", "beam_width", angle);
+        mitsuba_transform(w->xml, f.s, f.t, f.n, l->position);
+        mitsuba_end(w->xml);
+        return true;
+    }
+    case LIGHT_DIRECTIONAL:
+        mitsuba_begin(w->xml, "emitter", "directional", NULL, NULL);
+        mitsuba_point(w->xml, "vector", "direction", neg(l->to_light));
+        mitsuba_rgb(w->xml, "irradiance", l->value);
+        mitsuba_end(w->xml);
+        return true;
+    case LIGHT_ENVIRONMENT: return put_sky(w, e);
+    case LIGHT_TRIANGLES:
+    case LIGHT_SPHERE: break; /* by their material */
+    }
+    return true;
+}
+
+static bool put_scene(struct writer *w, int depth, struct err *e)
+{
+    mitsuba_text(w->xml, "default", "spp", "16");
+    mitsuba_text(w->xml, "default", "seed", "0");
+    mitsuba_begin(w->xml, "integrator", "path", NULL, NULL);
+    mitsuba_integer(w->xml, "max_depth",
+                    depth + 1); /* counts the light that is seen directly as 1 */
+    mitsuba_integer(w->xml, "rr_depth", 1000000);
+    mitsuba_end(w->xml);
+    put_camera(w);
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < w->s->num_materials; i++)
+        ok = put_material(w, i, e);
+    for (uint32_t i = 0; ok && i < w->s->num_objects; i++)
+        ok = put_object(w, i, e);
+    for (uint32_t i = 0; ok && i < w->s->num_lights; i++)
+        ok = put_light(w, i, e);
+    return ok;
+}
+
+bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
+                    const struct export_origin *origin, const char *path, struct err *e)
+{
+    assert(depth >= 0);
+    char stem[PATH_SIZE];
+    if (snprintf(stem, sizeof stem, "%s", path) >= (int)sizeof stem)
+        return err_set(e, "%.64s...: path too long", path);
+    char *slash = strrchr(stem, '/'), *dot = strrchr(stem, '.');
+    if (dot != NULL && (slash == NULL || dot > slash + 1))
+        *dot = '\0';
+    struct mitsuba_xml xml;
+    struct writer w = {
+        .xml = &xml, .s = s, .c = c, .stem = stem, .base = slash != NULL ? slash + 1 : stem};
+    if (!check_exportable("Mitsuba", s, c, e))
+        return false;
+    bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) &&
+              mitsuba_write(&xml, path, origin, w.named, e);
+    mitsuba_free(&xml);
+    return ok;
+}

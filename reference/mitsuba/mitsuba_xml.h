@@ -1,0 +1,41 @@
+/* The elements of a Mitsuba 3 scene file, over libxml2's writer. */
+#ifndef ASSAY_MITSUBA_XML_H
+#define ASSAY_MITSUBA_XML_H
+
+#include "renderer/base/err.h"
+#include "renderer/math/vec.h"
+#include "reference/base/export_provenance.h"
+
+#include <libxml/xmlwriter.h>
+
+/* libxml2 fails only out of memory: `failed` holds until mitsuba_write(). */
+struct mitsuba_xml {
+    xmlBufferPtr buffer;
+    xmlTextWriterPtr w;
+    bool failed;
+    int head; /* bytes of the buffer before <scene> */
+};
+
+/* Opens <scene>; free with mitsuba_free(), also on failure. */
+bool mitsuba_new(struct mitsuba_xml *x, struct err *e) __attribute__((warn_unused_result));
+/* Closes it and writes the file, by rename, before <scene> its origin unless that is NULL (named: as export_origin_write()). */
+bool mitsuba_write(struct mitsuba_xml *x, const char *path, const struct export_origin *origin,
+                   bool named, struct err *e) __attribute__((warn_unused_result));
+void mitsuba_free(struct mitsuba_xml *x);
+
+/* <tag type="type" key="value">, without the attributes that are NULL; up to mitsuba_end(). */
+void mitsuba_begin(struct mitsuba_xml *x, const char *tag, const char *type, const char *key,
+                   const char *value);
+void mitsuba_end(struct mitsuba_xml *x);
+
+/* <tag name="name" value="value"/>. */
+void mitsuba_text(struct mitsuba_xml *x, const char *tag, const char *name, const char *value);
+void mitsuba_integer(struct mitsuba_xml *x, const char *name, int value);
+void mitsuba_real(struct mitsuba_xml *x, const char *tag, const char *name, double value);
+void mitsuba_rgb(struct mitsuba_xml *x, const char *name, rgb c);
+/* <tag name="name" x= y= z=/>, tag "point" or "vector". */
+void mitsuba_point(struct mitsuba_xml *x, const char *tag, const char *name, vec3 v);
+/* to_world by the images of +X, +Y, +Z and the origin. */
+void mitsuba_transform(struct mitsuba_xml *x, vec3 to_x, vec3 to_y, vec3 to_z, vec3 o);
+
+#endif

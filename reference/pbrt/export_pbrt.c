@@ -1,0 +1,243 @@
+#include "export_pbrt.h"
+
+#include "reference/suite/features.h"
+
+#include "renderer/scene/environment.h"
+
+#include <assert.h>
+#include <gsl/gsl_math.h>
+
+struct writer {
+    FILE *f;
+    const struct scene *s;
+};
+
+static void put3(const struct writer *w, const char *type, const char *name, double x, double y,
+                 double z)
+{
+    fprintf(w->f, " \"%s %s\" [%.9g %.9g %.9g]", type, name, x + 0.0, y + 0.0, z + 0.0);
+}
+
+static void put_rgb(const struct writer *w, const char *name, rgb c)
+{
+    put3(w, "rgb", name, (double)c.r, (double)c.g, (double)c.b);
+}
+
+static void put_point(const struct writer *w, const char *name, vec3 p)
+{
+    put3(w, "point3", name, (double)p.x, (double)p.y, (double)p.z);
+}
+
+/* World to camera, which looks along +Z with +X to the right; by columns. */
+static void put_camera(const struct writer *w, const struct camera *c)
+{
+    const vec3 row[3] = {c->right, c->up, neg(c->backward)};
+    fputs("Transform [", w->f);
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < 3; i++) {
+            const double axis[3] = {(double)row[i].x, (double)row[i].y, (double)row[i].z};
+            double moved = -(axis[0] * (double)c->eye.x + axis[1] * (double)c->eye.y +
+                             axis[2] * (double)c->eye.z);
+            fprintf(w->f, "%.9g ", (k < 3 ? axis[k] : moved) + 0.0);
+        }
+        fputs(k < 3 ? "0  " : "1", w->f);
+    }
+    double h = (double)c->tan_h, v = (double)c->tan_v;
+    fprintf(w->f,
+            "]\nCamera \"perspective\" \"float fov\" [90] \"float screenwindow\" "
+            "[%.9g %.9g %.9g %.9g]",
+            -h, h, -v, v);
+    if (c->lens_radius > 0)
+        fprintf(w->f, " \"float lensradius\" [%.9g] \"float focaldistance\" [%.9g]",
+                (double)c->lens_radius, (double)c->focal_distance);
+    fprintf(w->f,
+            "\nFilm \"rgb\" \"integer xresolution\" [%d] \"integer yresolution\" [%d]"
+            " \"bool savefp16\" [false] \"string filename\" [\"pbrt.exr\"]\n"
+            "PixelFilter \"box\" \"float xradius\" [0.5] \"float yradius\" [0.5]\n"
+            "Sampler \"independent\" \"integer pixelsamples\" [16]\n",
+            c->width, c->height);
+}
+
+static bool is_one(rgb c)
+{
+    return c.r == 1 && c.g == 1 && c.b == 1;
+}
+
+static const char *what_is_missing(const struct material *m)
+{
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE: return NULL;
+    case MATERIAL_MIRROR:
+        return is_one(m->reflectance) ? NULL : "a mirror whose reflectance is not 1";
+    case MATERIAL_REFRACTION: return "a boundary that only refracts";
+    case MATERIAL_GLASS:
+        if (m->schlick)
+            return "Schlick's approximation";
+        return is_one(m->reflectance) && is_one(m->transmittance) ? NULL : "tinted glass";
+    case MATERIAL_MICROFACET:
+        if (m->microfacet != MICROFACET_GGX)
+            return "Beckmann's distribution";
+        if (m->separable)
+            return "shadowing and masking that are independent";
+        return m->conductor || is_one(m->reflectance)
+                   ? NULL
+                   : "a rough metal without an index of refraction whose reflectance is not 1";
+    }
+    return NULL;
+}
+
+static bool put_material(const struct writer *w, uint32_t index, struct err *e)
+{
+    const struct material *m = &w->s->materials[index];
+    const char *missing = what_is_missing(m);
+    if (missing != NULL)
+        return err_set(e, "pbrt does not have %s (material '%s')", missing, m->name);
+    fprintf(w->f, "MakeNamedMaterial \"material_%u\" \"string type\" ", index);
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE:
+        fputs("[\"diffuse\"]", w->f);
+        put_rgb(w, "reflectance", m->reflectance);
+        break;
+    case MATERIAL_GLASS:
+        fprintf(w->f, "[\"dielectric\"] \"float eta\" [%.9g]", (double)m->ior);
+        break;
+    case MATERIAL_MIRROR:
+    case MATERIAL_MICROFACET:
+        fputs("[\"conductor\"]", w->f);
+        if (m->kind == MATERIAL_MICROFACET && m->conductor) {
+            put_rgb(w, "eta", m->eta);
+            put_rgb(w, "k", m->k);
+        } else {
+            put_rgb(w, "reflectance", grey(1));
+        }
+        if (m->kind == MATERIAL_MICROFACET)
+            fprintf(w->f, " \"float roughness\" [%.9g] \"bool remaproughness\" [false]",
+                    (double)m->alpha);
+        break;
+    case MATERIAL_REFRACTION: assert(false); break; /* refused above */
+    }
+    fputc('\n', w->f);
+    return true;
+}
+
+static void put_mesh(const struct writer *w, const struct object *o)
+{
+    bool smooth = false;
+    fputs("Shape \"trianglemesh\" \"point3 P\" [", w->f);
+    for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++) {
+        smooth = smooth || !triangle_is_flat(w->s, i);
+        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++) {
+            vec3 p = w->s->position[k];
+            fprintf(w->f, "\n  %.9g %.9g %.9g", (double)p.x, (double)p.y, (double)p.z);
+        }
+    }
+    if (smooth) {
+        fputs("]\n \"normal N\" [", w->f);
+        for (size_t k = 3 * (size_t)o->first_triangle;
+             k < 3 * ((size_t)o->first_triangle + o->num_triangles); k++) {
+            vec3 n = w->s->normal[k];
+            fprintf(w->f, "\n  %.9g %.9g %.9g", (double)n.x, (double)n.y, (double)n.z);
+        }
+    }
+    fputs("]\n \"integer indices\" [", w->f);
+    for (uint32_t i = 0; i < 3 * o->num_triangles; i++)
+        fprintf(w->f, i % 24 == 0 ? "\n  %u" : " %u", i);
+    fputs("]\n", w->f);
+}
+
+static void put_object(const struct writer *w, const struct object *o)
+{
+    const struct material *m = &w->s->materials[o->material];
+    fprintf(w->f, "AttributeBegin\nNamedMaterial \"material_%u\"\n", o->material);
+    if (!rgb_is_zero(m->radiance)) {
+        fputs("AreaLightSource \"diffuse\"", w->f);
+        put_rgb(w, "L", m->radiance);
+        fprintf(w->f, " \"bool twosided\" [%s]\n", m->radiance_both_sides ? "true" : "false");
+    }
+    if (o->num_triangles > 0)
+        put_mesh(w, o);
+    for (uint32_t i = o->first_sphere; i < o->first_sphere + o->num_spheres; i++) {
+        const struct sphere *b = &w->s->spheres[i];
+        fprintf(
+            w->f,
+            "AttributeBegin\nTranslate %.9g %.9g %.9g\n%sShape \"sphere\" \"float radius\" [%.9g]\nAttributeEnd\n",
+            (double)b->centre.x, (double)b->centre.y, (double)b->centre.z,
+            b->normal_out < 0 ? "ReverseOrientation\n" : "", (double)b->radius);
+    }
+    fputs("AttributeEnd\n", w->f);
+}
+
+static bool put_sky(const struct writer *w, struct err *e)
+{
+    struct environment_parts sky = environment_parts(w->s->environment);
+    if (environment_is_hidden(w->s->environment))
+        return err_set(e, "pbrt has no ambient light that only rough surfaces receive");
+    if (sky.kind == ENVIRONMENT_IMAGE)
+        return err_set(e, "pbrt has no environment picture in latitude and longitude");
+    fputs("LightSource \"infinite\"", w->f);
+    put_rgb(w, "L", sky.radiance);
+    fputc('\n', w->f);
+    return true;
+}
+
+static bool put_light(const struct writer *w, uint32_t index, struct err *e)
+{
+    const struct light *l = &w->s->lights[index];
+    const float *a = l->attenuation;
+    if ((l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT) &&
+        (a[0] != 0 || a[1] != 0 || !(a[2] > 0)))
+        return err_set(e,
+                       "pbrt: light %u: falloff 1/(%g + %g d + %g d^2) is not the inverse square",
+                       index, (double)a[0], (double)a[1], (double)a[2]);
+    switch (l->kind) {
+    case LIGHT_POINT:
+        fputs("LightSource \"point\"", w->f);
+        put_rgb(w, "I", rgb_scale(l->value, 1 / a[2]));
+        put_point(w, "from", l->position);
+        break;
+    case LIGHT_SPOT:
+        if (l->exponent != 0)
+            return err_set(
+                e, "pbrt: light %u: no spot light that falls off as a power of the cosine", index);
+        fputs("LightSource \"spot\"", w->f);
+        put_rgb(w, "I", rgb_scale(l->value, 1 / a[2]));
+        put_point(w, "from", l->position);
+        put_point(w, "to", add(l->position, l->axis));
+        fprintf(w->f, " \"float coneangle\" [%.9g] \"float conedeltaangle\" [0]",
+                acos((double)l->cos_cutoff) * 180 / M_PI);
+        break;
+    case LIGHT_DIRECTIONAL:
+        fputs("LightSource \"distant\"", w->f);
+        put_rgb(w, "L", l->value);
+        put_point(w, "from", l->to_light);
+        put_point(w, "to", v3(0, 0, 0));
+        break;
+    case LIGHT_ENVIRONMENT: return put_sky(w, e);
+    case LIGHT_TRIANGLES:
+    case LIGHT_SPHERE: return true; /* with their object */
+    }
+    fputc('\n', w->f);
+    return true;
+}
+
+bool export_pbrt(const struct scene *s, const struct camera *c, int depth, FILE *f, struct err *e)
+{
+    assert(depth >= 0);
+    struct writer w = {f, s};
+    if (!check_exportable("pbrt", s, c, e))
+        return false;
+    fprintf(f,
+            "# pbrt --spp 64 --seed 1 --outfile OUT.exr THIS\n"
+            "Integrator \"path\" \"integer maxdepth\" [%d] \"bool regularize\" [false]\n",
+            depth);
+    put_camera(&w, c);
+    fputs("WorldBegin\n", f);
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < s->num_materials; i++)
+        ok = put_material(&w, i, e);
+    for (uint32_t i = 0; ok && i < s->num_lights; i++)
+        ok = put_light(&w, i, e);
+    for (uint32_t i = 0; ok && i < s->num_objects; i++)
+        put_object(&w, &s->objects[i]);
+    return ok && (!ferror(f) || err_set(e, "cannot write the pbrt scene"));
+}

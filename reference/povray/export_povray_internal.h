@@ -1,0 +1,46 @@
+/* Shared by the two halves of the POV-Ray writer: export_povray.c (camera, objects) and
+ * export_povray_light.c (light sources, sky). */
+#ifndef ASSAY_EXPORT_POVRAY_INTERNAL_H
+#define ASSAY_EXPORT_POVRAY_INTERNAL_H
+
+#include "export_povray.h"
+
+struct povray_writer {
+    FILE *f;
+    const struct scene *s;
+    const struct povray_variant *v;
+    const struct povray_plan *plan;
+    const struct povray_pass *pass;
+    bool radiosity;
+    bool hide_reflections; /* total reflection has to find nothing */
+    double roulette;
+    vec3 eye;
+};
+
+struct povray_point {
+    double x, y, z;
+};
+
+static inline struct povray_point povray_at(vec3 p)
+{
+    return (struct povray_point){(double)p.x, (double)p.y, (double)p.z};
+}
+
+static inline struct povray_point povray_moved(struct povray_point p, double s, vec3 d)
+{
+    return (struct povray_point){p.x + s * (double)d.x, p.y + s * (double)d.y,
+                                 p.z + s * (double)d.z};
+}
+
+/* "<x,y,z>", turned by the variant's rotation. */
+void povray_put(const struct povray_writer *w, struct povray_point p);
+/* before "<r,g,b>" after. */
+void povray_put_rgb(const struct povray_writer *w, const char *before, double r, double g, double b,
+                    const char *after);
+
+/* All light sources of the pass. */
+void povray_put_lights(const struct povray_writer *w);
+/* The environment, if there is one and the pass sees it. */
+void povray_put_sky(const struct povray_writer *w);
+
+#endif

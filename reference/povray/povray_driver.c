@@ -1,0 +1,254 @@
+/* Drives POV-Ray: the pictures of a povray_set, rendered side by side. */
+#include "reference/replicates/engine_driver.h"
+
+#include "povray_replicates.h"
+#include "reference/base/process.h"
+
+#include "renderer/base/sha256.h"
+#include "renderer/base/fs.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the workers share. */
+struct crew {
+    const struct povray_set *set;
+    const struct reference_job *job; /* of the set */
+    const char *program;
+    int first, last; /* of the pictures that are wanted */
+    pthread_mutex_t lock;
+    int next;
+    bool failed;
+    struct err why; /* of the first failure */
+};
+
+/* A picture with radiosity must say in its log that no sample was kept; a cache would be a bias that
+ * nobody sees. */
+static bool check_log(const char *path, struct err *e)
+{
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    char line[512];
+    long kept = -1;
+    while (kept < 0 && fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, " retained for re-use: %18ld", &kept) != 1)
+            kept = -1;
+    fclose(f);
+    if (kept < 0)
+        return err_set(e, "%s: POV-Ray does not say that it traced indirect light", path);
+    return kept == 0 || err_set(e, "%s: POV-Ray kept %ld radiosity samples for re-use", path, kept);
+}
+
+/* out += sign x the box-averaged picture / scale. */
+static bool add_picture(const struct crew *w, const struct povray_picture *p, const char *path,
+                        float sign, float *out, struct err *e)
+{
+    int width = w->job->suite->width, height = w->job->suite->height, k = p->grid;
+    struct image im = {0};
+    if (!image_read_exr(path, &im, NULL, e))
+        return false;
+    const int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
+    bool ok =
+        im.width == k * width && im.height == k * height && at[0] >= 0 && at[1] >= 0 && at[2] >= 0;
+    if (!ok)
+        err_set(e, "%s: POV-Ray wrote %d x %d x %d values, not %d x %d of R, G and B", path,
+                im.width, im.height, im.channels, k * width, k * height);
+    for (int y = 0; ok && y < height; y++)
+        for (int x = 0; ok && x < width; x++)
+            for (int c = 0; c < 3; c++) {
+                double sum = 0;
+                for (int j = 0; j < k; j++)
+                    for (int i = 0; i < k; i++)
+                        sum += (double)im.data[((size_t)(y * k + j) * (size_t)im.width +
+                                                (size_t)(x * k + i)) *
+                                                   (size_t)im.channels +
+                                               (size_t)at[c]];
+                if (!isfinite(sum))
+                    ok =
+                        err_set(e, "%s: pixel %d,%d is brighter than half floats hold", path, x, y);
+                size_t o = ((size_t)y * (size_t)width + (size_t)x) * 3 + (size_t)c;
+                out[o] += sign * (float)(sum / (k * k) / p->variant.scale);
+            }
+    image_free(&im);
+    return ok;
+}
+
+enum { MAX_STARTS = 10 /* of one picture */ };
+
+/* On a busy machine POV-Ray gives up before it has begun, when its own threads start too slowly. That
+ * says nothing about the picture, so it is asked again. */
+static bool run_engine(const struct process *run, struct err *e)
+{
+    for (int attempt = 1;; attempt++) {
+        if (process_run(run, NULL, e))
+            return true;
+        if (attempt == MAX_STARTS ||
+            strstr(e->msg, "Timed out waiting for worker thread startup") == NULL)
+            return false;
+    }
+}
+
+static bool render_one(struct crew *w, const struct povray_picture *p, float sign, float *out,
+                       struct err *e)
+{
+    char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
+    const char *argv[POVRAY_ARGS];
+    if (snprintf(dir, sizeof dir, "%s/%s", w->job->dir, p->name) >= (int)sizeof dir)
+        return err_set(e, "%.64s...: path too long", w->job->dir);
+    snprintf(pov, sizeof pov, "%s/scene.pov", dir);
+    snprintf(exr, sizeof exr, "%s/scene.exr", dir);
+    snprintf(log, sizeof log, "%s/povray.log", dir);
+    if (!make_dirs(dir, e))
+        return false;
+    FILE *f = fopen(pov, "w");
+    if (f == NULL)
+        return err_set(e, "%s: cannot write: %s", pov, strerror(errno));
+    bool ok = export_povray(w->job->scene, w->job->camera, w->job->suite->depth, &p->variant, f, e);
+    if (fclose(f) != 0 && ok)
+        ok = err_set(e, "%s: cannot write: %s", pov, strerror(errno));
+    if (!ok)
+        return false;
+    povray_command_line(w->set, w->program, p, text, argv);
+    struct process run = {
+        .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
+    bool radiosity = p->variant.indirect && w->set->plan.pass[p->variant.pass].recursion > 0;
+    return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
+           add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
+}
+
+/* Adds its passes up, box-averaged to the job's size, into a file. */
+static bool run_task(struct crew *w, int t, struct err *e)
+{
+    char path[PICTURE_PATH];
+    float *out = calloc(w->set->size, sizeof *out);
+    bool ok = out != NULL || err_set(e, "a picture: out of memory");
+    for (int pass = 0; ok && pass < w->set->plan.num_passes; pass++) {
+        if (t < POVRAY_WINDOWS) {
+            struct povray_picture fine = povray_set_window(w->set, t, pass);
+            ok = render_one(w, &fine, 1, out, e);
+        } else if (w->set->plan.pass[pass].recursion > 0) {
+            struct povray_picture indirect =
+                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, true);
+            struct povray_picture direct =
+                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, false);
+            ok = render_one(w, &indirect, 1, out, e) && render_one(w, &direct, -1, out, e);
+        }
+    }
+    if (ok) {
+        pictures_path(w->job->dir, povray_driver.prefix, t - w->first, path);
+        ok = pictures_write(path, w->job->suite->width, w->job->suite->height, out, e);
+    }
+    free(out);
+    return ok;
+}
+
+static void *work(void *arg)
+{
+    struct crew *w = arg;
+    for (;;) {
+        pthread_mutex_lock(&w->lock);
+        int t = w->failed || w->next == w->last ? -1 : w->next++;
+        pthread_mutex_unlock(&w->lock);
+        if (t < 0)
+            return NULL;
+        struct err e = {0};
+        if (run_task(w, t, &e))
+            continue;
+        pthread_mutex_lock(&w->lock);
+        if (!w->failed)
+            w->why = e;
+        w->failed = true;
+        pthread_mutex_unlock(&w->lock);
+    }
+}
+
+/* All tasks, on up to opt->threads threads, this one included. */
+static bool run_crew(struct crew *w, struct err *e)
+{
+    pthread_t thread[64];
+    int n = w->job->opt->threads - 1, started = 0;
+    pthread_mutex_init(&w->lock, NULL);
+    for (int i = 0; i < n && i < 64; i++) {
+        if (pthread_create(&thread[started], NULL, work, w) != 0)
+            break; /* fewer then */
+        started++;
+    }
+    work(w);
+    for (int i = 0; i < started; i++)
+        pthread_join(thread[i], NULL);
+    pthread_mutex_destroy(&w->lock);
+    if (!w->failed)
+        return true;
+    *e = w->why;
+    return err_prefix(e, "POV-Ray");
+}
+
+/* "POV-Ray 3.7.0.10.unofficial": the first line that begins so. */
+static bool engine_version(const struct crew *w, char line[128], struct err *e)
+{
+    char log[4224];
+    const char *argv[] = {w->program, "--version", NULL};
+    snprintf(log, sizeof log, "%s/version.log", w->job->dir);
+    if (!process_run(
+            &(struct process){
+                .argv = argv, .cwd = w->job->dir, .log = log, .timeout_s = w->job->opt->timeout_s},
+            NULL, e))
+        return false;
+    FILE *f = fopen(log, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", log, strerror(errno));
+    bool found = false;
+    while (!found && fgets(line, 128, f) != NULL)
+        found = strncmp(line, "POV-Ray ", 8) == 0;
+    fclose(f);
+    if (!found)
+        return err_set(e, "%s: no version in what it prints", w->program);
+    line[strcspn(line, "\r\n")] = '\0';
+    return true;
+}
+
+static bool render(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e)
+{
+    char program[4096], version[128], sha256[65];
+    struct povray_set set;
+    struct crew w = {.set = &set, .job = job, .program = program, .first = first, .last = last};
+    if (!process_find("povray", program, sizeof program))
+        return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
+    if (strlen(job->dir) >= 4096)
+        return err_set(e, "%.64s...: path too long", job->dir);
+    if (!povray_set(job, &set, e))
+        return false;
+    w.next = first;
+    return run_crew(&w, e) && engine_version(&w, version, e) && sha256_file(program, sha256, e) &&
+           ((json_object_set_new(said, "version", json_string(version)) == 0 &&
+             json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0) ||
+            err_set(e, "out of memory"));
+}
+
+static bool count(const struct reference_job *job, int *num, struct err *e)
+{
+    struct povray_set set;
+    if (!povray_set(job, &set, e))
+        return false;
+    *num = POVRAY_WINDOWS + set.replicates;
+    return true;
+}
+
+const struct driver povray_driver = {.engine = "povray",
+                                     .prefix = "picture",
+                                     .below_zero = true,
+                                     .count = count,
+                                     .render = render,
+                                     .fold = povray_fold};
+
+bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
+                   struct err *e)
+{
+    return driver_render(&povray_driver, job, out, manifest, e);
+}

@@ -1,0 +1,311 @@
+#include "povray_passes.h"
+
+#include "povray_glass.h"
+#include "povray_lamp.h"
+
+#include "renderer/shading/bsdf.h"
+#include "renderer/scene/environment.h"
+
+#include <assert.h>
+#include <gsl/gsl_math.h>
+
+/* Furnaces agree to 3e-5 up to here; beyond, nobody has looked. */
+#define MAX_RECURSION 20
+/* max_trace_level: mirrors and glass agree up to here, at 250 POV-Ray runs out of stack. */
+#define MAX_LEVELS 60
+/* POV-Ray ignores hits nearer than 1e-4, shadows nearer than 1e-3 and anything beyond 1e7. Extents
+ * of 0.05 to 5e5 were seen to be right; at 5e-3 direct light was 9 % wrong. */
+#define MIN_EXTENT 0.05
+#define MAX_REACH  1e6
+
+static vec3 face_normal(const vec3 *p)
+{
+    return normalize(cross(sub(p[1], p[0]), sub(p[2], p[0])));
+}
+
+static double distance_to_box(vec3 p, vec3 lo, vec3 hi)
+{
+    double dx = fmax(0, fmax((double)lo.x - p.x, (double)p.x - hi.x));
+    double dy = fmax(0, fmax((double)lo.y - p.y, (double)p.y - hi.y));
+    double dz = fmax(0, fmax((double)lo.z - p.z, (double)p.z - hi.z));
+    return sqrt(dx * dx + dy * dy + dz * dz);
+}
+
+static vec3 farthest_corner(vec3 p, vec3 lo, vec3 hi)
+{
+    return v3(fmaxf(p.x - lo.x, hi.x - p.x), fmaxf(p.y - lo.y, hi.y - p.y),
+              fmaxf(p.z - lo.z, hi.z - p.z));
+}
+
+/* A lower bound of the eye's distance to what is nearest: for a triangle, the distance to its plane
+ * and to its bounding box. */
+static double nearest_geometry(const struct scene *s, vec3 eye)
+{
+    double nearest = INFINITY;
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        const vec3 *p = &s->position[3 * (size_t)i];
+        double plane = fabsf(dot(face_normal(p), sub(eye, p[0])));
+        double box =
+            distance_to_box(eye, vmin(p[0], vmin(p[1], p[2])), vmax(p[0], vmax(p[1], p[2])));
+        nearest = fmin(nearest, fmax(plane, box));
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++)
+        nearest = fmin(nearest,
+                       fabs((double)length(sub(eye, s->spheres[i].centre)) - s->spheres[i].radius));
+    return nearest;
+}
+
+static bool reflects(const struct material *m)
+{
+    return !bsdf_is_black(m);
+}
+
+/* A plane does not see itself: there is no indirect light to wait for. */
+static bool one_plane_reflects(const struct scene *s, double extent)
+{
+    for (uint32_t i = 0; i < s->num_spheres; i++)
+        if (reflects(&s->materials[s->sphere_material[i]]))
+            return false;
+    vec3 n = {0}, o = {0};
+    bool found = false;
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        if (!reflects(&s->materials[s->tri_material[i]]))
+            continue;
+        const vec3 *p = &s->position[3 * (size_t)i];
+        if (!found) {
+            n = face_normal(p);
+            o = p[0];
+            found = true;
+        }
+        for (int k = 0; k < 3; k++)
+            if (fabsf(dot(n, sub(p[k], o))) > 1e-6 * extent)
+                return false;
+    }
+    return true;
+}
+
+static bool check_material(const struct material *m, struct err *e)
+{
+    if (m->kind == MATERIAL_MICROFACET)
+        return err_set(e, "POV-Ray has no microfacets: material '%s'", m->name);
+    if (m->kind != MATERIAL_DIFFUSE)
+        return true;
+    rgb a = m->reflectance, l = m->radiance;
+    if (reflects(m) && ((a.r == 0 && l.r > 0) || (a.g == 0 && l.g > 0) || (a.b == 0 && l.b > 0)))
+        return err_set(
+            e, "POV-Ray cannot express material '%s': it emits a colour it does not reflect",
+            m->name);
+    return true;
+}
+
+static bool check_normals(const struct scene *s, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        vec3 n = face_normal(&s->position[3 * (size_t)i]);
+        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
+            if (!(dot(n, s->normal[k]) > 0))
+                return err_set(e,
+                               "POV-Ray is not verified with shading normals behind the triangle "
+                               "(object '%s')",
+                               s->objects[s->tri_object[i]].name);
+    }
+    return true;
+}
+
+static bool check_camera(const struct scene *s, const struct camera *c, double extent,
+                         struct err *e)
+{
+    double farthest = length(farthest_corner(c->eye, s->bounds_min, s->bounds_max));
+    if (c->lens_radius > 0)
+        return err_set(e, "POV-Ray's depth of field is not verified: the lens must be a pinhole");
+    if (!(extent >= MIN_EXTENT && fmax(extent, farthest) <= MAX_REACH))
+        return err_set(
+            e,
+            "POV-Ray's fixed tolerances show: the scene spans %.3g and reaches %.3g from "
+            "the eye, not at least %g and at most %g",
+            extent, farthest, MIN_EXTENT, MAX_REACH);
+    double nearest = nearest_geometry(s, c->eye);
+    if (c->near > 0 && nearest < c->near)
+        return err_set(e,
+                       "POV-Ray has no clipping planes: geometry may be at %.6g, nearer than %.6g",
+                       nearest, c->near);
+    if (c->far > 0 && farthest > c->far)
+        return err_set(e,
+                       "POV-Ray has no clipping planes: geometry may be at %.6g, farther than %.6g",
+                       farthest, c->far);
+    return true;
+}
+
+/* What there is in a scene, of objects that reflect and of lights. */
+struct census {
+    bool diffuse, specular;
+    bool sources; /* point, spot, directional lights and lamps */
+    bool glow;    /* emitters that are no lamps, and the environment */
+    int lamps;
+};
+
+static void count_materials(const struct scene *s, struct census *n)
+{
+    for (uint32_t i = 0; i < s->num_objects; i++) {
+        const struct material *m = &s->materials[s->objects[i].material];
+        n->diffuse |= reflects(m) && m->kind == MATERIAL_DIFFUSE;
+        n->specular |= reflects(m) && m->kind != MATERIAL_DIFFUSE;
+    }
+}
+
+static bool plan_falloff(const struct light *l, struct povray_plan *p, struct err *e)
+{
+    bool constant = l->attenuation[0] > 0 && l->attenuation[1] == 0 && l->attenuation[2] == 0;
+    bool square = l->attenuation[0] == 0 && l->attenuation[1] == 0 && l->attenuation[2] > 0;
+    if (!constant && !square)
+        return err_set(e, "POV-Ray cannot express a light whose falloff is neither constant nor "
+                          "purely quadratic");
+    double r = 0.5 * p->extent;
+    double falloff = constant ? (double)l->attenuation[0] : (double)l->attenuation[2] * r * r;
+    p->radiance = fmax(p->radiance, (double)rgb_max(l->value) / falloff / M_PI);
+    return true;
+}
+
+static bool plan_environment(const struct environment *env, struct povray_plan *p, struct err *e)
+{
+    struct environment_parts sky = environment_parts(env);
+    if (environment_is_hidden(env))
+        return err_set(e, "POV-Ray cannot express ambient light that only diffuse surfaces see");
+    if (sky.width > POVRAY_MOST_TEXELS || sky.height > POVRAY_MOST_TEXELS)
+        return err_set(e, "POV-Ray: the environment is %u x %u, of which 254 x 254 is the most",
+                       sky.width, sky.height);
+    p->radiance = fmax(p->radiance, (double)rgb_max(sky.radiance));
+    for (size_t i = 0; i < (size_t)sky.width * sky.height; i++)
+        p->radiance = fmax(p->radiance, (double)rgb_max(sky.texel[i]));
+    return true;
+}
+
+static bool plan_lights(const struct scene *s, struct povray_plan *p, struct census *n,
+                        struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_lights; i++) {
+        const struct light *l = &s->lights[i];
+        struct povray_lamp lamp;
+        switch (l->kind) {
+        case LIGHT_POINT:
+        case LIGHT_SPOT:
+            if (!plan_falloff(l, p, e))
+                return false;
+            n->sources = true;
+            break;
+        case LIGHT_DIRECTIONAL:
+            p->radiance = fmax(p->radiance, (double)rgb_max(l->value) / M_PI);
+            n->sources = true;
+            break;
+        case LIGHT_ENVIRONMENT:
+            if (!plan_environment(s->environment, p, e))
+                return false;
+            n->glow = true;
+            break;
+        case LIGHT_TRIANGLES:
+        case LIGHT_SPHERE: {
+            bool ball = l->kind == LIGHT_SPHERE;
+            uint32_t material = ball ? s->sphere_material[l->first] : s->tri_material[l->first];
+            if (povray_lamp(s, l, &lamp))
+                n->lamps++;
+            else
+                n->glow = true;
+            p->radiance = fmax(p->radiance, (double)rgb_max(s->materials[material].radiance));
+            break;
+        }
+        }
+    }
+    n->sources |= n->lamps > 0;
+    p->num_lamps = n->lamps;
+    if (p->radiance == 0)
+        p->radiance = 1;
+    return true;
+}
+
+/* surfaces: of the longest path, the one that emits included. A path that leaves its j-th diffuse
+ * surface begins at level 3j/2 and has surfaces - 1 - j mirrors at most before it. */
+static void set_levels(struct povray_pass *pass, bool specular, int surfaces)
+{
+    pass->levels = specular ? surfaces : MAX_LEVELS;
+    pass->bailout_indirect =
+        specular && pass->recursion > 0 ? fmin(1e-4, 0.2 * exp2(-pass->recursion)) : 1e-9;
+    pass->levels_indirect =
+        specular && pass->recursion > 0 ? surfaces + surfaces / 2 : pass->levels;
+}
+
+static void plan_passes(const struct scene *s, const struct census *n, int depth,
+                        struct povray_plan *p)
+{
+    struct povray_pass lit = {.sources = true}, seen = {.glow = true};
+    bool lone = one_plane_reflects(s, p->extent);
+    if (depth > 1 && !lone)
+        lit.recursion = depth - 1;
+    if (n->diffuse && n->glow)
+        seen.recursion = depth;
+    else if (n->diffuse && n->specular && n->lamps > 0 && depth > 1)
+        seen.recursion =
+            depth - 1; /* a mirror or glass is the last, or the lamp has been sampled */
+    bool needs_lit = n->sources && n->diffuse && depth > 0;
+    bool needs_seen = !needs_lit || n->glow || n->lamps > 0;
+    set_levels(&lit, n->specular, depth);
+    set_levels(&seen, n->specular, depth + 1);
+    if (needs_lit && needs_seen && seen.recursion == 0 && !n->specular) {
+        lit.glow = true;
+        needs_seen = false;
+    }
+    if (needs_lit)
+        p->pass[p->num_passes++] = lit;
+    if (needs_seen)
+        p->pass[p->num_passes++] = seen;
+    p->specular = n->specular;
+}
+
+static bool check_depth(const struct povray_plan *p, const struct census *n, int depth,
+                        struct err *e)
+{
+    for (int i = 0; i < p->num_passes; i++) {
+        const struct povray_pass *pass = &p->pass[i];
+        if (pass->recursion > MAX_RECURSION || pass->levels > MAX_LEVELS)
+            return err_set(e, "POV-Ray is verified to depth %d only, not %d",
+                           pass->recursion > 0 ? MAX_RECURSION + (n->glow ? 0 : 1) : MAX_LEVELS - 1,
+                           depth);
+        if (pass->recursion > 0 && n->specular && depth < POVRAY_LEAST_MIXED_DEPTH)
+            return err_set(e,
+                           "POV-Ray cannot end paths that mix diffuse surfaces with mirrors or "
+                           "glass at depth %d: it needs %d at least",
+                           depth, POVRAY_LEAST_MIXED_DEPTH);
+    }
+    return true;
+}
+
+bool povray_plan_is_noisy(const struct povray_plan *p)
+{
+    bool indirect = false;
+    for (int i = 0; i < p->num_passes; i++)
+        indirect |= p->pass[i].recursion > 0;
+    return indirect && !p->constant;
+}
+
+bool povray_plan(const struct scene *s, const struct camera *c, int depth, struct povray_plan *out,
+                 struct err *e)
+{
+    assert(depth >= 0);
+    struct povray_plan p = {0};
+    struct census n = {0};
+    p.extent = length(sub(s->bounds_max, s->bounds_min));
+    for (uint32_t i = 0; i < s->num_materials; i++)
+        if (!check_material(&s->materials[i], e))
+            return false;
+    count_materials(s, &n);
+    if (!check_normals(s, e) || !check_camera(s, c, p.extent, e) ||
+        !povray_check_glass(s, c, p.extent, e) || !plan_lights(s, &p, &n, e))
+        return false;
+    plan_passes(s, &n, depth, &p);
+    if (!check_depth(&p, &n, depth, e))
+        return false;
+    p.constant = s->num_triangles == 0 && s->num_spheres == 1 && s->num_lights == 1 &&
+                 s->spheres[0].normal_out < 0 && n.diffuse && n.glow &&
+                 length(sub(c->eye, s->spheres[0].centre)) < s->spheres[0].radius;
+    *out = p;
+    return true;
+}

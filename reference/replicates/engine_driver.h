@@ -1,0 +1,74 @@
+/* What an engine's driver gets to do its part of reference_render(), and what it has to offer. */
+#ifndef ASSAY_ENGINE_DRIVER_H
+#define ASSAY_ENGINE_DRIVER_H
+
+#include "renderer/scene/camera.h"
+#include "replicate_images.h"
+#include "reference/store/reference_render.h"
+
+struct reference_job {
+    const struct suite_scene *suite;
+    const struct suite_reference *ref;
+    const struct reference_options *opt;
+    const struct scene *scene;   /* loaded from suite->dae */
+    const struct camera *camera; /* for suite->width x suite->height */
+    const char *dir;             /* empty working directory of this job */
+};
+
+/* Seed of replicate k >= 0: 31 bits, well spread, never 0, and another one for each k. */
+uint32_t replicate_seed(uint32_t seed, int k);
+
+/* An engine. Rendering and folding share nothing but pictures and what was said, so that they can be done on different
+ * machines. Each fails with one line if the engine cannot express the scene at all. */
+struct driver {
+    const char *engine;
+    const char *prefix; /* of a picture's file, pictures_path() */
+    bool below_zero;    /* pictures are differences */
+    /* How many pictures the fold takes. */
+    bool (*count)(const struct reference_job *job, int *num, struct err *e);
+    /* Pictures first .. last-1 into files of job->dir that are numbered from 0. Adds to `said` what the manifest needs and only
+     * the engine knows: "version", "binary_sha256" and more. */
+    bool (*render)(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e);
+    /* All pictures, in their order, into *out (unit "replicate", or "exact" where the engine's answer has no noise); adds to the
+     * manifest "version", "binary_sha256", "command", "settings" (object), "seeds" (array), and "independence".
+     * Calls opt->on_replicate. */
+    bool (*fold)(const struct reference_job *job, const struct pictures *pictures,
+                 const json_t *said, struct moments *out, json_t *manifest, struct err *e);
+};
+extern const struct driver cycles_driver, povray_driver;
+/* NULL if there is none of that name. */
+const struct driver *driver_of(const char *engine);
+
+/* All of it here: count, render, fold. */
+bool driver_render(const struct driver *driver, const struct reference_job *job,
+                   struct moments *out, json_t *manifest, struct err *e)
+    __attribute__((warn_unused_result));
+bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
+                   struct err *e) __attribute__((warn_unused_result));
+bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
+                   struct err *e) __attribute__((warn_unused_result));
+
+/* What reference_render() and the parts of reference_part.c have in common. */
+
+/* Date (UTC), and the seconds since the start once it is stopped; CPU: of this process and all children that were waited for. */
+struct timing {
+    char date[32];
+    double wall_s, cpu_s;
+};
+struct timing timing_start(void);
+void timing_stop(struct timing *t);
+
+/* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
+bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
+                            const struct reference_options *opt,
+                            bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
+                            void *ctx, struct err *e) __attribute__((warn_unused_result));
+
+/* Adds what every reference's manifest says; false out of memory. */
+bool reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
+                        const struct reference_options *opt, const struct timing *t,
+                        const struct moments *m, json_t *manifest)
+    __attribute__((warn_unused_result));
+
+#endif

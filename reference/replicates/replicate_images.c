@@ -1,0 +1,98 @@
+#include "replicate_images.h"
+
+#include "renderer/image/image.h"
+
+#include <assert.h>
+#include <math.h>
+#include <nettle/sha2.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const names[] = {"R", "G", "B"};
+
+void pictures_path(const char *dir, const char *prefix, int number, char path[PICTURE_PATH])
+{
+    assert(strlen(dir) + strlen(prefix) + 32 < PICTURE_PATH);
+    snprintf(path, PICTURE_PATH, "%s/%s_%04d.exr", dir, prefix, number);
+}
+
+float *pictures_read(const char *path, int width, int height, bool below_zero, struct err *e)
+{
+    struct image im = {0};
+    bool half;
+    if (!image_read_exr(path, &im, &half, e))
+        return NULL;
+    size_t pixels = (size_t)im.width * (size_t)im.height;
+    float *rgb_out = NULL;
+    int at[3];
+    for (int c = 0; c < 3; c++)
+        at[c] = image_channel(&im, names[c]);
+    if (im.width != width || im.height != height) {
+        err_set(e, "%s: %d x %d pixels, not %d x %d", path, im.width, im.height, width, height);
+        goto out;
+    }
+    if (half || at[0] < 0 || at[1] < 0 || at[2] < 0) {
+        err_set(e, "%s: not the 32-bit R, G, B that was asked for", path);
+        goto out;
+    }
+    rgb_out = malloc(3 * pixels * sizeof *rgb_out);
+    if (rgb_out == NULL) {
+        err_set(e, "%s: out of memory", path);
+        goto out;
+    }
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        float v = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
+        if (!isfinite(v) || (v < 0 && !below_zero)) {
+            err_set(e, "%s: pixel %d,%d is %s", path, (int)(i / 3 % (size_t)im.width),
+                    (int)(i / 3 / (size_t)im.width),
+                    below_zero ? "not finite" : "negative or not finite");
+            free(rgb_out);
+            rgb_out = NULL;
+            goto out;
+        }
+        rgb_out[i] = v;
+    }
+out:
+    image_free(&im);
+    return rgb_out;
+}
+
+bool pictures_write(const char *path, int width, int height, const float *pixels_rgb, struct err *e)
+{
+    struct image im;
+    if (!image_alloc(&im, width, height, 3, names, e))
+        return err_prefix(e, "%s", path);
+    memcpy(im.data, pixels_rgb, 3 * (size_t)width * (size_t)height * sizeof *im.data);
+    bool ok = image_write_exr(path, &im, e);
+    image_free(&im);
+    return ok;
+}
+
+bool repeats_alloc(struct repeats *r, int capacity, struct err *e)
+{
+    *r = (struct repeats){.capacity = capacity};
+    r->digest = malloc((size_t)capacity * sizeof *r->digest);
+    return r->digest != NULL || err_set(e, "hashes of pictures: out of memory");
+}
+
+int repeats_add(struct repeats *r, const float *pixels, size_t size)
+{
+    struct sha256_ctx ctx;
+    int k = 0;
+    assert(r->num < r->capacity);
+    static_assert(sizeof *r->digest == SHA256_DIGEST_SIZE, "a digest");
+    sha256_init(&ctx);
+    sha256_update(&ctx, size * sizeof *pixels, (const uint8_t *)pixels);
+    sha256_digest(&ctx, SHA256_DIGEST_SIZE, r->digest[r->num]);
+    while (memcmp(r->digest[k], r->digest[r->num], sizeof *r->digest) != 0)
+        k++;
+    r->num++;
+    return k;
+}
+
+void repeats_free(struct repeats *r)
+{
+    free(r->digest);
+    *r = (struct repeats){0};
+}

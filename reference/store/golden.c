@@ -1,0 +1,382 @@
+#define _GNU_SOURCE
+#include "reference_render.h"
+
+#include "renderer/base/sha256.h"
+#include "renderer/base/fs.h"
+#include "reference/base/json_file.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+enum { PATH_SIZE = 4096 };
+
+static bool golden_path(char out[PATH_SIZE], const char *golden_dir, const char *scene,
+                        const char *name, const char *suffix, struct err *e)
+{
+    int n = snprintf(out, PATH_SIZE, "%s/%s/%s%s", golden_dir, scene, name, suffix);
+    return (n > 0 && n < PATH_SIZE) || err_set(e, "%.64s...: path too long", golden_dir);
+}
+
+/* The manifest's object; an empty one if there is no file. */
+static json_t *load_manifest(const char *path, struct err *e)
+{
+    json_error_t je;
+    if (access(path, F_OK) != 0)
+        return json_object();
+    json_t *all = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
+    if (all == NULL) {
+        err_set(e, "%s:%d: %s", path, je.line, je.text);
+    } else if (!json_is_object(all)) {
+        err_set(e, "%s: not a JSON object", path);
+        json_decref(all);
+        all = NULL;
+    }
+    return all;
+}
+
+/* Held while the manifest is read, changed and renamed, so that engines of one scene may finish at
+ * the same time. Close the descriptor to let go. */
+static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
+{
+    char dir[PATH_SIZE];
+    if (!golden_path(dir, golden_dir, scene, "", "", e) || !make_dirs(dir, e))
+        return -1;
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC), r = -1;
+    if (fd >= 0)
+        do
+            r = flock(fd, LOCK_EX);
+        while (r != 0 && errno == EINTR);
+    if (r == 0)
+        return fd;
+    err_set(e, "%s: cannot lock: %s", dir, strerror(errno));
+    if (fd >= 0)
+        close(fd);
+    return -1;
+}
+
+/* *has: it is there and what the entry describes. Fails where it is there and cannot be read. */
+static bool look_at_hash(const char *path, const json_t *entry, bool *has, struct err *e)
+{
+    char sha256[65];
+    const char *want = json_string_value(json_object_get(entry, "exr_sha256"));
+    *has = false;
+    if (want == NULL || access(path, F_OK) != 0)
+        return true;
+    if (!sha256_file(path, sha256, e))
+        return false;
+    *has = strcmp(want, sha256) == 0;
+    return true;
+}
+
+/* Which file is the image of an entry: after an interruption it may be the next one still. What cannot be read is not it. */
+static const char *image_of(const json_t *entry, const char *exr, const char *next)
+{
+    struct err ignored;
+    bool here, waits;
+    return (!look_at_hash(exr, entry, &here, &ignored) || !here) &&
+                   look_at_hash(next, entry, &waits, &ignored) && waits
+               ? next
+               : exr;
+}
+
+/* Under the lock nobody writes: an image that waits is what a kill left. That of the manifest takes its place, another goes. */
+static bool settle(const json_t *entry, const char *exr, const char *next, struct err *e)
+{
+    if (access(next, F_OK) != 0)
+        return true;
+    bool here, waits;
+    if (!look_at_hash(exr, entry, &here, e) || !look_at_hash(next, entry, &waits, e))
+        return false;
+    int r = waits && !here ? rename(next, exr) : unlink(next);
+    return r == 0 || err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+}
+
+bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+{
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    if (access(next, F_OK) != 0)
+        return true;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
+/* The new image waits beside the old one until the manifest names it by its hash; the manifest's rename decides.
+ * Whatever a kill leaves, image_of() finds the image that the manifest describes. */
+bool golden_write(const char *golden_dir, const char *scene, const char *engine,
+                  const struct moments *m, json_t *manifest, struct err *e)
+{
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], sha256[65];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
+    const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
+    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
+    bool waits = ok && moments_write(next, m, attrs, 2, e);
+    ok = waits && sha256_file(next, sha256, e);
+    if (ok) {
+        ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
+             json_object_set(all, engine, entry) == 0;
+        ok = ok ? json_write(path, all, e) : err_set(e, "%s: out of memory", path);
+    }
+    if (waits && !ok)
+        unlink(next); /* no manifest names it */
+    if (ok && rename(next, exr) != 0)
+        ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+    json_decref(entry);
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
+bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+{
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
+    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    if (access(path, F_OK) != 0 && access(exr, F_OK) != 0)
+        return true;
+    int lock = lock_directory(golden_dir, scene, e);
+    if (lock < 0)
+        return false;
+    json_t *all = load_manifest(path, e);
+    bool ok = all != NULL;
+    if (ok && json_object_del(all, engine) == 0)
+        ok = json_write(path, all, e);
+    if (ok && ((unlink(exr) != 0 && errno != ENOENT) || (unlink(next) != 0 && errno != ENOENT)))
+        ok = err_set(e, "%s: cannot remove: %s", exr, strerror(errno));
+    json_decref(all);
+    close(lock);
+    return ok;
+}
+
+static bool check_number(const json_t *entry, const char *key, int want, const char *where,
+                         struct err *e)
+{
+    const json_t *v = json_object_get(entry, key);
+    if (!json_is_integer(v))
+        return err_set(e, "%s: '%s' is missing", where, key);
+    if (json_integer_value(v) != want)
+        return err_set(e, "%s: golden has %s %lld, the suite wants %d: make it again", where, key,
+                       (long long)json_integer_value(v), want);
+    return true;
+}
+
+static bool check_string(const json_t *entry, const char *key, const char *want, const char *where,
+                         const char *why, struct err *e)
+{
+    const char *v = json_string_value(json_object_get(entry, key));
+    if (v == NULL)
+        return err_set(e, "%s: '%s' is missing", where, key);
+    return strcmp(v, want) == 0 || err_set(e, "%s: %s", where, why);
+}
+
+/* Made for this scene file and these settings of the suite. */
+static bool check_entry(const json_t *entry, const struct suite_scene *scene,
+                        const struct suite_reference *ref, const char *where, struct err *e)
+{
+    if (!check_string(entry, "scene_sha256", scene->sha256, where,
+                      "stale golden: the scene file has changed since: make it again", e) ||
+        !check_string(entry, "engine", ref->engine, where, "golden of another engine", e) ||
+        !check_number(entry, "width", scene->width, where, e) ||
+        !check_number(entry, "height", scene->height, where, e) ||
+        !check_number(entry, "depth", scene->depth, where, e) ||
+        !check_number(entry, "replicates", ref->replicates, where, e) ||
+        !check_number(entry, "spp", ref->spp, where, e) ||
+        !check_number(entry, "subgrid", ref->subgrid, where, e))
+        return false;
+    if (strcmp(ref->engine, "truth") != 0)
+        return true;
+    return check_string(entry, "kind", ref->kind, where, "golden of another closed form", e) &&
+           (json_equal(json_object_get(entry, "values"), ref->values) ||
+            err_set(e, "%s: stale golden: the closed form's values have changed: make it again",
+                    where));
+}
+
+/* The image is what its manifest says. */
+static bool check_moments(const struct moments *m, const json_t *entry, const char *exr,
+                          struct err *e)
+{
+    json_int_t width = json_integer_value(json_object_get(entry, "width"));
+    json_int_t height = json_integer_value(json_object_get(entry, "height"));
+    if (m->width != width || m->height != height)
+        return err_set(e, "%s: %d x %d pixels, its manifest says %lld x %lld", exr, m->width,
+                       m->height, (long long)width, (long long)height);
+    if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
+        return false;
+    double n =
+        strcmp(m->unit, "exact") == 0 ? 1 : json_number_value(json_object_get(entry, "replicates"));
+    for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
+        if (m->n[p] != n)
+            return err_set(e, "%s: pixel %zu holds %g observations, not %g", exr, p, m->n[p], n);
+    return true;
+}
+
+/* Image and entry belong together, whatever they are of. */
+static bool read_pair(const char *exr, const json_t *entry, struct moments *out, struct err *e)
+{
+    char sha256[65];
+    struct moments m = {0};
+    if (!sha256_file(exr, sha256, e) ||
+        !check_string(entry, "exr_sha256", sha256, exr, "not the image that its manifest describes",
+                      e) ||
+        !moments_read(exr, &m, NULL, e))
+        return false;
+    if (!check_moments(&m, entry, exr, e)) {
+        moments_free(&m);
+        return false;
+    }
+    *out = m;
+    return true;
+}
+
+void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
+                    const struct suite_reference *ref, struct golden *out)
+{
+    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32];
+    *out = (struct golden){.state = GOLDEN_DAMAGED};
+    struct err *e = &out->why;
+    if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
+        !golden_path(next, golden_dir, scene->name, ref->engine, ".exr.next", e) ||
+        !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
+        return;
+    json_t *all = load_manifest(path, e);
+    if (all == NULL)
+        return;
+    snprintf(where, sizeof where, "%s: %s", path, ref->engine);
+    json_t *entry = json_object_get(all, ref->engine);
+    struct err stale = {0};
+    if (!json_is_object(entry)) {
+        out->state = GOLDEN_MISSING;
+        err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
+    } else {
+        bool fits = check_entry(entry, scene, ref, where, &stale);
+        if (read_pair(image_of(entry, exr, next), entry, &out->m, e)) {
+            out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
+            out->manifest = json_incref(entry);
+        }
+        if (!fits)
+            *e = stale;
+    }
+    json_decref(all);
+}
+
+void golden_free(struct golden *g)
+{
+    moments_free(&g->m);
+    json_decref(g->manifest);
+    *g = (struct golden){.state = GOLDEN_MISSING};
+}
+
+const char *golden_state_name(enum golden_state state)
+{
+    static const char *const names[] = {[GOLDEN_CURRENT] = "current",
+                                        [GOLDEN_STALE] = "stale",
+                                        [GOLDEN_MISSING] = "missing",
+                                        [GOLDEN_DAMAGED] = "damaged"};
+    return names[state];
+}
+
+bool golden_read(const char *golden_dir, const struct suite_scene *scene,
+                 const struct suite_reference *ref, struct moments *out, json_t **manifest,
+                 struct err *e)
+{
+    struct golden g;
+    golden_inspect(golden_dir, scene, ref, &g);
+    if (g.state != GOLDEN_CURRENT) {
+        *e = g.why;
+        golden_free(&g);
+        return false;
+    }
+    *out = g.m;
+    *manifest = g.manifest;
+    return true;
+}
+
+static bool is_wanted(const struct suite *suite, const char *scene, const char *engine)
+{
+    const struct suite_scene *s = suite_find(suite, scene);
+    for (int i = 0; s != NULL && strcmp(s->references_of, s->name) == 0 && i < s->num_references;
+         i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return true;
+    return false;
+}
+
+/* What one scene's directory holds, by manifest and by image. */
+static bool add_orphans(const char *golden_dir, const struct suite *suite, const char *scene,
+                        json_t *found, struct err *e)
+{
+    char dir[PATH_SIZE], path[PATH_SIZE], name[PATH_SIZE + 300];
+    if (!golden_path(dir, golden_dir, scene, "", "", e) ||
+        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+        return false;
+    DIR *d = opendir(dir);
+    if (d == NULL)
+        return errno == ENOTDIR || err_set(e, "%s: %s", dir, strerror(errno));
+    struct dirent *entry;
+    while ((entry = readdir(d)) != NULL) {
+        const char *dot = strrchr(entry->d_name, '.');
+        if (dot == NULL || strcmp(dot, ".exr") != 0)
+            continue;
+        snprintf(name, sizeof name, "%.*s", (int)(dot - entry->d_name), entry->d_name);
+        if (is_wanted(suite, scene, name))
+            continue;
+        snprintf(name, sizeof name, "%s/%.*s", scene, (int)(dot - entry->d_name), entry->d_name);
+        json_object_set_new(found, name, json_true());
+    }
+    closedir(d);
+    json_t *all = load_manifest(path, e);
+    const char *engine;
+    json_t *value;
+    json_object_foreach(all, engine, value)
+    {
+        snprintf(name, sizeof name, "%s/%s", scene, engine);
+        if (!is_wanted(suite, scene, engine))
+            json_object_set_new(found, name, json_true());
+    }
+    json_decref(all);
+    return all != NULL;
+}
+
+bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
+                    struct err *e)
+{
+    *names = json_object();
+    DIR *d = opendir(golden_dir);
+    if (d == NULL)
+        return errno == ENOENT || err_set(e, "%s: %s", golden_dir, strerror(errno));
+    bool ok = *names != NULL || err_set(e, "out of memory");
+    struct dirent *entry;
+    while (ok && (entry = readdir(d)) != NULL)
+        /* The catalogue of bugs (tools/diagnose/catalogue.h) has a manifest of its own kind. */
+        if (entry->d_name[0] != '.' && strcmp(entry->d_name, "diagnose") != 0)
+            ok = add_orphans(golden_dir, suite, entry->d_name, *names, e);
+    closedir(d);
+    if (!ok) {
+        json_decref(*names);
+        *names = NULL;
+    }
+    return ok;
+}

@@ -1,0 +1,108 @@
+/* Renders one scene of the suite with one reference engine: K replicates with seeds of their own,
+ * folded into moments (unit "replicate"), and a manifest that says how to do it again. */
+#ifndef ASSAY_REFERENCE_RENDER_H
+#define ASSAY_REFERENCE_RENDER_H
+
+#include "renderer/image/moments.h"
+#include "reference/suite/suite.h"
+
+struct reference_options {
+    uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
+    /* k of the first of ref->replicates: more of what an earlier call began, or, far from all that
+     * has been used, a fresh start. */
+    int first_replicate;
+    int threads;
+    double timeout_s; /* of one engine process; it is killed (whole process group) after that */
+    const char
+        *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
+    const char *share_dir; /* where cycles.py is */
+    /* NULL, or called with each replicate (RGB, 3 floats a pixel) in their order, by the calling
+     * thread; not where the engine's answer is exact. */
+    void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
+    void *on_replicate_ctx;
+};
+
+/* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds
+ *   scene, scene_sha256, engine, date (UTC), unit, spp_of_unit, width, height, depth, replicates,
+ *   spp, subgrid, seed, cpu_s, wall_s (of all of it, this process included),
+ *   of engines: version, binary_sha256, command, settings, seeds, and independence (independence.h)
+ *   unless the unit is "exact"; of "truth": kind, values.
+ * Fails (with the engine's own last lines) when the engine is absent, dies, hangs, writes something
+ * unreadable or replicates that are not independent, and when it cannot express the scene; what the
+ * engine left is then kept, and the line names the directory. */
+bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                      const struct reference_options *opt, struct moments *out, json_t **manifest,
+                      struct err *e) __attribute__((warn_unused_result));
+
+/* The same in parts, which may be made anywhere and in any order: ranges of the pictures that an engine's reference is folded
+ * from (replicate_images.h). Not of "truth". */
+
+/* How many pictures that are. */
+bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
+                     const struct reference_options *opt, int *num, struct err *e)
+    __attribute__((warn_unused_result));
+/* Pictures first .. last-1 into dir, which exists: picture_NNNN.exr (float32, to the bit what the fold takes), each looked at,
+ * and, in the end, part.json: "of" (scene, its hash, engine, settings, seed), "first", "last", "said" (what only the
+ * engine knows: version, hash of its binary ...), "cpu_s", "wall_s". */
+bool reference_render_part(const struct suite_scene *scene, const struct suite_reference *ref,
+                           const struct reference_options *opt, int first, int last,
+                           const char *dir, struct err *e) __attribute__((warn_unused_result));
+/* What reference_render() returns: the same moments to the bit, the same manifest but for "date", "cpu_s" and "wall_s": this
+ * function's and those of all parts added. dir: num directories of such parts, in the order of their pictures. Fails
+ * also if these are not all pictures of this reference, each once, or not all made by the same version of the engine. */
+bool reference_fold_parts(const struct suite_scene *scene, const struct suite_reference *ref,
+                          const struct reference_options *opt, const char *const *dir, int num,
+                          struct moments *out, json_t **manifest, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
+ * what reference_render() said and exr_sha256; the others are kept. Both appear by rename: the
+ * image beside its place (.exr.next), the manifest with its hash, the image in its place. So whenever a
+ * writer is killed there is the old pair or the new one, which golden_read() finds. Engines may be
+ * written at the same time. */
+bool golden_write(const char *golden_dir, const char *scene, const char *engine,
+                  const struct moments *m, json_t *manifest, struct err *e)
+    __attribute__((warn_unused_result));
+/* Ends what a killed golden_write() began: an image beside its place that the manifest describes takes it, another is removed. */
+bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+    __attribute__((warn_unused_result));
+/* The entry first, then the image. True also where there is none. */
+bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
+    __attribute__((warn_unused_result));
+/* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the
+ * EXR's hash differs from the manifest's, or if size, depth, spp, replicates are not those of the
+ * suite. *manifest is a new reference. */
+bool golden_read(const char *golden_dir, const struct suite_scene *scene,
+                 const struct suite_reference *ref, struct moments *out, json_t **manifest,
+                 struct err *e) __attribute__((warn_unused_result));
+
+enum golden_state {
+    GOLDEN_CURRENT, /* golden_read() accepts it */
+    GOLDEN_STALE,   /* whole, but of another scene file or other settings */
+    GOLDEN_MISSING, /* not in the manifest */
+    GOLDEN_DAMAGED /* manifest unreadable, image gone, or not the one that the manifest describes */
+};
+struct golden {
+    enum golden_state state;
+    struct moments m; /* of a current and of a stale one; else empty */
+    json_t *manifest; /* likewise; owned */
+    struct err why;   /* not current */
+};
+/* The caller calls golden_free(). */
+void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
+                    const struct suite_reference *ref, struct golden *out);
+void golden_free(struct golden *g);
+const char *golden_state_name(enum golden_state state);
+/* "scene/engine" of each stored image or manifest entry that the suite has no reference for: the
+ * members of a new object. Empty if the directory does not exist. */
+bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
+                    struct err *e) __attribute__((warn_unused_result));
+
+/* Hash of all that decides the bits of an engine's reference on one machine: scene, settings, seed, the
+ * files that the exporter writes, cycles.py, the engine's binary. A stored reference with this "key" in
+ * its manifest need not be rendered again. Fails if the engine is absent or cannot express the scene. */
+bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
+                   const struct reference_options *opt, char key[65], struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

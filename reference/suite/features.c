@@ -1,0 +1,158 @@
+#include "features.h"
+
+#include "renderer/math/mat4.h"
+
+#include <math.h>
+
+/* Normals closer than this to the geometric one are the geometric one: text with six digits. */
+#define FLAT 1e-5
+
+const char *const feature_names[NUM_FEATURES + 1] = {
+    [FEATURE_DIFFUSE] = "diffuse",
+    [FEATURE_MIRROR] = "mirror",
+    [FEATURE_GLASS] = "glass",
+    [FEATURE_REFRACTION] = "refraction",
+    [FEATURE_SCHLICK] = "schlick",
+    [FEATURE_MICROFACET] = "microfacet",
+    [FEATURE_BECKMANN] = "beckmann",
+    [FEATURE_AREA] = "area",
+    [FEATURE_TWO_SIDED] = "two_sided",
+    [FEATURE_POINT] = "point",
+    [FEATURE_SPOT] = "spot",
+    [FEATURE_FALLOFF] = "falloff",
+    [FEATURE_DIRECTIONAL] = "directional",
+    [FEATURE_ENVIRONMENT] = "environment",
+    [FEATURE_SPHERE] = "sphere",
+    [FEATURE_SMOOTH] = "smooth",
+    [FEATURE_LENS] = "lens",
+    [FEATURE_CLIP] = "clip",
+};
+
+static dvec3 wide(vec3 v)
+{
+    return d3(v.x, v.y, v.z);
+}
+
+static dvec3 unit_normal(const vec3 *p)
+{
+    dvec3 n = d3_cross(d3_sub(wide(p[1]), wide(p[0])), d3_sub(wide(p[2]), wide(p[0])));
+    return d3_scale(n, 1 / d3_length(n));
+}
+
+bool triangle_is_flat(const struct scene *s, uint32_t triangle)
+{
+    dvec3 n = unit_normal(s->position + 3 * (size_t)triangle);
+    for (size_t k = 3 * (size_t)triangle; k < 3 * (size_t)triangle + 3; k++)
+        if (d3_length(d3_sub(wide(s->normal[k]), n)) > FLAT)
+            return false;
+    return true;
+}
+
+/* Along one axis, from p to the interval of a, b, c. */
+static double gap(float p, float a, float b, float c)
+{
+    return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
+}
+
+void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
+{
+    *nearest = INFINITY;
+    *furthest = 0;
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        const vec3 *p = s->position + 3 * (size_t)i;
+        double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(eye), wide(p[0]))));
+        double box =
+            d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
+                         gap(eye.z, p[0].z, p[1].z, p[2].z)));
+        *nearest = fmin(*nearest, fmax(plane, box));
+        for (int k = 0; k < 3; k++)
+            *furthest = fmax(*furthest, d3_length(d3_sub(wide(p[k]), wide(eye))));
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++) {
+        double d = d3_length(d3_sub(wide(s->spheres[i].centre), wide(eye)));
+        double r = (double)s->spheres[i].radius;
+        *nearest = fmin(*nearest, fabs(d - r));
+        *furthest = fmax(*furthest, d + r);
+    }
+}
+
+static bool may_be_cut(const struct scene *s, const struct camera *c)
+{
+    double nearest, furthest, lens = (double)c->lens_radius;
+    scene_distances(s, c->eye, &nearest, &furthest);
+    return !(nearest - lens > (double)c->near && furthest + lens < (double)c->far);
+}
+
+static unsigned material_features(const struct material *m)
+{
+    unsigned f = 0;
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE: f = rgb_is_zero(m->reflectance) ? 0 : 1u << FEATURE_DIFFUSE; break;
+    case MATERIAL_MIRROR: f = 1u << FEATURE_MIRROR; break;
+    case MATERIAL_REFRACTION: f = 1u << FEATURE_REFRACTION; break;
+    case MATERIAL_GLASS: f = 1u << (m->schlick ? FEATURE_SCHLICK : FEATURE_GLASS); break;
+    case MATERIAL_MICROFACET:
+        f = 1u << (m->microfacet == MICROFACET_GGX ? FEATURE_MICROFACET : FEATURE_BECKMANN);
+        break;
+    }
+    if (!rgb_is_zero(m->radiance))
+        f |= 1u << FEATURE_AREA | (m->radiance_both_sides ? 1u << FEATURE_TWO_SIDED : 0);
+    return f;
+}
+
+static unsigned light_features(const struct light *l)
+{
+    bool physical = l->attenuation[0] == 0 && l->attenuation[1] == 0;
+    unsigned falloff = physical ? 0 : 1u << FEATURE_FALLOFF;
+    switch (l->kind) {
+    case LIGHT_POINT: return 1u << FEATURE_POINT | falloff;
+    case LIGHT_SPOT: return 1u << FEATURE_SPOT | falloff;
+    case LIGHT_DIRECTIONAL: return 1u << FEATURE_DIRECTIONAL;
+    case LIGHT_ENVIRONMENT: return 1u << FEATURE_ENVIRONMENT;
+    case LIGHT_TRIANGLES:
+    case LIGHT_SPHERE: break; /* by their material */
+    }
+    return 0;
+}
+
+unsigned scene_features(const struct scene *s, const struct camera *c)
+{
+    unsigned f = 0;
+    for (uint32_t i = 0; i < s->num_objects; i++)
+        f |= material_features(&s->materials[s->objects[i].material]);
+    for (uint32_t i = 0; i < s->num_lights; i++)
+        f |= light_features(&s->lights[i]);
+    if (s->num_spheres > 0)
+        f |= 1u << FEATURE_SPHERE;
+    for (uint32_t i = 0; i < s->num_triangles && !(f & 1u << FEATURE_SMOOTH); i++)
+        if (!triangle_is_flat(s, i))
+            f |= 1u << FEATURE_SMOOTH;
+    if (c->lens_radius > 0)
+        f |= 1u << FEATURE_LENS;
+    if (may_be_cut(s, c))
+        f |= 1u << FEATURE_CLIP;
+    return f;
+}
+
+bool check_exportable(const char *engine, const struct scene *s, const struct camera *c,
+                      struct err *e)
+{
+    double square = (double)c->tan_h * c->height / c->width;
+    dvec3 right = wide(c->right), up = wide(c->up), back = wide(c->backward);
+    if (!(fabs((double)c->tan_v / square - 1) < 1e-5))
+        return err_set(e, "%s: the camera's pixels are not square (tan_h %g, tan_v %g, %d x %d)",
+                       engine, (double)c->tan_h, (double)c->tan_v, c->width, c->height);
+    if (!(d3_length(d3_sub(d3_cross(right, up), back)) < 1e-5 && fabs(d3_dot(right, up)) < 1e-5))
+        return err_set(e, "%s: the camera's axes are not orthogonal", engine);
+    if (may_be_cut(s, c))
+        return err_set(e, "%s: the near plane at %g or the far plane at %g may cut the scene",
+                       engine, (double)c->near, (double)c->far);
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        dvec3 n = unit_normal(s->position + 3 * (size_t)i);
+        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
+            if (!(d3_dot(wide(s->normal[k]), n) > 0))
+                return err_set(e, "%s: object '%s' has a shading normal behind its triangle",
+                               engine, s->objects[s->tri_object[i]].name);
+    }
+    return true;
+}

@@ -1,0 +1,48 @@
+/* What a scene asks of a renderer, as names that an engine's description lists (ENGINES.md). Triangles
+ * and a pinhole camera with square pixels are asked of every engine and have no name. */
+#ifndef ASSAY_FEATURES_H
+#define ASSAY_FEATURES_H
+
+#include "renderer/scene/camera.h"
+
+enum feature {
+    FEATURE_DIFFUSE,     /* Lambert's law, on both sides */
+    FEATURE_MIRROR,      /* reflectance independent of the angle */
+    FEATURE_GLASS,       /* smooth dielectric with Fresnel's equations */
+    FEATURE_REFRACTION,  /* a boundary that only refracts */
+    FEATURE_SCHLICK,     /* glass with Schlick's approximation */
+    FEATURE_MICROFACET,  /* rough metal, GGX */
+    FEATURE_BECKMANN,    /* rough metal, Beckmann */
+    FEATURE_AREA,        /* glowing triangles or spheres, on the front side */
+    FEATURE_TWO_SIDED,   /* glowing on both sides */
+    FEATURE_POINT,       /* point light, inverse square */
+    FEATURE_SPOT,        /* spot light, inverse square */
+    FEATURE_FALLOFF,     /* a point or spot light with another falloff */
+    FEATURE_DIRECTIONAL, /* light from one direction */
+    FEATURE_ENVIRONMENT, /* light from all directions */
+    FEATURE_SPHERE,
+    FEATURE_SMOOTH, /* shading normals that are not the geometric ones */
+    FEATURE_LENS,   /* thin lens */
+    FEATURE_CLIP,   /* a near or far plane that may cut something off */
+    NUM_FEATURES
+};
+
+extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
+
+/* Bit 1 << enum feature of all that picture needs. */
+unsigned scene_features(const struct scene *s, const struct camera *c);
+
+/* True if a triangle's shading normals are its geometric normal, but for the rounding of text. */
+bool triangle_is_flat(const struct scene *s, uint32_t triangle);
+
+/* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
+ * the larger of its plane's and its box's), and that of the furthest. */
+void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
+
+/* For the writers of scene files: fails, with `engine` in front, where the camera's pixels are not
+ * square or its axes not orthogonal, where the near or far plane cuts, and where a shading normal of
+ * a vertex is on the back of its triangle. */
+bool check_exportable(const char *engine, const struct scene *s, const struct camera *c,
+                      struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,242 @@
+#include "suite.h"
+
+#include "suite_json.h"
+
+#include "renderer/collada/collada.h"
+#include "renderer/base/sha256.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const verdict_names[] = {
+    [VERDICT_EQUIVALENT] = "EQUIVALENT",
+    [VERDICT_DIFFERENT] = "DIFFERENT",
+    [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
+};
+
+const char *verdict_name(enum verdict v)
+{
+    return verdict_names[v];
+}
+
+bool verdict_parse(const char *name, enum verdict *out)
+{
+    for (size_t i = 0; i < sizeof verdict_names / sizeof *verdict_names; i++)
+        if (strcmp(name, verdict_names[i]) == 0) {
+            *out = (enum verdict)i;
+            return true;
+        }
+    return false;
+}
+
+/* "NN_name": a family digit, a digit, an underscore, then a-z, 0-9 and underscores. */
+static bool is_scene_name(const char *s)
+{
+    if (strchr("12349", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' || s[2] != '_' ||
+        s[3] == '\0')
+        return false;
+    return s[3 + strspn(s + 3, "abcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
+}
+
+/* Name without the extension, and which of the two files were seen. */
+struct stem {
+    char name[64];
+    bool dae, json;
+};
+
+struct stems {
+    struct stem *stem;
+    size_t num;
+};
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const struct stem *)a)->name, ((const struct stem *)b)->name);
+}
+
+static bool note_file(struct stems *s, const char *dir, const char *file, struct err *e)
+{
+    const char *dot = strrchr(file, '.');
+    bool dae = dot != NULL && strcmp(dot, ".dae") == 0;
+    bool json = dot != NULL && strcmp(dot, ".json") == 0;
+    if (file[0] == '.' || (!dae && !json))
+        return true;
+    struct stem new = {.dae = dae, .json = json};
+    size_t length = (size_t)(dot - file);
+    if (length < sizeof new.name)
+        memcpy(new.name, file, length);
+    if (!is_scene_name(new.name))
+        return err_set(e,
+                       "%s/%s: not named NN_name (families 1x, 2x, 3x, 4x, 9x; a-z, 0-9, _; "
+                       "at most 63 bytes)",
+                       dir, file);
+    for (size_t i = 0; i < s->num; i++)
+        if (strcmp(s->stem[i].name, new.name) == 0) {
+            s->stem[i].dae |= dae;
+            s->stem[i].json |= json;
+            return true;
+        }
+    struct stem *grown = realloc(s->stem, (s->num + 1) * sizeof *grown);
+    if (grown == NULL)
+        return err_set(e, "%s: out of memory", dir);
+    s->stem = grown;
+    s->stem[s->num++] = new;
+    return true;
+}
+
+/* Scene names of a directory, sorted, each with both files. The caller frees out->stem, also on
+ * failure. */
+static bool list_scenes(const char *dir, struct stems *out, struct err *e)
+{
+    DIR *d = opendir(dir);
+    if (d == NULL)
+        return err_set(e, "%s: %s", dir, strerror(errno));
+    bool ok = true;
+    struct dirent *entry;
+    while (ok && (errno = 0, entry = readdir(d)) != NULL)
+        ok = note_file(out, dir, entry->d_name, e);
+    if (ok && errno != 0)
+        ok = err_set(e, "%s: %s", dir, strerror(errno));
+    closedir(d);
+    if (!ok)
+        return false;
+    if (out->num == 0)
+        return err_set(e, "%s: no scenes (NN_name.dae with NN_name.json)", dir);
+    if (out->num > INT_MAX)
+        return err_set(e, "%s: too many scenes", dir);
+    qsort(out->stem, out->num, sizeof *out->stem, by_name);
+    for (size_t i = 0; i < out->num; i++)
+        if (!out->stem[i].dae || !out->stem[i].json)
+            return err_set(e, "%s/%s.%s: no %s.%s beside it", dir, out->stem[i].name,
+                           out->stem[i].dae ? "dae" : "json", out->stem[i].name,
+                           out->stem[i].dae ? "json" : "dae");
+    return true;
+}
+
+static bool hash_scene(struct suite_scene *s, struct err *e)
+{
+    char dae[65], environment[65] = "none", text[256];
+    if (!sha256_file(s->dae, dae, e) ||
+        (s->environment[0] != '\0' && !sha256_file(s->environment, environment, e)))
+        return false;
+    if (s->environment[0] == '\0' && s->lens_radius == 0) {
+        memcpy(s->sha256, dae, sizeof dae);
+        return true;
+    }
+    snprintf(text, sizeof text, "%s environment %s lens %.17g %.17g", dae, environment,
+             s->lens_radius, s->focal_distance);
+    sha256_text(text, s->sha256);
+    return true;
+}
+
+static bool load_scene(const char *dir, const char *name, struct suite_scene *s, struct err *e)
+{
+    char file[sizeof s->dae];
+    memcpy(s->name, name, strlen(name) + 1);
+    int length = snprintf(file, sizeof file, "%s/%s.json", dir, name);
+    if (length < 0 || (size_t)length >= sizeof file)
+        return err_set(e, "%s: path too long", name);
+    snprintf(s->dae, sizeof s->dae, "%s/%s.dae", dir, name);
+    json_error_t why;
+    s->json = json_load_file(file, JSON_REJECT_DUPLICATES, &why);
+    if (s->json == NULL && why.line < 1)
+        return err_set(e, "%s: %s", file, why.text);
+    if (s->json == NULL)
+        return err_set(e, "%s:%d: %s", file, why.line, why.text);
+    return suite_read_scene(file, s, e) && hash_scene(s, e);
+}
+
+/* A 9x scene is held against another scene's references, at the same size. */
+static bool inherit(const struct suite *suite, const char *dir, struct suite_scene *s,
+                    struct err *e)
+{
+    if (s->name[0] != '9')
+        return true;
+    const struct suite_scene *base = suite_find(suite, s->references_of);
+    if (base == NULL)
+        return err_set(e, "%s/%s.json: 'references_of' names no scene: '%s'", dir, s->name,
+                       s->references_of);
+    if (base->name[0] == '9')
+        return err_set(e, "%s/%s.json: 'references_of' names '%s', which has none of its own", dir,
+                       s->name, s->references_of);
+    if (base->width != s->width || base->height != s->height)
+        return err_set(e, "%s/%s.json: %d x %d pixels, but '%s' has %d x %d", dir, s->name,
+                       s->width, s->height, base->name, base->width, base->height);
+    memcpy(s->reference, base->reference, sizeof s->reference);
+    s->num_references = base->num_references;
+    s->not_expressible = base->not_expressible;
+    return true;
+}
+
+bool suite_load(const char *dir, struct suite *out, struct err *e)
+{
+    struct suite suite = {0};
+    struct stems stems = {0};
+    if (!list_scenes(dir, &stems, e))
+        goto fail;
+    suite.scene = calloc(stems.num, sizeof *suite.scene);
+    if (suite.scene == NULL) {
+        err_set(e, "%s: out of memory", dir);
+        goto fail;
+    }
+    suite.num_scenes = (int)stems.num;
+    for (size_t i = 0; i < stems.num; i++)
+        if (!load_scene(dir, stems.stem[i].name, &suite.scene[i], e))
+            goto fail;
+    for (size_t i = 0; i < stems.num; i++)
+        if (!inherit(&suite, dir, &suite.scene[i], e))
+            goto fail;
+    free(stems.stem);
+    *out = suite;
+    return true;
+fail:
+    free(stems.stem);
+    suite_free(&suite);
+    return false;
+}
+
+bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
+                struct err *e)
+{
+    *scene = (struct scene){0};
+    if (!collada_load(s->dae, DIALECT_AUTO, scene, e))
+        return false;
+    bool ok = (s->environment[0] == '\0' || scene_read_environment(scene, s->environment, e)) &&
+              (camera_init(camera, scene, s->width, s->height, e) || err_prefix(e, "%s", s->dae));
+    if (!ok) {
+        scene_free(scene);
+        return false;
+    }
+    camera->lens_radius = (float)s->lens_radius;
+    camera->focal_distance = (float)s->focal_distance;
+    return true;
+}
+
+void suite_free(struct suite *s)
+{
+    for (int i = 0; i < s->num_scenes; i++)
+        json_decref(s->scene[i].json);
+    free(s->scene);
+    *s = (struct suite){0};
+}
+
+const struct suite_scene *suite_find(const struct suite *s, const char *name)
+{
+    for (int i = 0; i < s->num_scenes; i++)
+        if (strcmp(s->scene[i].name, name) == 0)
+            return &s->scene[i];
+    return NULL;
+}
+
+const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return &s->reference[i];
+    return NULL;
+}

@@ -1,0 +1,118 @@
+/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against
+ * which references, inside which margins, what must come out) and NN_name.md (what it can detect,
+ * what it is blind to, and, for closed forms, the derivation). Families by number: 1x closed form,
+ * 2x BSDF, 3x light, 4x whole scene, 9x must differ.
+ *
+ *   {
+ *     "title": "Cornell box with two diffuse spheres",
+ *     "detects": "one line", "blind_to": "one line",
+ *     "width": 128, "height": 128, "depth": 5, "spp": 2048, "tile": 16,
+ *     "expect": "EQUIVALENT",
+ *     "environment": "sky.exr",                  (optional: the file beside this one that lights it)
+ *     "lens_radius": 0.1, "focal_distance": 2,   (optional, both or none: a thin lens)
+ *     "variants": [{"name": "hemisphere", "options": ["--direct", "hemisphere"], "spp": 4096,
+ *                   "margin_global": 0.01, "margin_tile": 0.05}],
+ *                                                (optional: ours by other means, judged too)
+ *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1,  (optional: tools/stats/stated_error.h)
+ *                     "noise_margin": 0.05,      (optional: tools/stats/sample_efficiency.h; with a truth whose noise
+ *                                                 has a closed form)
+ *                     "adaptive": {"batch": 16, "tolerance": 0.1, "spp": 512}},
+ *                                                (optional: tools/sequential/adaptive_stop.h)
+ *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
+ *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
+ *     "references": {
+ *       "cycles": {"class": "exact", "margin_global": 0.005, "margin_tile": 0.02,
+ *                  "replicates": 16, "spp": 256},
+ *       "povray": {"class": "limit", ..., "replicates": 16, "subgrid": 4},
+ *       "truth":  {"class": "exact", ..., "kind": "point_over_plane", "values": {...}}
+ *     }
+ *   }
+ *
+ * An unknown key, a missing key, a value out of range is an error with file and reason. */
+#ifndef ASSAY_SUITE_H
+#define ASSAY_SUITE_H
+
+#include "renderer/scene/camera.h"
+#include "renderer/base/err.h"
+
+#include <jansson.h>
+
+enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
+
+struct suite_reference {
+    char engine[16];      /* "cycles", "povray" or "truth" */
+    char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
+                             settings) or "approximate" */
+    double margin_global; /* largest relative difference of the image mean that counts as equal */
+    double margin_tile;   /* the same for one tile */
+    int replicates;       /* engines: images with a seed of their own */
+    int spp;              /* cycles: samples per pixel of one replicate */
+    int subgrid;          /* povray: one replicate is a box-averaged (k W) x (k H) picture */
+    char kind[32];        /* truth: which closed form (truth.h) */
+    json_t *values;       /* truth: its numbers; borrowed from the suite */
+};
+
+/* Another way of ours to the same picture: further options of pathtracer. */
+struct suite_variant {
+    char name[64]; /* "pathtracer-hemisphere" */
+    int spp;
+    double margin_global, margin_tile; /* as of a reference: its noise is its own */
+    const char *options[9];            /* NULL at the end; borrowed from the suite */
+};
+
+enum { MAX_VARIANTS = 8 };
+
+struct suite_scene {
+    char name[64];                      /* "41_cornell" */
+    char dae[4096];                     /* path of the .dae */
+    char environment[4096];             /* path of an .exr or .hdr; empty if there is none */
+    double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
+    char sha256[65]; /* lower-case hex: of the .dae; with an environment or a lens, of a text that
+                        holds that, the environment's and the lens */
+    char title[128], detects[512], blind_to[512];
+    int width, height;
+    int depth; /* -m: largest number of bounces */
+    int spp;   /* of our render */
+    int tile;  /* side of a reporting tile, pixels; divides width and height */
+    enum verdict expect;
+    struct suite_variant variant[MAX_VARIANTS];
+    int num_variants;
+    /* Renders with seeds of their own that must err as much as they say (tools/stats/stated_error.h); 0
+     * renders: not asked. */
+    struct {
+        int renders, spp;
+        double margin;
+        double noise_margin; /* 0: not asked */
+        int batch, most;     /* of one adaptive render; 0: not asked */
+        double tolerance;
+    } consistency;
+    json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
+    char references_of[64];  /* name of the scene whose references are used; its own name by default
+                             */
+    struct suite_reference reference[3];
+    int num_references;
+    json_t *json; /* owned */
+};
+
+struct suite {
+    struct suite_scene *scene; /* sorted by name */
+    int num_scenes;
+};
+
+/* Loads all scenes of a directory. A 9x scene inherits the `references` object of the scene it
+ * names. Fails on an empty directory, a .dae without .json and the reverse. */
+bool suite_load(const char *dir, struct suite *out, struct err *e)
+    __attribute__((warn_unused_result));
+void suite_free(struct suite *s);
+/* Reads the scene with its environment, and its camera with its lens. The caller calls
+ * scene_free(scene). */
+bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
+                struct err *e) __attribute__((warn_unused_result));
+/* NULL if there is none of that name. */
+const struct suite_scene *suite_find(const struct suite *s, const char *name);
+const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine);
+
+const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
+bool verdict_parse(const char *name, enum verdict *out);
+
+#endif

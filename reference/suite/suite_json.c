@@ -1,0 +1,245 @@
+#include "suite_json.h"
+
+#include "reference/base/json_node.h"
+#include "reference/truth/truth_noise.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* The keys that every reference has and those of its engine. */
+static bool read_reference(const char *file, const char *engine, json_t *object,
+                           struct suite_reference *r, struct err *e)
+{
+    static const char *const cycles_keys[] = {"class",      "margin_global", "margin_tile",
+                                              "replicates", "spp",           NULL};
+    static const char *const povray_keys[] = {"class",      "margin_global", "margin_tile",
+                                              "replicates", "subgrid",       NULL};
+    static const char *const truth_keys[] = {"class", "margin_global", "margin_tile",
+                                             "kind",  "values",        NULL};
+    bool cycles = strcmp(engine, "cycles") == 0, povray = strcmp(engine, "povray") == 0;
+    bool truth = strcmp(engine, "truth") == 0;
+    if (!cycles && !povray && !truth)
+        return err_set(e, "%s: unknown engine 'references.%s'", file, engine);
+    if (!json_is_object(object))
+        return err_set(e, "%s: 'references.%s' is not an object", file, engine);
+    char at[64];
+    snprintf(at, sizeof at, "references.%s.", engine);
+    struct json_node n = {file, at, object};
+    snprintf(r->engine, sizeof r->engine, "%s", engine);
+    if (!json_only_keys(&n,
+                        cycles   ? cycles_keys
+                        : povray ? povray_keys
+                                 : truth_keys,
+                        e) ||
+        !json_get_text(&n, "class", r->fidelity, sizeof r->fidelity, e) ||
+        !json_get_number(&n, "margin_global", 0, 1, &r->margin_global, e) ||
+        !json_get_number(&n, "margin_tile", 0, 1, &r->margin_tile, e))
+        return false;
+    if (strcmp(r->fidelity, "exact") != 0 && strcmp(r->fidelity, "limit") != 0 &&
+        strcmp(r->fidelity, "approximate") != 0)
+        return err_set(e, "%s: '%sclass' is '%s', not 'exact', 'limit' or 'approximate'", file, at,
+                       r->fidelity);
+    if (truth)
+        return json_get_text(&n, "kind", r->kind, sizeof r->kind, e) &&
+               json_get_object(&n, "values", &r->values, e);
+    /* One replicate would have no variance. */
+    if (!json_get_int(&n, "replicates", 2, 4096, &r->replicates, e))
+        return false;
+    return cycles ? json_get_int(&n, "spp", 1, 1 << 20, &r->spp, e)
+                  : json_get_int(&n, "subgrid", 1, 64, &r->subgrid, e);
+}
+
+static bool read_references(const char *file, json_t *object, struct suite_scene *s, struct err *e)
+{
+    const char *engine;
+    json_t *value;
+    json_object_foreach(object, engine, value)
+    {
+        struct suite_reference r = {0};
+        if (!read_reference(file, engine, value, &r, e))
+            return false;
+        s->reference[s->num_references++] = r;
+    }
+    return s->num_references > 0 || err_set(e, "%s: 'references' is empty", file);
+}
+
+/* A file beside the .json: no directories. */
+static bool read_environment(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    char name[256];
+    if (json_object_get(n->object, "environment") == NULL)
+        return true;
+    if (!json_get_text(n, "environment", name, sizeof name, e))
+        return false;
+    if (strchr(name, '/') != NULL)
+        return err_set(e, "%s: 'environment' is '%s', not a file beside it", n->file, name);
+    const char *slash = strrchr(n->file, '/');
+    int dir = slash != NULL ? (int)(slash - n->file) + 1 : 0;
+    int length = snprintf(s->environment, sizeof s->environment, "%.*s%s", dir, n->file, name);
+    return (length > 0 && (size_t)length < sizeof s->environment) ||
+           err_set(e, "%s: path too long", name);
+}
+
+static bool read_lens(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    if (json_object_get(n->object, "lens_radius") == NULL &&
+        json_object_get(n->object, "focal_distance") == NULL)
+        return true;
+    return json_get_number(n, "lens_radius", 0, 1e6, &s->lens_radius, e) &&
+           json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e);
+}
+
+static bool read_variant(const char *file, int i, json_t *object, struct suite_variant *v,
+                         struct err *e)
+{
+    static const char *const keys[] = {"name",          "options",     "spp",
+                                       "margin_global", "margin_tile", NULL};
+    const size_t most = sizeof v->options / sizeof *v->options - 1;
+    char at[32], name[32];
+    snprintf(at, sizeof at, "variants[%d].", i);
+    struct json_node n = {file, at, object};
+    json_t *options, *option;
+    size_t k;
+    if (!json_is_object(object))
+        return err_set(e, "%s: 'variants[%d]' is not an object", file, i);
+    if (!json_only_keys(&n, keys, e) || !json_get_text(&n, "name", name, sizeof name, e) ||
+        !json_get_int(&n, "spp", 2, 1 << 24, &v->spp, e) ||
+        !json_get_number(&n, "margin_global", 0, 1, &v->margin_global, e) ||
+        !json_get_number(&n, "margin_tile", 0, 1, &v->margin_tile, e) ||
+        !json_get(&n, "options", &options, e))
+        return false;
+    if (name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_")] != '\0')
+        return err_set(e, "%s: '%sname' is '%s': only a-z, 0-9 and _", file, at, name);
+    snprintf(v->name, sizeof v->name, "pathtracer-%s", name);
+    if (json_array_size(options) == 0 || json_array_size(options) > most)
+        return err_set(e, "%s: '%soptions' is not an array of 1 to %zu texts", file, at, most);
+    json_array_foreach(options, k, option)
+    {
+        v->options[k] = json_string_value(option);
+        if (v->options[k] == NULL)
+            return err_set(e, "%s: '%soptions' holds what is not a text", file, at);
+    }
+    return true;
+}
+
+static bool read_variants(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    json_t *array = json_object_get(n->object, "variants"), *value;
+    size_t i;
+    if (array == NULL)
+        return true;
+    if (json_array_size(array) == 0 || json_array_size(array) > MAX_VARIANTS)
+        return err_set(e, "%s: 'variants' is not an array of 1 to %d", n->file, MAX_VARIANTS);
+    json_array_foreach(array, i, value)
+    {
+        if (!read_variant(n->file, (int)i, value, &s->variant[i], e))
+            return false;
+        s->num_variants++;
+    }
+    return true;
+}
+
+static bool read_consistency(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    static const char *const keys[] = {"renders",      "spp",      "margin",
+                                       "noise_margin", "adaptive", NULL};
+    static const char *const adaptive_keys[] = {"batch", "tolerance", "spp", NULL};
+    struct json_node c = {n->file, "consistency.", NULL};
+    struct json_node a = {n->file, "consistency.adaptive.", NULL};
+    if (json_object_get(n->object, "consistency") == NULL)
+        return true;
+    if (!json_get_object(n, "consistency", &c.object, e) || !json_only_keys(&c, keys, e) ||
+        !json_get_int(&c, "renders", 4, 256, &s->consistency.renders, e) ||
+        !json_get_int(&c, "spp", 2, 1 << 16, &s->consistency.spp, e) ||
+        !json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e))
+        return false;
+    if (json_object_get(c.object, "noise_margin") != NULL &&
+        !json_get_number(&c, "noise_margin", 0, 10, &s->consistency.noise_margin, e))
+        return false;
+    return json_object_get(c.object, "adaptive") == NULL ||
+           (json_get_object(&c, "adaptive", &a.object, e) && json_only_keys(&a, adaptive_keys, e) &&
+            json_get_int(&a, "batch", 2, 1 << 16, &s->consistency.batch, e) &&
+            json_get_int(&a, "spp", 2, 1 << 24, &s->consistency.most, e) &&
+            json_get_number(&a, "tolerance", 0, 1, &s->consistency.tolerance, e));
+}
+
+static bool check_noise(const char *file, const struct suite_scene *s, struct err *e)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (truth_noise_has(s->reference[i].kind))
+            return true;
+    return s->consistency.noise_margin == 0 ||
+           err_set(e, "%s: 'consistency.noise_margin' needs a truth whose noise is known", file);
+}
+
+/* An engine either has a reference or a reason, not both. */
+static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
+{
+    static const char *const engines[] = {"cycles", "povray", NULL};
+    if (json_object_get(n->object, "not_expressible") == NULL)
+        return true;
+    if (!json_get_object(n, "not_expressible", &s->not_expressible, e))
+        return false;
+    struct json_node reasons = {n->file, "not_expressible.", s->not_expressible};
+    if (!json_only_keys(&reasons, engines, e))
+        return false;
+    const char *engine;
+    json_t *value;
+    json_object_foreach(s->not_expressible, engine, value)
+    {
+        char reason[256];
+        if (!json_get_text(&reasons, engine, reason, sizeof reason, e))
+            return false;
+        for (int i = 0; i < s->num_references; i++)
+            if (strcmp(s->reference[i].engine, engine) == 0)
+                return err_set(e, "%s: '%s' is both a reference and not expressible", n->file,
+                               engine);
+    }
+    return true;
+}
+
+bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
+{
+    static const char *const keys[] = {
+        "title",      "detects",         "blind_to",    "width",
+        "height",     "depth",           "spp",         "tile",
+        "expect",     "environment",     "lens_radius", "focal_distance",
+        "references", "not_expressible", "variants",    "consistency",
+        NULL};
+    static const char *const keys_9x[] = {
+        "title", "detects", "blind_to",    "width",       "height",         "depth",         "spp",
+        "tile",  "expect",  "environment", "lens_radius", "focal_distance", "references_of", NULL};
+    if (!json_is_object(s->json))
+        return err_set(e, "%s: not an object", file);
+    bool must_differ = s->name[0] == '9';
+    struct json_node n = {file, "", s->json};
+    char expect[32];
+    if (!json_only_keys(&n, must_differ ? keys_9x : keys, e) ||
+        !json_get_text(&n, "title", s->title, sizeof s->title, e) ||
+        !json_get_text(&n, "detects", s->detects, sizeof s->detects, e) ||
+        !json_get_text(&n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
+        !json_get_int(&n, "width", 1, 16384, &s->width, e) ||
+        !json_get_int(&n, "height", 1, 16384, &s->height, e) ||
+        !json_get_int(&n, "depth", 0, 100, &s->depth, e) ||
+        !json_get_int(&n, "spp", 2, 1 << 24, &s->spp, e) ||
+        !json_get_int(&n, "tile", 1, 16384, &s->tile, e) ||
+        !json_get_text(&n, "expect", expect, sizeof expect, e))
+        return false;
+    if (s->width % s->tile != 0 || s->height % s->tile != 0)
+        return err_set(e, "%s: tile %d does not divide %d x %d pixels", file, s->tile, s->width,
+                       s->height);
+    enum verdict wanted = must_differ ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT;
+    if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
+        return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,
+                       s->name[0], verdict_name(wanted));
+    if (!read_environment(&n, s, e) || !read_lens(&n, s, e) || !read_variants(&n, s, e) ||
+        !read_consistency(&n, s, e))
+        return false;
+    if (must_differ)
+        return json_get_text(&n, "references_of", s->references_of, sizeof s->references_of, e);
+    memcpy(s->references_of, s->name, sizeof s->name);
+    json_t *references;
+    return json_get_object(&n, "references", &references, e) &&
+           read_references(file, references, s, e) && read_not_expressible(&n, s, e) &&
+           check_noise(file, s, e);
+}

@@ -1,0 +1,91 @@
+#include "truth.h"
+
+#include "truth_ggx.h"
+#include "truth_several_lamps.h"
+#include "truth_lens.h"
+#include "truth_one_lamp.h"
+#include "truth_mirrors_and_glass.h"
+#include "truth_sky.h"
+#include "truth_sun.h"
+#include "truth_snell_window.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+double truth_furnace(double emission, double albedo, int depth)
+{
+    double sum = 1;
+    for (int k = 0; k < depth; k++)
+        sum = 1 + albedo * sum;
+    return emission * sum;
+}
+
+bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
+{
+    for (int c = 0; c < 3; c++)
+        if (!(v[c] >= 0 && v[c] <= hi))
+            return err_set(e, "%s[%d] is %g, not in [0, %g]", name, c, v[c], hi);
+    return true;
+}
+
+bool truth_check_depth(const struct suite_scene *scene, struct err *e)
+{
+    return scene->depth >= 1 ||
+           err_set(e, "depth is %d, but the form needs direct light (1 or more)", scene->depth);
+}
+
+static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct moments *out,
+                         struct err *e)
+{
+    double emission[3], albedo[3];
+    json_error_t why;
+    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:[F,F,F], s:[F,F,F]}", "emission",
+                       &emission[0], &emission[1], &emission[2], "albedo", &albedo[0], &albedo[1],
+                       &albedo[2]) != 0)
+        return err_set(e, "%s", why.text);
+    if (!truth_check_triple("emission", emission, HUGE_VAL, e) ||
+        !truth_check_triple("albedo", albedo, 1, e))
+        return false;
+    size_t pixels = (size_t)out->width * (size_t)out->height;
+    for (size_t i = 0; i < 3 * pixels; i++)
+        out->mean[i] = truth_furnace(emission[i % 3], albedo[i % 3], scene->depth);
+    return true;
+}
+
+static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, NULL}};
+
+static const struct truth_kind *const families[] = {furnaces,   truth_lights, truth_lamps,
+                                                    truth_lens, truth_optics, truth_window,
+                                                    truth_ggx,  truth_sky,    truth_sun};
+
+static const struct truth_kind *find_kind(const char *name)
+{
+    for (size_t i = 0; i < sizeof families / sizeof families[0]; i++)
+        for (const struct truth_kind *k = families[i]; k->name != NULL; k++)
+            if (strcmp(k->name, name) == 0)
+                return k;
+    return NULL;
+}
+
+bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                  struct moments *out, struct err *e)
+{
+    struct moments m = {0};
+    bool ok = moments_alloc(&m, scene->width, scene->height, e);
+    if (ok) {
+        snprintf(m.unit, sizeof m.unit, "exact");
+        m.spp = 0;
+        for (size_t i = 0; i < (size_t)m.width * (size_t)m.height; i++)
+            m.n[i] = 1;
+        const struct truth_kind *kind = find_kind(ref->kind);
+        ok = kind != NULL ? kind->fill(scene, ref->values, &m, e)
+                          : err_set(e, "unknown closed form");
+    }
+    if (!ok) {
+        moments_free(&m);
+        return err_prefix(e, "%s: truth '%s'", scene->name, ref->kind);
+    }
+    *out = m;
+    return true;
+}

@@ -1,0 +1,43 @@
+/* Closed forms as images. Each is evaluated from the numbers in the scene's .json, which are
+ * derived and explained in its .md; nothing of the renderer's camera, loader or light code is used,
+ * so that a mistake there cannot hide.
+ *
+ * kind      "values" in the .json (all keys needed, no others; triples are R, G, B)
+ * furnace   emission [W sr^-1 m^-2], albedo
+ *
+ * The other kinds are listed in truth_one_lamp.h, truth_several_lamps.h, truth_sun.h, truth_lens.h,
+ * truth_mirrors_and_glass.h, truth_snell_window.h, truth_ggx.h and truth_sky.h. */
+#ifndef ASSAY_TRUTH_H
+#define ASSAY_TRUTH_H
+
+#include "renderer/image/moments.h"
+#include "reference/suite/suite.h"
+
+/* Fills *out (unit "exact", spp 0) for that reference of that scene. Fails on an unknown kind, on
+ * missing, unknown or impossible values, on a depth at which the form does not hold, and where a
+ * quadrature over a pixel has not converged (to 1e-10 of the pixel's value; glass_sphere: truth_pixel_mean.h).
+ * The caller frees. */
+bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                  struct moments *out, struct err *e) __attribute__((warn_unused_result));
+
+/* Radiance inside a closed room whose walls all emit `emission` and reflect `albedo` by Lambert's
+ * law, counting paths of 0 .. depth bounces: emission * sum_{k=0}^{depth} albedo^k. */
+double truth_furnace(double emission, double albedo, int depth);
+
+/* A closed form by name. fill() sets all of out->mean, out->width x out->height pixels, from
+ * `values`; of the scene it may use depth, lens_radius and focal_distance. */
+struct truth_kind {
+    const char *name;
+    bool (*fill)(const struct suite_scene *scene, json_t *values, struct moments *out,
+                 struct err *e);
+};
+
+/* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */
+bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Fails unless paths of one bounce, direct light, are counted. */
+bool truth_check_depth(const struct suite_scene *scene, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,334 @@
+#include "truth_mirrors_and_glass.h"
+
+#include "truth_pixel_mean.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+double truth_fresnel(double cos_i, double n, double *cos_t)
+{
+    double sin_t2 = (1 - cos_i * cos_i) / (n * n), c = sin_t2 < 1 ? sqrt(1 - sin_t2) : 0;
+    if (cos_t != NULL)
+        *cos_t = c;
+    double s = (cos_i - n * c) / (cos_i + n * c), p = (n * cos_i - c) / (n * cos_i + c);
+    return 0.5 * (s * s + p * p);
+}
+
+double truth_glass_weight(double f, int j, int depth)
+{
+    return j + 2 <= depth ? (1 - f) * (1 - f) * pow(f, j) : 0;
+}
+
+static bool unpack_range(const char *name, const double v[2], struct err *e)
+{
+    return v[0] < v[1] || err_set(e, "%s is [%g, %g]: not a range", name, v[0], v[1]);
+}
+
+/* The mirror box. */
+
+/* Where the unfolded coordinate t of a mirrored room [lo, hi] lies in the room itself, and how often
+ * the way there from inside the room meets each of the two mirrors. */
+static double fold(double t, const double range[2], int *at_lo, int *at_hi)
+{
+    double size = range[1] - range[0], inside = t - range[0];
+    int cell = (int)floor(inside / size), count = abs(cell);
+    inside -= cell * size;
+    /* The first mirror met is the one on the side of t, then they take turns. */
+    *at_lo = cell < 0 ? (count + 1) / 2 : count / 2;
+    *at_hi = count - *at_lo;
+    return cell % 2 == 0 ? range[0] + inside : range[1] - inside;
+}
+
+void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, double sx, double sy,
+                               double light[3])
+{
+    double length = b->z[1] - b->z[0];
+    light[0] = light[1] = light[2] = 0;
+    /* The n-th arrival at the end, after as many reflections there and at the back. */
+    for (int n = 0; 2 * n <= depth; n++) {
+        double way = b->eye[2] - b->z[0] + 2 * n * length;
+        int met[6] = {[4] = n, [5] = n}, bounces = 0;
+        double x = fold(b->eye[0] + sx * way, b->x, &met[0], &met[1]);
+        double y = fold(b->eye[1] + sy * way, b->y, &met[2], &met[3]);
+        for (int k = 0; k < 6; k++)
+            bounces += met[k];
+        if (bounces > depth)
+            return;
+        int panel = (x < b->split[0] ? 0 : 1) + (y < b->split[1] ? 2 : 0);
+        if (panel == 3)
+            continue;
+        for (int c = 0; c < 3; c++) {
+            light[c] = b->radiance[panel][c];
+            for (int k = 0; k < 6; k++)
+                light[c] *= pow(b->reflectance[k][c], met[k]);
+        }
+        return;
+    }
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Slopes between -tan_half and tan_half at which a mirror or the panels' border begins, in any of the
+ * arrivals, and the borders of `pixels` pixels; sorted. The caller frees; NULL without memory. */
+static double *breaks(const struct truth_mirror_box *b, int depth, int axis, int pixels, int *num)
+{
+    const double *range = axis == 0 ? b->x : b->y, size = range[1] - range[0];
+    double t = b->tan_half, length = b->z[1] - b->z[0];
+    double longest = b->eye[2] - b->z[0] + 2 * (depth / 2) * length;
+    int cells = (int)ceil(t * longest / size) + 2;
+    double *s =
+        calloc((size_t)(depth / 2 + 1) * (size_t)(4 * cells + 2) + (size_t)pixels + 1, sizeof *s);
+    if (s == NULL)
+        return NULL;
+    int n = 0;
+    for (int i = 0; i <= pixels; i++)
+        s[n++] = t * (2.0 * i / pixels - 1);
+    for (int k = 0; k <= depth / 2; k++) {
+        double way = b->eye[2] - b->z[0] + 2 * k * length;
+        for (int cell = -cells; cell <= cells; cell++) {
+            double edge = range[0] + cell * size, split = b->split[axis] - range[0];
+            double at[2] = {edge, edge + (cell % 2 == 0 ? split : size - split)};
+            for (int i = 0; i < 2; i++) {
+                double slope = (at[i] - b->eye[axis]) / way;
+                if (fabs(slope) < t)
+                    s[n++] = slope;
+            }
+        }
+    }
+    qsort(s, (size_t)n, sizeof *s, ascending);
+    *num = n;
+    return s;
+}
+
+static bool box_values(json_t *values, struct truth_mirror_box *b, struct err *e)
+{
+    json_error_t why;
+    double(*l)[3] = b->radiance, (*r)[3] = b->reflectance;
+    if (json_unpack_ex(
+            values, &why, JSON_STRICT,
+            "{s:[F,F], s:[F,F], s:[F,F], s:[F,F,F], s:F, s:[F,F], s:{s:[F,F,F], s:[F,F,F], "
+            "s:[F,F,F]}, s:{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F]}}",
+            "x", &b->x[0], &b->x[1], "y", &b->y[0], &b->y[1], "z", &b->z[0], &b->z[1], "eye",
+            &b->eye[0], &b->eye[1], &b->eye[2], "tan_half", &b->tan_half, "split", &b->split[0],
+            &b->split[1], "radiance", "left_top", &l[0][0], &l[0][1], &l[0][2], "right_top",
+            &l[1][0], &l[1][1], &l[1][2], "left_bottom", &l[2][0], &l[2][1], &l[2][2],
+            "reflectance", "left", &r[0][0], &r[0][1], &r[0][2], "right", &r[1][0], &r[1][1],
+            &r[1][2], "bottom", &r[2][0], &r[2][1], &r[2][2], "top", &r[3][0], &r[3][1], &r[3][2],
+            "end", &r[4][0], &r[4][1], &r[4][2], "back", &r[5][0], &r[5][1], &r[5][2]) != 0)
+        return err_set(e, "%s", why.text);
+    for (int k = 0; k < 3; k++)
+        if (!truth_check_triple("radiance", l[k], HUGE_VAL, e))
+            return false;
+    for (int k = 0; k < 6; k++)
+        if (!truth_check_triple("reflectance", r[k], 1, e))
+            return false;
+    if (!unpack_range("x", b->x, e) || !unpack_range("y", b->y, e) || !unpack_range("z", b->z, e))
+        return false;
+    const double *range[3] = {b->x, b->y, b->z};
+    for (int k = 0; k < 3; k++)
+        if (!(b->eye[k] > range[k][0] && b->eye[k] < range[k][1]))
+            return err_set(e, "the eye is not inside the box");
+    for (int k = 0; k < 2; k++)
+        if (!(b->split[k] >= range[k][0] && b->split[k] <= range[k][1]))
+            return err_set(e, "split[%d] is not inside the end", k);
+    return b->tan_half > 0 || err_set(e, "tan_half is %g, not above 0", b->tan_half);
+}
+
+static bool fill_mirror_box(const struct suite_scene *scene, json_t *values, struct moments *out,
+                            struct err *e)
+{
+    struct truth_mirror_box b = {0};
+    if (!box_values(values, &b, e))
+        return false;
+    if (out->width != out->height)
+        return err_set(e, "the picture is %d x %d, not square", out->width, out->height);
+    int size = out->width, num_x, num_y;
+    double pixel = 2 * b.tan_half / size;
+    double *x = breaks(&b, scene->depth, 0, size, &num_x);
+    double *y = breaks(&b, scene->depth, 1, size, &num_y);
+    bool ok = x != NULL && y != NULL;
+    if (!ok)
+        err_set(e, "out of memory");
+    for (int j = 0; ok && j + 1 < num_y; j++)
+        for (int i = 0; i + 1 < num_x; i++) {
+            double sx = 0.5 * (x[i] + x[i + 1]), sy = 0.5 * (y[j] + y[j + 1]), light[3];
+            double area = (x[i + 1] - x[i]) * (y[j + 1] - y[j]);
+            int col = (int)((sx + b.tan_half) / pixel), row = (int)((b.tan_half - sy) / pixel);
+            if (area == 0)
+                continue;
+            truth_mirror_box_radiance(&b, scene->depth, sx, sy, light);
+            for (int c = 0; c < 3; c++)
+                out->mean[3 * ((size_t)row * (size_t)size + (size_t)col) + (size_t)c] +=
+                    light[c] * area / (pixel * pixel);
+        }
+    free(x);
+    free(y);
+    return ok;
+}
+
+/* The slab. */
+
+struct slab {
+    double n, front[3], behind[3];
+    int depth;
+};
+
+void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind)
+{
+    double f = truth_fresnel(cos_i, n, NULL), share[2] = {0, 0};
+    for (int j = 0; j + 2 <= depth; j++)
+        share[j % 2] += truth_glass_weight(f, j, depth);
+    *behind = share[0];
+    *front = share[1] + (depth >= 1 ? f : 0);
+}
+
+static int slab_radiance(const void *form, const double eye[3], const double d[3], double light[3])
+{
+    const struct slab *s = form;
+    double front, behind;
+    (void)eye;
+    truth_slab_shares(fabs(d[2]), s->n, s->depth, &front, &behind);
+    for (int c = 0; c < 3; c++)
+        light[c] = front * s->front[c] + behind * s->behind[c];
+    return d[2] < 0;
+}
+
+static bool fill_slab(const struct suite_scene *scene, json_t *values, struct moments *out,
+                      struct err *e)
+{
+    struct slab s = {.depth = scene->depth};
+    struct truth_view view;
+    json_error_t why;
+    json_t *v;
+    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view", &v,
+                       "ior", &s.n, "front", &s.front[0], &s.front[1], &s.front[2], "behind",
+                       &s.behind[0], &s.behind[1], &s.behind[2]) != 0)
+        return err_set(e, "%s", why.text);
+    if (!truth_view_read(v, &view, e) || !truth_check_triple("front", s.front, HUGE_VAL, e) ||
+        !truth_check_triple("behind", s.behind, HUGE_VAL, e))
+        return false;
+    if (!(s.n > 1))
+        return err_set(e, "ior is %g, not above 1", s.n);
+    for (int k = 0; k < 4; k++) {
+        double d[3];
+        truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
+        if (!(d[2] < 0))
+            return err_set(e, "a corner of the picture does not look at the slab");
+    }
+    return truth_view_render(&view, slab_radiance, &s, out, e);
+}
+
+/* The sphere. */
+
+/* The wall that a ray from inside the room meets. */
+static int wall_of(const struct truth_glass_sphere *s, const double p[3], const double d[3])
+{
+    double nearest = HUGE_VAL;
+    int wall = 0;
+    for (int k = 0; k < 3; k++) {
+        int side = d[k] > 0;
+        double t = d[k] != 0 ? (s->room[k][side] - p[k]) / d[k] : HUGE_VAL;
+        if (t < nearest) {
+            nearest = t;
+            wall = 2 * k + side;
+        }
+    }
+    return wall;
+}
+
+static int add_wall(const struct truth_glass_sphere *s, const double p[3], const double d[3],
+                    double weight, double light[3])
+{
+    int wall = wall_of(s, p, d);
+    for (int c = 0; c < 3; c++)
+        light[c] += weight * s->walls[wall][c];
+    return wall;
+}
+
+int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const double d[3],
+                                double light[3])
+{
+    const struct truth_glass_sphere *s = sphere;
+    double normal[3], along[3], cos_i;
+    light[0] = light[1] = light[2] = 0;
+    if (!truth_sphere_hit(eye, d, s->centre, s->radius, &cos_i, normal))
+        return add_wall(s, eye, d, 1, light);
+    double sin_i = sqrt(1 - cos_i * cos_i), f = truth_fresnel(cos_i, s->n, NULL);
+    /* In the plane of incidence, square to the normal at the point of entry: where the ray goes. */
+    for (int k = 0; k < 3; k++)
+        along[k] = sin_i > 0 ? (d[k] + cos_i * normal[k]) / sin_i : 0;
+    /* The ray leaves after j internal reflections at the polar angle (j + 1)(pi - 2 theta_t) from the
+     * point of entry, counted towards `along`, and there under theta_i to the normal, on the side it
+     * turns to. j = -1 is the reflection at the point of entry. */
+    double theta_i = atan2(sin_i, cos_i), theta_t = asin(sin_i / s->n);
+    int id = 6;
+    for (int j = -1; j + 2 <= s->depth; j++) {
+        double polar = (j + 1) * (M_PI - 2 * theta_t), out = polar + theta_i, p[3], w[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = s->centre[k] + s->radius * (cos(polar) * normal[k] + sin(polar) * along[k]);
+            w[k] = cos(out) * normal[k] + sin(out) * along[k];
+        }
+        double weight = j < 0 ? f : truth_glass_weight(f, j, s->depth);
+        id = 6 * id + add_wall(s, p, w, weight, light);
+    }
+    return id;
+}
+
+static bool sphere_values(json_t *values, json_t **view, struct truth_glass_sphere *s,
+                          struct err *e)
+{
+    json_error_t why;
+    double(*r)[2] = s->room, (*w)[3] = s->walls;
+    if (json_unpack_ex(
+            values, &why, JSON_STRICT,
+            "{s:o, s:F, s:[F,F,F], s:F, s:{s:[F,F], s:[F,F], s:[F,F]}, s:{s:[F,F,F], s:[F,F,F], "
+            "s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F]}}",
+            "view", view, "ior", &s->n, "centre", &s->centre[0], &s->centre[1], &s->centre[2],
+            "radius", &s->radius, "room", "x", &r[0][0], &r[0][1], "y", &r[1][0], &r[1][1], "z",
+            &r[2][0], &r[2][1], "walls", "left", &w[0][0], &w[0][1], &w[0][2], "right", &w[1][0],
+            &w[1][1], &w[1][2], "bottom", &w[2][0], &w[2][1], &w[2][2], "top", &w[3][0], &w[3][1],
+            &w[3][2], "far", &w[4][0], &w[4][1], &w[4][2], "near", &w[5][0], &w[5][1],
+            &w[5][2]) != 0)
+        return err_set(e, "%s", why.text);
+    for (int k = 0; k < 6; k++)
+        if (!truth_check_triple("walls", w[k], HUGE_VAL, e))
+            return false;
+    for (int k = 0; k < 3; k++)
+        if (!(s->centre[k] - s->radius > r[k][0] && s->centre[k] + s->radius < r[k][1]))
+            return err_set(e, "the sphere is not inside the room");
+    if (!(s->radius > 0))
+        return err_set(e, "radius is %g, not above 0", s->radius);
+    return s->n > 1 || err_set(e, "ior is %g, not above 1", s->n);
+}
+
+static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct moments *out,
+                        struct err *e)
+{
+    /* The number that tells the pieces apart has a digit to the base 6 for each way. */
+    enum { MAX_DEPTH = 10 };
+    struct truth_glass_sphere s = {.depth = scene->depth};
+    struct truth_view view;
+    json_t *v;
+    if (!sphere_values(values, &v, &s, e) || !truth_view_read(v, &view, e))
+        return false;
+    double distance2 = 0;
+    for (int k = 0; k < 3; k++) {
+        if (!(view.eye[k] > s.room[k][0] && view.eye[k] < s.room[k][1]))
+            return err_set(e, "the eye is not inside the room");
+        distance2 += (view.eye[k] - s.centre[k]) * (view.eye[k] - s.centre[k]);
+    }
+    if (!(distance2 > s.radius * s.radius))
+        return err_set(e, "the eye is inside the sphere");
+    if (s.depth > MAX_DEPTH)
+        return err_set(e, "depth is %d, more than %d", s.depth, MAX_DEPTH);
+    return truth_view_render(&view, truth_glass_sphere_radiance, &s, out, e);
+}
+
+const struct truth_kind truth_optics[] = {{"mirror_box", fill_mirror_box},
+                                          {"glass_slab", fill_slab},
+                                          {"glass_sphere", fill_sphere},
+                                          {NULL, NULL}};

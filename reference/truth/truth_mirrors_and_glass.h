@@ -1,0 +1,61 @@
+/* Closed forms of light that mirrors reflect and smooth glass reflects and refracts, by geometrical
+ * optics: no randomness, every path is found by unfolding.
+ *
+ * kind          "values" in the .json (all keys needed, no others; triples are R, G, B)
+ * mirror_box    x [left, right], y [bottom, top], z [end, back] of the box, eye, tan_half,
+ *               split [x, y], radiance {left_top, right_top, left_bottom}, reflectance {left, right,
+ *               bottom, top, end, back}
+ * glass_slab    view (truth_pixel_mean.h), ior, front, behind [radiance on either side]
+ * glass_sphere  view, ior, centre, radius, room {x, y, z: [lo, hi]}, walls {left, right, bottom, top,
+ *               far, near: radiance of the walls at x lo, x hi, y lo, y hi, z lo, z hi}
+ *
+ * mirror_box: the camera at `eye` looks along -Z, picture up being +Y; tan_half is the tangent of half
+ * its angle. All walls are mirrors but three of the four panels into which `split` divides the end:
+ * these glow and reflect nothing. The picture is constant on rectangles whose sides are parallel to the
+ * pixels' sides, and is integrated exactly.
+ * glass_slab: a slab parallel to the plane z = 0 with clear sides far away; what is on the side of +Z,
+ * where the eye is, has the radiance `front`, what is on the other side `behind`.
+ * glass_sphere: in a closed room of black glowing walls; the eye in the room, outside the sphere.
+ * Glass absorbs nothing. Every reflection and every refraction counts as one bounce. */
+#ifndef ASSAY_TRUTH_MIRRORS_AND_GLASS_H
+#define ASSAY_TRUTH_MIRRORS_AND_GLASS_H
+
+#include "truth.h"
+
+extern const struct truth_kind truth_optics[]; /* ends with a NULL name */
+
+/* Unpolarised reflectance of a smooth boundary by Fresnel's equations [Born99 1.5.2]; cos_i in (0,1],
+ * n: index behind over index in front. *cos_t (may be NULL): cosine behind, 0 under total reflection. */
+double truth_fresnel(double cos_i, double n, double *cos_t);
+
+struct truth_mirror_box {
+    double x[2], y[2], z[2], eye[3], tan_half, split[2];
+    double radiance[4][3]; /* left top, right top, left bottom, right bottom (a mirror: unused) */
+    double reflectance[6][3]; /* left, right, bottom, top, end, back */
+};
+
+/* Radiance that arrives from the direction (sx, sy, -1) on paths of at most `depth` bounces. */
+void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, double sx, double sy,
+                               double light[3]);
+
+/* Of a slab or any other body in which every internal reflection is like the first: weights of
+ * light that comes out after j = 0, 1, .. internal reflections, j + 2 bounces. F: reflectance on entry.
+ * (1 - F)^2 F^j, or 0 if that is more than `depth` bounces. */
+double truth_glass_weight(double f, int j, int depth);
+
+/* Light from in front of the slab and from behind it, as shares of the radiance seen under cos_i. */
+void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind);
+
+struct truth_glass_sphere {
+    double n, centre[3], radius;
+    double room[3][2];  /* x, y, z */
+    double walls[6][3]; /* x lo, x hi, y lo, y hi, z lo, z hi */
+    int depth;
+};
+
+/* Radiance that arrives at `eye` from the unit direction d. Returns which walls it comes from and by
+ * which ways, as a number: truth_shade of truth_pixel_mean.h, with a struct truth_glass_sphere. */
+int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const double d[3],
+                                double light[3]);
+
+#endif

@@ -1,0 +1,260 @@
+#include "truth_pixel_mean.h"
+
+#include <gsl/gsl_integration.h>
+#include <gsl/gsl_math.h>
+
+/* ORDER and twice as many points are compared for smooth pixels; in pixels with edges, a part with
+ * its two halves. */
+enum { ORDER = 8, SCAN = 32, MAX_HALVINGS = 40 };
+static const double smooth_tolerance = 1e-10, edge_tolerance = 1e-6;
+
+static double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+bool truth_view_read(json_t *values, struct truth_view *view, struct err *e)
+{
+    json_error_t why;
+    double *p = view->eye, *r = view->right, *u = view->up, *f = view->forward;
+    if (json_unpack_ex(values, &why, JSON_STRICT,
+                       "{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:F}", "eye", &p[0], &p[1],
+                       &p[2], "right", &r[0], &r[1], &r[2], "up", &u[0], &u[1], &u[2], "forward",
+                       &f[0], &f[1], &f[2], "tan_half", &view->tan_half) != 0)
+        return err_set(e, "view: %s", why.text);
+    const double *axis[3] = {r, u, f};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k <= i; k++)
+            if (!(fabs(dot3(axis[i], axis[k]) - (i == k)) < 1e-12))
+                return err_set(e, "view: right, up and forward are not unit and orthogonal");
+    if (!(view->tan_half > 0))
+        return err_set(e, "view: tan_half is %g, not above 0", view->tan_half);
+    return true;
+}
+
+void truth_view_direction(const struct truth_view *view, double u, double v, double d[3])
+{
+    double x = view->tan_half * u, y = -view->tan_half * v, length = sqrt(1 + x * x + y * y);
+    for (int k = 0; k < 3; k++)
+        d[k] = (view->forward[k] + x * view->right[k] + y * view->up[k]) / length;
+}
+
+bool truth_sphere_hit(const double o[3], const double d[3], const double centre[3], double radius,
+                      double *cos_i, double normal[3])
+{
+    double v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = o[k] - centre[k];
+    double half = dot3(v, d), chord2 = radius * radius - dot3(v, v) + half * half;
+    if (half >= 0 || chord2 <= 0)
+        return false;
+    for (int k = 0; k < 3; k++)
+        normal[k] = (v[k] - (half + sqrt(chord2)) * d[k]) / radius;
+    *cos_i = sqrt(chord2) / radius;
+    return true;
+}
+
+bool truth_view_filled(const struct truth_view *view, const double centre[3], double radius,
+                       double *min_cos, struct err *e)
+{
+    if (!(radius > 0))
+        return err_set(e, "radius is %g, not above 0", radius);
+    *min_cos = 1;
+    /* Directions that meet it form a cone about its middle; of a square, a corner is furthest off. */
+    for (int k = 0; k < 4; k++) {
+        double d[3], cos_i, normal[3];
+        truth_view_direction(view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
+        if (!truth_sphere_hit(view->eye, d, centre, radius, &cos_i, normal))
+            return err_set(e, "the sphere does not fill the picture");
+        *min_cos = fmin(*min_cos, cos_i);
+    }
+    return true;
+}
+
+struct picture {
+    const struct truth_view *view;
+    truth_shade *shade;
+    const void *form;
+    gsl_integration_glfixed_table *rule, *check;
+    double v;     /* of the scan line */
+    double width; /* of a pixel in u and v */
+    double scale; /* of the pixel's value, for the tolerance */
+    bool converged;
+};
+
+static int look(const struct picture *p, double u, double v, double light[3])
+{
+    double d[3];
+    truth_view_direction(p->view, u, v, d);
+    return p->shade(p->form, p->view->eye, d, light);
+}
+
+/* The piece that the whole pixel's border lies in and its middle, or false. */
+static bool is_one_piece(const struct picture *p, double u, double v)
+{
+    double light[3], w = p->width;
+    int id = look(p, u + w / 2, v + w / 2, light);
+    for (int i = 0; i < SCAN; i++) {
+        double t = w * i / SCAN;
+        if (look(p, u + t, v, light) != id || look(p, u + w, v + t, light) != id ||
+            look(p, u + w - t, v + w, light) != id || look(p, u, v + w - t, light) != id)
+            return false;
+    }
+    return true;
+}
+
+static void product_rule(const struct picture *p, const gsl_integration_glfixed_table *rule,
+                         double u0, double v0, double mean[3])
+{
+    for (int c = 0; c < 3; c++)
+        mean[c] = 0;
+    for (size_t i = 0; i < rule->n; i++)
+        for (size_t j = 0; j < rule->n; j++) {
+            double u, v, wu, wv, light[3];
+            gsl_integration_glfixed_point(0, 1, i, &u, &wu, rule);
+            gsl_integration_glfixed_point(0, 1, j, &v, &wv, rule);
+            look(p, u0 + p->width * u, v0 + p->width * v, light);
+            for (int c = 0; c < 3; c++)
+                mean[c] += wu * wv * light[c];
+        }
+}
+
+typedef void line_function(struct picture *p, double t, double light[3]);
+
+static void rule_on(struct picture *p, line_function *f, double a, double b, double sum[3])
+{
+    sum[0] = sum[1] = sum[2] = 0;
+    for (size_t i = 0; i < p->rule->n; i++) {
+        double t, w, light[3];
+        gsl_integration_glfixed_point(a, b, i, &t, &w, p->rule);
+        f(p, t, light);
+        for (int c = 0; c < 3; c++)
+            sum[c] += w * light[c];
+    }
+}
+
+/* Adds the integral of f over [a,b], of which `whole` is the rule's estimate, to sum. The tolerance
+ * is absolute and shared out by length, but for parts that hold a jump, which no halving smooths: they
+ * may be off by `most`. */
+static void refine(struct picture *p, line_function *f, double a, double b, const double whole[3],
+                   double tolerance, double most, int halvings, double sum[3])
+{
+    double m = 0.5 * (a + b), left[3], right[3], worst = 0;
+    rule_on(p, f, a, m, left);
+    rule_on(p, f, m, b, right);
+    for (int c = 0; c < 3; c++)
+        worst = fmax(worst, fabs(left[c] + right[c] - whole[c]));
+    if (worst <= fmax(tolerance, most)) {
+        for (int c = 0; c < 3; c++)
+            sum[c] += left[c] + right[c];
+    } else if (halvings == MAX_HALVINGS) {
+        p->converged = false;
+    } else {
+        refine(p, f, a, m, left, tolerance / 2, most, halvings + 1, sum);
+        refine(p, f, m, b, right, tolerance / 2, most, halvings + 1, sum);
+    }
+}
+
+static void integrate(struct picture *p, line_function *f, double a, double b, double tolerance,
+                      double sum[3])
+{
+    double whole[3];
+    rule_on(p, f, a, b, whole);
+    refine(p, f, a, b, whole, tolerance, 0.01 * tolerance, 0, sum);
+}
+
+static void at_point(struct picture *p, double u, double light[3])
+{
+    look(p, u, p->v, light);
+}
+
+/* Integral along the scan line at v from a to b, piece by piece. */
+static void along_line(struct picture *p, double a, double b, double sum[3])
+{
+    double tolerance = 0.1 * edge_tolerance * p->scale * (b - a), start = a, light[3];
+    int id = look(p, a, p->v, light);
+    sum[0] = sum[1] = sum[2] = 0;
+    for (int i = 1; i <= SCAN; i++) {
+        double known = a + (b - a) * (i - 1) / SCAN, end = a + (b - a) * i / SCAN;
+        int last = look(p, end, p->v, light);
+        while (id != last) {
+            double lo = known, hi = end;
+            while (hi - lo > 1e-10 * (b - a)) {
+                double m = 0.5 * (lo + hi);
+                if (look(p, m, p->v, light) == id)
+                    lo = m;
+                else
+                    hi = m;
+            }
+            integrate(p, at_point, start, lo, tolerance, sum);
+            start = known = hi;
+            id = look(p, hi, p->v, light);
+        }
+    }
+    integrate(p, at_point, start, b, tolerance, sum);
+}
+
+struct column {
+    struct picture p; /* first, so that a line_function finds it */
+    double u;
+};
+
+static void at_line(struct picture *p, double v, double light[3])
+{
+    struct column *c = (struct column *)p;
+    p->v = v;
+    along_line(p, c->u, c->u + p->width, light);
+}
+
+static bool edge_pixel(struct picture *p, double u, double v, double mean[3], struct err *e)
+{
+    struct column c = {.p = *p, .u = u};
+    double area = p->width * p->width, sum[3] = {0};
+    product_rule(p, p->check, u, v, mean);
+    c.p.scale = fmin(mean[0], fmin(mean[1], mean[2]));
+    c.p.converged = true;
+    if (!(c.p.scale > 0))
+        return err_set(e, "a pixel with edges is black in a channel: no scale for its tolerance");
+    integrate(&c.p, at_line, v, v + p->width, edge_tolerance * c.p.scale * area, sum);
+    for (int k = 0; k < 3; k++)
+        mean[k] = sum[k] / area;
+    return c.p.converged || err_set(e, "quadrature not converged at an edge");
+}
+
+static bool smooth_pixel(const struct picture *p, double u, double v, double mean[3])
+{
+    double coarse[3];
+    product_rule(p, p->rule, u, v, coarse);
+    product_rule(p, p->check, u, v, mean);
+    bool same = true;
+    for (int c = 0; c < 3; c++)
+        same = same && fabs(coarse[c] - mean[c]) <= smooth_tolerance * mean[c];
+    return same;
+}
+
+bool truth_view_render(const struct truth_view *view, truth_shade *shade, const void *form,
+                       struct moments *out, struct err *e)
+{
+    if (out->width != out->height)
+        return err_set(e, "the picture is %d x %d, not square", out->width, out->height);
+    struct picture p = {.view = view,
+                        .shade = shade,
+                        .form = form,
+                        .rule = gsl_integration_glfixed_table_alloc(ORDER),
+                        .check = gsl_integration_glfixed_table_alloc(2 * ORDER),
+                        .width = 2.0 / out->width};
+    bool ok = p.rule != NULL && p.check != NULL;
+    if (!ok)
+        err_set(e, "out of memory for a quadrature rule");
+    for (int i = 0; ok && i < out->width * out->height; i++) {
+        int col = i % out->width, row = i / out->width;
+        double u = p.width * col - 1, v = p.width * row - 1, *mean = out->mean + 3 * (size_t)i;
+        if (!is_one_piece(&p, u, v) || !smooth_pixel(&p, u, v, mean))
+            ok = edge_pixel(&p, u, v, mean, e) || err_prefix(e, "pixel (%d,%d)", col, row);
+        if (ok && !(isfinite(mean[0]) && isfinite(mean[1]) && isfinite(mean[2])))
+            ok = err_set(e, "pixel (%d,%d) is not a number", col, row);
+    }
+    gsl_integration_glfixed_table_free(p.rule);
+    gsl_integration_glfixed_table_free(p.check);
+    return ok;
+}

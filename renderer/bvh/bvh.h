@@ -1,0 +1,54 @@
+/* Which primitive does a ray meet first, and is anything in between: over all primitives of a
+ * scene, by brute force or by a binary bounding volume hierarchy. Rays come in batches, so that
+ * wider kernels can take their place behind the same interface. */
+#ifndef ASSAY_BVH_H
+#define ASSAY_BVH_H
+
+#include "renderer/math/ray_batch.h"
+#include "renderer/base/isa.h"
+#include "renderer/scene/scene.h"
+
+enum bvh_kind {
+    BVH_BRUTE_FORCE, /* every primitive for every ray: the oracle */
+    BVH_CENTROID,    /* the assignment's: split the longest axis at the mean centroid */
+    BVH_SAH,         /* binned surface area heuristic [Wald07] */
+    BVH_WIDE         /* eight wide, by vector kernels (bvh_wide.h) */
+};
+
+/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves, of up to eight each, and those
+ * that a packet of rays visits together once. */
+struct bvh_stats {
+    uint64_t rays, box_tests, primitive_tests;
+};
+
+struct bvh; /* opaque; refers to the scene, which must outlive it */
+
+/* NULL on failure (out of memory). */
+struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same with the instructions of BVH_WIDE chosen (it has no scalar version: ISA_SCALAR is as
+ * ISA_AUTO); fails too if the machine lacks them. */
+struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
+    __attribute__((warn_unused_result));
+/* And on up to `threads` threads, where the kind can (BVH_WIDE): the same tree. */
+struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa, int threads,
+                         struct err *e) __attribute__((warn_unused_result));
+void bvh_free(struct bvh *b);
+
+/* Expected cost of a random ray in primitive tests, a box test counting as one [MacDonald90];
+ * and the size of the tree, also in bytes. */
+double bvh_sah_cost(const struct bvh *b);
+int bvh_depth(const struct bvh *b);
+uint32_t bvh_num_nodes(const struct bvh *b);
+size_t bvh_size(const struct bvh *b);
+
+/* For the listed lanes: nearest hit inside (tmin, tmax) into h, h->prim = NO_HIT if none. */
+void bvh_closest(const struct bvh *b, const struct rays *r, const uint16_t *lane, int num_lanes,
+                 struct hits *h, struct bvh_stats *stats);
+/* For the listed lanes: occluded[lane] tells if there is any hit inside (tmin, tmax). */
+void bvh_occluded(const struct bvh *b, const struct rays *r, const uint16_t *lane, int num_lanes,
+                  bool *occluded, struct bvh_stats *stats);
+
+extern const char *const bvh_kind_names[]; /* by enum bvh_kind; ends with NULL */
+
+#endif

@@ -1,0 +1,323 @@
+#include "bvh_wide.h"
+#include "renderer/base/huge_alloc.h"
+#include "renderer/base/parallel.h"
+#include "small_scene.h"
+#include "traverse.h"
+#include "wide_build.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A leaf that has its place and is not filled yet. */
+struct empty_leaf {
+    uint32_t place, first, count;
+};
+
+struct build {
+    struct wide *w;
+    int threads;
+    struct wide_parts parts;
+    const struct wide_splitter *splitter;
+    const struct scene *scene;
+    struct wide_item *item;
+    size_t capacity; /* bytes of the arena */
+    struct empty_leaf *leaf;
+    size_t leaf_room;
+    double root_area;
+};
+
+/* Room for `size` bytes more; what there is may move. */
+static bool reserve(struct build *b, size_t size)
+{
+    struct wide *w = b->w;
+    if (w->used + size <= b->capacity)
+        return true;
+    if (w->used + size > WIDE_PLACE)
+        return false; /* references end here, at some 8 10^7 triangles */
+    size_t capacity = b->capacity + b->capacity / 2 + size;
+    char *larger = alloc_large(capacity);
+    if (larger == NULL)
+        return false;
+    memcpy(larger, w->arena, w->used);
+    free(w->arena);
+    w->arena = larger;
+    b->capacity = capacity;
+    return true;
+}
+
+static void set_item(const struct scene *s, uint32_t prim, struct wide_item *it)
+{
+    vec3 low, high;
+    if (prim < s->num_triangles) {
+        const vec3 *p = s->position + 3 * (size_t)prim;
+        low = vmin(vmin(p[0], p[1]), p[2]);
+        high = vmax(vmax(p[0], p[1]), p[2]);
+    } else {
+        const struct sphere *sp = &s->spheres[prim - s->num_triangles];
+        vec3 r = v3(sp->radius, sp->radius, sp->radius);
+        low = sub(sp->centre, r);
+        high = add(sp->centre, r);
+    }
+    *it = (struct wide_item){
+        .min = {low.x, low.y, low.z}, .prim = prim, .minus_max = {-high.x, -high.y, -high.z}};
+}
+
+static void set_items(void *ctx, size_t first, size_t last)
+{
+    const struct build *b = ctx;
+    for (size_t i = first; i < last; i++)
+        set_item(b->scene, (uint32_t)i, &b->item[i]);
+}
+
+static bool is_sphere(const struct build *b, uint32_t item)
+{
+    return b->item[item].prim >= b->scene->num_triangles;
+}
+
+static int by_number(const void *a, const void *b)
+{
+    uint32_t x = ((const struct wide_item *)a)->prim, y = ((const struct wide_item *)b)->prim;
+    return (x > y) - (x < y);
+}
+
+static void fill_leaf(const struct build *b, struct wide_item *item, uint32_t count,
+                      struct wide_leaf *l)
+{
+    const struct scene *s = b->scene;
+    qsort(item, count, sizeof *item, by_number);
+    for (int c = 0; c < 3; c++)
+        for (int a = 0; a < 3; a++)
+            for (int i = 0; i < WIDTH; i++)
+                l->p[c][a][i] = NAN;
+    for (uint32_t i = 0; i < WIDTH; i++)
+        l->prim[i] = i < count ? item[i].prim : NO_HIT;
+    for (uint32_t i = 0; i < count; i++) {
+        if (item[i].prim >= s->num_triangles) {
+            const struct sphere *sp = &s->spheres[item[i].prim - s->num_triangles];
+            l->p[0][0][i] = sp->centre.x;
+            l->p[0][1][i] = sp->centre.y;
+            l->p[0][2][i] = sp->centre.z;
+            l->p[1][0][i] = sp->radius;
+            continue;
+        }
+        const vec3 *p = s->position + 3 * (size_t)item[i].prim;
+        for (int c = 0; c < 3; c++) {
+            l->p[c][0][i] = p[c].x;
+            l->p[c][1][i] = p[c].y;
+            l->p[c][2][i] = p[c].z;
+        }
+    }
+}
+
+static void fill_leaves(void *ctx, size_t first, size_t last)
+{
+    const struct build *b = ctx;
+    for (size_t i = first; i < last; i++) {
+        const struct empty_leaf *l = &b->leaf[i];
+        fill_leaf(b, b->item + l->first, l->count, (struct wide_leaf *)(b->w->arena + l->place));
+    }
+}
+
+/* Appends one to be filled later; the reference, or WIDE_PLACE if out of memory. */
+static uint32_t add_leaf(struct build *b, const struct wide_range *r)
+{
+    struct wide *w = b->w;
+    if (w->num_leaves == b->leaf_room) {
+        size_t room = b->leaf_room + b->leaf_room / 2 + 64;
+        struct empty_leaf *larger = realloc(b->leaf, room * sizeof *larger);
+        if (larger == NULL)
+            return WIDE_PLACE;
+        b->leaf = larger;
+        b->leaf_room = room;
+    }
+    if (!reserve(b, sizeof(struct wide_leaf)))
+        return WIDE_PLACE;
+    uint32_t ref = (uint32_t)w->used | WIDE_LEAF;
+    if (is_sphere(b, r->first))
+        ref |= WIDE_SPHERES;
+    b->leaf[w->num_leaves++] = (struct empty_leaf){(uint32_t)w->used, r->first, r->count};
+    w->used += sizeof(struct wide_leaf);
+    return ref;
+}
+
+static double chance(const struct build *b, const struct wide_box *box)
+{
+    return b->root_area > 0 ? (double)wide_half_area(box) / b->root_area : 1;
+}
+
+/* Part i as a node and what is below. False if out of memory. */
+static bool add_node(struct build *b, uint32_t i, int depth)
+{
+    const struct wide_part *part = b->parts.part;
+    uint32_t child[WIDTH];
+    int n = wide_parts_children(&b->parts, i, child);
+    struct wide *w = b->w;
+    if (!reserve(b, sizeof(struct wide_node)))
+        return false;
+    size_t place = w->used;
+    w->used += sizeof(struct wide_node);
+    w->num_nodes++;
+    if (depth > w->depth)
+        w->depth = depth;
+    w->cost += chance(b, &part[i].box);
+    struct wide_node node = {.child = {0}};
+    for (int k = 0; k < WIDTH; k++)
+        for (int a = 0; a < 3; a++) {
+            node.plane[2 * a][k] = k < n ? part[child[k]].box.v[a] : INFINITY;
+            node.plane[2 * a + 1][k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
+        }
+    /* Leaves lie behind their node. */
+    for (int k = 0; k < n; k++) {
+        const struct wide_part *c = &part[child[k]];
+        if (c->left != 0)
+            continue;
+        const struct wide_range r = {.first = c->first, .count = c->count};
+        if ((node.child[k] = add_leaf(b, &r)) == WIDE_PLACE)
+            return false;
+        w->cost += chance(b, &c->box);
+    }
+    for (int k = 0; k < n; k++)
+        if (part[child[k]].left != 0) {
+            node.child[k] = (uint32_t)w->used;
+            if (!add_node(b, child[k], depth + 1))
+                return false;
+        }
+    memcpy(w->arena + place, &node, sizeof node);
+    return true;
+}
+
+static bool add_tree(struct build *b, const struct wide_range *all)
+{
+    return wide_parts_build(b->splitter, b->item, b->scene->num_triangles, all, b->threads,
+                            &b->parts) &&
+           add_node(b, 0, 0);
+}
+
+static bool add_list(struct build *b, struct wide_range *all)
+{
+    uint32_t prim[WIDE_FLAT];
+    for (uint32_t i = 0; i < all->count; i++)
+        prim[i] = i;
+    if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
+        return false;
+    wide_flat_fill(b->scene, prim, (int)all->count, b->w->flat);
+    uint32_t triangles = b->scene->num_triangles;
+    for (uint32_t i = 0; i < all->count;) {
+        uint32_t end = i < triangles ? triangles : all->count;
+        struct wide_range r = {.first = i, .count = end - i < WIDTH ? end - i : WIDTH};
+        if (add_leaf(b, &r) == WIDE_PLACE)
+            return false;
+        b->w->num_sphere_leaves += i >= triangles;
+        i += r.count;
+    }
+    b->w->cost = b->w->num_leaves;
+    return true;
+}
+
+/* The walls of a room would be in every ray's way down the tree. Takes them out of `all`: primitives that
+ * a random ray through the scene meets the box of by more than LARGE_PART, if there are few. The rest
+ * follow, in their order. False if out of memory. */
+enum { MOST_LARGE = 16 };
+#define LARGE_PART (1.0 / 32)
+
+static bool is_large(const struct build *b, const struct wide_item *it)
+{
+    float x = -it->minus_max[0] - it->min[0], y = -it->minus_max[1] - it->min[1];
+    float z = -it->minus_max[2] - it->min[2];
+    return x * y + y * z + z * x > LARGE_PART * b->root_area;
+}
+
+static bool take_large(struct build *b, struct wide_range *all)
+{
+    struct wide *w = b->w;
+    uint32_t prim[MOST_LARGE], num = 0;
+    for (uint32_t i = 0; i < all->count; i++) {
+        if (!is_large(b, &b->item[i]))
+            continue;
+        if (num == MOST_LARGE)
+            return true;
+        prim[num++] = i;
+    }
+    if (num == 0)
+        return true;
+    if ((w->flat = malloc(sizeof *w->flat)) == NULL)
+        return false;
+    wide_flat_fill(b->scene, prim, (int)num, w->flat);
+    if (!w->flat->quick) {
+        free(w->flat);
+        w->flat = NULL;
+        return true;
+    }
+    uint32_t to = all->count;
+    for (uint32_t i = all->count; i-- > 0;)
+        if (!is_large(b, &b->item[i]))
+            b->item[--to] = b->item[i];
+    w->num_list_leaves = (num + WIDTH - 1) / WIDTH;
+    w->cost += w->num_list_leaves;
+    all->first = num;
+    all->count -= num;
+    b->splitter->bounds(b->item + num, all->count, &all->box, &all->centres);
+    return true;
+}
+
+struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
+{
+    static const struct {
+        const struct wide_kernel *kernel;
+        const struct wide_splitter *splitter;
+    } code[] = {
+        [ISA_SSE42] = {&wide_kernel_sse42, &wide_splitter_sse42},
+        [ISA_AVX2] = {&wide_kernel_avx2, &wide_splitter_avx2},
+        [ISA_AVX512] = {&wide_kernel_avx512, &wide_splitter_avx512},
+    };
+    if (!isa_choose(&isa, e))
+        return NULL;
+    struct build b = {.scene = s, .splitter = code[isa].splitter, .threads = threads};
+    struct wide_range all = {.count = scene_num_primitives(s)};
+    struct wide *w = b.w = calloc(1, sizeof *w);
+    if (w == NULL)
+        goto fail;
+    w->kernel = code[isa].kernel;
+    w->num_triangles = s->num_triangles;
+    b.capacity = 64 * (size_t)all.count + 4096;
+    w->arena = alloc_large(b.capacity);
+    b.item = alloc_large(all.count * sizeof *b.item);
+    if (w->arena == NULL || b.item == NULL)
+        goto fail;
+    parallel_for(threads, all.count, set_items, &b);
+    b.splitter->bounds(b.item, all.count, &all.box, &all.centres);
+    b.root_area = (double)wide_half_area(&all.box);
+    for (int a = 0; a < 3; a++) {
+        w->min[a] = all.box.v[a];
+        w->max[a] = -all.box.v[4 + a];
+    }
+    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : take_large(&b, &all) && add_tree(&b, &all)))
+        goto fail;
+    for (int a = 0; a < 3; a++) {
+        w->tree_min[a] = all.box.v[a];
+        w->tree_max[a] = -all.box.v[4 + a];
+    }
+    parallel_for(threads, w->num_leaves, fill_leaves, &b);
+    float extent = maxf(maxf(w->max[0] - w->min[0], w->max[1] - w->min[1]), w->max[2] - w->min[2]);
+    w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);
+    free(b.item);
+    free(b.leaf);
+    wide_parts_free(&b.parts);
+    return w;
+fail:
+    free(b.item);
+    free(b.leaf);
+    wide_parts_free(&b.parts);
+    wide_free(w);
+    err_set(e, "out of memory for the acceleration structure of %u primitives", all.count);
+    return NULL;
+}
+
+void wide_free(struct wide *w)
+{
+    if (w == NULL)
+        return;
+    free(w->arena);
+    free(w->flat);
+    free(w);
+}

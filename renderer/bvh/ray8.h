@@ -1,0 +1,167 @@
+/* Eight rays of a batch, lane by lane what boxes and primitives want of each. Part of
+ * traverse.c. */
+#ifndef ASSAY_RAY8_H
+#define ASSAY_RAY8_H
+
+#include "bvh_wide.h"
+#include "renderer/math/simd.h"
+
+#include <float.h>
+
+enum { NOTHING = INT32_MAX /* no primitive yet: more than any */ };
+
+struct octet {
+    vf o[3], d[3], sx, sy, sz, tmin, tmax;
+    vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
+                 distance counts only if its number is smaller */
+    vf u, v; /* with prim: what has been met so far */
+    vi prim;
+    bool in_row;                   /* the lanes follow each other */
+    vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
+    vi axis;                       /* of the largest component of d, the third of the shear */
+    vi ignore;
+};
+
+/* a[lane[0]], ..., a[lane[7]] */
+INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
+{
+    vf v;
+    if (in_row)
+        memcpy(&v, a + lane[0], sizeof v);
+    else
+        v = (vf){a[lane[0]], a[lane[1]], a[lane[2]], a[lane[3]],
+                 a[lane[4]], a[lane[5]], a[lane[6]], a[lane[7]]};
+    return v;
+}
+
+/* As shear_of(). */
+INLINE void octet_shear(struct octet *q)
+{
+    vf x = vf_abs(q->d[0]), y = vf_abs(q->d[1]), z = vf_abs(q->d[2]);
+    vi is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
+    q->axis = vi_select(is_x, vi_set(0), vi_select(is_y, vi_set(1), vi_set(2)));
+    q->sz = 1 / vf_select(is_x, q->d[0], vf_select(is_y, q->d[1], q->d[2]));
+    q->sx = vf_select(is_x, q->d[1], vf_select(is_y, q->d[2], q->d[0])) * q->sz;
+    q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
+}
+
+/* Origins, directions and ends. */
+INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    bool in_row = true;
+    for (int i = 1; i < LANES; i++)
+        in_row &= lane[i] == lane[0] + i;
+    q->o[0] = gather(r->o.x, lane, in_row);
+    q->o[1] = gather(r->o.y, lane, in_row);
+    q->o[2] = gather(r->o.z, lane, in_row);
+    q->d[0] = gather(r->d.x, lane, in_row);
+    q->d[1] = gather(r->d.y, lane, in_row);
+    q->d[2] = gather(r->d.z, lane, in_row);
+    q->tmin = gather(r->tmin, lane, in_row);
+    q->tmax = gather(r->tmax, lane, in_row);
+    q->in_row = in_row;
+}
+
+/* Results of all lanes; prim -1: nothing. */
+INLINE void octet_store(const struct octet *q, const uint16_t lane[LANES], vf t, vf u, vf v,
+                        vi prim, struct hits *h)
+{
+    if (q->in_row) {
+        vf_store_any(h->t + lane[0], t);
+        vf_store_any(h->u + lane[0], u);
+        vf_store_any(h->v + lane[0], v);
+        vf_store_any(h->prim + lane[0], (vf)prim);
+        return;
+    }
+    for (int i = 0; i < LANES; i++) {
+        h->t[lane[i]] = t[i];
+        h->u[lane[i]] = u[i];
+        h->v[lane[i]] = v[i];
+        h->prim[lane[i]] = (uint32_t)prim[i];
+    }
+}
+
+INLINE void octet_store_flags(const struct octet *q, const uint16_t lane[LANES], unsigned mask,
+                              bool *flag)
+{
+    const uint64_t flags = bytes_of(mask);
+    if (q->in_row)
+        memcpy(flag + lane[0], &flags, sizeof flags);
+    else
+        for (int i = 0; i < LANES; i++)
+            flag[lane[i]] = flags >> 8 * i & 1;
+}
+
+INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    octet_load(r, lane, q);
+    vi tmax = (vi)q->tmax;
+    vi zero = vf_eq((vf)tmax, vf_set(0));
+    q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
+    octet_shear(q);
+    q->u = q->v = vf_set(0);
+    q->prim = vi_set(NOTHING);
+}
+
+/* Lanes k .. k+7 of a list of n; behind its end the last again. */
+static inline const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
+{
+    if (n - k >= LANES)
+        return lane + k;
+    for (int i = 0; i < LANES; i++)
+        filled[i] = lane[k + i < n ? k + i : n - 1];
+    return filled;
+}
+
+INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+{
+    const uint32_t *a = r->ignore;
+    q->ignore =
+        (vi){(int32_t)a[lane[0]], (int32_t)a[lane[1]], (int32_t)a[lane[2]], (int32_t)a[lane[3]],
+             (int32_t)a[lane[4]], (int32_t)a[lane[5]], (int32_t)a[lane[6]], (int32_t)a[lane[7]]};
+}
+
+/* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
+ * of float of their distance from the origin [Woop13 3.3]; reciprocal, products and difference of the
+ * slabs come to no more than 4 of distance and coordinate together. Twice that. */
+INLINE vf growth(const struct wide *w, const struct octet *q)
+{
+    vf reach = vf_set(0), coordinate = reach;
+    for (int a = 0; a < 3; a++) {
+        reach = vf_max(reach, vf_max(vf_abs(w->min[a] - q->o[a]), vf_abs(w->max[a] - q->o[a])));
+        coordinate = vf_max(coordinate, vf_abs(q->o[a]));
+    }
+    return 10 * FLT_EPSILON * (reach + coordinate);
+}
+
+/* 1/d, of zeros and next to them a number as large that neither NaN nor infinity comes up. */
+INLINE vf inverse(vf d, vf grow)
+{
+    vf tiny = vf_max(vf_set(1e-18f), grow * 1e-29f), sign = (vf)((vi)d & vi_set(INT32_MIN));
+    return 1 / vf_select(vf_lt(vf_abs(d), tiny), (vf)((vi)tiny | (vi)sign), d);
+}
+
+INLINE void octet_slabs(const struct wide *w, struct octet *q)
+{
+    vf grow = growth(w, q);
+    for (int a = 0; a < 3; a++) {
+        vf inv = q->inv[a] = inverse(q->d[a], grow), by = grow * vf_abs(inv);
+        q->enter[a] = q->o[a] * inv + by;
+        q->leave[a] = q->o[a] * inv - by;
+    }
+}
+
+/* Lanes that meet the tree's box within (tmin, limit]. */
+INLINE unsigned octet_box(const struct wide *w, const struct octet *q)
+{
+    vf begin = q->tmin, end = q->limit;
+    for (int a = 0; a < 3; a++) {
+        vi backwards = vf_lt(q->inv[a], vf_set(0));
+        vf low = vf_set(w->tree_min[a]), high = vf_set(w->tree_max[a]);
+        begin = vf_max(begin, mul_sub(vf_select(backwards, high, low), q->inv[a], q->enter[a]));
+        end = vf_min(end, mul_sub(vf_select(backwards, low, high), q->inv[a], q->leave[a]));
+    }
+    return bits(vf_le(begin, end));
+}
+
+#endif

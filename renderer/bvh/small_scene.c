@@ -1,0 +1,155 @@
+#include "small_scene.h"
+
+#include <string.h>
+
+static uint8_t find_corner(struct wide_flat *f, vec3 p)
+{
+    const float q[3] = {p.x, p.y, p.z};
+    for (int i = 0; i < f->num_corners; i++)
+        /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): edges are shared bit for bit or not at all. */
+        if (memcmp(f->corner[i], q, sizeof q) == 0)
+            return (uint8_t)i;
+    memcpy(f->corner[f->num_corners], q, sizeof q);
+    return (uint8_t)f->num_corners++;
+}
+
+static uint8_t find_edge(struct wide_flat *f, uint8_t from, uint8_t to)
+{
+    for (int i = 0; i < f->num_edges; i++) {
+        if (f->edge[i][0] == from && f->edge[i][1] == to)
+            return (uint8_t)(2 * i);
+        if (f->edge[i][0] == to && f->edge[i][1] == from)
+            return (uint8_t)(2 * i + 1);
+    }
+    f->edge[f->num_edges][0] = from;
+    f->edge[f->num_edges][1] = to;
+    return (uint8_t)(2 * f->num_edges++);
+}
+
+struct point {
+    double v[3];
+};
+
+static struct point corner_of(const struct wide_flat *f, int triangle, int k)
+{
+    const float *p = f->corner[f->triangle[triangle].corner[k]];
+    return (struct point){{p[0], p[1], p[2]}};
+}
+
+static struct point difference(struct point a, struct point b)
+{
+    return (struct point){{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2]}};
+}
+
+static double product(struct point a, struct point b)
+{
+    return a.v[0] * b.v[0] + a.v[1] * b.v[1] + a.v[2] * b.v[2];
+}
+
+static struct point cross_product(struct point a, struct point b)
+{
+    return (struct point){{a.v[1] * b.v[2] - a.v[2] * b.v[1], a.v[2] * b.v[0] - a.v[0] * b.v[2],
+                           a.v[0] * b.v[1] - a.v[1] * b.v[0]}};
+}
+
+static void set_row(float row[4], struct point a, double scale, struct point origin)
+{
+    for (int k = 0; k < 3; k++)
+        row[k] = (float)(a.v[k] * scale);
+    row[3] = (float)(-product(a, origin) * scale);
+}
+
+/* With corner k of triangle i for the origin; false if rounding would be more than a few hundredths of
+ * it. */
+static bool set_face(const struct wide_flat *f, int i, int k, struct flat_face *face)
+{
+    struct point o = corner_of(f, i, k);
+    struct point eu = difference(corner_of(f, i, (k + 1) % 3), o);
+    struct point ev = difference(corner_of(f, i, (k + 2) % 3), o);
+    struct point n = cross_product(eu, ev);
+    double area2 = product(n, n), area = sqrt(area2);
+    if (!(FLAT_ERROR * (double)f->reach * (double)f->reach < 0.05 * area))
+        return false;
+    set_row(face->u_row, cross_product(ev, n), 1 / area2, o);
+    set_row(face->v_row, cross_product(n, eu), 1 / area2, o);
+    float plane[4];
+    set_row(plane, n, 1 / area, o);
+    memcpy(face->normal, plane, sizeof face->normal);
+    face->offset = -plane[3];
+    face->per_area = (float)(1 / area);
+    face->prim[0] = face->prim[1] = i;
+    face->is_triangle = true;
+    return true;
+}
+
+/* The corner of triangle j that completes triangle i, seen from its corner k, to a parallelogram. */
+static bool completes(const struct wide_flat *f, int i, int k, int j)
+{
+    const uint8_t *a = f->triangle[i].corner, *b = f->triangle[j].corner;
+    int other = -1, shared = 0;
+    for (int c = 0; c < 3; c++) {
+        if (b[c] == a[(k + 1) % 3] || b[c] == a[(k + 2) % 3])
+            shared++;
+        else
+            other = c;
+    }
+    if (shared != 2 || other < 0)
+        return false;
+    struct point o = corner_of(f, i, k), s = corner_of(f, i, (k + 1) % 3);
+    struct point t = corner_of(f, i, (k + 2) % 3), q = corner_of(f, j, other);
+    for (int c = 0; c < 3; c++)
+        if (fabs(q.v[c] - (s.v[c] + t.v[c] - o.v[c])) > 8 * FLT_EPSILON * (double)f->reach)
+            return false;
+    return true;
+}
+
+static void fill_faces(struct wide_flat *f)
+{
+    bool done[WIDE_FLAT] = {false};
+    f->quick = f->reach > 1e-4f && f->reach < 1e4f;
+    for (int i = 0; i < f->num_triangles && f->quick; i++) {
+        if (done[i])
+            continue;
+        struct flat_face *face = &f->face[f->num_faces++];
+        int corner = 0, partner = -1;
+        for (int k = 0; k < 3 && partner < 0; k++)
+            for (int j = i + 1; j < f->num_triangles && partner < 0; j++)
+                if (!done[j] && completes(f, i, k, j)) {
+                    corner = k;
+                    partner = j;
+                }
+        f->quick = set_face(f, i, corner, face);
+        if (partner >= 0) {
+            done[partner] = true;
+            face->prim[1] = partner;
+            face->is_triangle = false;
+        }
+    }
+}
+
+void wide_flat_fill(const struct scene *s, const uint32_t *prim, int num, struct wide_flat *f)
+{
+    *f = (struct wide_flat){0};
+    for (int i = 0; i < num; i++)
+        f->number[i] = (int32_t)prim[i];
+    for (; f->num_triangles < num && prim[f->num_triangles] < s->num_triangles;
+         f->num_triangles++) {
+        const int i = f->num_triangles;
+        uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
+        for (int k = 0; k < 3; k++)
+            c[k] = find_corner(f, s->position[3 * (size_t)prim[i] + (size_t)k]);
+        e[0] = find_edge(f, c[1], c[2]);
+        e[1] = find_edge(f, c[2], c[0]);
+        e[2] = find_edge(f, c[0], c[1]);
+        for (int k = 0; k < 9; k++) {
+            f->row[i][k] = f->corner[c[k / 3]][k % 3];
+            f->reach = maxf(f->reach, fabsf(f->row[i][k]));
+        }
+    }
+    for (int i = f->num_triangles; i < num; i++) {
+        const struct sphere *sp = &s->spheres[prim[i] - s->num_triangles];
+        const float q[4] = {sp->centre.x, sp->centre.y, sp->centre.z, sp->radius};
+        memcpy(f->sphere[f->num_spheres++], q, sizeof q);
+    }
+    fill_faces(f);
+}

@@ -1,0 +1,337 @@
+/* A list without a tree: eight rays at a time against every primitive, each ray sheared along its own
+ * largest axis. Part of traverse.c. */
+#ifndef ASSAY_SMALL_SCENE_HIT_H
+#define ASSAY_SMALL_SCENE_HIT_H
+
+#include "small_scene.h"
+#include "hit8.h"
+#include "ray8.h"
+
+/* Corners as the rays see them; edge functions in both directions, so that a triangle finds its own. */
+struct list {
+    vf x[FLAT_CORNERS], y[FLAT_CORNERS], z[FLAT_CORNERS], edge[FLAT_EDGES][2];
+};
+
+INLINE void list_init(const struct wide_flat *f, const struct octet *q, struct list *l)
+{
+    const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
+    for (int i = 0; i < f->num_corners; i++) {
+        vf x = f->corner[i][0] - q->o[0], y = f->corner[i][1] - q->o[1];
+        vf z = f->corner[i][2] - q->o[2];
+        vf along = vf_select(is_x, x, vf_select(is_y, y, z));
+        l->z[i] = along;
+        l->x[i] = vf_select(is_x, y, vf_select(is_y, z, x)) - q->sx * along;
+        l->y[i] = vf_select(is_x, z, vf_select(is_y, x, y)) - q->sy * along;
+    }
+    const vf zero = vf_set(0);
+    vi touched = vi_set(0);
+    for (int i = 0; i < f->num_edges; i++) {
+        const int a = f->edge[i][0], b = f->edge[i][1];
+        vf e = l->x[a] * l->y[b] - l->y[a] * l->x[b];
+        touched |= vf_eq(e, zero);
+        l->edge[i][0] = e;
+        l->edge[i][1] = 0 - e;
+    }
+    if (__builtin_expect(bits(touched) != 0, 0))
+        for (int i = 0; i < f->num_edges; i++) {
+            const int a = f->edge[i][0], b = f->edge[i][1];
+            edge_exact(&l->x[a], &l->y[a], &l->x[b], &l->y[b], &l->edge[i][0]);
+            /* By itself: what underflows keeps its sign, and 0 has none. */
+            edge_exact(&l->x[b], &l->y[b], &l->x[a], &l->y[a], &l->edge[i][1]);
+        }
+}
+
+/* Triangle i against all rays, as sheared_hit(); lanes that meet it inside (tmin, limit). No branches:
+ * some ray of eight is almost always inside, and when not cannot be predicted. */
+INLINE vi list_triangle(const struct wide_flat *f, const struct list *l, int i,
+                        const struct octet *q, vf limit, vf *t, vf *u, vf *v)
+{
+    const uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
+    const vf *edge = l->edge[0], zero = vf_set(0);
+    vf e0 = edge[e[0]], e1 = edge[e[1]], e2 = edge[e[2]];
+    vi pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+    vf inv = 1 / (e0 + e1 + e2);
+    *u = e1 * inv;
+    *v = e2 * inv;
+    *t = q->sz * (e0 * inv * l->z[c[0]] + *u * l->z[c[1]] + *v * l->z[c[2]]);
+    return pass & vf_lt(q->tmin, *t) & vf_lt(*t, limit);
+}
+
+/* The largest float below a. */
+INLINE vf below(vf a)
+{
+    vi b = (vi)a, zero = vf_eq(a, vf_set(0));
+    return (vf)vi_select(zero, vi_set(INT32_MIN + 1), b + 1 + 2 * vi_lt(vi_set(-1), b));
+}
+
+INLINE vi list_sphere(const struct wide_flat *f, int i, const struct octet *q, vf limit, vf *t)
+{
+    const float *s = f->sphere[i];
+    return sphere_hit(q->o[0] - s[0], q->o[1] - s[1], q->o[2] - s[2], q->d[0], q->d[1], q->d[2],
+                      vf_set(s[3]), q->tmin, below(limit), t);
+}
+
+/* What eight rays meet first. prim: place in the list, -1: nothing. */
+struct list_hits {
+    vf t, u, v;
+    vi prim;
+};
+
+static __attribute__((noinline)) void
+list_closest_exact(const struct wide_flat *f, const struct octet *q, struct list_hits *best)
+{
+    struct list l;
+    vf t = vf_set(0), u, v;
+    list_init(f, q, &l);
+    *best = (struct list_hits){q->tmax, vf_set(0), vf_set(0), vi_set(-1)};
+    for (int i = 0; i < f->num_triangles; i++) {
+        vi hit = list_triangle(f, &l, i, q, best->t, &t, &u, &v);
+        best->t = vf_select(hit, t, best->t);
+        best->u = vf_select(hit, u, best->u);
+        best->v = vf_select(hit, v, best->v);
+        best->prim = vi_select(hit, vi_set(i), best->prim);
+    }
+    for (int i = 0; i < f->num_spheres; i++) {
+        vi hit = list_sphere(f, i, q, best->t, &t);
+        best->t = vf_select(hit, t, best->t);
+        best->u = vf_select(hit, vf_set(0), best->u);
+        best->v = vf_select(hit, vf_set(0), best->v);
+        best->prim = vi_select(hit, vi_set(f->num_triangles + i), best->prim);
+    }
+}
+
+INLINE vi does_not_ignore(const struct wide_flat *f, int i, const struct octet *q)
+{
+    return ~vi_eq(q->ignore, vi_set(f->number[i]));
+}
+
+static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *f,
+                                                        const struct octet *q)
+{
+    struct list l;
+    vf t, u, v;
+    vi met = vi_set(0);
+    list_init(f, q, &l);
+    for (int i = 0; i < f->num_triangles; i++)
+        met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & does_not_ignore(f, i, q);
+    for (int i = 0; i < f->num_spheres; i++)
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
+    return met;
+}
+
+/* Rays to the quick form: bounds of its errors, per |normal.d|, and lanes that it serves. */
+struct quick {
+    vf error, slack; /* FLAT_ERROR m^2, FLAT_SLACK m */
+    vf end;          /* where the ray ends, or has left the scene */
+    vi fit;
+};
+
+INLINE struct quick quick_init(const struct wide_flat *f, const struct octet *q)
+{
+    vf m = vf_max(vf_max(vf_abs(q->o[0]), vf_abs(q->o[1])), vf_abs(q->o[2]));
+    m = vf_max(vf_set(f->reach), m);
+    return (struct quick){FLAT_ERROR * m * m, FLAT_SLACK * m, vf_min(4 * m, q->tmax),
+                          vf_lt(m, vf_set(1e5f))};
+}
+
+/* Where a ray meets a face. `inside`: how far from the rim, in u or v; off by no more than `error`. t
+ * lies in (low, high). */
+struct quick_hit {
+    vf inside, error, low, high, sum;
+};
+
+/* normal.d, and how far the plane is from the origin along the normal. */
+struct quick_plane {
+    vf nd, no;
+};
+
+INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct octet *q)
+{
+    const float *n = face->normal;
+    const vf *o = q->o, *d = q->d;
+    vf nd = mul_add(vf_set(n[0]), d[0], mul_add(vf_set(n[1]), d[1], n[2] * d[2]));
+    vf no = face->offset - mul_add(vf_set(n[0]), o[0], mul_add(vf_set(n[1]), o[1], n[2] * o[2]));
+    return (struct quick_plane){nd, no};
+}
+
+/* Lanes that begin and end on the same side of the plane, farther from it than rounding matters; at the
+ * end that is twice as far, since k->end can be four times m. */
+INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
+{
+    vf end = mul_add(-k->end, p->nd, p->no);
+    return vf_lt(k->slack, vf_min(p->no, end - k->slack)) |
+           vf_lt(vf_max(p->no, end + k->slack), -k->slack);
+}
+
+INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
+                                   const struct octet *q, const struct quick *k)
+{
+    const float *ur = face->u_row, *vr = face->v_row;
+    const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
+    /* Along the plane t is huge, and so is its error, but both are numbers. */
+    vf inv = 1 / (nd + 1e-20f), t = no * inv;
+    vf x = mul_add(t, d[0], o[0]), y = mul_add(t, d[1], o[1]), z = mul_add(t, d[2], o[2]);
+    vf u = mul_add(vf_set(ur[0]), x,
+                   mul_add(vf_set(ur[1]), y, mul_add(vf_set(ur[2]), z, vf_set(ur[3]))));
+    vf v = mul_add(vf_set(vr[0]), x,
+                   mul_add(vf_set(vr[1]), y, mul_add(vf_set(vr[2]), z, vf_set(vr[3]))));
+    vf steep = vf_abs(inv);
+    struct quick_hit h = {.error = k->error * (face->per_area * steep), .sum = u + v};
+    vf off = k->slack * steep, rim = vf_min(u, v);
+    h.inside = face->is_triangle ? vf_min(rim, 1 - h.sum) : vf_min(rim, vf_min(1 - u, 1 - v));
+    h.low = t - off;
+    h.high = t + off;
+    return h;
+}
+
+/* The nearest hits of the lanes that the quick form can tell, of the others anything; which these
+ * are. */
+INLINE vi list_closest_quick(const struct wide_flat *f, const struct octet *q,
+                             struct list_hits *best)
+{
+    const struct quick k = quick_init(f, q);
+    const vf far = vf_set(INFINITY), zero = vf_set(0);
+    vf low = far, high = far, second = far, sure = zero, worst = zero, sphere_t = far;
+    vi prim = vi_set(-1);
+    for (int i = 0; i < f->num_faces; i++) {
+        const struct flat_face *face = &f->face[i];
+        const struct quick_plane p = quick_plane(face, q);
+        struct quick_hit h = quick_face(face, &p, q, &k);
+        vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin);
+        vf begin = vf_select(out, far, h.low), surely = h.inside - h.error;
+        vi number = vi_set(face->prim[0]);
+        if (!face->is_triangle) {
+            vf beyond = h.sum - 1;
+            surely = vf_min(surely, vf_abs(beyond) - 2 * h.error);
+            number = vi_select(vf_lt(zero, beyond), vi_set(face->prim[1]), number);
+        }
+        vi nearer = vf_lt(begin, low);
+        second = vf_min(second, vf_max(begin, low));
+        low = vf_min(begin, low);
+        high = vf_select(nearer, h.high, high);
+        sure = vf_select(nearer, surely, sure);
+        prim = vi_select(nearer, number, prim);
+        worst = vf_max(h.error, worst);
+    }
+    for (int i = 0; i < f->num_spheres; i++) {
+        vf t = far;
+        vi hit = list_sphere(f, i, q, q->tmax, &t);
+        if (!bits(hit))
+            continue;
+        vf begin = vf_select(hit, t, far);
+        vi nearer = vf_lt(begin, low);
+        second = vf_min(second, vf_max(begin, low));
+        low = vf_min(begin, low);
+        high = vf_select(nearer, t, high);
+        sphere_t = vf_select(nearer, t, sphere_t);
+        sure = vf_select(nearer, vf_set(1), sure);
+        prim = vi_select(nearer, vi_set(f->num_triangles + i), prim);
+    }
+    vi nothing = vf_lt(q->tmax, low) | vf_eq(low, far);
+    vi known = vf_lt(zero, sure) & vf_lt(q->tmin, low) & vf_lt(high, q->tmax) & vf_lt(high, second);
+    known &= ~nothing;
+    prim = vi_select(known, prim, vi_set(-1));
+    /* Distance and coordinates are those of the exact test. */
+    const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
+    vi flat = vi_lt(prim, vi_set(f->num_triangles));
+    int32_t number[LANES];
+    vf w[2][LANES], x[3], y[3], z[3], t = far, u = zero, v = zero;
+    vf_store_any(number, (vf)(prim & flat & ~vi_lt(prim, vi_set(0))));
+    gather_columns(f->row[0], FLAT_ROW, number, w[0]);
+    gather_columns(f->row[0] + LANES, FLAT_ROW, number, w[1]);
+    for (int c = 0; c < 3; c++) {
+        vf a = w[0][3 * c] - q->o[0], b = (c < 2 ? w[0][3 * c + 1] : w[0][7]) - q->o[1];
+        vf e = (c < 2 ? w[0][3 * c + 2] : w[1][0]) - q->o[2];
+        z[c] = vf_select(is_x, a, vf_select(is_y, b, e));
+        x[c] = vf_select(is_x, b, vf_select(is_y, e, a)) - q->sx * z[c];
+        y[c] = vf_select(is_x, e, vf_select(is_y, a, b)) - q->sy * z[c];
+    }
+    vi pass = sheared_hit(x, y, z, q->sz, &t, &u, &v) & vf_lt(q->tmin, t) & vf_lt(t, q->tmax);
+    vi ball = known & ~flat;
+    best->t = vf_select(nothing, q->tmax, vf_select(ball, sphere_t, t));
+    best->u = vf_select(known & flat, u, zero);
+    best->v = vf_select(known & flat, v, zero);
+    best->prim = prim;
+    return k.fit & vf_lt(worst, far) & (nothing | ball | (known & pass));
+}
+
+/* Lanes that meet something; *known: those of which the quick form can tell. */
+INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, vi *known)
+{
+    const struct quick k = quick_init(f, q);
+    const vf zero = vf_set(0);
+    vf worst = zero;
+    vi met = vi_set(0), maybe = vi_set(0);
+    for (int i = 0; i < f->num_faces; i++) {
+        const struct quick_plane p = quick_plane(&f->face[i], q);
+        if (bits(quick_clear(&p, &k)) == 255)
+            continue;
+        struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
+        vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
+        met |= vf_lt(h.error, h.inside) & vf_lt(q->tmin, h.low) & vf_lt(h.high, q->tmax);
+        maybe |= ~out;
+        worst = vf_max(h.error, worst);
+    }
+    for (int i = 0; i < f->num_spheres; i++) {
+        vf t;
+        met |= list_sphere(f, i, q, q->tmax, &t) & does_not_ignore(f, f->num_triangles + i, q);
+    }
+    *known = k.fit & vf_lt(worst, vf_set(INFINITY)) & (met | ~maybe);
+    return met;
+}
+
+/* Sheared rays. */
+INLINE void list_closest_eight(const struct wide_flat *f, const struct octet *q,
+                               struct list_hits *best)
+{
+    if (!f->quick || bits(list_closest_quick(f, q, best)) != 255)
+        list_closest_exact(f, q, best);
+}
+
+/* Lanes that meet something. is_sheared: the rays are; else they will be if need be. */
+INLINE vi list_occluded_eight(const struct wide_flat *f, struct octet *q, bool is_sheared)
+{
+    vi known = vi_set(0), met = known;
+    if (f->quick)
+        met = list_occluded_quick(f, q, &known);
+    if (bits(known) == 255)
+        return met;
+    if (!is_sheared)
+        octet_shear(q);
+    return list_occluded_exact(f, q);
+}
+
+static __attribute__((noinline)) void list_closest(const struct wide *w, const struct rays *r,
+                                                   const uint16_t *lane, int n, struct hits *h,
+                                                   struct bvh_stats *stats)
+{
+    for (int k = 0; k < n; k += LANES) {
+        struct octet q;
+        struct list_hits best;
+        uint16_t filled[LANES];
+        const uint16_t *eight = eight_of(lane, k, n, filled);
+        octet_load(r, eight, &q);
+        octet_shear(&q);
+        list_closest_eight(w->flat, &q, &best);
+        stats->primitive_tests += w->num_leaves;
+        octet_store(&q, eight, best.t, best.u, best.v, best.prim, h);
+    }
+}
+
+static __attribute__((noinline)) void list_occluded(const struct wide *w, const struct rays *r,
+                                                    const uint16_t *lane, int n, bool *occluded,
+                                                    struct bvh_stats *stats)
+{
+    for (int k = 0; k < n; k += LANES) {
+        struct octet q;
+        uint16_t filled[LANES];
+        const uint16_t *eight = eight_of(lane, k, n, filled);
+        octet_load(r, eight, &q);
+        octet_ignore(r, eight, &q);
+        vi met = list_occluded_eight(w->flat, &q, false);
+        stats->primitive_tests += w->num_leaves;
+        octet_store_flags(&q, eight, bits(met), occluded);
+    }
+}
+
+#endif

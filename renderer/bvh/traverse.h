@@ -1,0 +1,17 @@
+/* The way of rays through the wide hierarchy, compiled once for each instruction set (isa.h). */
+#ifndef ASSAY_TRAVERSE_H
+#define ASSAY_TRAVERSE_H
+
+#include "bvh_wide.h"
+
+/* As bvh_closest() and bvh_occluded(). */
+struct wide_kernel {
+    void (*closest)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
+                    struct hits *h, struct bvh_stats *stats);
+    void (*occluded)(const struct wide *w, const struct rays *r, const uint16_t *lane,
+                     int num_lanes, bool *occluded, struct bvh_stats *stats);
+};
+
+extern const struct wide_kernel wide_kernel_sse42, wide_kernel_avx2, wide_kernel_avx512;
+
+#endif

@@ -1,0 +1,108 @@
+/* Nodes and leaves that wait while a ray, or a packet of them, is elsewhere in the tree: the nearest
+ * child is visited at once, the others are pushed in order. Part of traverse.c. */
+#ifndef ASSAY_TRAVERSE_STACK_H
+#define ASSAY_TRAVERSE_STACK_H
+
+#include "bvh_wide.h"
+#include "renderer/math/simd.h"
+
+/* A node leaves at most seven of its children behind; 64 free levels and 32 of halving. */
+enum { STACK = 7 * 104 };
+
+/* A node or leaf that waits: the bits of the distance where it begins, and its reference. As numbers
+ * they are in order of distance as far as that is positive; elsewhere only the order of visits
+ * suffers. */
+typedef int64_t stacked;
+
+static inline const void *at(const struct wide *w, uint32_t ref)
+{
+    return w->arena + (ref & WIDE_PLACE);
+}
+
+INLINE void fetch_ahead(const struct wide *w, uint32_t ref)
+{
+    const char *p = at(w, ref);
+    __builtin_prefetch(p);
+    __builtin_prefetch(p + 64);
+    __builtin_prefetch(p + 128);
+    __builtin_prefetch(p + 192);
+}
+
+INLINE stacked stack_entry(float t, uint32_t ref)
+{
+    uint32_t of_t;
+    memcpy(&of_t, &t, sizeof t);
+    return (stacked)((uint64_t)of_t << 32 | ref);
+}
+
+INLINE float stacked_t(stacked s)
+{
+    uint32_t of_t = (uint32_t)((uint64_t)s >> 32);
+    float t;
+    memcpy(&t, &of_t, sizeof t);
+    return t;
+}
+
+INLINE uint32_t stacked_ref(stacked s)
+{
+    return (uint32_t)s;
+}
+
+/* Without a branch: which of two is nearer cannot be predicted. */
+INLINE void order(stacked *near, stacked *far)
+{
+    stacked a = *near, b = *far;
+    *near = a < b ? a : b;
+    *far = a < b ? b : a;
+}
+
+/* Pushes the children, two or more, the farthest first, but returns the nearest. */
+INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
+                            stacked **top)
+{
+    float t[LANES] __attribute__((aligned(32)));
+    vf_store(t, enter);
+    int i = __builtin_ctz(hit);
+    hit &= hit - 1;
+    int j = __builtin_ctz(hit);
+    hit &= hit - 1;
+    stacked near = stack_entry(t[i], n->child[i]), far = stack_entry(t[j], n->child[j]);
+    fetch_ahead(w, n->child[i]);
+    fetch_ahead(w, n->child[j]);
+    order(&near, &far);
+    stacked *p = *top;
+    if (hit) {
+        i = __builtin_ctz(hit);
+        hit &= hit - 1;
+        fetch_ahead(w, n->child[i]);
+        stacked third = stack_entry(t[i], n->child[i]);
+        order(&near, &third);
+        order(&far, &third);
+        *p++ = third;
+        while (hit) {
+            i = __builtin_ctz(hit);
+            hit &= hit - 1;
+            fetch_ahead(w, n->child[i]);
+            stacked next = stack_entry(t[i], n->child[i]);
+            order(&near, &next);
+            order(&far, &next);
+            stacked *q = p++;
+            for (; q > *top && q[-1] < next; q--)
+                *q = q[-1];
+            *q = next;
+        }
+    }
+    *p++ = far;
+    *top = p;
+    return stacked_ref(near);
+}
+
+INLINE uint32_t next_of(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
+                        stacked **top)
+{
+    if ((hit & (hit - 1)) == 0)
+        return n->child[__builtin_ctz(hit)];
+    return push_sorted(w, n, hit, enter, top);
+}
+
+#endif

@@ -1,0 +1,301 @@
+#include "wide_build.h"
+#include "renderer/base/huge_alloc.h"
+#include "renderer/base/parallel.h"
+
+#include <assert.h>
+#include <float.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_FREE_DEPTH = 64 };
+
+struct build {
+    const struct wide_splitter *splitter;
+    struct wide_item *item;
+    uint32_t num_triangles;
+    struct wide_parts *parts;
+};
+
+static bool is_sphere(const struct build *b, uint32_t item)
+{
+    return b->item[item].prim >= b->num_triangles;
+}
+
+/* A leaf is of triangles or of spheres. */
+static bool fits_leaf(const struct build *b, const struct wide_range *r)
+{
+    if (r->count > WIDTH)
+        return false;
+    for (uint32_t i = 1; i < r->count; i++)
+        if (is_sphere(b, r->first + i) != is_sphere(b, r->first))
+            return false;
+    return true;
+}
+
+static uint32_t spheres_last(struct build *b, struct wide_range *r)
+{
+    uint32_t left = 0;
+    for (uint32_t i = 0; i < r->count; i++)
+        if (!is_sphere(b, r->first + i)) {
+            struct wide_item swap = b->item[r->first + i];
+            b->item[r->first + i] = b->item[r->first + left];
+            b->item[r->first + left++] = swap;
+        }
+    return left;
+}
+
+/* Cuts r in two: what is left of it, and *right. */
+static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
+{
+    const struct wide_splitter *k = b->splitter;
+    struct wide_item *item = b->item + r->first;
+    struct wide_split s = {.cost = FLT_MAX};
+    struct wide_range l = {.first = r->first, .depth = r->depth + 1};
+    *right = (struct wide_range){.depth = r->depth + 1};
+    if (r->count > WIDTH && r->depth < MAX_FREE_DEPTH)
+        k->split(item, r->count, &r->centres, &s);
+    if (s.cost < FLT_MAX) {
+        l.count = k->partition(item, r->count, &s, &l.centres, &right->centres);
+        l.box = s.left;
+        right->box = s.right;
+    } else {
+        /* Eight or fewer of both kinds; or coincident centres, or a tree grown too deep. */
+        l.count = r->count <= WIDTH ? spheres_last(b, r) : r->count / 2;
+        k->bounds(item, l.count, &l.box, &l.centres);
+        k->bounds(item + l.count, r->count - l.count, &right->box, &right->centres);
+    }
+    right->first = l.first + l.count;
+    right->count = r->count - l.count;
+    *r = l;
+}
+
+/* Room for so many more. */
+static bool reserve(struct wide_parts *p, size_t more)
+{
+    if (p->num + more <= p->room)
+        return true;
+    size_t room = p->room + p->room / 2 + more + 64;
+    struct wide_part *larger = alloc_large(room * sizeof *larger);
+    if (larger == NULL)
+        return false;
+    if (p->part != NULL)
+        memcpy(larger, p->part, p->num * sizeof *larger);
+    free(p->part);
+    p->part = larger;
+    p->room = room;
+    return true;
+}
+
+/* The best ways to hang part i on 1 to 8 children, by those of its halves [Ylitie17]. */
+static void best_slots(struct build *b, uint32_t i)
+{
+    struct wide_part *p = &b->parts->part[i];
+    const struct wide_part *l = &b->parts->part[p->left], *r = l + 1;
+    float split[WIDTH + 1];
+    uint8_t left[WIDTH + 1];
+    for (int n = 2; n <= WIDTH; n++) {
+        split[n] = INFINITY;
+        left[n] = 1; /* costs that are infinite or not numbers are as good as each other */
+        for (int k = 1; k < n; k++) {
+            float c = l->cost[k - 1] + r->cost[n - k - 1];
+            if (c < split[n]) {
+                split[n] = c;
+                left[n] = (uint8_t)k;
+            }
+        }
+    }
+    p->cost[0] = wide_half_area(&p->box) + split[WIDTH];
+    p->left_slots[0] = left[WIDTH];
+    for (int n = 2; n <= WIDTH; n++) {
+        bool better = split[n] < p->cost[n - 2];
+        bool inherit = !better && n > 2;
+        p->cost[n - 1] = better ? split[n] : p->cost[n - 2];
+        p->left_slots[n - 1] = better ? left[n] : inherit ? p->left_slots[n - 2] : 0;
+    }
+}
+
+/* Cuts range r in two until each part is a leaf; part i is the whole. False if out of memory. */
+static bool add_part(struct build *b, uint32_t i, struct wide_range *r)
+{
+    b->parts->part[i] = (struct wide_part){.box = r->box, .first = r->first, .count = r->count};
+    if (fits_leaf(b, r)) {
+        for (int k = 0; k < WIDTH; k++)
+            b->parts->part[i].cost[k] = wide_half_area(&r->box);
+        return true;
+    }
+    if (!reserve(b->parts, 2))
+        return false;
+    uint32_t left = (uint32_t)b->parts->num;
+    b->parts->num += 2;
+    struct wide_range right;
+    cut(b, r, &right);
+    if (!add_part(b, left, r) || !add_part(b, left + 1, &right))
+        return false;
+    b->parts->part[i].left = left;
+    best_slots(b, i);
+    return true;
+}
+
+/* The parts that become children: those of part i, which has `slots` of them. */
+static int gather_children(const struct wide_parts *p, uint32_t i, int slots, uint32_t *child,
+                           int n)
+{
+    const struct wide_part *c = &p->part[i];
+    int left = c->left == 0 || slots == 1 ? 0 : c->left_slots[slots - 1];
+    if (left == 0) {
+        child[n] = i;
+        return n + 1;
+    }
+    n = gather_children(p, c->left, left, child, n);
+    return gather_children(p, c->left + 1, slots - left, child, n);
+}
+
+/* One thread's own part of the tree, which hangs on part `at` of the whole. */
+struct branch {
+    uint32_t at;
+    struct wide_parts parts;
+};
+
+/* Several threads: large ranges are cut one by one, smaller ones become branches. */
+struct grove {
+    struct build *b;
+    pthread_mutex_t lock; /* of b->parts and of what follows */
+    uint32_t most;        /* items of a branch */
+    struct branch *branch;
+    size_t num, room;
+};
+
+struct grove_task {
+    uint32_t at;
+    struct wide_range range;
+};
+static_assert(sizeof(struct grove_task) <= PARALLEL_TASK, "a task is stored by value");
+
+static struct parallel_task grove_task(uint32_t at, const struct wide_range *r)
+{
+    struct parallel_task t = {.size = r->count};
+    memcpy(t.what, &(struct grove_task){at, *r}, sizeof(struct grove_task));
+    return t;
+}
+
+static bool add_branch(struct grove *g, struct branch *n)
+{
+    if (g->num == g->room) {
+        size_t room = 2 * g->room + 64;
+        struct branch *larger = realloc(g->branch, room * sizeof *larger);
+        if (larger == NULL)
+            return false;
+        g->branch = larger;
+        g->room = room;
+    }
+    g->branch[g->num++] = *n;
+    return true;
+}
+
+static int grow_range(void *ctx, const struct parallel_task *task, struct parallel_task more[2])
+{
+    struct grove *g = ctx;
+    struct grove_task t;
+    memcpy(&t, task->what, sizeof t);
+    if (t.range.count <= g->most) {
+        struct branch n = {.at = t.at};
+        struct build b = *g->b;
+        b.parts = &n.parts;
+        bool ok = reserve(&n.parts, 2);
+        n.parts.num = 1;
+        ok = ok && add_part(&b, 0, &t.range);
+        pthread_mutex_lock(&g->lock);
+        ok = ok && add_branch(g, &n);
+        pthread_mutex_unlock(&g->lock);
+        if (!ok)
+            wide_parts_free(&n.parts);
+        return ok ? 0 : -1;
+    }
+    struct wide_range left = t.range, right;
+    cut(g->b, &left, &right);
+    pthread_mutex_lock(&g->lock);
+    struct wide_parts *p = g->b->parts;
+    bool ok = reserve(p, 2);
+    uint32_t i = (uint32_t)p->num;
+    if (ok) {
+        p->part[t.at] = (struct wide_part){
+            .box = t.range.box, .first = t.range.first, .count = t.range.count, .left = i};
+        p->num += 2;
+    }
+    pthread_mutex_unlock(&g->lock);
+    more[0] = grove_task(i, &left);
+    more[1] = grove_task(i + 1, &right);
+    return ok ? 2 : -1;
+}
+
+/* The branches' parts behind those there are. */
+static bool join_branches(struct grove *g)
+{
+    struct wide_parts *p = g->b->parts;
+    size_t more = 0;
+    for (size_t k = 0; k < g->num; k++)
+        more += g->branch[k].parts.num;
+    if (!reserve(p, more))
+        return false;
+    for (size_t k = 0; k < g->num; k++) {
+        const struct wide_parts *from = &g->branch[k].parts;
+        uint32_t shift = (uint32_t)p->num - 1;
+        for (size_t i = 0; i < from->num; i++) {
+            struct wide_part *to = &p->part[i == 0 ? g->branch[k].at : i + shift];
+            *to = from->part[i];
+            to->left += to->left != 0 ? shift : 0;
+        }
+        p->num += from->num - 1;
+        wide_parts_free(&g->branch[k].parts);
+    }
+    return true;
+}
+
+static bool grow_on_threads(struct build *b, const struct wide_range *all, int threads)
+{
+    struct grove g = {.b = b, .most = all->count / (16 * (uint32_t)threads)};
+    pthread_mutex_init(&g.lock, NULL);
+    const struct parallel_task first = grove_task(0, all);
+    bool ok = parallel_divide(threads, &first, grow_range, &g);
+    pthread_mutex_destroy(&g.lock);
+    size_t num_cut = b->parts->num;
+    if (ok)
+        ok = join_branches(&g);
+    else
+        for (size_t k = 0; k < g.num; k++)
+            wide_parts_free(&g.branch[k].parts);
+    free(g.branch);
+    for (size_t i = num_cut; ok && i-- > 0;)
+        if (b->parts->part[i].left != 0 && b->parts->part[i].left < num_cut)
+            best_slots(b, (uint32_t)i);
+    return ok;
+}
+
+bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
+                      const struct wide_range *all, int threads, struct wide_parts *p)
+{
+    enum { LEAST_FOR_THREADS = 1 << 14 };
+    struct build b = {.splitter = s, .item = item, .num_triangles = num_triangles, .parts = p};
+    struct wide_range r = *all;
+    if (!reserve(p, 2))
+        return false;
+    p->num = 1;
+    if (threads > 1 && all->count >= LEAST_FOR_THREADS)
+        return grow_on_threads(&b, all, threads);
+    return add_part(&b, 0, &r);
+}
+
+int wide_parts_children(const struct wide_parts *p, uint32_t i, uint32_t child[WIDTH])
+{
+    uint32_t left = p->part[i].left;
+    int slots = p->part[i].left_slots[0];
+    assert(left != 0);
+    int n = gather_children(p, left, slots, child, 0);
+    return gather_children(p, left + 1, WIDTH - slots, child, n);
+}
+
+void wide_parts_free(struct wide_parts *p)
+{
+    free(p->part);
+}

@@ -1,0 +1,51 @@
+/* The binary tree that the wide one is made of, and which of its parts become the eight children of
+ * each wide node. */
+#ifndef ASSAY_WIDE_BUILD_H
+#define ASSAY_WIDE_BUILD_H
+
+#include "bvh_wide.h"
+#include "sah_split.h"
+
+/* Items [first, first + count), and what was cut on the way here. */
+struct wide_range {
+    uint32_t first, count;
+    int depth; /* cuts */
+    struct wide_box box, centres;
+};
+
+/* cost[i]: expected tests of the best wide tree of this part that hangs on at most i + 1 children of
+ * the node above, each times the half area of its box; left_slots[i]: how many of these go to the left
+ * half, 0: all of it is one child; left_slots[0]: if it is a node, how many of its eight. */
+struct wide_part {
+    struct wide_box box;
+    uint32_t first, count;
+    uint32_t left; /* left and left + 1 are the halves; 0: a leaf */
+    float cost[WIDTH];
+    uint8_t left_slots[WIDTH];
+};
+
+struct wide_parts {
+    struct wide_part *part; /* 0 is the root */
+    size_t num, room;
+};
+
+/* Half the surface. */
+static inline float wide_half_area(const struct wide_box *b)
+{
+    float x = -b->v[4] - b->v[0], y = -b->v[5] - b->v[1], z = -b->v[6] - b->v[2];
+    return x * y + y * z + z * x;
+}
+
+/* Cuts the items in `all` in two until each part is a leaf, of up to eight triangles or of up to eight
+ * spheres (those from num_triangles on), by the surface area heuristic [Wald07], and chooses children
+ * [Ylitie17]. More than eight items, so the root is no leaf; they are put in order of the parts. *p is
+ * empty before; wide_parts_free() afterwards. The same tree on any number of threads, though its parts may
+ * have other numbers. False if out of memory. */
+bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
+                      const struct wide_range *all, int threads, struct wide_parts *p)
+    __attribute__((warn_unused_result));
+/* The children of part i, not a leaf, as a node; how many. */
+int wide_parts_children(const struct wide_parts *p, uint32_t i, uint32_t child[WIDTH]);
+void wide_parts_free(struct wide_parts *p);
+
+#endif

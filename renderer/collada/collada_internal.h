@@ -1,0 +1,243 @@
+/* What the files of the COLLADA loader share: the loader's state, the reading of XML
+ * (collada_xml.c, collada_text.c), of meshes (collada_mesh.c), materials (collada_material.c),
+ * lights and cameras (collada_light.c), and the growing scene (collada_build.c). Every bool
+ * function fails with "path:line: what" in loader.err. */
+#ifndef ASSAY_COLLADA_INTERNAL_H
+#define ASSAY_COLLADA_INTERNAL_H
+
+#include "collada.h"
+#include "renderer/math/mat4.h"
+
+#include <libxml/tree.h>
+#include <stdio.h>
+
+/* Limits that only a broken or hostile file reaches. */
+enum {
+    MAX_FILE_BYTES = 1 << 30,
+    MAX_XML_DEPTH = 200,
+    MAX_NODE_DEPTH = 100,
+    MAX_NODES = 1 << 20, /* visited, so instances count */
+    MAX_TRIANGLES = 1 << 25,
+    MAX_POLYGON_CORNERS = 1 << 14
+};
+
+struct id_entry {
+    const char *id;
+    xmlNode *node;
+};
+
+/* Grows by doubling; `data` belongs to it. */
+struct doubles {
+    double *data;
+    size_t count, capacity;
+};
+struct uints {
+    uint32_t *data;
+    size_t count, capacity;
+};
+
+/* A corner of a triangle in the geometry's own space. The normal is zero where the file has none.
+ */
+struct corner {
+    dvec3 position;
+    float normal[3];
+};
+
+/* One <polylist>, <triangles> or <polygons>. */
+struct mesh_group {
+    const char *symbol; /* of the material; NULL if absent; lives in the document */
+    const xmlNode *node;
+    size_t first, count; /* triangles */
+};
+
+/* A parsed <geometry>: triangles in groups, or one sphere. */
+struct mesh {
+    const xmlNode *node;
+    struct corner *corners; /* 3 per triangle */
+    size_t num_triangles, capacity;
+    struct mesh_group *groups;
+    size_t num_groups;
+    bool is_sphere;
+    double radius;
+    float normal_out;
+};
+
+struct material_slot {
+    const xmlNode *node; /* <material>; NULL: the grey of CGL */
+    uint32_t index;
+};
+
+struct loader {
+    const char *path;
+    struct err *err;
+    bool parse_failed;
+    enum dialect dialect;
+    xmlDoc *doc;
+    struct id_entry *ids; /* sorted by id */
+    size_t num_ids;
+    double unit; /* metres per length unit of the file */
+    struct mesh *meshes;
+    size_t num_meshes, cap_meshes;
+    struct material_slot *slots;
+    size_t num_slots, cap_slots;
+    bool *is_lamp; /* per object: it came from a light element */
+    size_t num_nodes;
+    unsigned num_cameras;
+    struct scene scene; /* under construction; num_* are also the array sizes in use */
+    size_t cap_triangles, cap_spheres, cap_materials, cap_lights, cap_objects;
+};
+
+/* collada_xml.c */
+
+/* Where the text comes from: a file or memory, whatever is left to read. */
+struct text_input {
+    FILE *file; /* NULL: memory */
+    const char *text;
+    size_t size, taken;
+    bool failed; /* the error is set */
+};
+/* Parses the text into ld->doc, refuses document types, foreign structure and other versions,
+ * indexes the ids and resolves DIALECT_AUTO. */
+bool xml_open(struct loader *ld, struct text_input *in);
+
+/* collada_element.c */
+
+/* Sets the line "path:line: ..."; control characters become '?'. Always false. */
+bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
+    __attribute__((format(printf, 3, 4)));
+bool fail_line(struct loader *ld, long line, const char *fmt, ...)
+    __attribute__((format(printf, 3, 4)));
+bool fail_memory(struct loader *ld);
+#ifdef __clang_analyzer__ /* as in err.h */
+#define fail_at(...)    ((void)fail_at(__VA_ARGS__), false)
+#define fail_line(...)  ((void)fail_line(__VA_ARGS__), false)
+#define fail_memory(ld) ((void)fail_memory(ld), false)
+#endif
+/* "unexpected <child> in <parent>". */
+bool fail_unexpected(struct loader *ld, const xmlNode *child);
+long line_of(const xmlNode *n);
+
+/* Child elements in document order; NULL at the end. */
+xmlNode *first_child(const xmlNode *n);
+xmlNode *next_sibling(const xmlNode *n);
+/* First child element of that name or NULL. */
+xmlNode *child_named(const xmlNode *n, const char *name);
+/* The only child element of that name, NULL if there is none; fails if there are two. */
+bool one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out);
+/* Is it the COLLADA element of that name? */
+bool is_element(const xmlNode *n, const char *name);
+/* Is its name one of the words, separated by blanks? */
+bool is_one_of(const xmlNode *n, const char *words);
+/* Fails if a child's name is not one of the words. */
+bool only_children(struct loader *ld, const xmlNode *n, const char *words);
+/* The attribute's value or NULL; lives in the document. */
+const char *attribute(const xmlNode *n, const char *name);
+/* Required unsigned attribute. */
+bool attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out);
+/* The same with a default. */
+bool attribute_count_or(struct loader *ld, const xmlNode *n, const char *name, uint64_t missing,
+                        uint64_t *out);
+/* The element that attribute `name` ("#id") points to; it must be called `element`. */
+bool follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
+            xmlNode **out);
+/* Orders ids by name, for qsort() and bsearch(). */
+int compare_ids(const void *a, const void *b);
+/* Is it "ASSAY" or "CGL"? */
+bool is_own_profile(const char *profile);
+/* The profile="ASSAY" or profile="CGL" technique in the element's <extra>s, NULL if none. */
+bool own_technique(struct loader *ld, const xmlNode *n, xmlNode **out);
+/* The only child element of a technique of ours. */
+bool technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out);
+
+/* collada_text.c */
+
+/* The element's text as finite numbers, appended. */
+bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out);
+bool read_uints(struct loader *ld, const xmlNode *n, struct uints *out);
+/* Exactly n of them. */
+bool read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count);
+/* At least one, at most `most`; the missing ones are 0. */
+bool read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most);
+/* A non-negative colour; alpha (may be NULL) is 1 where there are only three numbers. */
+bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
+/* The element's text without blanks around it; the caller frees. NULL: failed. */
+char *read_word(struct loader *ld, const xmlNode *n);
+
+/* collada_extra.c */
+
+/* Our or the assignment's material tag in a technique of theirs, on top of what profile_COMMON has
+ * put into *m. */
+bool read_material_tag(struct loader *ld, const xmlNode *technique, struct material *m);
+
+/* collada_build.c */
+
+/* `data` (count elements of size bytes, room for *capacity) with room for one more: moved or as it
+ * was. NULL: out of memory, and `data` still belongs to the caller. */
+void *grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity);
+/* Copies a name: at most size-1 bytes, whole UTF-8 characters, no control characters. */
+void copy_name(char *out, size_t size, const char *name);
+bool add_material(struct loader *ld, const struct material *m, uint32_t *index);
+bool add_light(struct loader *ld, const struct light *l);
+/* A new object that the following triangles and spheres belong to. */
+bool begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
+                  bool is_lamp);
+/* One triangle of the object begun last, through the transform, whose determinant has that sign.
+ * `n` is who to blame. */
+bool add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
+                  const struct corner c[3]);
+bool add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
+                float normal_out);
+/* Sign of the determinant; fails for a matrix that is singular or not affine. */
+bool transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign);
+/* Bounds of all primitives, with or without those of light elements. False if there are none. */
+bool find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi);
+/* CGL: emissive meshes that show the same lamp as an area light are taken out. */
+void drop_twin_lamps(struct loader *ld);
+
+/* collada_source.c */
+
+/* The triples that an accessor picks out of a <float_array>. */
+struct source {
+    const xmlNode *node;
+    double *xyz; /* 3 per item */
+    uint32_t count;
+};
+
+/* Sources of one mesh are parsed once, however many primitives share them. */
+struct sources {
+    struct source *data;
+    size_t count, capacity;
+};
+
+/* The inputs of one primitive that are read. Indices into `sources`; -1: none. */
+struct inputs {
+    uint64_t stride; /* numbers per corner */
+    uint64_t vertex_offset, normal_offset;
+    long position, normal;
+    bool normal_by_vertex; /* the normal's index is the vertex's */
+};
+
+/* Reads the inputs of a <polylist>, <triangles> or <polygons>. */
+bool read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
+                 struct inputs *in);
+void sources_release(struct sources *all);
+
+/* collada_mesh.c */
+bool geometry_get(struct loader *ld, const xmlNode *geometry, const struct mesh **out);
+void mesh_release(struct mesh *m);
+
+/* collada_material.c */
+
+/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>. */
+bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
+                  const char *symbol, uint32_t *index);
+
+/* collada_light.c */
+bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
+                    const char *node_name, const mat4 *m);
+bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
+                     const mat4 *m);
+/* What the assignment uses for a file without a camera. */
+void camera_default(struct loader *ld);
+
+#endif

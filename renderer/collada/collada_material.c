@@ -1,0 +1,242 @@
+/* Materials: from the symbol of a primitive over <instance_material> and <material> to <effect>. */
+#include "collada_internal.h"
+
+#include <string.h>
+
+/* One channel of a shader: a colour, or false with a line for a texture or a parameter. A missing
+ * element leaves *value and *alpha as they are. */
+static bool read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb *value,
+                         double *alpha)
+{
+    xmlNode *channel, *color;
+    if (!one_child(ld, shader, name, &channel))
+        return false;
+    if (channel == NULL)
+        return true;
+    for (const xmlNode *c = first_child(channel); c != NULL; c = next_sibling(c)) {
+        if (is_one_of(c, "texture param"))
+            return fail_at(ld, c, "<%s> by <%s> is not supported%s", name, (const char *)c->name,
+                           ld->dialect == DIALECT_COLLADA && strcmp(name, "diffuse") != 0
+                               ? " (--dialect cgl ignores it)"
+                               : "");
+        if (!is_element(c, "color"))
+            return fail_unexpected(ld, c);
+    }
+    if (!one_child(ld, channel, "color", &color))
+        return false;
+    if (color == NULL)
+        return fail_at(ld, channel, "<%s> without <color>", name);
+    return read_color(ld, color, value, alpha);
+}
+
+static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
+{
+    xmlNode *factor, *number;
+    if (!one_child(ld, shader, name, &factor))
+        return false;
+    if (factor == NULL)
+        return true;
+    if (!only_children(ld, factor, "float") || !one_child(ld, factor, "float", &number))
+        return false;
+    if (number == NULL)
+        return fail_at(ld, factor, "<%s> without <float>", name);
+    return read_exactly(ld, number, value, 1);
+}
+
+/* COLLADA 1.5 "Determining Transparency (Opacity)". */
+static bool check_opaque(struct loader *ld, const xmlNode *shader)
+{
+    xmlNode *transparent;
+    rgb color = grey(1);
+    double alpha = 1, factor = 1;
+    if (!one_child(ld, shader, "transparent", &transparent) ||
+        !read_channel(ld, shader, "transparent", &color, &alpha) ||
+        !read_factor(ld, shader, "transparency", &factor))
+        return false;
+    const char *mode = transparent != NULL ? attribute(transparent, "opaque") : NULL;
+    bool opaque;
+    if (mode == NULL || strcmp(mode, "A_ONE") == 0)
+        opaque = alpha * factor == 1;
+    else if (strcmp(mode, "A_ZERO") == 0)
+        opaque = alpha * factor == 0;
+    else if (strcmp(mode, "RGB_ZERO") == 0)
+        opaque = rgb_is_zero(color) || factor == 0;
+    else if (strcmp(mode, "RGB_ONE") == 0)
+        opaque = color.r * factor == 1 && color.g * factor == 1 && color.b * factor == 1;
+    else
+        return fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
+    if (opaque)
+        return true;
+    return fail_at(ld, transparent != NULL ? transparent : child_named(shader, "transparency"),
+                   "transparency is not supported (--dialect cgl ignores it)");
+}
+
+/* What reflects in other ways than diffusely must be black. */
+static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
+{
+    rgb specular = grey(0), reflective = grey(0);
+    double reflectivity = 1;
+    if (!read_channel(ld, shader, "specular", &specular, NULL) ||
+        !read_channel(ld, shader, "reflective", &reflective, NULL) ||
+        !read_factor(ld, shader, "reflectivity", &reflectivity))
+        return false;
+    if (!rgb_is_zero(specular))
+        return fail_at(ld, child_named(shader, "specular"),
+                       "specular reflection is not supported (--dialect cgl ignores it)");
+    if (!rgb_is_zero(reflective) && reflectivity != 0)
+        return fail_at(ld, child_named(shader, "reflective"),
+                       "mirror reflection is not supported (--dialect cgl ignores it)");
+    return check_opaque(ld, shader);
+}
+
+static bool read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
+{
+    bool is_constant = is_element(shader, "constant");
+    if (!only_children(ld, shader,
+                       is_constant
+                           ? "emission reflective reflectivity transparent transparency "
+                             "index_of_refraction"
+                           : "emission ambient diffuse specular shininess reflective reflectivity "
+                             "transparent transparency index_of_refraction"))
+        return false;
+    m->reflectance = grey(ld->dialect == DIALECT_CGL && !is_constant ? 0.5f : 0);
+    m->radiance_both_sides = true;
+    if (!read_channel(ld, shader, "diffuse", &m->reflectance, NULL) ||
+        !read_channel(ld, shader, "emission", &m->radiance, NULL))
+        return false;
+    if (rgb_max(m->reflectance) > 1)
+        return fail_at(ld, child_named(shader, "diffuse"), "diffuse reflectance above 1");
+    if (ld->dialect == DIALECT_COLLADA)
+        return check_only_diffuse(ld, shader);
+    if (!rgb_is_zero(m->radiance))
+        return fail_at(ld, child_named(shader, "emission"),
+                       "the assignment has no emission in profile_COMMON: use a technique of "
+                       "profile CGL");
+    return true;
+}
+
+static bool read_common(struct loader *ld, const xmlNode *common, struct material *m)
+{
+    xmlNode *technique;
+    if (!only_children(ld, common, "asset image newparam technique extra") ||
+        !one_child(ld, common, "technique", &technique))
+        return false;
+    if (technique == NULL)
+        return fail_at(ld, common, "<profile_COMMON> without <technique>");
+    const xmlNode *shader = NULL;
+    for (const xmlNode *c = first_child(technique); c != NULL; c = next_sibling(c)) {
+        if (is_one_of(c, "asset annotate image newparam extra"))
+            continue;
+        if (!is_one_of(c, "constant lambert phong blinn") || shader != NULL)
+            return fail_unexpected(ld, c);
+        shader = c;
+    }
+    if (shader == NULL)
+        return fail_at(ld, technique,
+                       "<technique> without <lambert>, <phong>, <blinn> or <constant>");
+    return read_shader(ld, shader, m);
+}
+
+static bool read_effect(struct loader *ld, const xmlNode *effect, struct material *m)
+{
+    xmlNode *technique, *common;
+    for (const xmlNode *c = first_child(effect); c != NULL; c = next_sibling(c))
+        if (!is_one_of(c, "asset annotate image newparam extra") &&
+            strncmp((const char *)c->name, "profile_", 8) != 0)
+            return fail_unexpected(ld, c);
+    if (!own_technique(ld, effect, &technique) || !one_child(ld, effect, "profile_COMMON", &common))
+        return false;
+    bool is_cgl = technique != NULL && strcmp(attribute(technique, "profile"), "CGL") == 0;
+    if (is_cgl)
+        return read_material_tag(ld, technique, m);
+    if (common == NULL && ld->dialect == DIALECT_COLLADA)
+        return fail_at(ld, effect, "<effect> without <profile_COMMON>");
+    if (common != NULL && !read_common(ld, common, m))
+        return false;
+    return technique == NULL || read_material_tag(ld, technique, m);
+}
+
+static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)
+{
+    xmlNode *instance, *effect;
+    if (!only_children(ld, material, "asset instance_effect extra") ||
+        !one_child(ld, material, "instance_effect", &instance))
+        return false;
+    if (instance == NULL)
+        return fail_at(ld, material, "<material> without <instance_effect>");
+    if (!only_children(ld, instance, "technique_hint extra") ||
+        !follow(ld, instance, "url", "effect", &effect))
+        return false;
+    const char *name = attribute(material, "name"), *id = attribute(material, "id");
+    copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
+    return read_effect(ld, effect, m);
+}
+
+/* material NULL: what the assignment takes for a surface without material. */
+static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index)
+{
+    for (size_t i = 0; i < ld->num_slots; i++) {
+        if (ld->slots[i].node == material) {
+            *index = ld->slots[i].index;
+            return true;
+        }
+    }
+    struct material m = {.name = "default", .kind = MATERIAL_DIFFUSE, .reflectance = grey(0.5f)};
+    if (material != NULL && !read_material(ld, material, &m))
+        return false;
+    struct material_slot *grown = grow(ld, ld->slots, sizeof *grown, ld->num_slots, &ld->cap_slots);
+    if (grown == NULL)
+        return false;
+    ld->slots = grown;
+    if (!add_material(ld, &m, index))
+        return false;
+    ld->slots[ld->num_slots++] = (struct material_slot){material, *index};
+    return true;
+}
+
+/* The <technique_common> of the <bind_material>, NULL if nothing is bound. */
+static bool find_bindings(struct loader *ld, const xmlNode *instance, xmlNode **common)
+{
+    xmlNode *bind;
+    *common = NULL;
+    if (!only_children(ld, instance, "bind_material extra") ||
+        !one_child(ld, instance, "bind_material", &bind))
+        return false;
+    if (bind == NULL)
+        return true;
+    return only_children(ld, bind, "param technique_common technique extra") &&
+           one_child(ld, bind, "technique_common", common) &&
+           (*common == NULL || only_children(ld, *common, "instance_material"));
+}
+
+bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
+                  const char *symbol, uint32_t *index)
+{
+    xmlNode *common, *material = NULL;
+    if (!find_bindings(ld, instance, &common))
+        return false;
+    const xmlNode *first = common != NULL ? first_child(common) : NULL, *match = NULL;
+    for (const xmlNode *c = first; c != NULL; c = next_sibling(c)) {
+        const char *s = attribute(c, "symbol");
+        if (s == NULL)
+            return fail_at(ld, c, "<instance_material> without attribute 'symbol'");
+        if (!only_children(ld, c, "bind bind_vertex_input extra"))
+            return false;
+        if (symbol != NULL && strcmp(s, symbol) != 0)
+            continue;
+        if (match != NULL && ld->dialect == DIALECT_COLLADA)
+            return symbol != NULL ? fail_at(ld, c, "a second binding of symbol '%.60s'", s)
+                                  : fail_at(ld, c, "two materials for one surface");
+        match = match != NULL ? match : c;
+    }
+    if (match == NULL && ld->dialect == DIALECT_CGL)
+        match = first;
+    if (match == NULL && ld->dialect == DIALECT_COLLADA)
+        return symbol != NULL
+                   ? fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld",
+                             symbol, line_of(user))
+                   : fail_at(ld, instance, "no material bound to <%.60s> of line %ld",
+                             (const char *)user->name, line_of(user));
+    return (match == NULL || follow(ld, match, "target", "material", &material)) &&
+           slot_get(ld, material, index);
+}

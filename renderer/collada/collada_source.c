@@ -1,0 +1,201 @@
+/* What a primitive's <input>s lead to: <source>s of triples behind accessors. */
+#include "collada_internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void sources_release(struct sources *all)
+{
+    for (size_t i = 0; i < all->count; i++)
+        free(all->data[i].xyz);
+    free(all->data);
+    *all = (struct sources){NULL, 0, 0};
+}
+
+/* Positions of the first three named <param>s: unnamed ones are not for us to see. */
+static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t stride,
+                        uint64_t param[3])
+{
+    uint64_t place = 0, named = 0;
+    for (const xmlNode *p = first_child(accessor); p != NULL; p = next_sibling(p), place++) {
+        if (!is_element(p, "param"))
+            return fail_unexpected(ld, p);
+        const char *name = attribute(p, "name"), *type = attribute(p, "type");
+        if (type != NULL && strcmp(type, "float") != 0 && strcmp(type, "double") != 0)
+            return fail_at(ld, p, "<param> of type '%.60s' where numbers are needed", type);
+        if (name != NULL && name[0] != '\0' && named < 3)
+            param[named++] = place;
+    }
+    if (named < 3)
+        return fail_at(ld, accessor, "<accessor> has %d named <param>s where 3 are needed",
+                       (int)named);
+    if (stride < place)
+        return fail_at(ld, accessor, "<accessor> has more <param>s than its stride");
+    return true;
+}
+
+static bool read_source(struct loader *ld, const xmlNode *node, struct source *out)
+{
+    struct doubles d = {NULL, 0, 0};
+    bool ok = false;
+    xmlNode *common, *accessor = NULL;
+    if (!one_child(ld, node, "technique_common", &common) ||
+        (common != NULL && !one_child(ld, common, "accessor", &accessor)))
+        return false;
+    if (accessor == NULL)
+        return fail_at(ld, node, "<source> without an <accessor>");
+    uint64_t count, stride, offset, declared, param[3];
+    xmlNode *array;
+    if (!attribute_count(ld, accessor, "count", &count) ||
+        !attribute_count_or(ld, accessor, "stride", 1, &stride) ||
+        !attribute_count_or(ld, accessor, "offset", 0, &offset) ||
+        !read_params(ld, accessor, stride, param) ||
+        !follow(ld, accessor, "source", "float_array", &array) ||
+        !attribute_count(ld, array, "count", &declared) || !read_doubles(ld, array, &d))
+        goto done;
+    if (d.count != declared) {
+        fail_at(ld, array, "<float_array> has %zu numbers, its count says %llu", d.count,
+                (unsigned long long)declared);
+        goto done;
+    }
+    if (count > 0 && offset + (count - 1) * stride + param[2] >= d.count) {
+        fail_at(ld, accessor, "<accessor> reaches beyond the end of its <float_array>");
+        goto done;
+    }
+    if (offset == 0 && stride == 3 && param[0] == 0 && param[1] == 1 && param[2] == 2) {
+        *out = (struct source){node, d.data, (uint32_t)count};
+        return true;
+    }
+    *out = (struct source){node, malloc((3 * count + 1) * sizeof *out->xyz), (uint32_t)count};
+    if (out->xyz == NULL) {
+        fail_memory(ld);
+        goto done;
+    }
+    for (uint64_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++)
+            out->xyz[3 * i + (uint64_t)k] = d.data[offset + i * stride + param[k]];
+    ok = true;
+done:
+    free(d.data);
+    return ok;
+}
+
+static bool get_source(struct loader *ld, struct sources *all, const xmlNode *input, long *index)
+{
+    xmlNode *node;
+    if (!follow(ld, input, "source", "source", &node))
+        return false;
+    for (size_t i = 0; i < all->count; i++) {
+        if (all->data[i].node == node) {
+            *index = (long)i;
+            return true;
+        }
+    }
+    struct source *grown = grow(ld, all->data, sizeof *grown, all->count, &all->capacity);
+    if (grown == NULL)
+        return false;
+    all->data = grown;
+    if (!read_source(ld, node, &grown[all->count]))
+        return false;
+    *index = (long)all->count++;
+    return true;
+}
+
+/* Texture coordinates and what hangs on them cannot show without textures, which are refused where
+ * they are used. */
+static bool is_texture_semantic(const char *s)
+{
+    static const char *const WORDS[] = {"TEXCOORD", "UV",         "TANGENT",    "BINORMAL",
+                                        "IMAGE",    "TEXTANGENT", "TEXBINORMAL"};
+    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
+        if (strcmp(s, WORDS[i]) == 0)
+            return true;
+    return false;
+}
+
+/* Vertex colours do not show in the assignment; elsewhere they would be expected to. */
+static bool skip_input(struct loader *ld, const xmlNode *input, const char *semantic)
+{
+    if (is_texture_semantic(semantic) ||
+        (ld->dialect == DIALECT_CGL && strcmp(semantic, "COLOR") == 0))
+        return true;
+    return fail_at(ld, input, "<input> of semantic '%.60s' is not supported", semantic);
+}
+
+static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode *vertices,
+                          struct inputs *in)
+{
+    in->position = -1;
+    for (const xmlNode *c = first_child(vertices); c != NULL; c = next_sibling(c)) {
+        if (is_element(c, "extra"))
+            continue;
+        if (!is_element(c, "input"))
+            return fail_unexpected(ld, c);
+        const char *semantic = attribute(c, "semantic");
+        if (semantic == NULL)
+            return fail_at(ld, c, "<input> without attribute 'semantic'");
+        if (strcmp(semantic, "POSITION") == 0) {
+            if (in->position >= 0)
+                return fail_at(ld, c, "a second <input> of semantic 'POSITION'");
+            if (!get_source(ld, all, c, &in->position))
+                return false;
+        } else if (strcmp(semantic, "NORMAL") == 0) {
+            /* The normals of corners win over those of vertices. */
+            if (in->normal >= 0 && !in->normal_by_vertex)
+                continue;
+            if (in->normal >= 0)
+                return fail_at(ld, c, "a second <input> of semantic 'NORMAL'");
+            if (!get_source(ld, all, c, &in->normal))
+                return false;
+            in->normal_by_vertex = true;
+        } else if (!skip_input(ld, c, semantic)) {
+            return false;
+        }
+    }
+    if (in->position < 0)
+        return fail_at(ld, vertices, "<vertices> without an <input> of semantic 'POSITION'");
+    return true;
+}
+
+bool read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
+                 struct inputs *in)
+{
+    *in = (struct inputs){.position = -1, .normal = -1};
+    bool has_vertex = false;
+    for (const xmlNode *c = first_child(primitive); c != NULL; c = next_sibling(c)) {
+        if (!is_element(c, "input"))
+            continue;
+        const char *semantic = attribute(c, "semantic");
+        uint64_t offset;
+        if (semantic == NULL)
+            return fail_at(ld, c, "<input> without attribute 'semantic'");
+        if (!attribute_count(ld, c, "offset", &offset))
+            return false;
+        if (offset > 255)
+            return fail_at(ld, c, "<input> offset above 255");
+        in->stride = offset + 1 > in->stride ? offset + 1 : in->stride;
+        if (strcmp(semantic, "VERTEX") == 0) {
+            xmlNode *vertices;
+            if (has_vertex)
+                return fail_at(ld, c, "a second <input> of semantic 'VERTEX'");
+            if (!follow(ld, c, "source", "vertices", &vertices) ||
+                !read_vertices(ld, all, vertices, in))
+                return false;
+            has_vertex = true;
+            in->vertex_offset = offset;
+        } else if (strcmp(semantic, "NORMAL") == 0) {
+            if (in->normal >= 0 && !in->normal_by_vertex)
+                return fail_at(ld, c, "a second <input> of semantic 'NORMAL'");
+            if (!get_source(ld, all, c, &in->normal))
+                return false;
+            in->normal_by_vertex = false;
+            in->normal_offset = offset;
+        } else if (!skip_input(ld, c, semantic)) {
+            return false;
+        }
+    }
+    if (!has_vertex)
+        return fail_at(ld, primitive, "<%s> without an <input> of semantic 'VERTEX'",
+                       (const char *)primitive->name);
+    return true;
+}

@@ -1,0 +1,98 @@
+/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Pictures of other kinds,
+ * which only the harness reads: image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
+#ifndef ASSAY_IMAGE_H
+#define ASSAY_IMAGE_H
+
+#include "renderer/base/err.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Text metadata of a file: owned by whoever filled it. */
+struct image_attr {
+    const char *name;
+    const char *value;
+};
+
+struct image {
+    int width, height, channels;
+    char (*names)[32]; /* channels of them: "R", "G", "B", "M2.R", ... */
+    float *data;       /* width*height*channels */
+    char **attr;       /* num_attrs pairs: name, value, name, value, ... */
+    int num_attrs;
+};
+
+/* Shape and names alone, data NULL: what a file that is written by rows starts from. */
+bool image_head(struct image *im, int width, int height, int channels, const char *const *names,
+                struct err *e) __attribute__((warn_unused_result));
+/* A zeroed image of that shape; names are copied. Fails on sizes below 1 or out of memory. */
+bool image_alloc(struct image *im, int width, int height, int channels, const char *const *names,
+                 struct err *e) __attribute__((warn_unused_result));
+void image_free(struct image *im);
+
+/* Appends a text attribute (both copied). Fails only out of memory. */
+bool image_set_attr(struct image *im, const char *name, const char *value, struct err *e)
+    __attribute__((warn_unused_result));
+/* The value of a text attribute or NULL. Owned by the image. */
+const char *image_get_attr(const struct image *im, const char *name);
+/* Index of a channel by exact name, -1 if absent. */
+int image_channel(const struct image *im, const char *name);
+
+/* What the readers take at most. */
+enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
+#define IMAGE_MAX_FLOATS 4e9 /* 16384 x 16384 pixels of a dozen channels */
+/* Bytes of pixels for a byte of file: deflate, the densest of the compressions in use, makes one of 1032. A header
+ * that promises more is refused before memory is asked for. */
+#define IMAGE_MAX_EXPANSION 1032
+
+/* Reads an OpenEXR file (its first part; rows or tiles of halves or floats) with its text attributes.
+ * Channels are in the file's order. *half (may be NULL) tells if it stored fewer than 32 bits per
+ * channel. */
+bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
+    __attribute__((warn_unused_result));
+/* Its header alone: data stays NULL. */
+bool image_read_exr_head(const char *path, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
+/* Reads a Radiance picture (RGBE, rows from the top) as R G B. */
+bool image_read_hdr(const char *path, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Writes a float32, ZIP-compressed scan-line OpenEXR with all channels and attributes. The file
+ * appears whole, by rename, or not at all. */
+bool image_write_exr(const char *path, const struct image *im, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* The same for a picture that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
+ * the rest last, and the file appears when it is closed. */
+enum { IMAGE_BAND = 16 };
+struct image_writer;
+/* head: shape, names and attributes; has to stay as it is until the end. NULL with a line on failure. */
+struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
+    __attribute__((warn_unused_result));
+bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
+    __attribute__((warn_unused_result));
+/* Both free the writer. Without close there is no file; after a failure there is only abandon. */
+bool image_writer_close(struct image_writer *w, struct err *e) __attribute__((warn_unused_result));
+void image_writer_abandon(struct image_writer *w);
+
+/* Writes or encodes 8-bit RGB (3 bytes a pixel, row 0 at the top) as PNG. The encoded bytes belong
+ * to the caller (free()). The file appears by rename. */
+bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8, struct err *e)
+    __attribute__((warn_unused_result));
+bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes, size_t *size,
+                      struct err *e) __attribute__((warn_unused_result));
+/* The file with texts (tEXt; iTXt where one has other letters than ASCII) before its pixels. */
+bool image_write_png_texts(const char *path, int width, int height, const uint8_t *rgb8,
+                           const struct image_attr *attr, int num_attrs, struct err *e)
+    __attribute__((warn_unused_result));
+/* Reads a PNG as these write it, 8-bit RGB in rows, and its texts. data has the codes as they are, 0 .. 255, as R G B.
+ * Fails with a line on any other and on a damaged one. */
+bool image_read_png(const char *path, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
+/* By its first bytes; false too where it cannot be read. */
+bool image_is_png(const char *path);
+
+/* Text that names the libraries: "OpenEXR 3.1.5, libpng 1.6.39". */
+const char *image_library_version(void);
+
+#endif

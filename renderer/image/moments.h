@@ -1,0 +1,77 @@
+/* Per pixel and channel moments over independent observations, the currency of the project: n,
+ * mean, M2 = sum (x-mean)^2 and M3 = sum (x-mean)^3, in double, mergeable [Pebay08]. An observation
+ * is a sample (of our renderer) or a replicate (a whole image of an engine, with a seed of its
+ * own). */
+#ifndef ASSAY_MOMENTS_H
+#define ASSAY_MOMENTS_H
+
+#include "image.h"
+#include "renderer/math/vec.h"
+
+struct moments {
+    int width, height;
+    double *n;    /* width*height; row 0 at the top */
+    double *mean; /* 3 per pixel, RGB, linear radiance */
+    double *m2;   /* 3 per pixel */
+    double *m3;   /* 3 per pixel */
+    /* What one observation is: "sample", "replicate", "exact" (a closed form: n = 1, M2 = M3 = 0, no
+     * uncertainty), or "stratified": a sample that is not independent of the pixel's others, so that
+     * M2 tells nothing about the error of the mean. Of a comparison also "picture": a mean of
+     * unknown samples, whose M2 was guessed from its neighbours (tools/stats/noise_estimate.h); n counts nothing. */
+    char unit[16];
+    double spp; /* paths per pixel in one observation; 0 where that has no meaning */
+    /* How far the mean may be off on top of its variance, because its numbers were rounded: 3 per
+     * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
+     * memory only: no file has it, and moments_merge() refuses it. */
+    double *tolerance;
+};
+
+/* All zero, unit "sample", spp 1. */
+bool moments_alloc(struct moments *m, int width, int height, struct err *e)
+    __attribute__((warn_unused_result));
+void moments_free(struct moments *m);
+
+/* One more observation of one pixel. */
+void moments_add(struct moments *m, size_t pixel, const double x[3]);
+/* One more observation of every pixel: a whole replicate (RGB, 3 floats a pixel). */
+void moments_add_image(struct moments *m, const float *pixels_rgb);
+/* dst += src, as if all observations had been added to one [Pebay08 eq. 2.1]. Same sizes, or fails
+ * (as it does on different units or spp). */
+bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
+    __attribute__((warn_unused_result));
+/* Pixels first .. first+num-1 in the order of their rows, as a picture one pixel high for moments_merge(). Owns nothing. */
+struct moments moments_run(const struct moments *m, size_t first, int num);
+/* Groups of `k` samples are not kept apart, so the variance of the pixel's mean is M2/(n(n-1));
+ * NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
+double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
+
+/* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes
+ * "assay:unit", "assay:spp" and those given. float32. */
+bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
+                   int num_attrs, struct err *e) __attribute__((warn_unused_result));
+/* The same with the channels of `layers` (same size; NULL: none) after those. */
+bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
+                          const struct image_attr *attrs, int num_attrs, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same for a picture that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
+ * multiple of that at a time and the rest last. */
+struct moments_writer;
+/* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */
+struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
+                                           int height, const struct image *layers,
+                                           const struct image_attr *attrs, int num_attrs,
+                                           struct err *e) __attribute__((warn_unused_result));
+bool moments_writer_rows(struct moments_writer *w, const struct moments *m,
+                         const struct image *layers, struct err *e)
+    __attribute__((warn_unused_result));
+/* Both free the writer; the file appears with close. */
+bool moments_writer_close(struct moments_writer *w, struct err *e)
+    __attribute__((warn_unused_result));
+void moments_writer_abandon(struct moments_writer *w);
+/* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
+ * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
+ * n, n not a whole number, or no pixel. */
+bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

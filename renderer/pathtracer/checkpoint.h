@@ -1,0 +1,40 @@
+/* A film kept for going on with it: PICTURE.state beside the picture. All sums in double to the last
+ * bit, which the float32 of the picture do not have; whose render it is; and a SHA-256 of the lot.
+ * Valid on the kind of machine and the version of the program that wrote it. */
+#ifndef ASSAY_CHECKPOINT_H
+#define ASSAY_CHECKPOINT_H
+
+#include "renderer/transport/film.h"
+#include "render_id.h"
+
+#include <stdio.h>
+
+/* Appears by rename. */
+bool state_write(const char *path, const struct identity *id, const struct film *f, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Fills a film that film_alloc() made. Fails with a line on a missing or damaged file, and on one of
+ * another render, naming the first thing that differs. */
+bool state_read(const char *path, const struct identity *id, struct film *f, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* A state read by rows, for putting together a picture that is larger than memory. */
+struct state_file {
+    FILE *f; /* NULL: closed */
+    char path[4096];
+    int width, height;
+    bool first_hits, has_target;
+    uint32_t num_samples; /* film.num_samples */
+    long body;            /* where it begins */
+};
+/* Reads all of it once, to see that it is whole and of that render. */
+bool state_open(struct state_file *s, const char *path, const struct identity *id, int width,
+                int height, bool first_hits, struct err *e) __attribute__((warn_unused_result));
+/* Rows y .. y+num-1 into a film that is at least as wide, from its pixel (at_x, at_y) on; the target too if the
+ * film has one. Not film.num_samples. */
+bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
+                struct err *e) __attribute__((warn_unused_result));
+/* Gives the file back, until state_rows() wants it again: so any number of states can be read in turn. */
+void state_close(struct state_file *s);
+
+#endif

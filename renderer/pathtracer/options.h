@@ -1,0 +1,52 @@
+/* The command line of pathtracer. */
+#ifndef ASSAY_OPTIONS_H
+#define ASSAY_OPTIONS_H
+
+#include "renderer/transport/render.h"
+
+enum { MAX_OUTPUTS = 8 };
+
+enum { FRESNEL_EXACT, FRESNEL_SCHLICK }; /* options.fresnel */
+enum { FRAME_CROP, FRAME_WHOLE };        /* options.frame */
+
+struct options {
+    const char *scene, *camera_file, *environment_file;
+    const char *output[MAX_OUTPUTS]; /* each ends in .exr or .png */
+    int num_outputs;
+    const char *heatmap; /* PNG file; NULL: none */
+    const char *resume;  /* the picture to go on with; NULL: from the start */
+    int width, height;
+    int cell[4]; /* x y dx dy, origin at the bottom left */
+    int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
+    unsigned starter; /* 1 << enum starter (cs184_deviations.h) */
+    int spp;          /* of the whole picture, the most if adaptive */
+    int first, last;  /* sample numbers first .. last-1 are this program's share */
+    int light_samples, threads, max_bounces, first_bounce;
+    bool quiet, aov, keep_state;
+    enum roulette_kind roulette;
+    double survival; /* of ROULETTE_FIXED */
+    uint64_t seed;
+    int adaptive_batch; /* 0: off */
+    double adaptive_tolerance;
+    int pilot;                                  /* samples */
+    double pilot_tolerance;                     /* negative: no pilot */
+    double lens_radius, focal_distance;         /* negative: not given */
+    double max_seconds, max_error, write_every; /* 0: off */
+    int slurm;                                  /* jobs on a cluster; 0: render here */
+    enum { ACTION_RENDER, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
+};
+
+/* cli_apart() of a command that options_parse() took. */
+char **options_apart(int argc, char **argv) __attribute__((warn_unused_result));
+/* Fills *o from the command line, with defaults where it is silent. An action other than
+ * ACTION_RENDER leaves the rest unchecked. */
+bool options_parse(int argc, char **argv, struct options *o, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* What --help, --version and --list say, on stdout. */
+void options_print(const struct options *o);
+
+/* Does a file name end in .exr (else it ends in .png)? */
+bool is_exr(const char *path);
+
+#endif

@@ -1,0 +1,275 @@
+/* pathtracer: options -> scene -> render -> pictures. */
+#include "renderer/collada/collada.h"
+#include "renderer/base/fs.h"
+#include "heatmap.h"
+#include "options.h"
+#include "output.h"
+#include "png_metadata.h"
+#include "renderer/scene/cs184_deviations.h"
+#include "checkpoint.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { EXIT_BAD_INPUT = 3, EXIT_SIGNAL = 128 };
+
+/* What the renderer's control calls back with. */
+struct session {
+    struct output out;
+    char state_path[STATE_PATH];
+    sigset_t signals; /* blocked while rendering, so that they can be looked for */
+    int signal;       /* the first that came; 0: none */
+};
+
+/* SIGINT and SIGTERM wait until they are asked for; those that the parent wants ignored stay so. All
+ * threads inherit this. */
+static void hold_signals(struct session *s)
+{
+    static const int numbers[] = {SIGINT, SIGTERM};
+    sigemptyset(&s->signals);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        struct sigaction a;
+        if (sigaction(numbers[i], NULL, &a) == 0 && a.sa_handler != SIG_IGN)
+            sigaddset(&s->signals, numbers[i]);
+    }
+    pthread_sigmask(SIG_BLOCK, &s->signals, NULL);
+}
+
+/* After the first signal a second one has its usual effect: the end at once. */
+static bool signal_came(void *arg)
+{
+    struct session *s = arg;
+    const struct timespec now = {0};
+    int signal = sigtimedwait(&s->signals, NULL, &now);
+    if (signal <= 0)
+        return false;
+    s->signal = signal;
+    pthread_sigmask(SIG_UNBLOCK, &s->signals, NULL);
+    return true;
+}
+
+static bool write_meanwhile(void *arg, const struct film *f, struct err *e)
+{
+    const struct session *s = arg;
+    return output_pictures(&s->out, f, NULL, e) && state_write(s->state_path, s->out.id, f, e);
+}
+
+static bool setup_camera(const struct options *o, const struct scene *scene, struct camera *c,
+                         struct err *e)
+{
+    if (!camera_init(c, scene, o->width, o->height, e))
+        return err_prefix(e, "%s", o->scene);
+    if (o->frame == FRAME_WHOLE && (scene->dialect != DIALECT_CGL || o->camera_file != NULL))
+        return err_set(e, "%s: --frame is of the assignment's camera, without --camera", o->scene);
+    if (o->frame == FRAME_WHOLE)
+        camera_show_whole(c);
+    if (o->camera_file != NULL && !camera_read_file(c, o->camera_file, e))
+        return false;
+    if (o->lens_radius >= 0)
+        c->lens_radius = (float)o->lens_radius;
+    if (o->focal_distance >= 0 || o->camera_file == NULL)
+        c->focal_distance = o->focal_distance >= 0 ? (float)o->focal_distance : 4.7f;
+    return true;
+}
+
+static bool load_scene(const struct options *o, struct scene *scene, struct err *e)
+{
+    if (!collada_load(o->scene, (enum dialect)o->dialect, scene, e))
+        return false;
+    if (scene->note[0] != '\0' && !o->quiet)
+        fprintf(stderr, "pathtracer: note: %s\n", scene->note);
+    if (scene->num_degenerate > 0 && !o->quiet)
+        fprintf(stderr, "pathtracer: note: %s: %u triangles without area left out\n", o->scene,
+                scene->num_degenerate);
+    if (scene->num_zero_normals > 0 && !o->quiet)
+        fprintf(stderr, "pathtracer: note: %s: %u corners with a normal of no length, flat there\n",
+                o->scene, scene->num_zero_normals);
+    for (uint32_t i = 0; i < scene->num_materials; i++)
+        scene->materials[i].schlick = o->fresnel == FRESNEL_SCHLICK;
+    if (scene->num_dark_lights > 0 && !o->quiet)
+        fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
+                scene->num_dark_lights);
+    starter_apply(scene, o->starter);
+    if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
+        return false;
+    if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)
+        return err_set(e, "%s: the scene has no light", o->scene);
+    return true;
+}
+
+static struct render_options render_options_of(const struct options *o)
+{
+    bool pilot = o->pilot_tolerance >= 0;
+    const struct sampler sampler = {(enum sampler_kind)o->sampler, o->seed};
+    return (struct render_options){.integrator = {.kind = (enum integrator_kind)o->kind,
+                                                  .direct = (enum direct_kind)o->direct,
+                                                  .max_bounces = o->max_bounces,
+                                                  .first_bounce = o->first_bounce,
+                                                  .light_samples = o->light_samples,
+                                                  .roulette = o->roulette,
+                                                  .survival = (float)o->survival,
+                                                  .sampler = sampler,
+                                                  .isa = (enum isa)o->isa},
+                                   .x = o->cell[0],
+                                   .y = o->height - o->cell[1] - o->cell[3],
+                                   .width = o->cell[2],
+                                   .height = o->cell[3],
+                                   .first_sample = (uint32_t)o->first,
+                                   .num_samples = (uint32_t)(o->last - o->first),
+                                   .threads = o->threads,
+                                   .adaptive_batch = o->adaptive_batch,
+                                   .adaptive_tolerance = o->adaptive_tolerance,
+                                   .pilot_samples = pilot ? (uint32_t)o->pilot : 0,
+                                   .pilot_max = (uint32_t)o->spp,
+                                   .pilot_tolerance = pilot ? o->pilot_tolerance : 0};
+}
+
+static bool start_film(const struct session *s, const struct options *o, struct film *f,
+                       struct err *e)
+{
+    char path[STATE_PATH];
+    if (!film_alloc(f, o->cell[2], o->cell[3], o->aov, e))
+        return false;
+    if (o->resume == NULL)
+        return true;
+    if (!output_state_path(&s->out, o->resume, path, e) || !state_read(path, s->out.id, f, e))
+        return false;
+    if (f->num_samples > (uint32_t)(o->last - o->first))
+        return err_set(e, "%s: has %lu samples per pixel already, more than the %d asked for", path,
+                       (unsigned long)f->num_samples, o->last - o->first);
+    return true;
+}
+
+/* Pictures, and the state if it can be of use; a state that this render has outlived goes. */
+static bool finish(struct session *s, const struct film *f, const struct render_stats *stats,
+                   struct err *e)
+{
+    const struct options *o = s->out.opt;
+    if (!output_pictures(&s->out, f, stats, e))
+        return false;
+    if (stats->end == RENDER_ASKED || o->keep_state)
+        return state_write(s->state_path, s->out.id, f, e);
+    unlink(s->state_path);
+    return true;
+}
+
+static bool write_heatmap(const struct output *out, const struct bvh *bvh, const struct camera *c,
+                          const struct render_options *opt, struct err *e)
+{
+    const char *path = out->opt->heatmap;
+    struct picture_texts t;
+    uint64_t most;
+    if (!picture_texts_make(out, PICTURE_HEATMAP, 0, &t))
+        return err_set(e, "%s: out of memory", path);
+    bool ok = heatmap_write(path, bvh, c, opt->x, opt->y, opt->width, opt->height, t.attr, t.num,
+                            &most, e);
+    if (ok)
+        printf("%s: at most %llu nodes visited\n", path, (unsigned long long)most);
+    picture_texts_free(&t);
+    return ok;
+}
+
+static bool run(struct session *s, struct err *e)
+{
+    const struct options *o = s->out.opt;
+    struct identity id;
+    struct scene scene = {0};
+    struct camera camera;
+    struct film film = {0};
+    struct bvh *bvh = NULL;
+    bool ok = false;
+    if (!load_scene(o, &scene, e) || !setup_camera(o, &scene, &camera, e) ||
+        !identity_make(o, &id, e))
+        goto done;
+    double start = now_seconds();
+    bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
+    if (bvh == NULL)
+        goto done;
+    snprintf(s->out.accel, sizeof s->out.accel,
+             "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],
+             bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), now_seconds() - start);
+    s->out.id = &id;
+    s->out.scene = &scene;
+    if (!output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
+        goto done;
+    const struct render_options opt = render_options_of(o);
+    if (o->heatmap != NULL && !write_heatmap(&s->out, bvh, &camera, &opt, e))
+        goto done;
+    const struct render_control control = {.max_seconds = o->max_seconds,
+                                           .max_error = o->max_error,
+                                           .write_every = o->write_every,
+                                           .write = write_meanwhile,
+                                           .asked_to_stop = signal_came,
+                                           .arg = s};
+    struct progress progress;
+    struct render_stats stats;
+    progress_start(&progress, "rendering", "Mpaths", o->quiet);
+    hold_signals(s);
+    if (!render_film(&scene, &camera, bvh, &opt, &control, &progress, &film, &stats, e))
+        goto done;
+    progress_end(&progress, stats.samples);
+    if (stats.end != RENDER_ASKED)
+        s->signal = 0; /* it came too late to cut anything short */
+    ok = finish(s, &film, &stats, e);
+    if (ok)
+        print_summary(&s->out, &film, &stats);
+    if (ok && s->signal != 0)
+        print_how_to_resume(&s->out, &film);
+done:
+    s->out.id = NULL; /* this function's own */
+    s->out.scene = NULL;
+    film_free(&film);
+    bvh_free(bvh);
+    scene_free(&scene);
+    return ok;
+}
+
+/* assay plans, submits and gathers; it calls us again for each part. Returns only if it cannot be run. */
+static bool hand_over(int argc, char **argv, struct err *e)
+{
+    char path[4096];
+    beside_program(path, sizeof path, "assay");
+    char **words = calloc((size_t)argc + 3, sizeof *words);
+    if (words == NULL)
+        return err_set(e, "--slurm: out of memory");
+    words[0] = path;
+    words[1] = (char[]){"slurm"};
+    words[2] = (char[]){"pathtracer"};
+    memcpy(words + 3, argv + 1, (size_t)(argc - 1) * sizeof *words);
+    execv(path, words);
+    free(words);
+    return err_set(e, "--slurm: cannot run %s: %s", path, strerror(errno));
+}
+
+int main(int argc, char **argv)
+{
+    struct options o;
+    struct session s = {.out = {.opt = &o, .argc = argc, .argv = argv}};
+    struct err e = {0};
+    bool ok = options_parse(argc, argv, &o, &e);
+    char **words = ok ? options_apart(argc, argv) : NULL;
+    if (ok && words == NULL)
+        ok = err_set(&e, "out of memory");
+    if (ok)
+        for (s.out.argv = words, s.out.argc = 0; words[s.out.argc] != NULL;)
+            s.out.argc++;
+    if (ok && o.action != ACTION_RENDER)
+        options_print(&o);
+    else if (ok && o.slurm > 0)
+        ok = hand_over(s.out.argc, words, &e);
+    else
+        ok = ok && run(&s, &e);
+    if (ok && fflush(stdout) != 0)
+        ok = err_set(&e, "cannot write to standard output");
+    free(words);
+    if (!ok) {
+        fprintf(stderr, "pathtracer: %s\n", e.msg);
+        return EXIT_BAD_INPUT;
+    }
+    return s.signal != 0 ? EXIT_SIGNAL + s.signal : 0;
+}

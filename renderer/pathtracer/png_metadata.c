@@ -1,0 +1,76 @@
+#include "png_metadata.h"
+
+#include "renderer/base/cli_rewrite.h"
+#include "renderer/base/shell_quote.h"
+#include "renderer/base/version.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+const char *const picture_kind_names[] = {"image", "rates", "heatmap", NULL};
+
+/* No option says in two ways what the samples and the kind of picture say already. */
+static const struct option_words said_apart[] = {{"-s", 1}, {"--spp", 1}, {"--aov", 0}, {0}};
+
+static char *canonical_command(const struct output *o, enum picture_kind kind)
+{
+    char program[] = "pathtracer", most[] = "-s", spp[16],
+         **apart = options_apart(o->argc, o->argv);
+    int num = 0, n = 1;
+    while (apart != NULL && apart[num] != NULL)
+        num++;
+    char **word = calloc((size_t)num + 4, sizeof *word), *command = NULL;
+    if (apart != NULL && word != NULL) {
+        word[0] = program;
+        if (o->opt->pilot_tolerance >= 0 && kind != PICTURE_HEATMAP) {
+            snprintf(spp, sizeof spp, "%d", o->opt->spp);
+            word[n++] = most;
+            word[n++] = spp;
+        }
+        int kept = words_kept(render_how, num - 1, apart + 1, word + n);
+        word[n + words_kept(said_apart, kept, word + n, word + n)] = NULL;
+        command = shell_join(NULL, (const char *const *)word);
+    }
+    free(apart);
+    free(word);
+    return command;
+}
+
+static void say(struct picture_texts *t, const char *name, const char *value)
+{
+    t->attr[t->num++] = (struct image_attr){name, value};
+}
+
+bool picture_texts_make(const struct output *o, enum picture_kind kind, uint32_t num_samples,
+                        struct picture_texts *t)
+{
+    *t = (struct picture_texts){.command = canonical_command(o, kind)};
+    if (t->command == NULL)
+        return false;
+    say(t, "assay:version", assay_version);
+    say(t, "assay:picture", picture_kind_names[kind]);
+    say(t, "assay:command", t->command);
+    say(t, "assay:scene", o->id->scene);
+    say(t, "assay:settings", o->id->settings);
+    say(t, "assay:cell", o->id->cell);
+    if (kind == PICTURE_HEATMAP)
+        return true;
+    snprintf(t->samples, sizeof t->samples, "%d:%lld", o->opt->first,
+             (long long)o->opt->first + num_samples);
+    say(t, "assay:adaptive", o->id->adaptive);
+    say(t, "assay:seed", o->id->seed);
+    say(t, "assay:samples", t->samples);
+    if (kind == PICTURE_RATES) {
+        snprintf(t->most, sizeof t->most, "%d", o->opt->last - o->opt->first);
+        say(t, "assay:most", t->most);
+    } else if (o->ranges != NULL) {
+        say(t, "assay:ranges", o->ranges);
+    }
+    return true;
+}
+
+void picture_texts_free(struct picture_texts *t)
+{
+    free(t->command);
+    *t = (struct picture_texts){0};
+}

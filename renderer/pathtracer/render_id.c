@@ -1,0 +1,58 @@
+#include "render_id.h"
+
+#include "renderer/base/sha256.h"
+
+#include <stdio.h>
+#include <string.h>
+
+bool identity_make(const struct options *o, struct identity *id, struct err *e)
+{
+    char camera[65] = "none", environment[65] = "none";
+    *id = (struct identity){.first_sample = (uint32_t)o->first};
+    if (!sha256_file(o->scene, id->scene, e) ||
+        (o->camera_file != NULL && !sha256_file(o->camera_file, camera, e)) ||
+        (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)))
+        return false;
+    /* The dialect by number: 0 stands for auto, which the scene file decides. */
+    snprintf(id->settings, sizeof id->settings,
+             "integrator %s; direct %s; max-bounces %d; first-bounce %d; light-samples %d; "
+             "roulette %d %.17g; accel %s; dialect %d; lens-radius %.17g; focal-distance %.17g; "
+             "camera %s; environment %s; fresnel %d; sampler %s",
+             integrator_kind_names[o->kind], direct_kind_names[o->direct], o->max_bounces,
+             o->first_bounce, o->light_samples, (int)o->roulette, o->survival,
+             bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
+             environment, o->fresnel, sampler_kind_names[o->sampler]);
+    if (o->starter != 0 || o->frame != FRAME_CROP) {
+        size_t n = strlen(id->settings);
+        snprintf(id->settings + n, sizeof id->settings - n, "; starter %u; frame %d", o->starter,
+                 o->frame);
+    }
+    if (o->adaptive_batch > 0)
+        snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,
+                 o->adaptive_tolerance);
+    else if (o->pilot_tolerance >= 0)
+        snprintf(id->adaptive, sizeof id->adaptive, "pilot %d %.17g most %d", o->pilot,
+                 o->pilot_tolerance, o->spp);
+    else
+        snprintf(id->adaptive, sizeof id->adaptive, "off");
+    snprintf(id->seed, sizeof id->seed, "%llu", (unsigned long long)o->seed);
+    identity_cell(o->cell, o->width, o->height, id->cell);
+    return true;
+}
+
+void identity_cell(const int cell[4], int width, int height, char text[64])
+{
+    snprintf(text, 64, "%d %d %d %d of %d %d", cell[0], cell[1], cell[2], cell[3], width, height);
+}
+
+bool identity_parse_cell(const char *text, int c[6])
+{
+    int end = 0;
+    if (strlen(text) > 60 ||
+        sscanf(text, "%5d %5d %5d %5d of %5d %5d%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5],
+               &end) != 6 ||
+        text[end] != '\0')
+        return false;
+    return c[0] >= 0 && c[1] >= 0 && c[2] > 0 && c[3] > 0 && c[0] + c[2] <= c[4] &&
+           c[1] + c[3] <= c[5];
+}

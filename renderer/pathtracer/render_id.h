@@ -1,0 +1,26 @@
+/* Which render a picture or a state belongs to: what has to be the same for its samples to be samples
+ * of the same picture. Goes into the metadata of pictures and the head of state files. */
+#ifndef ASSAY_RENDER_ID_H
+#define ASSAY_RENDER_ID_H
+
+#include "options.h"
+
+struct identity {
+    char scene[65];     /* SHA-256 of the scene file, lower-case hex */
+    char settings[512]; /* what decides the law of a sample: "integrator path; direct mis; ..." */
+    char adaptive[96];  /* "off", "rule N TOL" or "pilot N TOL most SPP" */
+    char seed[24];
+    char cell[64]; /* "X Y DX DY of W H", origin at the bottom left */
+    uint32_t first_sample;
+};
+
+/* Reads scene and camera file to hash them. */
+bool identity_make(const struct options *o, struct identity *id, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* X Y DX DY and the W and H of the whole -> "X Y DX DY of W H". */
+void identity_cell(const int cell[4], int width, int height, char text[64]);
+/* "X Y DX DY of W H" -> six numbers; false on anything else or a cell that is not inside. */
+bool identity_parse_cell(const char *text, int cell[6]) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,28 @@
+/* What the assignment's starter code does wrong, done on purpose: references by which a program that was built on it is
+ * graded (tools/grade/rubric.h, `accept`). Nothing else may ask for it. */
+#ifndef ASSAY_CS184_DEVIATIONS_H
+#define ASSAY_CS184_DEVIATIONS_H
+
+#include "scene.h"
+
+enum starter {
+    STARTER_LIGHT_PDF, /* the density of a light sample lacks a factor 1/distance: irradiance falls as 1/r */
+    STARTER_TURNED_LAMP, /* the rectangle that is sampled is turned by 90 degrees against the one that is seen */
+    STARTER_BECKMANN, /* the shadowing of rough metals has a pi for a sqrt(pi) (microfacet.h) */
+    NUM_STARTERS
+};
+extern const char *const starter_names[NUM_STARTERS + 1]; /* NULL at the end */
+
+static inline bool starter_has(const struct scene *s, enum starter what)
+{
+    return (s->starter >> what & 1) != 0;
+}
+
+/* Sets s->starter to `bits` (1 << enum starter), and turns the lamps that are seen, so that what is sampled stays as in the
+ * file, and changes the kind of rough metals. Only rectangles, lights of two triangles, are turned; once. Before the hierarchy is built. */
+void starter_apply(struct scene *s, unsigned bits);
+
+/* The point of a rectangle that stands for p of the turned one: by 90 degrees about its centre, in its plane. */
+vec3 starter_turn(const struct scene *s, const struct light *l, vec3 p);
+
+#endif

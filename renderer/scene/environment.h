@@ -1,0 +1,69 @@
+/* Light from infinitely far away, of every direction: a constant, or an image in latitude and
+ * longitude. The image lies as in the assignment: theta = acos(y) from the top row to the bottom
+ * row, phi = atan2(-z, x) + pi from the left column to the right one; so -X is the left and right
+ * edge, +Z a quarter from the left, +X the middle, -Z a quarter from the right.
+ *
+ * Radiance is interpolated between the centres of texels, around the circle of longitude and
+ * constant beyond the centres of the first and last row, so that a coarse map shows no squares to a
+ * camera or in a mirror. Directions are chosen among the cells that the centres span, by the mean
+ * luminance of a cell's corners times its solid angle, and uniformly in solid angle within the
+ * cell. That density is exact, and positive wherever there is light; it is proportional to
+ * luminance up to what luminance varies within a cell (a factor of 4 at most). */
+#ifndef ASSAY_ENVIRONMENT_H
+#define ASSAY_ENVIRONMENT_H
+
+#include "renderer/base/err.h"
+#include "renderer/image/image.h"
+#include "renderer/math/vec.h"
+
+struct environment; /* opaque; const once made */
+
+enum environment_kind { ENVIRONMENT_CONSTANT, ENVIRONMENT_UPPER_HALF, ENVIRONMENT_IMAGE };
+
+/* What one is made of, for exporters. */
+struct environment_parts {
+    enum environment_kind kind;
+    rgb radiance; /* not image */
+    uint32_t width, height;
+    const rgb *texel; /* image: width x height by rows from the top; the environment's own */
+};
+
+/* The same from everywhere. All four of these return NULL on failure, and the caller frees. */
+struct environment *environment_constant(rgb radiance, struct err *e)
+    __attribute__((warn_unused_result));
+/* The assignment's ambient light: constant from the half space y > 0, nothing from below, and
+ * hidden. */
+struct environment *environment_upper_half(rgb radiance, struct err *e)
+    __attribute__((warn_unused_result));
+/* Channels R, G and B of an image. `where` starts the error line. Fails if they are not there, on a
+ * texel that is negative or not finite (which it names), and if all are black. */
+struct environment *environment_from_image(const struct image *im, const char *where, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same of an .exr or .hdr file, whose numbers are radiance. Other kinds of files are refused:
+ * their numbers are not linear. */
+struct environment *environment_read(const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+void environment_free(struct environment *env);
+
+/* Radiance that arrives from direction w (unit). */
+rgb environment_radiance(const struct environment *env, vec3 w);
+
+struct environment_sample {
+    vec3 wi;
+    rgb radiance;
+    float pdf_w;
+};
+
+/* u in [0,1)^4. */
+struct environment_sample environment_sample_direction(const struct environment *env,
+                                                       const float u[4]);
+/* Per steradian, for unit w. */
+float environment_pdf_w(const struct environment *env, vec3 w);
+
+/* Lights rough surfaces only: neither the camera nor a mirror sees it. */
+bool environment_is_hidden(const struct environment *env);
+struct environment_parts environment_parts(const struct environment *env);
+/* Luminance summed over directions, W m^-2: of an image, as the mean over each cell's corners. */
+double environment_total(const struct environment *env);
+
+#endif

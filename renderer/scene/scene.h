@@ -1,0 +1,164 @@
+/* A scene as plain data, in world space: right-handed, Y up, lengths as in the file times its unit,
+ * radiance in W sr^-1 m^-2 (linear Rec. 709). Filled by collada_load(); const for every thread
+ * afterwards. Arrays belong to the scene and go with scene_free().
+ *
+ * Primitives are numbered: 0 .. num_triangles-1 are triangles, then come the spheres. */
+#ifndef ASSAY_SCENE_H
+#define ASSAY_SCENE_H
+
+#include "renderer/base/err.h"
+#include "renderer/shading/microfacet.h"
+#include "renderer/math/vec.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Whose conventions a file follows (renderer/DIALECT.md). */
+enum dialect {
+    DIALECT_AUTO,    /* as an option only: CGL if the file has a profile="CGL" technique */
+    DIALECT_COLLADA, /* the file is taken at its word */
+    DIALECT_CGL      /* the CS184 assignment: camera re-placed, -r crops, lights without falloff */
+};
+
+/* Coordinates beyond this, which would overflow float32 when squared, are refused in every file. */
+#define FARTHEST 1e18
+
+/* Relative index of refraction: 1/MAX_IOR to MAX_IOR. */
+#define MAX_IOR 100.0f
+
+enum material_kind {
+    MATERIAL_DIFFUSE,
+    MATERIAL_MIRROR,
+    MATERIAL_REFRACTION, /* only the refracted ray; nothing under total reflection */
+    MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
+    MATERIAL_MICROFACET  /* rough conductor */
+};
+
+/* Emission and reflection are independent: an emitter may reflect too. */
+struct material {
+    char name[64];
+    enum material_kind kind;
+    rgb reflectance;   /* diffuse: albedo in [0,1]; mirror, glass: factor of the mirror ray */
+    rgb transmittance; /* refraction, glass: factor of the refracted ray */
+    float ior;         /* refraction, glass: of the side that the normal points away from,
+                                 relative to the side it points to; above 1 for glass in air */
+    bool schlick;      /* glass: Schlick's approximation, as the assignment has it */
+    enum microfacet_kind microfacet;
+    float alpha;              /* microfacet: roughness, root mean square slope times sqrt(2) */
+    bool separable;           /* microfacet: shadowing and masking independent */
+    bool conductor;           /* microfacet: Fresnel by eta and k; else reflectance, at any angle */
+    rgb eta, k;               /* microfacet: complex index of refraction against air */
+    rgb radiance;             /* emitted radiance; zero for most */
+    bool radiance_both_sides; /* else only from the side the geometric normal points to */
+};
+
+/* normal_out: +1, the geometric normal points away from the centre; -1, towards it (an interior).
+ */
+struct sphere {
+    vec3 centre;
+    float radius;
+    float normal_out;
+};
+
+enum light_kind {
+    LIGHT_POINT, /* radiant intensity value / (att[0] + att[1] d + att[2] d^2); att = {0,0,1} is
+                    physical and value is then W sr^-1 */
+    LIGHT_SPOT,  /* the same, times cos(angle to axis)^exponent; 0 where cos <= cos_cutoff */
+    LIGHT_DIRECTIONAL, /* value: irradiance on a plane facing it, W m^-2 */
+    LIGHT_TRIANGLES,   /* emissive triangles, all of one object */
+    LIGHT_SPHERE,      /* one emissive sphere */
+    LIGHT_ENVIRONMENT  /* the scene's environment */
+};
+
+struct environment;
+
+struct light {
+    enum light_kind kind;
+    rgb value;                  /* point, spot, directional */
+    vec3 position;              /* point, spot */
+    vec3 axis;                  /* spot: unit, the direction it shines in */
+    float cos_cutoff, exponent; /* spot: 0 <= cos_cutoff < 1, exponent >= 0 */
+    vec3 to_light;              /* directional: unit, from the scene towards the light */
+    float attenuation[3];
+    uint32_t first; /* triangles: first triangle; sphere: index of the sphere */
+    uint32_t count; /* triangles: they are contiguous, first .. first+count-1 */
+    float area;     /* triangles, sphere: total, one side */
+};
+
+/* One named node instance of the file; the unit of object-id pictures and of the exporters. */
+struct object {
+    char name[64];
+    uint32_t first_triangle, num_triangles;
+    uint32_t first_sphere, num_spheres;
+    uint32_t material;
+};
+
+/* The camera as the file has it, after transforms; camera_init() makes the picture's camera of it.
+ * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles
+ * are full angles in radians; 0 where the file is silent. In the CGL dialect all fields are filled
+ * even if not present (by the assignment's defaults), backward is the assignment's direction from
+ * the scene to the eye, and right and up follow from it and world +Y. */
+struct scene_camera {
+    bool present;
+    vec3 right, up, backward, eye;
+    float hfov, vfov, aspect;
+    float near, far;
+};
+
+struct scene {
+    enum dialect dialect; /* COLLADA or CGL, never AUTO */
+    uint32_t num_triangles, num_spheres, num_materials, num_lights, num_objects;
+    vec3 *position; /* 3 per triangle; counter-clockwise seen from the front */
+    vec3 *normal;   /* 3 per triangle, unit shading normals (geometric where the file has none);
+                       the sum of the three is on the front side */
+    uint32_t *tri_material; /* per triangle */
+    uint32_t *tri_object;
+    int32_t *tri_light; /* per triangle: index into lights, -1 if it does not emit */
+    struct sphere *spheres;
+    uint32_t *sphere_material, *sphere_object;
+    int32_t *sphere_light;
+    struct material *materials;
+    struct light *lights;
+    struct object *objects;
+    struct environment *environment; /* NULL if there is none */
+    int32_t environment_light;       /* index into lights, -1 if there is none */
+    struct scene_camera camera;
+    vec3 bounds_min, bounds_max; /* of all primitives */
+    /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
+     * lights, with the meshes that gave way to them; else the bounds. */
+    vec3 frame_min, frame_max;
+    unsigned num_degenerate;   /* triangles without area that were dropped at loading */
+    unsigned num_zero_normals; /* corners whose normal in the file had no length; they got the
+                                  triangle's own */
+    unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
+    unsigned starter;          /* cs184_deviations.h; 0: nothing is done wrong */
+    char note[256];            /* what the dialect merged, one line for the user; else empty */
+};
+
+/* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
+void scene_free(struct scene *s);
+
+/* Completes a scene whose triangles, spheres, materials, objects, camera, delta lights and
+ * environment (with its light) are in place: drops nothing, appends one area light for the
+ * triangles and one for each sphere of each emissive object (in object order), allocates and fills
+ * tri_light and sphere_light, fills areas and bounds. `lights` must come from malloc() or be NULL.
+ * Fails on an index out of range, objects that are not contiguous, a value that is not finite, a
+ * normal not of unit length, a negative reflectance or radiance, a reflectance above 1, or a scene
+ * without primitives; `where` starts the line. */
+bool scene_finish(struct scene *s, const char *where, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns
+ * it from then on; on failure (there is one already; out of memory) the caller still does. */
+bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same of a file (environment_read()); each failure is a line with its path. */
+bool scene_read_environment(struct scene *s, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+static inline uint32_t scene_num_primitives(const struct scene *s)
+{
+    return s->num_triangles + s->num_spheres;
+}
+
+#endif

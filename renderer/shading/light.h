@@ -1,0 +1,73 @@
+/* Choosing a light, sampling it from a point, and the density of doing so. Areas are sampled uniformly (pdf_a
+ * = 1/area, turned into pdf_w = pdf_a d^2 / cos_l at the receiver [Veach97 8.2]); a sphere seen
+ * from outside, uniformly over the cone it subtends [Shirley96]. */
+#ifndef ASSAY_LIGHT_H
+#define ASSAY_LIGHT_H
+
+#include "renderer/math/ray_batch.h"
+#include "renderer/scene/scene.h"
+#include "renderer/scene/shape.h"
+
+/* With more lights than this, a sample goes to one of them chosen by power, not to each. */
+enum { MANY_LIGHTS = 16 };
+
+struct light_table; /* per-scene tables for choosing lights and triangles; opaque */
+
+/* NULL on failure (out of memory, more lights than DISCRETE_MOST). Refers to the scene. */
+struct light_table *light_table_build(const struct scene *s, struct err *e)
+    __attribute__((warn_unused_result));
+void light_table_free(struct light_table *t);
+
+/* A light and the probability with which it was chosen; 0: none has any power. */
+struct light_choice {
+    uint32_t light;
+    float probability;
+};
+
+/* One light, in proportion to its power: the luminance of the flux that it sends into the scene,
+ * in watts, with R the radius of the ball around the scene's bounding box.
+ *   point         4 pi value / (att[0] + att[1] R + att[2] R^2) R^2, which is 4 pi value if physical
+ *   spot          the same with 2 pi (1 - cos_cutoff^(exponent+1)) / (exponent+1) for 4 pi
+ *   directional   pi R^2 value
+ *   triangles, sphere   pi radiance area, twice if both sides emit
+ *   environment   pi R^2 times its radiance summed over directions
+ * only_delta: among the delta lights alone. */
+struct light_choice light_choose(const struct light_table *t, bool only_delta, float u);
+/* The probability that light_choose(t, false, ..) has for light l. */
+float light_choice_probability(const struct light_table *t, uint32_t l);
+/* By triangle: the area of its light up to and including it. */
+const float *light_table_areas(const struct light_table *t);
+/* How many are no delta lights. */
+uint32_t light_count_areas(const struct light_table *t);
+
+struct light_sample {
+    vec3 wi;         /* unit, from the point to the light */
+    float distance;  /* to the sampled place; INFINITY for directional lights and the environment */
+    rgb radiance;    /* arriving along wi; for delta lights irradiance on a plane facing wi */
+    uint32_t sphere; /* primitive number of the light if it is a sphere seen from outside, which a
+                        shadow ray then has to ignore; else NO_HIT */
+    float pdf_w;     /* per steradian; 0: this sample brings no light */
+    bool delta;      /* pdf_w is then 1 and no BSDF sample can find the light */
+};
+
+/* One sample of light number l as seen from p. u in [0,1)^4. */
+struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
+                                           const float u[4]);
+
+/* The density with which light l (an area light) would have sampled the place `hit`, found from p
+ * along unit wi at distance d. The environment has environment_pdf_w(). */
+float light_pdf_w(const struct light_table *t, uint32_t l, vec3 p, vec3 wi, float d,
+                  const struct surface *hit);
+
+static inline bool light_is_delta(const struct light *l)
+{
+    return l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT || l->kind == LIGHT_DIRECTIONAL;
+}
+
+/* Emitted radiance towards w (any length) of material m at a surface with geometric normal ng. */
+static inline rgb emitted_radiance(const struct material *m, vec3 ng, vec3 w)
+{
+    return m->radiance_both_sides || dot(ng, w) > 0 ? m->radiance : grey(0);
+}
+
+#endif

@@ -1,0 +1,55 @@
+/* The scene once more, as records that eight lanes fetch in rows of eight words. */
+#ifndef ASSAY_SCENE_SIMD_H
+#define ASSAY_SCENE_SIMD_H
+
+#include "light.h"
+
+/* Words of a primitive's record. A triangle has RECORD_P .. RECORD_N: first corner, the two edges from
+ * it, geometric normal, three shading normals; a sphere RECORD_CENTRE .. RECORD_OUT. */
+enum {
+    RECORD_P = 0,
+    RECORD_E1 = 3,
+    RECORD_E2 = 6,
+    RECORD_NG = 9,
+    RECORD_N = 12,
+    RECORD_CENTRE = 0,
+    RECORD_RADIUS = 3,
+    RECORD_OUT = 4,
+    RECORD_EPS = 21,
+    RECORD_MATERIAL = 22, /* number, as an integer's bits */
+    RECORD_LIGHT = 23,    /* as well; -1: none */
+    RECORD_WORDS = 24
+};
+
+/* Words of a material's record. */
+enum {
+    MATERIAL_REFLECTANCE = 0,
+    MATERIAL_IOR = 3,
+    MATERIAL_TRANSMITTANCE = 4,
+    MATERIAL_BITS = 7, /* 1 << enum material_kind, and the following, as an integer's bits */
+    MATERIAL_ALPHA = 8,
+    MATERIAL_ETA = 9,
+    MATERIAL_K = 12,
+    MATERIAL_WORDS = 16
+};
+enum {
+    MATERIAL_IS_BLACK = 1 << 8,
+    MATERIAL_IS_SCHLICK = 1 << 9,
+    MATERIAL_IS_SEPARABLE = 1 << 10,
+    MATERIAL_IS_CONDUCTOR = 1 << 11,
+    MATERIAL_IS_BECKMANN = 1 << 12,
+    MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_MICROFACET /* no delta lobe */
+};
+
+struct lanes_scene {
+    float *primitive; /* RECORD_WORDS of each; triangles, then spheres */
+    float *material;  /* MATERIAL_WORDS of each */
+    bool only_diffuse, has_spheres;
+};
+
+/* NULL if out of memory. Does not refer to the scene. */
+struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
+    __attribute__((warn_unused_result));
+void lanes_scene_free(struct lanes_scene *l);
+
+#endif

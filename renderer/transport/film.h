@@ -1,0 +1,62 @@
+/* What a render accumulates, pixel by pixel, and can be stopped and gone on with: the moments, the sums
+ * of the adaptive rule and of the error estimate, and means over what the camera rays met first. */
+#ifndef ASSAY_FILM_H
+#define ASSAY_FILM_H
+
+#include "integrator.h"
+#include "renderer/image/moments.h"
+
+/* Sums over the samples of one pixel. */
+struct first_hit_sums {
+    double hits;      /* samples whose camera ray met something */
+    double depth;     /* over those */
+    double normal[3]; /* over all samples, as albedo; a miss adds nothing */
+    double albedo[3];
+    double object; /* 1 + object number of the pixel's first sample, 0 where it missed */
+};
+
+struct film {
+    struct moments m;
+    /* Illuminance, the assignment's word for luminance: sums of it and of its square. */
+    double *s1, *s2;
+    struct first_hit_sums *first; /* NULL: not kept */
+    /* How many samples each pixel gets, counted from sample number 0, as a pilot decided; NULL: there
+     * was no pilot. */
+    uint32_t *target;
+    /* Every pixel has seen this many sample numbers: it took them all, or had stopped before. */
+    uint32_t num_samples;
+};
+
+/* All zero, without target. */
+bool film_alloc(struct film *f, int width, int height, bool first_hits, struct err *e)
+    __attribute__((warn_unused_result));
+void film_free(struct film *f);
+
+/* The unit of its moments: samples of any but the independent sampler are stratified. */
+void film_set_sampler(struct film *f, enum sampler_kind kind);
+/* Adds lane i of a batch to a pixel. */
+void film_add(struct film *f, size_t pixel, const struct batch *b, int i);
+
+/* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of these pixels, by moments_merge(). Both are
+ * films of the same size, with the same layers; targets and film.num_samples are not looked at. */
+bool film_merge(struct film *dst, const struct film *src, size_t first, int num, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Root mean square over the pixels of the standard error of luminance, over the mean luminance of the
+ * picture. INFINITY while a pixel has fewer than two samples or the picture is black. */
+double film_relative_error(const struct film *f);
+
+/* The layers beside the moments, as an image to write with them: variance.R G B (of one sample),
+ * stderr.R G B (of the pixel), depth.Z, depth.hits, normal.X Y Z, albedo.R G B, id.object.
+ * A variance that one sample cannot tell is INFINITY; depth.Z is the distance from the plane through
+ * the eye, along the viewing axis, in scene units, averaged over depth.hits samples, and 1e10 where
+ * there are none, as Blender has it; normals are in world space, their means not of unit length. */
+bool film_layers(const struct film *f, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+enum { NUM_LAYERS = 15 };
+extern const char *const layer_names[NUM_LAYERS];
+/* Fills variance and stderr, the first six of a pixel's layers. */
+void layers_of_moments(const struct moments *m, size_t pixel, float layers[6]);
+
+#endif

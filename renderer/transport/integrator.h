@@ -1,0 +1,132 @@
+/* The light transport estimators, over batches of paths in stages: generate, intersect, shade,
+ * connect, scatter. One path is one sample of its pixel's radiance,
+ * independent of the others if the sampler is. */
+#ifndef ASSAY_INTEGRATOR_H
+#define ASSAY_INTEGRATOR_H
+
+#include "renderer/math/ray_batch.h"
+#include "renderer/bvh/bvh.h"
+#include "renderer/scene/camera.h"
+#include "renderer/base/isa.h"
+#include "renderer/shading/light.h"
+#include "renderer/math/sampler.h"
+
+enum integrator_kind {
+    INTEGRATE_PATHS,
+    INTEGRATE_NORMALS /* (n + 1)/2 of the shading normal first seen; black where nothing is */
+};
+
+/* How light that arrives directly from an emitter is found at every vertex. All have the same mean;
+ * delta lights are always sampled. */
+enum direct_kind {
+    DIRECT_HEMISPHERE, /* uniform directions, the assignment's -H */
+    DIRECT_LIGHT,      /* points on the lights, directions of the environment */
+    DIRECT_BSDF,       /* only what the path itself runs into */
+    DIRECT_MIS         /* lights and path, power heuristic [Veach97 9.2] */
+};
+
+/* Which lights a vertex samples. All have the same mean. */
+enum many_lights {
+    LIGHTS_AUTO, /* all up to MANY_LIGHTS of them, else one */
+    LIGHTS_ALL,  /* light_samples of each; one of each delta light */
+    LIGHTS_ONE   /* light_samples times one light, chosen by power */
+};
+
+/* How paths end before max_bounces, without changing a mean [Arvo90]. */
+enum roulette_kind {
+    ROULETTE_OFF,
+    ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the largest component of the
+                            throughput, with nets four times that, 1 at most */
+    ROULETTE_FIXED       /* from the second vertex on: survive with the same probability each time,
+                            as in the assignment */
+};
+
+struct integrator_options {
+    enum integrator_kind kind;
+    enum direct_kind direct;
+    int max_bounces;   /* 0: emission seen directly, 1: + direct light, ... */
+    int first_bounce;  /* light with fewer bounces is left out */
+    int light_samples; /* per area light and vertex; hemisphere: directions per area light, of which
+                          no more than MANY_LIGHTS count */
+    enum many_lights many_lights;
+    enum roulette_kind roulette;
+    float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
+    struct sampler sampler;
+    bool first_hits; /* fill the batch's `first`; changes nothing else */
+    enum isa isa;    /* of the stages; ISA_SCALAR: none. Every choice gives the same bits */
+};
+
+/* ROULETTE_THROUGHPUT: the chance to go on, over the largest component of the throughput. With nets a coin at every
+ * vertex undoes what they gain: fewer coins are worth longer paths. */
+static inline float roulette_factor(const struct integrator_options *o)
+{
+    return o->sampler.kind == SAMPLER_INDEPENDENT ? 1 : 4;
+}
+
+struct integrator {
+    struct integrator_options opt;
+    const struct scene *scene;
+    const struct camera *camera;
+    const struct bvh *bvh;
+    const struct light_table *lights;
+    /* The stages on eight paths at a time, NULL: one by one; and the scene for them, NULL: not needed. */
+    const struct lanes_kernel *lanes;
+    const struct lanes_scene *lanes_scene;
+};
+
+/* The working memory of one thread. In: lanes 0 .. num_lanes-1 of pixel (number in the full
+ * picture, row 0 at the top) and sample. Out: radiance and, if asked for, first. */
+struct batch {
+    uint32_t pixel[BATCH_ROOM], sample[BATCH_ROOM];
+    struct rgbs radiance;
+    struct first_hits first;
+    struct rgbs throughput;
+    float pdf_w[BATCH_ROOM]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
+                                 whose emitters nothing else finds */
+    float eta2[BATCH_ROOM];  /* what the throughput is divided by for being inside glass */
+    struct rays ray, shadow;
+    struct hits hit, shadow_hit;
+    struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
+    bool occluded[BATCH_ROOM];
+    struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
+    float eps[BATCH_ROOM];
+    bool front[BATCH_ROOM];
+    uint32_t material[BATCH_ROOM];
+    uint16_t active[BATCH_ROOM], shadow_lane[BATCH_ROOM];
+    struct light_choice choice[BATCH_ROOM];
+    float choice_probability[BATCH_ROOM];
+    uint16_t diffuse[BATCH_ROOM]; /* those of active that light sampling serves */
+    /* Of the stages on eight paths, which keep the paths that go on side by side: whose path a lane
+     * is, and what it has gathered. */
+    uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
+    float numbers[4][BATCH_ROOM]; /* random ones, eight paths and one purpose a row */
+    struct rgbs gathered, reflectance;
+    int32_t bits[BATCH_ROOM];        /* of the material's record */
+    uint8_t goes_on[BATCH_ROOM / 8]; /* by eight lanes, a bit each */
+    uint8_t shadow_bits[BATCH_ROOM / 8];
+    uint16_t shadow_first[BATCH_ROOM / 8];
+    struct bvh_stats stats;
+};
+
+void integrate(const struct integrator *it, struct batch *b, int num_lanes);
+
+/* One light, chosen by power, is sampled at a vertex and not each of them. */
+static inline bool chooses_light(const struct integrator *it)
+{
+    switch (it->opt.many_lights) {
+    case LIGHTS_AUTO: break;
+    case LIGHTS_ALL: return false;
+    case LIGHTS_ONE: return true;
+    }
+    return it->scene->num_lights > MANY_LIGHTS;
+}
+
+/* Fills it->lanes and it->lanes_scene as it->opt.isa asks, for the scene in *it; false if out of
+ * memory or if the machine lacks the instructions. integrator_free() afterwards, in either case. */
+bool integrator_prepare(struct integrator *it, struct err *e) __attribute__((warn_unused_result));
+void integrator_free(struct integrator *it);
+
+extern const char *const integrator_kind_names[]; /* end with NULL */
+extern const char *const direct_kind_names[];
+
+#endif

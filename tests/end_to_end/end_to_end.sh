@@ -1,0 +1,699 @@
+#!/bin/bash
+# The programs as a user meets them: exit codes, messages, files. Prints "ok NAME", "not ok NAME", or "skip NAME" with
+# the reason where this machine cannot do it.
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/end_to_end.sh BUILD}")
+pathtracer=$build/pathtracer assay=$build/assay
+# Where bad input is fed in, the sanitized builds run.
+san_pathtracer=$build/san/pathtracer san_assay=$build/san/assay
+# Whose objects mutants are made of, and what is installed: tests/end_to_end/coverage.sh counts lines in programs of another compiler.
+plain=$(realpath "${PLAIN_BUILD:-$build}")
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+
+ok() { echo "ok $1"; }
+not_ok() {
+    echo "not ok $1: $2"
+    failures=$((failures + 1))
+}
+
+# expect NAME STATUS PATTERN COMMAND...: exit status, and a pattern in what it printed. A status of 3
+# has to come with exactly one line on stderr.
+expect() {
+    local name=$1 status=$2 pattern=$3
+    shift 3
+    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+    local got=$?
+    if [ $got -ne "$status" ]; then
+        not_ok "$name" "exit status $got instead of $status: $(head -c 2000 "$tmp/err")"
+    elif ! cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern"; then
+        not_ok "$name" "no '$pattern' in: $(head -c 2000 "$tmp/out" "$tmp/err")"
+    elif [ "$status" -eq 3 ] && [ "$(wc -l <"$tmp/err")" -ne 1 ]; then
+        not_ok "$name" "$(wc -l <"$tmp/err") lines on stderr: $(head -c 2000 "$tmp/err")"
+    else
+        ok "$name"
+    fi
+}
+
+# part SCRIPT ARGUMENT...: one that prints such lines too. To have looked at nothing, or not to the end, is a failure.
+part() {
+    local wrong status
+    "$@" >"$tmp/part"
+    status=$?
+    cat "$tmp/part"
+    wrong=$(grep -c '^not ok' "$tmp/part")
+    failures=$((failures + wrong))
+    grep -q '^ok ' "$tmp/part" || not_ok "$1" "nothing was looked at"
+    [ $status -eq 0 ] || [ "$wrong" -gt 0 ] || not_ok "$1" "ended with status $status"
+}
+
+scene=reference/scenes/41_cornell.dae
+small="-r 32 32 -s 16 -t 2 -q"
+
+# The command line of pathtracer.
+for option in --spp --light-samples --max-bounces --hemisphere --adaptive --resolution --cell --seed \
+    --fresnel; do
+    expect "help names $option" 0 "$option" "$san_pathtracer" --help
+done
+expect "version" 0 "pathtracer 0" "$san_pathtracer" --version
+expect "no scene" 3 "no scene" "$san_pathtracer" -f "$tmp/x.exr"
+expect "no output" 3 "no output" "$san_pathtracer" $scene
+expect "unknown option" 3 "unknown option '--sppp'" "$san_pathtracer" --sppp 4 -f "$tmp/x.exr" $scene
+expect "missing argument" 3 "needs W H" "$san_pathtracer" $scene -r 4
+expect "not a number" 3 "'1x'" "$san_pathtracer" -s 1x -f "$tmp/x.exr" $scene
+expect "negative samples" 3 "not a whole number" "$san_pathtracer" -s -1 -f "$tmp/x.exr" $scene
+expect "two scenes" 3 "more than one scene" "$san_pathtracer" -f "$tmp/x.exr" $scene $scene
+expect "unknown file type" 3 "neither" "$san_pathtracer" -f "$tmp/x.bmp" $scene
+expect "cell outside" 3 "reaches out" "$san_pathtracer" -r 8 8 -p 4 4 5 1 -f "$tmp/x.exr" $scene
+expect "roulette" 3 "neither on, off, nor" "$san_pathtracer" --roulette 1.5 -f "$tmp/x.exr" $scene
+expect "unknown Fresnel" 3 "fresnel" "$san_pathtracer" --fresnel guess -f "$tmp/x.exr" $scene
+expect "environment map that is not there" 3 "nosky.exr: cannot read" \
+    "$san_pathtracer" $small -e nosky.exr -f "$tmp/x.exr" $scene
+expect "environment map of 8 bits" 3 "must be an .exr or .hdr" \
+    "$san_pathtracer" $small -e sky.png -f "$tmp/x.exr" $scene
+expect "adaptive sobol" 3 "independent" \
+    "$san_pathtracer" -a 8 0.1 --sampler sobol -f "$tmp/x.exr" $scene
+expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
+expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
+expect "unwritable output" 3 "/nonexistent/x.exr" \
+    "$san_pathtracer" $small -f /nonexistent/x.exr $scene
+for bad in tests/bad/*.dae; do
+    case $bad in
+    */00_valid.dae) continue ;; # what the others are faults of
+    */material_cgl_in_collada.dae) dialect=collada ;;
+    */light_spot_of_the_assignment.dae) dialect=cgl ;;
+    *) dialect=auto ;;
+    esac
+    expect "bad scene $(basename "$bad")" 3 "$bad" "$san_pathtracer" $small --dialect $dialect -f "$tmp/bad.exr" "$bad"
+done
+if [ -n "$(ls "$tmp" | grep -v '^out$\|^err$')" ]; then
+    not_ok "failures leave no files" "$(ls "$tmp")"
+else
+    ok "failures leave no files"
+fi
+
+# The known bugs of tests/mutants still fit the renderer. (`make mutants` builds and finds all of them.)
+stale=0
+for patch in tests/mutants/*.patch; do
+    patch --dry-run --quiet --fuzz=0 -p1 <"$patch" >/dev/null 2>&1 || { stale=1; not_ok "mutant $(basename "$patch")" "does not apply"; }
+    sed -n 1p "$patch" | grep -q '^Bug: .' && sed -n 2p "$patch" | grep -q '^Where: .' ||
+        { stale=1; not_ok "mutant $(basename "$patch")" "does not begin with the lines 'Bug: ' and 'Where: '"; }
+done
+[ $stale -eq 0 ] && ok "mutants apply and say what they are"
+# Three of them are built and found, and the renderer as it is passes the same scenes.
+if tests/mutants/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "three mutants are caught"; else
+    not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
+fi
+rm -f "$tmp/mutants.out"
+
+# Pictures.
+expect "render" 0 "mean radiance" \
+    "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
+expect "environment map" 0 "mean radiance" \
+    "$san_pathtracer" $small -e "$tmp/a.exr" -f "$tmp/sky.png" $scene
+"$pathtracer" $small -t 1 --seed 1 -f "$tmp/a1.png" $scene >/dev/null
+"$pathtracer" $small -t 2 --seed 1 -f "$tmp/a2.png" $scene >/dev/null
+if cmp -s "$tmp/a1.png" "$tmp/a2.png"; then ok "1 and 2 threads, same bytes"; else
+    not_ok "1 and 2 threads, same bytes" "PNG files differ"
+fi
+"$pathtracer" $small -t 2 --seed 2 -f "$tmp/a3.png" $scene >/dev/null
+if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
+    not_ok "another seed, another picture" "PNG files are the same"
+else ok "another seed, another picture"; fi
+
+# What tests/support/asan_options.c turns off is on without it: else a search for leaks now and then dies of where a variable happens to lie.
+sky=reference/scenes/46_sky.exr
+late_variables() { # ASAN_OPTIONS: those of libraries loaded late that the sanitizer took note of
+    ASAN_OPTIONS=$1 "$san_assay" compare $sky $sky 2>&1 | grep -c '__tls_get_addr: 0x'
+}
+if [ "$(late_variables verbosity=2)" -eq 0 ] && [ "$(late_variables verbosity=2:intercept_tls_get_addr=1)" -gt 0 ]; then
+    ok "the search for leaks keeps to what it knows"
+else not_ok "the search for leaks keeps to what it knows" "looked at $(late_variables verbosity=2) variables it should not, $(late_variables verbosity=2:intercept_tls_get_addr=1) that it should"; fi
+
+# Stopping and going on. --keep-state leaves every sum to the last bit, so equal states are equal renders.
+box="$pathtracer -q -r 48 32 --aov $scene"
+$box -s 40 --keep-state -f "$tmp/whole.exr" >/dev/null || not_ok "--keep-state" "failed"
+$box -s 17 --keep-state -f "$tmp/part.exr" >/dev/null || not_ok "--keep-state" "failed"
+expect "resume" 0 "mean radiance" "$san_pathtracer" -q -r 48 32 --aov $scene -s 40 --keep-state \
+    -t 3 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+if cmp -s "$tmp/whole.exr.state" "$tmp/part.exr.state"; then ok "resumed, same bytes"; else
+    not_ok "resumed, same bytes" "states differ"
+fi
+expect "resume: other seed" 3 "'seed 1' there, 'seed 2' here" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene --seed 2 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+expect "resume: fewer samples" 3 "has 40 samples" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene -s 8 --resume "$tmp/part.exr" -f "$tmp/part.exr"
+expect "resume: no state" 3 "nothing.exr.state: cannot read" \
+    "$san_pathtracer" -q -r 48 32 $scene --resume "$tmp/nothing.exr" -f "$tmp/part.exr"
+head -c 4000 "$tmp/whole.exr.state" >"$tmp/cut.exr.state"
+expect "resume: damaged state" 3 "damaged" \
+    "$san_pathtracer" -q -r 48 32 --aov $scene -s 40 --resume "$tmp/cut.exr" -f "$tmp/part.exr"
+
+# interrupt SIGNAL STATUS: a render without end is interrupted, its moments are valid, and it can be gone
+# on with for two samples more than it has.
+interrupt() {
+    rm -f "$tmp/long.exr" "$tmp/long.exr.state"
+    expect "$1 ends with $2 and says how to resume" "$2" "pathtracer --resume $tmp/long.exr " \
+        timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
+    local done
+    done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
+    expect "$1: the picture has moments, and is not judged by itself" 3 "the same observations" \
+        "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
+    $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
+        -f "$tmp/long.exr" >/dev/null
+    $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state -f "$tmp/straight.exr" >/dev/null
+    if cmp -s "$tmp/long.exr.state" "$tmp/straight.exr.state"; then ok "$1, resumed, same bytes"; else
+        not_ok "$1, resumed, same bytes" "states differ after $done samples"
+    fi
+}
+interrupt INT 130
+interrupt TERM 143
+
+expect "--time" 0 "stopped by --time" "$pathtracer" -r 32 32 --time 0.3s $scene -f "$tmp/x.exr"
+expect "--error" 0 "stopped by --error" "$pathtracer" -r 32 32 --error 40% $scene -f "$tmp/x.exr"
+if ls "$tmp"/x.exr.state >/dev/null 2>&1; then not_ok "no state is left" "it is"; else ok "no state is left"; fi
+$pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" >/dev/null &
+for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
+kill -9 $!
+wait $! 2>/dev/null
+expect "--write-every: the picture of a killed render has moments" 3 "the same observations" \
+    "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
+if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
+    not_ok "--write-every: its state" "none"
+fi
+expect "--time: not a time" 3 "5d" "$san_pathtracer" --time 5d $scene -f "$tmp/x.exr"
+expect "--samples: not a range" 3 "not a range" "$san_pathtracer" --samples 5 $scene -f "$tmp/x.exr"
+expect "--samples: empty" 3 "no sample" "$san_pathtracer" --samples 5:5 $scene -f "$tmp/x.exr"
+expect "two adaptive modes" 3 "exclude" \
+    "$san_pathtracer" -a 32 0.1 --adaptive-unbiased 0.1 $scene -f "$tmp/x.exr"
+expect "adaptive pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 -a 16 0.2 $scene \
+    -f "$tmp/rule.exr" -f "$tmp/rule.png" --heatmap "$tmp/heat.png"
+expect "a pilot's pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 --pilot 16 \
+    --adaptive-unbiased 0.2 $scene -f "$tmp/pilot.png"
+for file in rule_rate.png heat.png pilot_rate.png; do
+    if [ -s "$tmp/$file" ]; then ok "there is $file"; else not_ok "there is $file" "no"; fi
+done
+expect "--list" 0 "integrators: path normals" "$san_pathtracer" --list
+expect "--version names libxml2" 0 "libxml2 [0-9]" "$san_pathtracer" --version
+for option in $("$pathtracer" --help | grep -o '^ *\(-., \| \)*--[a-z-]*' | grep -o -- '--[a-z-]*'); do
+    if grep -q -- "\\\\-\\\\-$(sed 's/-/\\\\-/g' <<<"${option#--}")" renderer/pathtracer/pathtracer.1; then
+        ok "the man page has $option"
+    else not_ok "the man page has $option" "no"; fi
+done
+
+# merge. Layers: names that OpenImageIO, a reader of its own, finds.
+$box --samples 0:10 -f "$tmp/s0.exr" >/dev/null
+$box --samples 10:40 -f "$tmp/s1.exr" >/dev/null
+$box -s 40 -p 0 0 20 32 -f "$tmp/c0.exr" >/dev/null
+$box -s 40 -p 20 0 28 32 -f "$tmp/c1.exr" >/dev/null
+$box --seed 2 --samples 10:40 -f "$tmp/s2.exr" >/dev/null
+expect "merge samples" 0 "ms.exr" "$san_assay" merge "$tmp/ms.exr" "$tmp/s1.exr" "$tmp/s0.exr"
+expect "merge cells" 0 "mc.exr" "$san_assay" merge "$tmp/mc.exr" "$tmp/c1.exr" "$tmp/c0.exr"
+if command -v oiiotool >/dev/null; then
+    expect "merged cells, same bits" 0 "PASS" \
+        oiiotool --fail 0 --hardfail 0 --diff "$tmp/mc.exr" "$tmp/whole.exr"
+    expect "merged samples, same mean" 0 "PASS" oiiotool --fail 4e-6 --hardfail 4e-6 \
+        "$tmp/ms.exr" --ch R,G,B "$tmp/whole.exr" --ch R,G,B --diff
+    expect "layers" 0 "albedo.R.*depth.Z.*id.object.*normal.X.*stderr.R.*variance.B" \
+        oiiotool --info -v "$tmp/whole.exr"
+else
+    ok "oiiotool is not here: bits of merged pictures are not compared"
+fi
+expect "merge: the same samples twice" 3 "both have samples" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/s0.exr" "$tmp/s1.exr" "$tmp/whole.exr"
+expect "merge: another seed" 3 "different seed" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/s0.exr" "$tmp/s2.exr"
+expect "merge: cells overlap" 3 "overlap" \
+    "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr" "$tmp/whole.exr"
+$box -s 40 -p 40 0 8 32 -f "$tmp/c2.exr" >/dev/null
+expect "merge: a cell is missing" 3 "open" "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr" "$tmp/c2.exr"
+expect "merge: one share" 3 "two shares" "$san_assay" merge "$tmp/x.exr" "$tmp/c0.exr"
+
+# compare: two seeds of a correct renderer; a render that lacks a bounce; too few samples; no file.
+render() { "$pathtracer" -q -r 64 64 "$@" $scene >/dev/null || not_ok "render $*" "failed"; }
+render -s 256 --seed 3 -f "$tmp/one.exr"
+render -s 256 --seed 4 -f "$tmp/two.exr"
+render -s 256 --seed 5 -m 4 -f "$tmp/shallow.exr"
+render -s 8 --seed 6 -f "$tmp/few.exr"
+expect "compare: equivalent" 0 "^EQUIVALENT" \
+    "$san_assay" compare --margin 0.02 --margin-tile 0.08 "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: different" 1 "^DIFFERENT" \
+    "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
+    "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/few.exr" "$tmp/two.exr"
+expect "compare: missing file" 3 "gone.exr" "$san_assay" compare "$tmp/gone.exr" "$tmp/two.exr"
+expect "compare: a PNG without its curve" 3 "what light is a code" \
+    "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
+expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
+"$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
+expect "compare: samples that are not independent" 3 "only replicates" \
+    "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
+expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
+    --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
+# compare: inputs from elsewhere. Replicates are any float pictures, so moments images do.
+for option in --alpha --margin --margin-tile --margin-variance --again --exchangeable --curve --spp-a --spp-b; do
+    expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
+done
+for k in 1 2 3 4 5; do
+    for set in a b c a2 b2 c2; do
+        mkdir -p "$tmp/runs_$set"
+        case $set in c*) bounces=1 ;; *) bounces=5 ;; esac
+        case $set in a) seed=10 ;; b) seed=20 ;; c) seed=30 ;; a2) seed=40 ;; b2) seed=50 ;; c2) seed=60 ;; esac
+        "$pathtracer" -q -r 32 32 -s 32 -m $bounces --seed $((seed + k)) -f "$tmp/runs_$set/$k.exr" $scene \
+            >/dev/null || not_ok "render runs_$set" "failed"
+    done
+done
+expect "compare: directories" 1 "5 replicates" "$san_assay" compare "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, equal" 2 "could have been missed" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_a" "$tmp/runs_b"
+expect "compare: exchangeable, different" 1 "^DIFFERENT.*p = 0.00794 by 252 labellings" \
+    "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: too few replicates" 2 "7 a side are needed" \
+    "$san_assay" compare --exchangeable "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable in two stages" 1 "^DIFFERENT.*fresh seeds.*p = 0.0079 and 0.004" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b2" \
+    --json "$tmp/perm/results.json" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: exchangeable, the same seeds again" 3 "fresh seeds" \
+    "$san_assay" compare --exchangeable --alpha 1e-4 --again "$tmp/runs_c2" "$tmp/runs_b" "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: results have the notes" 0 "judged by permutation" grep '"notes"' -A 3 "$tmp/perm/results.json"
+expect "report of directories" 0 "index.html" "$san_assay" report "$tmp/perm/results.json"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy.exr"
+cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy2.exr"
+expect "compare: a seed that was ignored" 3 "copy.exr and copy2.exr are the same picture" \
+    "$san_assay" compare "$tmp/runs_a2" "$tmp/runs_b"
+expect "compare: exchangeable files" 3 "one.exr: cannot read" \
+    "$san_assay" compare --exchangeable "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: exchangeable with a margin" 3 "no margin" \
+    "$san_assay" compare --exchangeable --margin 0.1 "$tmp/runs_a" "$tmp/runs_b"
+render -s 256 --seed 7 -m 4 -f "$tmp/shallow2.exr"
+render -s 256 --seed 8 -f "$tmp/two2.exr"
+expect "compare: two stages" 1 "^DIFFERENT.*confirmed" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: two stages, not needed" 0 "were not needed" "$san_assay" compare --alpha 1e-3 \
+    --again "$tmp/shallow2.exr" "$tmp/two2.exr" "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: two stages of the same files" 3 "fresh seeds" "$san_assay" compare --alpha 1e-9 \
+    --again "$tmp/shallow.exr" "$tmp/two2.exr" "$tmp/shallow.exr" "$tmp/two.exr"
+"$pathtracer" -q -r 64 64 -s 256 --seed 3 -f "$tmp/one.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 4 -f "$tmp/two.png" $scene >/dev/null
+"$pathtracer" -q -r 64 64 -s 256 --seed 5 -m 1 -f "$tmp/shallow.png" $scene >/dev/null
+expect "compare: PNG, equal but for what is saturated" 2 "note: saturated: [0-9]* of 4096" \
+    "$san_assay" compare --curve srgb --margin 0.2 --margin-tile 0.8 "$tmp/one.png" "$tmp/two.png"
+expect "compare: PNG, different" 1 "^DIFFERENT" \
+    "$san_assay" compare --curve srgb --json "$tmp/png/results.json" "$tmp/shallow.png" "$tmp/two.png"
+expect "report --github" 0 "^::error title=.*DIFFERENT, expected EQUIVALENT" \
+    env GITHUB_STEP_SUMMARY="$tmp/summary.md" "$san_assay" report --github "$tmp/png/results.json"
+expect "report --github: the summary" 0 "^## Of 1 claims 1 came out wrong" cat "$tmp/summary.md"
+expect "report --github: with another" 3 "no other" "$san_assay" report --github --matrix "$tmp/png/results.json"
+expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
+expect "compare: PNG against moments" 1 "is not used" \
+    "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
+expect "compare: the same PNG" 3 "the same picture" \
+    "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
+expect "compare: a curve for nothing" 3 "neither" \
+    "$san_assay" compare --curve srgb "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: unknown curve" 3 "none of" \
+    "$san_assay" compare --curve film "$tmp/one.png" "$tmp/two.png"
+expect "compare: samples of a file that says them" 3 "says itself" \
+    "$san_assay" compare --spp-a 4 "$tmp/one.exr" "$tmp/two.exr"
+
+expect "report of a comparison" 0 "index.html" "$san_assay" report "$tmp/cmp/results.json"
+mkdir -p "$tmp/history"
+for k in 1 2; do
+    mkdir -p "$tmp/history/$k"
+    sed "s/\"date\": \"2/\"date\": \"$k/" "$tmp/png/results.json" >"$tmp/history/$k/results.json"
+done
+expect "report --history" 0 "^0 of 1 claims moved in the last of 2 runs: .*/history/history.html" \
+    "$san_assay" report --history "$tmp/history/"
+sed -i 's/"difference": -*0/"difference": 9/' "$tmp/history/2/results.json"
+expect "report --history: a move" 1 "^1 of 1 claims moved" "$san_assay" report --history "$tmp/history"
+expect "report --history: nothing there" 3 "no results.json" "$san_assay" report --history "$tmp/runs_a"
+expect "report --history with another option" 3 "alone" "$san_assay" report --history "$tmp/history" --matrix
+expect "compare --report" 1 "^DIFFERENT" "$san_assay" compare --curve srgb --report "$tmp/png/page.html" \
+    "$tmp/shallow.png" "$tmp/two.png"
+expect "compare --report: the page has the notes" 0 "<li>.*rounded\|<li>.*curve" grep -A 3 'class="notes"' "$tmp/png/page.html"
+expect "compare --report: only the page is left" 0 "^index.html page.html results.json results.json.a.exr results.json.b.exr results.json.relative.exr results.json.z.exr $" \
+    sh -c "ls '$tmp/png' | tr '\\n' ' '"
+expect "compare --report: no directory" 3 "one.exr: not a directory" "$san_assay" compare --margin 0.5 -r "$tmp/one.exr/page.html" \
+    "$tmp/one.exr" "$tmp/two.exr"
+expect "unknown verb" 3 "unknown verb" "$san_assay" assay
+expect "report: no file" 3 "none.json" "$san_assay" report none.json
+
+# Convergence. The controls are our own program with a fault: a slope that is not -1/2, a bias, a seed
+# without effect.
+converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16 --alpha 0.01 --slope-margin 0.25"
+expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
+    $converge --margin 0.2 -o "$tmp/conv" 41_cornell
+expect "converge: results have all rungs" 0 "^3$" grep -c '"spp"' "$tmp/conv/results.json"
+expect "converge: the depth ladder is on the page" 0 "Depth ladder" grep -o "<b>Depth ladder" "$tmp/conv/index.html"
+expect "converge: too few samples to tell a bias" 2 "RMS bias.*INCONCLUSIVE" \
+    $converge --margin 0.001 -o "$tmp/conv2" 41_cornell
+expect "converge: against a long run of our own" 0 "pathtracer, 1024 samples" \
+    $converge --margin 0.2 --reference own -o "$tmp/conv3" 41_cornell
+expect "converge: against a closed form" 0 "closed form" \
+    $converge --margin 0.2 -o "$tmp/conv4" 13_square_patch
+faulty() {
+    printf '#!/bin/bash\n%s\n' "$1" >"$tmp/faulty"
+    chmod +x "$tmp/faulty"
+}
+faulty "exec $pathtracer \"\$@\" -s 4"
+expect "converge: samples without effect" 1 "slope of RMSE.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv5" 41_cornell
+faulty "exec $pathtracer \"\$@\" -m 1"
+expect "converge: a bias" 1 "RMS bias.*DIFFERENT" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv6" 41_cornell
+faulty "exec $pathtracer \"\$@\" --seed 7"
+expect "converge: a seed without effect" 3 "the seed has no effect" \
+    $converge --pathtracer "$tmp/faulty" -o "$tmp/conv7" 41_cornell
+expect "converge: no scene" 3 "name of a scene" "$san_assay" converge
+expect "converge: unknown scene" 3 "no scene 'x'" "$san_assay" converge -o "$tmp/conv8" x
+expect "converge: two rungs" 3 "three rungs" "$san_assay" converge --ladder 1,4 x
+expect "converge: a ladder that falls" 3 "does not ascend" "$san_assay" converge --ladder 4,1,16 x
+expect "converge: size" 3 "3 times smaller" "$san_assay" converge --shrink 3 -o "$tmp/conv8" 41_cornell
+expect "report of convergence as Markdown" 0 "| slope of RMSE |" \
+    "$san_assay" report --markdown "$tmp/conv/results.json"
+expect "report of claims and convergence" 0 "joined.html" "$san_assay" report \
+    --converge "$tmp/conv/results.json" -o "$tmp/joined.html" "$tmp/cmp/results.json"
+
+# export.
+expect "export to POV-Ray" 0 "c.pov" "$san_assay" export -o "$tmp/c.pov" $scene
+expect "export to Cycles" 0 "c.json" "$san_assay" export -o "$tmp/c.json" $scene
+expect "export to Mitsuba" 0 "c.xml" \
+    "$san_assay" export -o "$tmp/c.xml" -m 3 -b 0.1 -d 2 -e "$tmp/a.exr" $scene
+if xmllint --noout "$tmp/c.xml" && grep -q 'thinlens' "$tmp/c.xml" && [ -s "$tmp/c_environment.exr" ] &&
+    [ "$(grep -c 'type="ply"' "$tmp/c.xml")" -eq "$(ls "$tmp"/c_object_*.ply | wc -l)" ]; then
+    ok "the Mitsuba scene is XML, with its files"
+else not_ok "the Mitsuba scene is XML, with its files" "$(ls "$tmp"/c[._]*)"; fi
+expect "export to pbrt" 0 "c.pbrt" "$san_assay" export -o "$tmp/c.pbrt" -b 0.1 -d 2 $scene
+expect "export: what pbrt has not" 3 "no environment picture" \
+    "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene
+if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
+    ok "a refused export leaves no file"
+fi
+expect "export: unknown kind" 3 "neither" "$san_assay" export -o "$tmp/c.txt" $scene
+
+# validate, against the goldens.
+out=$tmp/report
+validate="$assay validate -q --out $out"
+expect "validate a closed form" 0 "EQUIVALENT" $validate --only 11_furnace
+for file in index.html results.json junit.xml; do
+    if [ -s "$out/$file" ]; then ok "validate writes $file"; else not_ok "validate writes $file" "no"; fi
+done
+if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "junit.xml is XML" "no"; fi
+expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
+expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
+
+# More and more samples: cheap scenes are decided with fewer than the 64 and 256 declared.
+expect "validate --budget" 0 "EQUIVALENT" \
+    $validate --budget 5m --only 10_furnace_one --only 12_point_plane --only 31_spot_plane
+# (Nine claims of ours, each with one look.)
+if [ "$(grep -c '"n_a": 16.0' "$out/results.json")" -eq 18 ]; then
+    ok "--budget decides with fewer samples than declared"
+else not_ok "--budget decides with fewer samples than declared" "$(grep '"n_a"' "$out/results.json" | head -40)"; fi
+expect "a spent budget is inconclusive" 2 "INCONCLUSIVE" $validate --budget 1s --only 41_cornell --only 45_many_lights
+if grep -q '"passed": true' "$out/results.json"; then not_ok "a spent budget passes nothing" "it does"; else
+    ok "a spent budget passes nothing"
+fi
+expect "a spent budget says so" 2 "budget spent" $validate --budget 0.001s --only 12_point_plane
+expect "validate: alpha 1e-9 means two stages" 0 "EQUIVALENT" $validate --alpha 1e-9 --only 31_spot_plane
+if [ "$(grep -c '"stages": 2' "$out/results.json")" -eq 2 ] && [ "$(grep -c '"stages": 1' "$out/results.json")" -eq 4 ]; then
+    ok "two stages against the closed form, one against goldens"
+else not_ok "two stages against the closed form, one against goldens" "$(grep '"stages"' "$out/results.json")"; fi
+expect "validate: --budget is no time" 3 "5d" $validate --budget 5d
+expect "validate: --stages" 3 "stages" $validate --stages 3
+
+# Negative controls: wrong programs under test.
+wrong() {
+    printf '#!/bin/sh\n%s\n' "$1" >"$tmp/wrong"
+    chmod +x "$tmp/wrong"
+}
+wrong "exec $pathtracer \"\$@\" -m 4"
+expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails at the first look" 1 "DIFFERENT" \
+    $validate --until-different --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails twice, with fresh seeds" 1 "DIFFERENT" \
+    $validate --budget 5m --stages 2 --only 11_furnace --pathtracer "$tmp/wrong"
+if grep -q 'with fresh seeds, confirmed' "$out/results.json"; then ok "a second stage confirms"; else
+    not_ok "a second stage confirms" "$(grep '"reason"' "$out/results.json")"
+fi
+wrong "exit 5"
+expect "a program that dies is not judged" 3 "exit status 5" \
+    $validate --only 11_furnace --pathtracer "$tmp/wrong"
+wrong "sleep 60"
+expect "a program that hangs is not judged" 3 "no end after" \
+    $validate --only 11_furnace --timeout 1 --pathtracer "$tmp/wrong"
+wrong "exit 0"
+expect "a program that writes nothing is not judged" 3 "pathtracer.exr" \
+    $validate --only 12_point_plane --pathtracer "$tmp/wrong"
+expect "a missing program is not judged" 3 "nothing-here" \
+    $validate --only 11_furnace --pathtracer "$tmp/nothing-here"
+
+# Further renderers. student_tracer shares no code with ours; it reads the exported Mitsuba scene.
+engine_path=$build:$build/tests:$PATH
+student="$validate --only 12_point_plane --engine-spp 16 --engine-replicates 8"
+expect "another renderer is judged" 0 "student *pathtracer .*EQUIVALENT *EQUIVALENT" \
+    env PATH="$engine_path" $student --engine student
+# engine COMMAND [EXPRESSES]: the description of fake.sh, which is beside it.
+engine() {
+    cat >"$tmp/fake.json" <<EOF
+{"name": "fake", "format": "mitsuba", "output": "mean", "image": "pfm", "command": [$1],
+ "expresses": [${2:-"\"diffuse\", \"point\""}]}
+EOF
+}
+# fake SCRIPT: a renderer that gets scene, spp, seed and out.
+fake() {
+    printf '#!/bin/sh\n%s\n' "$1" >"$tmp/fake.sh"
+    chmod +x "$tmp/fake.sh"
+}
+command='"./fake.sh", "{scene}", "{spp}", "{seed}", "{out}"'
+engine "$command"
+fake 'exec student_tracer "$@" 1.05'
+expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
+    env PATH="$engine_path" $student --engine "$tmp/fake.json"
+bad_engine() { # NAME PATTERN SCRIPT
+    fake "$3"
+    expect "a renderer that $1 is not judged" 3 "$2" $student --engine "$tmp/fake.json" --timeout 15
+}
+pfm='printf "PF\n64 64\n-1.0\n";'
+bad_engine "exits with 1" "exit status 1: no light" 'echo no light; exit 1'
+bad_engine "hangs" "no end after 15 s" 'sleep 100'
+bad_engine "writes nothing" "replicate_0000.pfm: cannot read" ':'
+bad_engine "writes garbage" "replicate_0000.pfm" 'echo garbage >$4'
+bad_engine "writes another size" "3 x 1 pixels, not 64 x 64" \
+    'printf "PF\n3 1\n-1.0\n123456789012123456789012123456789012" >$4'
+bad_engine "writes NaN" "is not finite" "($pfm head -c 49152 /dev/zero | tr '\\0' '\\377') >\$4"
+bad_engine "ignores its seed" "the seed has no effect" "($pfm yes abcdefg | head -c 49152) >\$4"
+rm "$tmp/fake.sh"
+expect "a renderer that is not there is not judged" 3 "fake.sh: no such program" \
+    $student --engine "$tmp/fake.json"
+bad_description() { # NAME PATTERN
+    expect "description: $1" 3 "fake.json: .*$2" \
+        "$san_assay" validate --only 12_point_plane --engine "$tmp/fake.json"
+}
+engine "$command, \"{samples}\""
+bad_description "unknown placeholder" "'command' \[5\]: unknown placeholder '{samples}'"
+engine '"x", "{scene}", "{out}"'
+bad_description "no seed" "no {seed}"
+engine "$command" '"magic"'
+bad_description "unknown feature" "'magic' is no feature"
+echo '{"name": "fake", "colour": 1}' >"$tmp/fake.json"
+bad_description "unknown key" "unknown key 'colour'"
+engine "$command" '"diffuse"'
+expect "a renderer that can express nothing" 3 "fake can express none .*does not list: point" \
+    $student --engine "$tmp/fake.json"
+sed 's/"point", //' reference/engines/student.json >"$tmp/no_points.json"
+expect "what a renderer cannot express is listed" 0 "student cannot express 12_point_plane" \
+    env PATH="$engine_path" $validate --only 11_furnace --only 12_point_plane \
+    --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
+
+# Missing, stale and damaged goldens are never a pass.
+expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
+cp -R golden "$tmp/golden"
+printf 'x' >>"$tmp/golden/11_furnace/cycles.exr"
+expect "a damaged golden is not judged" 3 "cycles" $validate --only 11_furnace --golden "$tmp/golden"
+cp -R reference/scenes "$tmp/scenes"
+echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
+expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace --suite "$tmp/scenes"
+
+# golden: what may be stored. The stored goldens stand in for candidates.
+golden="$san_assay golden"
+expect "golden status" 0 "current  41_cornell/cycles" $golden status
+expect "golden status of damaged goldens" 3 "damaged  11_furnace/cycles" \
+    $golden status --golden "$tmp/golden"
+expect "golden status of another scene" 3 "stale    11_furnace/cycles" \
+    $golden status --suite "$tmp/scenes"
+expect "golden approve needs names" 3 "takes --all or names" $golden approve --from golden
+expect "golden approve: nothing is stored" 3 "approve it with --new" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace
+expect "golden approve --new" 0 "2 approved" \
+    $golden approve --from golden --golden "$tmp/store" --new 11_furnace
+expect "golden approve: the same again" 0 "1 unchanged" \
+    $golden approve --from golden --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: no candidate" 3 "no candidate in" \
+    $golden approve --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve --all: none needed" 0 "0 approved, 0 unchanged" \
+    $golden approve --all --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
+expect "golden approve: not in the suite" 3 "no such reference" \
+    $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
+cp -R golden/41_cornell "$tmp/store/98_deleted"
+expect "golden status: an orphan" 3 "orphan   .*98_deleted/cycles" $golden status --golden "$tmp/store"
+expect "golden: unknown" 3 "none of render" $golden forget
+
+# diagnose: names a bug, and none where there is none.
+expect "diagnose: help lists the views" 0 "12_point_plane" "$san_assay" diagnose --help
+expect "diagnose: the correct renderer" 0 "nothing wrong found" "$assay" diagnose --seed 5
+if tests/mutants/mutants.sh --build-only "$plain" point_light_linear seed_ignored variance_halved; then
+    ok "bugs can be built"
+else
+    not_ok "bugs can be built" "see $build/mutants"
+fi
+for bug in point_light_linear seed_ignored variance_halved; do
+    expect "diagnose: $bug" 1 "tests/mutants/$bug.patch" "$assay" diagnose --seed 6 \
+        --pathtracer "$plain/mutants/$bug/pathtracer" --json "$tmp/diagnosis.json"
+    expect "diagnose: $bug alone" 0 "\"named\":\[\"$bug\"\]" bash -c "tr -d ' \n' <'$tmp/diagnosis.json'"
+done
+expect "diagnose: left out of the catalogue" 1 "none of the" "$assay" diagnose --seed 6 \
+    --pathtracer "$plain/mutants/point_light_linear/pathtracer" --without point_light_linear
+expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only 12_point_plane \
+    --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
+expect "diagnose: the pictures of a validation" 1 "tests/mutants/point_light_linear.patch" \
+    "$assay" diagnose "$tmp/wrong_suite/results.json"
+plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
+$plane -r 48 48 -f "$tmp/plane.exr" >"$tmp/out" && $plane -r 40 40 -f "$tmp/odd.exr" >"$tmp/out"
+expect "diagnose: one picture, larger than the catalogue's" 0 "nothing wrong found" \
+    "$san_assay" diagnose --scene 12_point_plane "$tmp/plane.exr"
+expect "diagnose: a size that is no multiple" 3 "40 x 40 pixels: the width has to be" \
+    "$san_assay" diagnose --scene 12_point_plane "$tmp/odd.exr"
+expect "diagnose: another shape" 3 "width by height is not" \
+    "$san_assay" diagnose --scene 39_three_lamps-four_light_samples "$tmp/plane.exr"
+expect "diagnose: unknown view" 3 "has no '99_none'" "$san_assay" diagnose --scene 99_none "$tmp/plane.exr"
+expect "diagnose: no picture" 3 "needs the picture" "$san_assay" diagnose --scene 12_point_plane
+expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --without x
+expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
+expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
+
+# Each part of `make bench` on its smallest case: that it runs, not what it finds.
+ASSAY_CS184=$tmp/none expect "bench, a tiny run that says what it skips" 0 "SKIPPED: no $tmp/none" \
+    "$build/tests/bench" --smoke --build "$build" --out "$tmp/bench"
+expect "bench: its figures" 0 '"mrays_per_cpu_second"' cat "$tmp/bench/results.json"
+expect "bench: its plots" 0 "</svg>" cat "$tmp/bench/error_41_cornell.svg"
+expect "bench: no such part" 3 "usage" "$build/tests/bench" --nonsense
+
+# Grading: one right program among hostile ones; each costs its author the check, none of them the run.
+expect "grade: help" 0 "unsafe-no-sandbox" "$san_assay" grade --help
+expect "grade: the rubric of the course" 0 "137 points" "$san_assay" grade --check-rubric tools/rubrics/cs184.rubric
+sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubrics/template.rubric >"$tmp/wrong.rubric"
+expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
+expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
+cp tests/end_to_end/quick.rubric "$tmp/quick.rubric"
+mkdir -p "$tmp/subs" "$tmp/subs/pictures" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
+sub() { # NAME: a shell script from stdin
+    { echo '#!/bin/sh' && cat; } >"$tmp/subs/$1" && chmod +x "$tmp/subs/$1"
+}
+cp "$pathtracer" "$tmp/subs/right"
+"$pathtracer" -q -s 16 -m 1 -r 64 64 --seed 9 -f "$tmp/subs/pictures/point.png" reference/scenes/12_point_plane.dae >/dev/null
+cp "$pathtracer" "$tmp/subs/source/pathtracer"
+ln -s "$tmp/subs/pictures/point.png" "$tmp/subs/linked/point.png"
+cp "$pathtracer" "$tmp/subs/other_scene.bin"
+sub crash <<<'kill -SEGV $$'
+sub hang <<<'trap "" TERM; while :; do sleep 1; done'
+sub fork_bomb <<<'b() { b | b & }; b; wait; sleep 100'
+sub huge_file <<<'exec head -c 100G /dev/zero >out.png'
+sub link_out <<<"ln -s $tmp/subs/pictures/point.png out.png"
+sub reads_golden <<<"cp $PWD/golden/12_point_plane/* $tmp/subs/pictures/point.png out.png"
+sub made_up <<<'echo "{\"score\": 100}" >results.json; echo "{\"points\": 100}" >grade.json; echo "0 ended" >.report'
+sub noise <<<'head -c 12288 /dev/urandom >out.png'
+sub text <<<'echo "I am a picture" >out.png'
+sub nothing <<<'exit 0'
+{ printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
+mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
+if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
+    expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
+    for good in right pictures source; do
+        [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
+    done
+    for bad in crash hang fork_bomb huge_file link_out linked reads_golden made_up noise text nothing bomb empty; do
+        [ "$(points $bad)" = 0.00 ] && ok "grade: $bad has none" || not_ok "grade: $bad has none" "$(points $bad)"
+    done
+    for why in "crash signal 11" "hang no end after 10 s" "huge_file all 16 MiB of its directory are full" "link_out wrote no out.png" \
+        "nothing wrote no out.png" "noise not an OpenEXR" "bomb 65536 x 65536" "empty cannot execute\|No such file\|failed to execute"; do
+        expect "grade: what $why" 0 "${why#* }" cat "$tmp/grades/${why%% *}/results.json"
+    done
+    expect "grade: Gradescope's fields" 0 '"max_score": 8.0' cat "$tmp/grades/right/results.json"
+    expect "grade: the chance of another score" 0 '"chance": [0-9.e-]*' cat "$tmp/grades/right/grade.json"
+    expect "grade: JUnit" 0 'testsuite name="fork_bomb" tests="1" failures="1"' xmllint "$tmp/grades/junit.xml"
+    expect "grade: TAP" 0 "^ok [0-9]* - right point (8.00 of 8)" cat "$tmp/grades/grades.tap"
+    cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
+    expect "grade: goes on where it was" 0 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
+    cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
+    mkdir "$tmp/two" && cp -r "$plain/mutants/point_light_linear" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
+    sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
+        $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
+        sed 's/^total 8/total 10/' >"$tmp/named.rubric"
+    expect "grade: with diagnosis" 0 "student  *0.00 of 10" "$assay" grade -j 2 -o "$tmp/named" "$tmp/named.rubric" "$tmp/two"/*
+    expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
+    expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
+    expect "grade: on the page" 0 "This looks like a known bug" cat "$tmp/named/student/index.html"
+    expect "grade: the plot of it" 0 "all points while a bar touches green" cat "$tmp/named/student/index.html"
+    expect "grade: and whether another run would change it" 0 "gets the same points here" cat "$tmp/named/student/index.html"
+    expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
+    expect "grade: staff see who has it" 0 'student/index.html.*point_light_linear' bash -c "tr -d '\n' <'$tmp/named/index.html'"
+    if ! grep -q "<html" "$tmp/named/student/index.html" ||
+        grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
+        not_ok "grade: the page has no hidden check and needs no other file" "it does"
+    else
+        ok "grade: the page has no hidden check and needs no other file"
+    fi
+    expect "grade: two of a name" 3 "would both be" "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right" "$tmp/probe/../subs/right"
+elif grep -q "no sandbox" "$tmp/out"; then
+    echo "skip grade: programs of submissions, hostile and right ($(cat "$tmp/out"))"
+else
+    not_ok "grade: one submission" "$(cat "$tmp/out")"
+fi
+expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
+expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
+expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
+part tests/end_to_end/grading.sh "$build"
+part tests/end_to_end/autograder.sh "$build"
+expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
+expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
+expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
+
+# The same bits on any number of threads.
+part tests/end_to_end/threads.sh "$pathtracer"
+
+# Pictures made again from what they say of themselves.
+part tests/end_to_end/reproduce.sh "$build"
+
+# What a file or a command line may ask for.
+part tests/end_to_end/limits.sh "$build"
+
+# Verbs, and ways through them, that nothing above takes.
+part tests/end_to_end/verbs.sh "$build"
+
+# The same work in jobs.
+part tests/studies/scale/scale.sh "$build"
+part tests/studies/scale/scale_reference.sh "$build"
+
+# Kills, full disks and missing memory.
+part tests/end_to_end/faults.sh "$build" 2 97
+
+# The page, in a browser.
+part tests/browser/run.sh "$build"
+
+# Installed elsewhere, it needs nothing of the checkout.
+if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
+    not_ok "make install" "$(cat "$tmp/out")"
+fi
+cd "$tmp" || exit 1
+expect "the installed programs work" 0 "EQUIVALENT" \
+    "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace
+expect "installed, it reads pictures from elsewhere" 1 "^DIFFERENT" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+mv "$tmp/usr/lib/assay/oiio.so" "$tmp/oiio.so"
+expect "without OpenImageIO: a line" 3 "cannot load what reads pictures: .*oiio.so is not there" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+echo garbage >"$tmp/usr/lib/assay/oiio.so"
+expect "with a damaged one: a line" 3 "cannot load what reads pictures: .*oiio.so" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+
+[ $failures -eq 0 ]

@@ -1,0 +1,53 @@
+#!/bin/bash
+# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/README.md) and two more students, one with
+# ada's program under another name and one with a seed of her own: points, the same noise, the same again on one processor
+# and two, and after an interruption. Prints "ok NAME" or "not ok NAME: why".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/grading.sh BUILD}")
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+
+check() { # NAME COMMAND...
+    local name=$1
+    shift
+    if "$@" >"$tmp/out" 2>&1; then echo "ok grading: $name"; else
+        echo "not ok grading: $name: $(head -c 1000 "$tmp/out")"
+        failures=$((failures + 1))
+    fi
+}
+student() { # NAME OPTION...: our program with these options besides
+    mkdir -p "$tmp/submissions/$1"
+    cp "$build/pathtracer" "$tmp/submissions/$1/ours"
+    printf '#!/bin/sh\nexec ./ours "$@" %s\n' "${*:2}" >"$tmp/submissions/$1/pathtracer"
+    chmod +x "$tmp/submissions/$1/pathtracer"
+}
+mkdir -p "$tmp/submissions/ada" && cp "$build/pathtracer" "$tmp/submissions/ada/"
+student bob --only direct
+student cyd -t 2
+student eve --seed 77
+rubric=tools/rubrics/template.rubric
+grade() { "$build/assay" grade -q "$@" "$rubric" "$tmp/submissions"/*; }
+# What is the same in every run: all but times.
+sums() { (cd "$1" && cat */grade.json | grep -v '"cpu_s"\|"wall_s"' | sha256sum) | grep .; }
+points() { grep -q "^\"$1\",$2," "$tmp/two/grades.csv"; }
+
+check "the rubric" "$build/assay" grade --check-rubric "$rubric"
+if ! grade -o "$tmp/two" -j2 >"$tmp/out" 2>&1 && grep -q "no sandbox" "$tmp/out"; then
+    echo "skip grading: programs of submissions ($(cat "$tmp/out"))"
+    exit 0
+fi
+check "ada has all points" points ada 10.00
+check "bob has not" points bob 4.00
+check "eve has all points" points eve 10.00
+tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The same noise//p' | sed 's,</ul>.*,,' >"$tmp/alike"
+check "ada and cyd have the same noise" grep -q '>ada</a>, <a href="cyd/index.html">cyd</a></li>' "$tmp/alike"
+check "eve has her own" bash -c "! grep -q eve '$tmp/alike'"
+check "on one processor" grade -o "$tmp/one" -j 1
+check "the same points and reasons on one and on two" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
+rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"
+check "after an interruption" grade -o "$tmp/one" -j 2
+check "the same again" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
+check "another seed" grade -o "$tmp/other" --seed 2
+check "other numbers (control)" test "$(sums "$tmp/other")" != "$(sums "$tmp/two")"
+[ $failures -eq 0 ]

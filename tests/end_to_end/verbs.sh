@@ -1,0 +1,145 @@
+#!/bin/bash
+# tests/end_to_end/verbs.sh BUILD: verbs, and ways through them, that the other end-to-end runs leave out: references of a live engine, the matrix
+# of a validation, second looks, rubrics that accept deviations and count samples. Prints "ok NAME", "not ok NAME: why" or "skip NAME".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/verbs.sh BUILD}")
+pathtracer=$build/pathtracer assay=$build/assay
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+
+expect() { # NAME STATUS PATTERN COMMAND...: as in tests/end_to_end/end_to_end.sh
+    local name=$1 status=$2 pattern=$3 got
+    shift 3
+    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+    got=$?
+    if [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ $got -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; }; then
+        echo "ok $name"
+    else
+        echo "not ok $name: status $got, no '$pattern' in: $(head -c 1000 "$tmp/out") $(head -c 1000 "$tmp/err")"
+        failures=$((failures + 1))
+    fi
+}
+sum() { sha256sum "$1" | cut -d ' ' -f 1; }
+
+# assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate that is older than
+# what is stored goes. In Blender's place our own program writes a picture for each seed.
+mkdir "$tmp/suite" "$tmp/work" "$tmp/bin"
+cp reference/scenes/13_square_patch.dae "$tmp/suite"
+sed 's/"width": 64, "height": 64/"width": 16, "height": 16/; s/"tile": 16/"tile": 8/; s/"replicates": [0-9]*, "spp": [0-9]*/"replicates": 3, "spp": 4/' \
+    reference/scenes/13_square_patch.json >"$tmp/suite/13_square_patch.json"
+cat >"$tmp/bin/blender" <<END
+#!/bin/bash
+k=0
+for seed in \$(grep -o '[0-9]*' seeds.json); do
+    "$pathtracer" -q -r 16 16 -s 4 -m 1 --seed \$seed -f "replicate_\$(printf %04d \$k).exr" "$PWD/reference/scenes/13_square_patch.dae" || exit 1
+    k=\$((k + 1))
+done
+echo 'ASSAY OK {"version": "none", "settings": {}}'
+END
+chmod +x "$tmp/bin/blender"
+export PATH="$tmp/bin:$PATH"
+reference=("$assay" reference --suite "$tmp/suite" --work "$tmp/work" -t 1 --engine cycles)
+image=$tmp/new/13_square_patch/cycles.exr
+right() { # NAME COMMAND...
+    local name=$1
+    shift
+    if "$@"; then echo "ok $name"; else
+        echo "not ok $name: $*"
+        failures=$((failures + 1))
+    fi
+}
+expect "reference: help" 0 "usage: assay reference" "$assay" reference --help
+expect "reference: unknown engine" 3 "none of" "${reference[@]}" --engine mitsuba
+expect "reference: unknown scene" 3 "no scene 'x'" "${reference[@]}" --only x
+expect "reference: an argument" 3 "takes no argument 'x'" "${reference[@]}" x
+expect "reference: no program" 3 "blender: no such program" env PATH=/nowhere "${reference[@]}" -o "$tmp/new"
+expect "reference: Cycles" 0 "cycles.exr: 16 x 16 pixels, 3 x replicate" "${reference[@]}" -o "$tmp/new"
+first=$(sum "$image")
+expect "reference: up to date" 0 "cycles.exr: up to date" "${reference[@]}" -o "$tmp/new"
+expect "reference: approved" 0 "1 approved" "$assay" golden approve --new --suite "$tmp/suite" --from "$tmp/new" --golden "$tmp/store" 13_square_patch/cycles
+expect "reference: fresh" 0 "3 x replicate" "${reference[@]}" -o "$tmp/new" --fresh
+right "reference: the same seed, the same bits" test "$(sum "$image")" = "$first"
+expect "reference: another seed" 0 "3 x replicate" "${reference[@]}" -o "$tmp/new" --seed 2
+right "reference: another seed, other bits" test "$(sum "$image")" != "$first"
+expect "reference: what is stored is up to date" 0 "store/13_square_patch/cycles.exr: up to date" "${reference[@]}" -o "$tmp/new" --golden "$tmp/store"
+right "reference: an older candidate goes" test ! -e "$image"
+expect "import-check: help" 0 "usage: assay import-check" "$assay" import-check --help
+expect "import-check: unknown scene" 3 "no scene 'x'" "$assay" import-check --work "$tmp/work" --only x
+expect "import-check: an argument" 3 "takes no argument 'x'" "$assay" import-check x
+expect "import-check: no program" 3 "blender" env PATH=/nowhere "$assay" import-check --work "$tmp/work" --suite "$tmp/suite"
+
+# A validation that looks again where 16 samples do not decide: what was rendered before counts.
+expect "validate: looks" 0 "33_sphere_light" "$assay" validate -q --budget 5m --only 33_sphere_light --out "$tmp/report"
+right "validate: one look of 16 samples, another with 64" grep -q '"n_a": 16.0' "$tmp/report/results.json"
+right "validate: and a third with 256" test "$(grep -c '"n_a": \(64\|256\).0' "$tmp/report/results.json")" -gt 1
+expect "report: matrix" 0 "^| 33_sphere_light | [+-][0-9.]* ± [0-9.]*, [0-9.]* | [+-][0-9.]* ± [0-9.]*, [0-9.]* | [+-][0-9.]* ± [0-9.]*, [0-9.]* |$" \
+    "$assay" report --matrix "$tmp/report/results.json"
+
+# A rubric that counts samples, accepts what the starter code does wrong, and builds source trees.
+cat >"$tmp/counts.rubric" <<'END'
+rubric Counts
+curve srgb
+command {program} -q -t {threads} -s {spp} -l {lights} -m {bounces} -r {width} {height} --seed {seed} {options} -f {out} {scene}
+program pathtracer
+build sh make.sh
+limit wall 20
+limit cpu 20
+limit memory 1024
+limit disk 64
+total 10
+accept light_pdf --starter light-pdf
+picture adaptive
+  scene 13_square_patch
+  size 64 64
+  spp 256
+  bounces 1
+  options --direct light -a 32 0.1
+  reference ours 64
+picture area
+  scene 13_square_patch
+  size 64 64
+  spp 64
+  bounces 1
+  options --direct light
+  reference ours 256 --direct light
+part 1 All
+check batches 4 rates adaptive
+  batch 32
+  share 0.01 0.3
+  count 0.03 0.2
+check light 6 equal area
+  image 0.02 0.08
+  tile 0.08 0.3
+END
+# Source trees whose build wraps our program; WORDS changes the words "${a[@]}" of its command, number i at a time.
+sub() { # NAME WORDS
+    mkdir -p "$tmp/subs/$1"
+    cp "$pathtracer" "$tmp/subs/$1/tracer"
+    printf '#!/bin/bash\na=("$@")\nfor i in "${!a[@]}"; do\n%s\ndone\nexec ./tracer "${a[@]}"\n' "$2" >"$tmp/subs/$1/source"
+    echo 'cp source pathtracer && chmod +x pathtracer' >"$tmp/subs/$1/make.sh"
+}
+sub right :
+sub starter '[ "${a[i]}" = --direct ] && a+=(--starter light-pdf)'
+sub batches '[ "${a[i]}" = 32 ] && a[i]=20'
+sub no_rates '[ "${a[i]}" = -a ] && unset "a[i]" "a[i+1]" "a[i+2]"'
+mkdir "$tmp/subs/broken"
+echo 'echo no compiler; exit 1' >"$tmp/subs/broken/make.sh"
+if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer" >"$tmp/out" 2>&1; then
+    expect "grade: rates, a build, a deviation" 0 "right" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/counts.rubric" "$tmp/subs"/*
+    points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
+    for good in right starter; do
+        right "grade: $good has all points" test "$(points $good)" = 10.00
+    done
+    for bad in batches no_rates; do
+        right "grade: $bad has those of the light alone" test "$(points $bad)" = 6.00
+    done
+    right "grade: what cannot be built has none" test "$(points broken)" = 0.00
+    expect "grade: why it cannot be built" 0 "building it failed: .*no compiler" cat "$tmp/grades/broken/results.json"
+    expect "grade: why batches are wrong" 0 "pixels stand for no multiple of 32" cat "$tmp/grades/batches/results.json"
+    expect "grade: no rate picture" 0 "there is no rate picture" cat "$tmp/grades/no_rates/results.json"
+    expect "grade: the deviation is named" 0 "light_pdf" cat "$tmp/grades/starter/results.json"
+else
+    echo "skip grade: $(tail -n 1 "$tmp/out")"
+fi
+[ $failures -eq 0 ]

@@ -1,9 +1,0 @@
-#!/bin/bash
-# tests/lint.sh BUILD: `make lint` as one of the tests. Prints "ok NAME" or "not ok NAME: why".
-build=${1:?usage: tests/lint.sh BUILD}
-if make --no-print-directory -k -j1 BUILD="$build" lint >"$build/lint.log" 2>&1; then
-    echo "ok lint: $(tail -n 1 "$build/lint.log")"
-else
-    echo "not ok lint: $(grep -E '(error|warning): |planted|\*\*\*' "$build/lint.log" | head -n 20)"
-    exit 1
-fi

@@ -1,0 +1,395 @@
+/* process_run() against programs whose behaviour is known: they are shell scripts of a few words.
+ * Times are compared with bounds far from what is measured, so that a loaded machine passes. */
+#define _GNU_SOURCE
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "reference/base/process.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+/* One script through sh -c. */
+static bool sh(const char *script, const char *log, double timeout_s, struct process_usage *usage,
+               struct err *e)
+{
+    const char *const argv[] = {"sh", "-c", script, NULL};
+    return process_run(&(struct process){.argv = argv, .log = log, .timeout_s = timeout_s}, usage,
+                       e);
+}
+
+/* A fresh directory; the caller removes what it puts there. */
+static void temp_dir(char path[64])
+{
+    strcpy(path, "/tmp/assay_process_XXXXXX");
+    assert_non_null(mkdtemp(path));
+}
+
+static long read_number(const char *path)
+{
+    long v = -1;
+    FILE *f = fopen(path, "r");
+    if (f != NULL) {
+        if (fscanf(f, "%ld", &v) != 1)
+            v = -1;
+        fclose(f);
+    }
+    return v;
+}
+
+/* Alive: exists and is not a zombie that its new parent has yet to collect. */
+static bool is_alive(long pid)
+{
+    char path[64], state = 'Z';
+    snprintf(path, sizeof path, "/proc/%ld/stat", pid);
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return false;
+    if (fscanf(f, "%*d (%*[^)]) %c", &state) != 1)
+        state = 'Z';
+    fclose(f);
+    return state != 'Z' && state != 'X';
+}
+
+/* SIGKILL has been sent; the kernel may need a moment. */
+static bool dies_soon(long pid)
+{
+    for (int i = 0; i < 1000 && is_alive(pid); i++)
+        usleep(10000);
+    return !is_alive(pid);
+}
+
+static int count_fds(void)
+{
+    int n = 0;
+    DIR *d = opendir("/proc/self/fd");
+    assert_non_null(d);
+    while (readdir(d) != NULL)
+        n++;
+    closedir(d);
+    return n;
+}
+
+static void success_leaves_the_error_untouched(void **state)
+{
+    (void)state;
+    struct err e = {"untouched"};
+    struct process_usage u = {-1, -1, -1};
+    assert_true(sh("echo hello", NULL, 60, &u, &e));
+    assert_string_equal(e.msg, "untouched");
+    assert_true(u.wall_s > 0 && u.wall_s < 60);
+    assert_true(u.cpu_s >= 0 && u.cpu_s < 60);
+}
+
+static void exit_status_and_last_lines_are_reported(void **state)
+{
+    (void)state;
+    struct err e;
+    assert_false(
+        sh("for i in 1 2 3 4 5 6 7 8; do echo line $i; done; echo; exit 7", NULL, 60, NULL, &e));
+    assert_string_equal(e.msg,
+                        "sh: exit status 7: line 3 | line 4 | line 5 | line 6 | line 7 | line 8");
+    assert_false(sh("echo only >&2; exit 1", NULL, 60, NULL, &e));
+    assert_string_equal(e.msg, "sh: exit status 1: only");
+    assert_false(sh("exit 2", NULL, 60, NULL, &e));
+    assert_string_equal(e.msg, "sh: exit status 2");
+}
+
+/* Bytes that would break a terminal, JSON or XML, and a line without end. */
+static void the_line_is_short_printable_ascii(void **state)
+{
+    (void)state;
+    struct err e;
+    assert_false(sh("printf 'a\\033[31m\\tb\\377'; exit 1", NULL, 60, NULL, &e));
+    assert_string_equal(e.msg, "sh: exit status 1: a?[31m b?");
+    assert_false(sh("head -c 100000 /dev/zero | tr '\\0' x; exit 1", NULL, 60, NULL, &e));
+    assert_non_null(strstr(e.msg, "exit status 1: ...xxxx"));
+    assert_true(strlen(e.msg) < 700);
+}
+
+static void a_signal_is_named(void **state)
+{
+    (void)state;
+    struct err e;
+    assert_false(sh("echo before; kill -SEGV $$", NULL, 60, NULL, &e));
+    assert_non_null(strstr(e.msg, "sh: killed by signal 11 ("));
+    assert_non_null(strstr(e.msg, "): before"));
+}
+
+static void a_missing_program_is_not_found(void **state)
+{
+    (void)state;
+    struct err e;
+    char path[4096];
+    const char *const none[] = {"assay-no-such-program", NULL};
+    assert_false(process_run(&(struct process){.argv = none}, NULL, &e));
+    assert_string_equal(e.msg, "assay-no-such-program: no such program in PATH");
+    const char *const directory[] = {"/", NULL};
+    assert_false(process_run(&(struct process){.argv = directory}, NULL, &e));
+    assert_string_equal(e.msg, "/: no such program");
+    assert_false(process_find("assay-no-such-program", path, sizeof path));
+    assert_false(process_find("", path, sizeof path));
+    assert_true(process_find("sh", path, sizeof path));
+    assert_int_equal(path[0], '/');
+    assert_int_equal(access(path, X_OK), 0);
+    assert_false(process_find("sh", path, 3));
+}
+
+/* Found and executable, but the kernel refuses it: its interpreter is missing. */
+static void a_program_that_cannot_be_executed_says_why(void **state)
+{
+    (void)state;
+    char dir[64], path[128], want[256];
+    temp_dir(dir);
+    snprintf(path, sizeof path, "%s/script", dir);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("#!/assay/no/such/interpreter\n", f);
+    fclose(f);
+    assert_int_equal(chmod(path, 0755), 0);
+    struct err e;
+    const char *const argv[] = {path, NULL};
+    assert_false(process_run(&(struct process){.argv = argv}, NULL, &e));
+    snprintf(want, sizeof want, "%s: cannot run: %s", path, strerror(ENOENT));
+    assert_string_equal(e.msg, want);
+    unlink(path);
+    rmdir(dir);
+}
+
+/* The shell ignores SIGTERM and so does what it started: only SIGKILL to the group ends them. */
+static void a_hang_is_killed_with_its_grandchild(void **state)
+{
+    (void)state;
+    char dir[64], file[96], script[512];
+    temp_dir(dir);
+    snprintf(file, sizeof file, "%s/pid", dir);
+    snprintf(script, sizeof script,
+             "trap '' TERM; sleep 1000 & echo $! > %s; echo started; while :; do sleep 1; done",
+             file);
+    struct err e;
+    struct process_usage u;
+    assert_false(sh(script, NULL, 3, &u, &e));
+    assert_string_equal(e.msg, "sh: no end after 3 s: started");
+    assert_true(u.wall_s >= 3 && u.wall_s < 60);
+    long pid = read_number(file);
+    assert_true(pid > 1);
+    assert_true(dies_soon(pid));
+    unlink(file);
+    rmdir(dir);
+}
+
+/* A program that ends but leaves a process behind, which holds the output open. */
+static void what_a_finished_program_leaves_behind_is_killed(void **state)
+{
+    (void)state;
+    char dir[64], file[96], script[512];
+    temp_dir(dir);
+    snprintf(file, sizeof file, "%s/pid", dir);
+    snprintf(script, sizeof script, "sleep 1000 & echo $! > %s", file);
+    struct err e;
+    struct process_usage u;
+    assert_true(sh(script, NULL, 100, &u, &e));
+    assert_true(u.wall_s < 60);
+    assert_true(dies_soon(read_number(file)));
+    unlink(file);
+    rmdir(dir);
+}
+
+/* Ctrl-C, or even kill -9, of the harness must not leave an engine and its children running. */
+static void the_death_of_the_caller_ends_the_group(void **state)
+{
+    (void)state;
+    char dir[64], file[96], script[512];
+    temp_dir(dir);
+    snprintf(file, sizeof file, "%s/pid", dir);
+    snprintf(script, sizeof script, "sleep 1000 & echo $! > %s.new; mv %s.new %s; wait", file, file,
+             file);
+    pid_t caller = fork();
+    assert_true(caller >= 0);
+    if (caller == 0)
+        _exit(sh(script, NULL, 0, NULL, NULL) ? 0 : 1);
+    long pid = -1;
+    for (int i = 0; i < 2000 && pid < 0; i++) {
+        usleep(10000);
+        pid = read_number(file);
+    }
+    assert_true(pid > 1 && is_alive(pid));
+    kill(caller, SIGKILL);
+    assert_int_equal(waitpid(caller, NULL, 0), caller);
+    assert_true(dies_soon(pid));
+    unlink(file);
+    rmdir(dir);
+}
+
+static void stdin_is_empty_and_the_directory_is_the_one_asked_for(void **state)
+{
+    (void)state;
+    char dir[64], want[128];
+    temp_dir(dir);
+    struct err e;
+    const char *const argv[] = {"sh", "-c", "cat; pwd -P; exit 1", NULL};
+    assert_false(
+        process_run(&(struct process){.argv = argv, .cwd = dir, .timeout_s = 60}, NULL, &e));
+    char *real = realpath(dir, NULL);
+    snprintf(want, sizeof want, "sh: exit status 1: %s", real);
+    assert_string_equal(e.msg, want);
+    free(real);
+    rmdir(dir);
+    assert_false(process_run(&(struct process){.argv = argv, .cwd = dir}, NULL, &e));
+    assert_non_null(strstr(e.msg, "sh: cannot run: "));
+}
+
+/* 1e5 lines of 100 bytes go to the log whole; only the last are quoted. */
+static void a_long_output_is_logged_whole(void **state)
+{
+    (void)state;
+    char dir[64], log[128];
+    temp_dir(dir);
+    snprintf(log, sizeof log, "%s/log", dir);
+    struct err e;
+    assert_false(
+        sh("yes 123456789012345678901234567890123456789012345678901234567890123456789012345"
+           "678901234567890123456789 | head -n 100000; echo end; exit 5",
+           log, 120, NULL, &e));
+    assert_non_null(strstr(e.msg, "exit status 5: "));
+    assert_string_equal(e.msg + strlen(e.msg) - 6, " | end");
+    struct stat st;
+    assert_int_equal(stat(log, &st), 0);
+    assert_int_equal(st.st_size, 100 * 100000 + 4);
+    unlink(log);
+    rmdir(dir);
+}
+
+/* `yes` prints for ever, faster than we can read: the clock must win and the log must end. */
+static void a_flood_is_stopped_by_the_clock_and_the_log_is_bounded(void **state)
+{
+    (void)state;
+    char dir[64], log[128];
+    temp_dir(dir);
+    snprintf(log, sizeof log, "%s/log", dir);
+    struct err e;
+    struct process_usage u;
+    assert_false(sh("exec yes flood", log, 1, &u, &e));
+    assert_non_null(strstr(e.msg, "sh: no end after 1 s: flood | flood"));
+    assert_true(u.wall_s < 60);
+    struct stat st;
+    assert_int_equal(stat(log, &st), 0);
+    assert_true(st.st_size > 0 && st.st_size <= (64 << 20) + 64);
+    unlink(log);
+    rmdir(dir);
+}
+
+static void a_log_that_cannot_be_written_is_an_error(void **state)
+{
+    (void)state;
+    struct err e;
+    assert_false(sh("echo x", "/assay/no/such/directory/log", 60, NULL, &e));
+    assert_non_null(strstr(e.msg, "/assay/no/such/directory/log: cannot write: "));
+    assert_false(sh("echo x", "/dev/full", 60, NULL, &e));
+    assert_non_null(strstr(e.msg, "/dev/full: cannot write: "));
+}
+
+static void count_tick(void *ctx)
+{
+    ++*(int *)ctx;
+}
+
+/* Ticks come a few times a second: in about a second at least 2, and never more than 10 a second.
+ */
+static void the_caller_is_called_back_while_it_runs(void **state)
+{
+    (void)state;
+    int ticks = 0;
+    const char *const argv[] = {"sleep", "1", NULL};
+    struct err e;
+    struct process_usage u;
+    assert_true(process_run(&(struct process){.argv = argv, .tick = count_tick, .tick_ctx = &ticks},
+                            &u, &e));
+    assert_true(ticks >= 2 && ticks <= 10 * u.wall_s + 1);
+}
+
+/* The shell's arithmetic loop burns CPU in a grandchild that the shell waits for. */
+static void cpu_time_includes_descendants(void **state)
+{
+    (void)state;
+    struct err e;
+    struct process_usage u;
+    assert_true(
+        sh("sh -c 'i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done'; exit 0", NULL, 120, &u, &e));
+    assert_true(u.cpu_s > 0.02);
+}
+
+static void nothing_is_left_open_and_no_zombie_waits(void **state)
+{
+    (void)state;
+    struct err e;
+    int before = count_fds();
+    for (int i = 0; i < 20; i++) {
+        assert_true(sh("true", "/dev/null", 60, NULL, &e));
+        assert_false(sh("false", NULL, 60, NULL, &e));
+        const char *const bad[] = {"sh", NULL};
+        assert_false(process_run(&(struct process){.argv = bad, .cwd = "/assay/none"}, NULL, &e));
+    }
+    assert_int_equal(count_fds(), before);
+    assert_int_equal(waitpid(-1, NULL, WNOHANG), -1);
+    assert_int_equal(errno, ECHILD);
+}
+
+static void ignore(int sig)
+{
+    (void)sig;
+}
+
+/* Signals with a handler interrupt our system calls all the time (no SA_RESTART). */
+static void interrupted_system_calls_are_repeated(void **state)
+{
+    (void)state;
+    struct sigaction act = {.sa_handler = ignore}, old;
+    sigaction(SIGALRM, &act, &old);
+    timer_t timer;
+    assert_int_equal(timer_create(CLOCK_MONOTONIC, NULL, &timer), 0);
+    struct itimerspec every = {.it_interval = {0, 2000000}, .it_value = {0, 2000000}};
+    assert_int_equal(timer_settime(timer, 0, &every, NULL), 0);
+    struct err e;
+    bool ok = true;
+    for (int i = 0; ok && i < 10; i++)
+        ok = sh("sleep 0.05; echo done", "/dev/null", 60, NULL, &e);
+    timer_delete(timer);
+    sigaction(SIGALRM, &old, NULL);
+    assert_true(ok);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(success_leaves_the_error_untouched),
+        cmocka_unit_test(exit_status_and_last_lines_are_reported),
+        cmocka_unit_test(the_line_is_short_printable_ascii),
+        cmocka_unit_test(a_signal_is_named),
+        cmocka_unit_test(a_missing_program_is_not_found),
+        cmocka_unit_test(a_program_that_cannot_be_executed_says_why),
+        cmocka_unit_test(a_hang_is_killed_with_its_grandchild),
+        cmocka_unit_test(what_a_finished_program_leaves_behind_is_killed),
+        cmocka_unit_test(the_death_of_the_caller_ends_the_group),
+        cmocka_unit_test(stdin_is_empty_and_the_directory_is_the_one_asked_for),
+        cmocka_unit_test(a_long_output_is_logged_whole),
+        cmocka_unit_test(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded),
+        cmocka_unit_test(a_log_that_cannot_be_written_is_an_error),
+        cmocka_unit_test(the_caller_is_called_back_while_it_runs),
+        cmocka_unit_test(cpu_time_includes_descendants),
+        cmocka_unit_test(nothing_is_left_open_and_no_zombie_waits),
+        cmocka_unit_test(interrupted_system_calls_are_repeated),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,561 @@
+/* Descriptions of engines: what is read and refused, which scenes need what, and what comes of
+ * programs that behave and that do not. The programs are a few words of shell; their pictures are
+ * written here first, so that every number of the folded picture is known. Renderers that trace rays
+ * are run by end_to_end.sh. */
+#define _GNU_SOURCE
+#include "tests/support/build_scene.h"
+
+#include "reference/external/engine_description.h"
+#include "reference/suite/features.h"
+#include "reference/replicates/engine_driver.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/shell_quote.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { W = 4, H = 3, PIXELS = W * H, K = 3, SEED = 5 };
+
+static char dir[64];
+static struct suite suite;
+static struct suite_scene point_plane; /* 12_point_plane at W x H */
+
+static int set_up(void **state)
+{
+    (void)state;
+    struct err e;
+    strcpy(dir, "/tmp/assay_engine_XXXXXX");
+    assert_non_null(mkdtemp(dir));
+    if (!suite_load("reference/scenes", &suite, &e))
+        fail_msg("%s", e.msg);
+    const struct suite_scene *s = suite_find(&suite, "12_point_plane");
+    assert_non_null(s);
+    point_plane = *s;
+    point_plane.width = W;
+    point_plane.height = H;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    struct err e;
+    suite_free(&suite);
+    return remove_tree(dir, &e) ? 0 : -1;
+}
+
+static const char *path_of(const char *name)
+{
+    static char path[8][256];
+    static int turn;
+    char *out = path[turn++ % 8];
+    snprintf(out, sizeof *path, "%s/%s", dir, name);
+    return out;
+}
+
+static void write_file(const char *name, const void *bytes, size_t size)
+{
+    FILE *f = fopen(path_of(name), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+}
+
+static bool load(const char *json, struct engine *en, struct err *e)
+{
+    write_file("engine.json", json, strlen(json));
+    return engine_load(path_of("engine.json"), en, e);
+}
+
+static void must_load(const char *json, struct engine *en)
+{
+    struct err e;
+    if (!load(json, en, &e))
+        fail_msg("%s", e.msg);
+}
+
+/* Red is red(pixel), green 2, blue 0. PFM goes from the bottom row up. */
+static void write_pfm(const char *name, int width, int height, float (*red)(int pixel, int k),
+                      int k)
+{
+    char bytes[4096];
+    int n = snprintf(bytes, sizeof bytes, "PF\n%d %d\n-1.0\n", width, height);
+    for (int y = height - 1; y >= 0; y--)
+        for (int x = 0; x < width; x++) {
+            const float px[3] = {red(y * width + x, k), 2, 0};
+            memcpy(bytes + n, px, sizeof px);
+            n += (int)sizeof px;
+        }
+    write_file(name, bytes, (size_t)n);
+}
+
+static float ramp(int pixel, int k)
+{
+    return (float)(pixel + 1) * (float)(k * k + 1); /* x 1, 2, 5 */
+}
+static float constant(int pixel, int k)
+{
+    (void)pixel, (void)k;
+    return 0.25f;
+}
+static float not_a_number(int pixel, int k)
+{
+    return pixel == 6 ? NAN : (float)k;
+}
+
+/* Runs `script` with the scene, the picture's path and the seed as $1, $2, $3. */
+static void engine_of_script(const char *script, const char *more, struct engine *en)
+{
+    char json[2048];
+    snprintf(
+        json, sizeof json,
+        "{\"name\": \"fake\", \"format\": \"pbrt\", \"image\": \"pfm\", \"expresses\": "
+        "[\"diffuse\", \"point\"], \"replicates\": %d, \"spp\": 7, \"command\": [\"sh\", \"-c\", "
+        "\"%s\", \"sh\", \"{scene}\", \"{out}\", \"{seed}\", \"{spp} {depth} {width} {height} "
+        "{threads}\"], \"output\": \"mean\"%s}",
+        K, script, more);
+    must_load(json, en);
+}
+
+static bool render(const struct engine *en, const struct suite_scene *s, struct moments *m,
+                   json_t **manifest, struct err *e)
+{
+    const struct engine_options opt = {.seed = SEED, .threads = 2, .timeout_s = 1, .work_dir = dir};
+    return engine_render(en, s, &opt, m, manifest, e);
+}
+
+static void shipped_descriptions_load(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"mitsuba", "pbrt", "povray_plain", "student",
+                                        "pathtracer_again"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char path[128];
+        struct engine en;
+        struct err e;
+        snprintf(path, sizeof path, "reference/engines/%s.json", names[i]);
+        if (!engine_load(path, &en, &e))
+            fail_msg("%s", e.msg);
+        assert_string_equal(en.name, names[i]);
+        engine_free(&en);
+    }
+}
+
+static void members_are_read(void **state)
+{
+    (void)state;
+    struct engine en;
+    must_load(
+        "{\"name\": \"a-1\", \"format\": \"cycles\", \"output\": \"mean\", \"image\": \"hdr\","
+        "\"command\": [\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": [\"mirror\"],"
+        "\"depth_offset\": -1, \"spp\": 9, \"replicates\": 11}",
+        &en);
+    assert_string_equal(en.name, "a-1");
+    assert_int_equal(en.format, FORMAT_CYCLES);
+    assert_int_equal(en.output, OUTPUT_MEAN);
+    assert_string_equal(en.image, "hdr");
+    assert_int_equal(en.feature, 1u << FEATURE_MIRROR);
+    assert_int_equal(en.depth_offset, -1);
+    assert_int_equal(en.spp, 9);
+    assert_int_equal(en.replicates, 11);
+    engine_free(&en);
+}
+
+/* Each replaces one member of a good description, or adds one; NULL: leaves it out. */
+static void bad_descriptions_are_refused(void **state)
+{
+    (void)state;
+    static const char *const good[][2] = {
+        {"name", "\"x\""},
+        {"format", "\"pbrt\""},
+        {"output", "\"mean\""},
+        {"command", "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"]"},
+        {"expresses", "[\"diffuse\"]"},
+    };
+    enum { NUM_GOOD = sizeof good / sizeof *good };
+    static const char *const bad[][3] = {
+        {"colour", "1", "unknown key 'colour'"},
+        {"name", NULL, "missing key 'name'"},
+        {"name", "\"X\"", "a-z, 0-9"},
+        {"name", "\"../x\"", "a-z, 0-9"},
+        {"name", "\"cycles\"", "which this program uses itself"},
+        {"format", "\"obj\"", "'format' is 'obj', none of: mitsuba, pbrt, povray, cycles, dae"},
+        {"output", "\"variance\"", "none of: mean, exact, moments"},
+        {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
+        {"image", "\"png\"", "none of: exr, hdr, pfm"},
+        {"command", "[]", "'command' is not a list of 1 to 256 texts"},
+        {"command", "\"x {scene}\"", "'command' is not a list"},
+        {"command", "[\"x\", 3]", "'command' [1] is not a text"},
+        {"command", "[\"\", \"{scene}\"]", "'command' [0] is not a text"},
+        {"command", "[\"x\", \"{scene}\", \"{seed}\"]", "'command' has no {out}"},
+        {"command", "[\"x\", \"{out}\", \"{seed}\"]", "'command' has no {scene}"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\"]", "'command' has no {seed}"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\", \"-s={samples}\"]",
+         "'command' [4]: unknown placeholder '{samples}'"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed\"]", "'command' [3]: a brace without"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\", \"seed}\"]", "'command' [3]: a brace without"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\", \"{}\"]",
+         "unknown placeholder '{}'"},
+        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\\n\"]",
+         "'command' [3] is not one line"},
+        {"version", "[\"x\", \"{seed}\"]", "'version' [1]: unknown placeholder '{seed}'"},
+        {"expresses", "[\"diffuse\", \"hair\"]", "'expresses' [1]: 'hair' is no feature"},
+        {"expresses", "[7]", "'expresses' [0]"},
+        {"depth_offset", "2", "'depth_offset' is 2, not in -1..1"},
+        {"spp", "0.5", "'spp' is not a whole number"},
+        {"replicates", "2", "'replicates' is 2, not in 3..4096"},
+        {"lens_args", "[\"-b\", \"{lens_radius}\", \"{focal_distance}\"]",
+         "'lens_args' is for \"format\": \"dae\" only"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        char json[1024] = "{";
+        bool replaced = false;
+        for (size_t k = 0; k <= NUM_GOOD; k++) {
+            const char *key = k < NUM_GOOD ? good[k][0] : bad[i][0];
+            const char *value = k < NUM_GOOD ? good[k][1] : bad[i][1];
+            if (k < NUM_GOOD && strcmp(key, bad[i][0]) == 0) {
+                value = bad[i][1];
+                replaced = true;
+            }
+            if (value != NULL && (k < NUM_GOOD || !replaced))
+                snprintf(json + strlen(json), sizeof json - strlen(json), "%s\"%s\": %s",
+                         strlen(json) > 1 ? ", " : "", key, value);
+        }
+        strcat(json, "}");
+        struct engine en;
+        struct err e = {0};
+        if (load(json, &en, &e))
+            fail_msg("accepted: %s", json);
+        if (strstr(e.msg, bad[i][2]) == NULL || strstr(e.msg, "engine.json") == NULL)
+            fail_msg("%s\n  gave: %s\n  not: %s", json, e.msg, bad[i][2]);
+    }
+    struct engine en;
+    struct err e;
+    assert_false(load("{\"name\": }", &en, &e));
+    assert_non_null(strstr(e.msg, "engine.json:1:"));
+    assert_false(load("{\"name\": \"x\", \"name\": \"y\"}", &en, &e));
+    assert_false(load("[]", &en, &e));
+    assert_false(engine_load(path_of("nothing.json"), &en, &e));
+    assert_non_null(strstr(e.msg, "nothing.json: cannot read"));
+}
+
+static void a_dae_needs_its_lens_on_the_command_line(void **state)
+{
+    (void)state;
+    const char *const head =
+        "{\"name\": \"x\", \"format\": \"dae\", \"output\": \"mean\", \"command\": "
+        "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": ";
+    static const struct {
+        const char *tail, *error;
+    } cases[] = {
+        {"[\"lens\"]}", "come together"},
+        {"[], \"lens_args\": [\"{lens_radius}\", \"{focal_distance}\"]}", "come together"},
+        {"[\"lens\"], \"lens_args\": [\"{lens_radius}\"]}", "has no {focal_distance}"},
+        {"[\"lens\"], \"lens_args\": [\"{lens_radius}\", \"{focal_distance}\"]}", NULL},
+        {"[\"environment\"], \"environment_args\": [\"{scene}\"]}", "unknown placeholder"},
+        {"[\"environment\"], \"environment_args\": [\"-e{environment}\"]}", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char json[1024];
+        struct engine en;
+        struct err e = {0};
+        snprintf(json, sizeof json, "%s%s", head, cases[i].tail);
+        bool ok = load(json, &en, &e);
+        assert_int_equal(ok, cases[i].error == NULL);
+        if (ok)
+            engine_free(&en);
+        else if (strstr(e.msg, cases[i].error) == NULL)
+            fail_msg("%s: %s", json, e.msg);
+    }
+}
+
+static void placeholders_are_filled_in(void **state)
+{
+    (void)state;
+    struct engine en;
+    struct err e;
+    char **argv;
+    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"mean\", \"expresses\": [],"
+              "\"command\": [\"run\", \"\", \"{{{seed}}}\", \"{out}{out}\", \"a b;$(c) {scene}\"]}",
+              &en);
+    const char *const values[] = {"scene", "s", "out", "/o", "seed", "12", NULL};
+    if (!engine_argv(&en, "command", values, &argv, &e))
+        fail_msg("%s", e.msg);
+    const char *const want[] = {"run", "", "{12}", "/o/o", "a b;$(c) s"};
+    for (int i = 0; i < 5; i++)
+        assert_string_equal(argv[i], want[i]);
+    assert_null(argv[5]);
+    free(argv);
+    assert_true(engine_argv(&en, "version", values, &argv, &e));
+    assert_null(argv[0]);
+    free(argv);
+    assert_false(engine_argv(&en, "command", values + 2, &argv, &e));
+    assert_non_null(strstr(e.msg, "no value for '{scene}'"));
+    engine_free(&en);
+}
+
+static void scenes_know_what_they_need(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        unsigned features;
+    } cases[] = {
+        {"11_furnace", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA | 1u << FEATURE_SPHERE},
+        {"12_point_plane", 1u << FEATURE_DIFFUSE | 1u << FEATURE_POINT},
+        {"13_square_patch", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA},
+        {"41_cornell", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA | 1u << FEATURE_SPHERE},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const struct suite_scene *s = suite_find(&suite, cases[i].name);
+        struct scene scene;
+        struct camera camera;
+        struct err e;
+        assert_non_null(s);
+        if (!suite_open(s, &scene, &camera, &e))
+            fail_msg("%s", e.msg);
+        assert_int_equal(scene_features(&scene, &camera), cases[i].features);
+        camera.lens_radius = 0.01f;
+        assert_int_equal(scene_features(&scene, &camera), cases[i].features | 1u << FEATURE_LENS);
+        camera.lens_radius = 0;
+        camera.far = 0.01f;
+        assert_int_equal(scene_features(&scene, &camera), cases[i].features | 1u << FEATURE_CLIP);
+        scene_free(&scene);
+    }
+}
+
+/* The features that no scene above has, one material or light at a time. */
+static void materials_and_lights_have_features(void **state)
+{
+    (void)state;
+    const struct material materials[] = {
+        {.kind = MATERIAL_MIRROR, .reflectance = {1, 1, 1}},
+        {.kind = MATERIAL_GLASS, .ior = 1.5f},
+        {.kind = MATERIAL_GLASS, .ior = 1.5f, .schlick = true},
+        {.kind = MATERIAL_REFRACTION, .ior = 1.5f},
+        {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_GGX, .alpha = .1f},
+        {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_BECKMANN, .alpha = .1f},
+        {.radiance = {1, 1, 1}, .radiance_both_sides = true},
+    };
+    const enum feature of_material[] = {FEATURE_MIRROR,     FEATURE_GLASS,      FEATURE_SCHLICK,
+                                        FEATURE_REFRACTION, FEATURE_MICROFACET, FEATURE_BECKMANN,
+                                        FEATURE_TWO_SIDED};
+    const struct light lights[] = {
+        {.kind = LIGHT_SPOT, .value = {1, 1, 1}, .axis = {0, 1, 0}, .attenuation = {0, 0, 1}},
+        {.kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 1, 0}},
+    };
+    const unsigned of_light[] = {1u << FEATURE_SPOT, 1u << FEATURE_DIRECTIONAL};
+    for (size_t i = 0; i < 10; i++) {
+        struct scene s = build_scene();
+        struct camera c;
+        struct err e;
+        unsigned want = 0;
+        uint32_t m = build_material(&s, grey(0), grey(0));
+        if (i < 7) {
+            s.materials[m] = materials[i];
+            want = 1u << of_material[i] | (i == 6 ? 1u << FEATURE_AREA : 0);
+        }
+        build_quad(&s, v3(-1, -1, -3), v3(2, 0, 0), v3(0, 2, 0), m);
+        if (i == 7 || i == 8) {
+            build_light(&s, lights[i - 7]);
+            want = of_light[i - 7];
+        }
+        if (i == 9) { /* tilted by 0.01, a little over half a degree */
+            s.normal[0] = normalize(v3(0.01f, 0, 1));
+            want = 1u << FEATURE_SMOOTH;
+        }
+        build_camera(&s, v3(0, 0, 0), 40);
+        if (!scene_finish(&s, "test", &e) || !camera_init(&c, &s, 8, 8, &e))
+            fail_msg("%s", e.msg);
+        assert_int_equal(scene_features(&s, &c), want);
+        scene_free(&s);
+    }
+}
+
+static void what_cannot_be_expressed_is_said(void **state)
+{
+    (void)state;
+    struct engine en;
+    struct err e;
+    must_load("{\"name\": \"x\", \"format\": \"povray\", \"output\": \"mean\", \"expresses\": "
+              "[\"diffuse\", \"point\"], \"command\": [\"x\", \"{scene}\", \"{out}\", \"{seed}\"]}",
+              &en);
+    assert_true(engine_expresses(&en, &point_plane, dir, &e));
+    assert_false(engine_expresses(&en, suite_find(&suite, "41_cornell"), dir, &e));
+    assert_string_equal(e.msg, "the description does not list: area, sphere");
+    /* The format's own limits, whatever the description says. */
+    struct suite_scene deep = *suite_find(&suite, "41_cornell");
+    en.feature = ~0u;
+    deep.depth = 60;
+    assert_false(engine_expresses(&en, &deep, dir, &e));
+    assert_non_null(strstr(e.msg, "POV-Ray is verified to depth"));
+    engine_free(&en);
+}
+
+/* Three pictures whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
+ * sum (x - 8/3)^2 = 1 + 4 + 25 - 64/3 = 26/3, M3 = (-5/3)^3 + (-2/3)^3 + (7/3)^3 = 210/27. */
+static void replicates_are_folded(void **state)
+{
+    (void)state;
+    struct engine en;
+    struct moments m;
+    json_t *manifest;
+    struct err e;
+    for (int k = 0; k < K; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
+        write_pfm(name, W, H, ramp, k);
+    }
+    engine_of_script("cp {here}/picture_$3.pfm $2 && test -s $1 && echo $4 > {here}/args",
+                     ", \"version\": [\"sh\", \"-c\", \"echo; echo Fake 3.1; echo more\"], "
+                     "\"depth_offset\": 1",
+                     &en);
+    if (!render(&en, &point_plane, &m, &manifest, &e))
+        fail_msg("%s", e.msg);
+    assert_string_equal(m.unit, "replicate");
+    assert_true(m.spp == 7);
+    for (int p = 0; p < PIXELS; p++) {
+        double x = p + 1;
+        assert_true(m.n[p] == K);
+        assert_true(fabs(m.mean[3 * p] - x * 8 / 3) < 1e-12 * x);
+        assert_true(fabs(m.m2[3 * p] - x * x * 26 / 3) < 1e-12 * x * x);
+        assert_true(fabs(m.m3[3 * p] - x * x * x * 210 / 27) < 1e-11 * x * x * x);
+        assert_true(m.mean[3 * p + 1] == 2 && m.mean[3 * p + 2] == 0 && m.m2[3 * p + 1] == 0);
+    }
+    static const char *const text[][2] = {{"engine", "fake"},
+                                          {"scene", "12_point_plane"},
+                                          {"unit", "replicate"},
+                                          {"version", "Fake 3.1"}};
+    for (size_t i = 0; i < sizeof text / sizeof *text; i++)
+        assert_string_equal(json_string_value(json_object_get(manifest, text[i][0])), text[i][1]);
+    const json_t *seeds = json_object_get(manifest, "seeds");
+    assert_int_equal(json_array_size(seeds), K);
+    for (int k = 0; k < K; k++)
+        assert_int_equal(json_integer_value(json_array_get(seeds, (size_t)k)),
+                         replicate_seed(SEED, k));
+    assert_int_equal(strlen(json_string_value(json_object_get(manifest, "binary_sha256"))), 64);
+    /* One of the words has blanks. */
+    int num;
+    char **word = shell_split(json_string_value(json_object_get(manifest, "command")), &num, &e);
+    assert_non_null(word);
+    const json_t *command = json_object_get(en.json, "command");
+    assert_int_equal(num, json_array_size(command));
+    for (int i = 0; i < num; i++)
+        assert_string_equal(word[i], json_string_value(json_array_get(command, (size_t)i)));
+    free(word);
+    /* {spp} {depth} {width} {height} {threads} */
+    char args[64] = "", want[64];
+    FILE *f = fopen(path_of("args"), "r");
+    assert_non_null(f);
+    assert_non_null(fgets(args, sizeof args, f));
+    fclose(f);
+    snprintf(want, sizeof want, "7 %d 4 3 2\n", point_plane.depth + 1);
+    assert_string_equal(args, want);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+}
+
+static void pictures_without_noise_are_exact(void **state)
+{
+    (void)state;
+    struct engine en;
+    struct moments m;
+    json_t *manifest;
+    struct err e;
+    write_pfm("constant.pfm", W, H, constant, 0);
+    engine_of_script("cp {here}/constant.pfm $2", "", &en);
+    if (!render(&en, &point_plane, &m, &manifest, &e))
+        fail_msg("%s", e.msg);
+    assert_string_equal(m.unit, "exact");
+    assert_true(m.n[0] == 1 && m.mean[0] == 0.25 && m.m2[0] == 0 && m.m3[0] == 0);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+    /* "exact" by declaration: one run, pixels may differ. */
+    write_pfm("ramp.pfm", W, H, ramp, 0);
+    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"exact\", \"image\": \"pfm\", "
+              "\"expresses\": [\"diffuse\", \"point\"], \"command\": [\"sh\", \"-c\", \"cp "
+              "{here}/ramp.pfm {out} # {scene}\"]}",
+              &en);
+    if (!render(&en, &point_plane, &m, &manifest, &e))
+        fail_msg("%s", e.msg);
+    assert_string_equal(m.unit, "exact");
+    assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
+    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+}
+
+static void programs_that_misbehave_are_errors(void **state)
+{
+    (void)state;
+    write_pfm("ramp.pfm", W, H, ramp, 0);
+    write_pfm("large.pfm", W + 1, H, ramp, 0);
+    write_pfm("nan.pfm", W, H, not_a_number, 0);
+    write_file("grey.pfm", "Pf\n4 3\n-1.0\n................................................", 60);
+    static const struct {
+        const char *script, *error;
+    } cases[] = {
+        {"echo I am ill >&2; exit 3", "exit status 3: I am ill"},
+        {"kill -9 $$", "killed by signal 9"},
+        {"sleep 30", "no end after 1 s"},
+        {"true", "replicate_0000.pfm: cannot read"},
+        {"echo garbage > $2", "replicate_0000.pfm"},
+        {"cp {here}/large.pfm $2", "5 x 3 pixels, not 4 x 3"},
+        {"cp {here}/nan.pfm $2", "pixel 2,1 is not finite"},
+        {"cp {here}/grey.pfm $2", "no channels R, G and B"},
+        {"cp {here}/ramp.pfm $2",
+         "replicate 1 is the same picture as an earlier one: the seed has"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct engine en;
+        struct moments m;
+        json_t *manifest;
+        struct err e = {0};
+        engine_of_script(cases[i].script, "", &en);
+        if (render(&en, &point_plane, &m, &manifest, &e))
+            fail_msg("accepted: %s", cases[i].script);
+        if (strstr(e.msg, cases[i].error) == NULL || strstr(e.msg, "12_point_plane, fake") == NULL)
+            fail_msg("%s\n  gave: %s\n  not: %s", cases[i].script, e.msg, cases[i].error);
+        assert_non_null(strstr(e.msg, "(see "));
+        engine_free(&en);
+    }
+    struct engine en;
+    struct moments m;
+    json_t *manifest;
+    struct err e = {0};
+    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"mean\", \"expresses\": [], "
+              "\"command\": [\"./no-such-program\", \"{scene}\", \"{out}\", \"{seed}\"]}",
+              &en);
+    assert_false(render(&en, &point_plane, &m, &manifest, &e));
+    /* Beside the description, not where we stand. */
+    assert_non_null(strstr(e.msg, path_of("./no-such-program: no such program")));
+    engine_free(&en);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shipped_descriptions_load),
+        cmocka_unit_test(members_are_read),
+        cmocka_unit_test(bad_descriptions_are_refused),
+        cmocka_unit_test(a_dae_needs_its_lens_on_the_command_line),
+        cmocka_unit_test(placeholders_are_filled_in),
+        cmocka_unit_test(scenes_know_what_they_need),
+        cmocka_unit_test(materials_and_lights_have_features),
+        cmocka_unit_test(what_cannot_be_expressed_is_said),
+        cmocka_unit_test(replicates_are_folded),
+        cmocka_unit_test(pictures_without_noise_are_exact),
+        cmocka_unit_test(programs_that_misbehave_are_errors),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

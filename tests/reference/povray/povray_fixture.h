@@ -1,0 +1,34 @@
+/* What tests of the POV-Ray driver share: a job for povray_render(), and our own picture of it. */
+#ifndef ASSAY_POVRAY_FIXTURE_H
+#define ASSAY_POVRAY_FIXTURE_H
+
+#include "reference/replicates/engine_driver.h"
+
+/* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
+enum { THREADS = 8 };
+
+/* What povray_render() is given, in a directory that goes with it. */
+struct fixture {
+    char dir[64];
+    struct scene s;
+    struct camera c;
+    struct suite_scene suite;
+    struct suite_reference ref;
+    struct reference_options opt;
+    struct reference_job job;
+};
+
+/* Takes over the scene and completes it. Two replicates of subgrid 1. Aborts the test on failure. */
+void fixture_init(struct fixture *f, struct scene s, int size, int depth);
+void fixture_free(struct fixture *f);
+/* POV-Ray's picture; aborts the test if there is none. */
+struct moments must_render(struct fixture *f, json_t *manifest);
+/* Looks straight down at the plane y = 0 from height h; the picture is 2 h x 2 h wide. */
+void look_down(struct scene *s, float h);
+/* Says so where there is none. */
+bool have_povray(void);
+double image_mean(const struct moments *m, int channel);
+/* Our own renderer: image means of paths of up to `depth` bounces, and their variances. */
+void render_ours(struct fixture *f, int depth, double mean[3], double variance[3]);
+
+#endif

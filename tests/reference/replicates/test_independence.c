@@ -1,0 +1,245 @@
+/* Independence of replicates: how often independent ones fail, and that dependent ones are found. The
+ * replicates are drawn here; the laws are those of simulate.h. */
+#include "reference/replicates/independence.h"
+#include "tests/support/simulate.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <gsl/gsl_cdf.h>
+
+enum { SIDE = 32, PIXELS = SIDE * SIDE };
+
+/* K pictures of one law; where `blur`, each pixel is half its own draw and half its left neighbour's,
+ * which correlates pixels but not replicates. */
+static struct replicates draw_all(enum law law, int count, bool blur, uint64_t *state)
+{
+    struct replicates r;
+    struct err e;
+    assert_true(replicates_alloc(&r, SIDE, SIDE, count, &e));
+    float x[3 * PIXELS];
+    for (int k = 0; k < count; k++) {
+        double left = 0;
+        for (int p = 0; p < PIXELS; p++) {
+            double own = draw(law, state), v = blur ? (own + left) / 2 : own;
+            left = own;
+            /* Brightness and noise differ between pixels. */
+            for (int c = 0; c < 3; c++)
+                x[3 * p + c] = (float)(v * (1 + p % 7));
+        }
+        replicates_add(&r, x);
+    }
+    return r;
+}
+
+static struct independence test(const struct replicates *r, double alpha)
+{
+    struct independence out;
+    struct err e;
+    assert_true(independence_test(r, alpha, &out, &e));
+    return out;
+}
+
+/* H0 true, alpha = 1 %, n = 1000 sets a row of 8 or 32 replicates of 1024 pixels. Each row's count of failures
+ * has at most the law Binomial(1000, 1 %): more than 29 have the probability 1.8e-7. Under H0 each z
+ * is standard normal: beyond 1.96 in 5 %, between 15 and 96 of 1000 but for 1e-9 (neighbours, batches).
+ * That a test is not merely silent is what the lower bound and the next tests are for. */
+static void independent_replicates_pass(void **state)
+{
+    (void)state;
+    static const struct {
+        enum law law;
+        int count;
+        bool blur;
+    } rows[] = {{LAW_NORMAL, 8, false},
+                {LAW_EXPONENTIAL, 8, false},
+                {LAW_BLACK, 8, false},
+                {LAW_NORMAL, 8, true},
+                {LAW_EXPONENTIAL, 32, false}};
+    uint64_t seed = 20261121;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        int failed = 0, neighbours = 0, batches = 0;
+        for (int n = 0; n < 1000; n++) {
+            struct replicates r = draw_all(rows[i].law, rows[i].count, rows[i].blur, &seed);
+            struct independence t = test(&r, 0.01);
+            assert_true(t.tested);
+            /* Blurred pixels are correlated and are refused for that: here it is the other tests. */
+            failed += rows[i].blur
+                          ? fabs(t.pair_z) > t.pair_limit || fabs(t.neighbours_z) > t.limit ||
+                                fabs(t.batches_z) > t.limit
+                          : !t.passed;
+            neighbours += fabs(t.neighbours_z) > 1.959964;
+            batches += fabs(t.batches_z) > 1.959964;
+            replicates_free(&r);
+        }
+        printf(
+            "law %d, %d replicates%s: %.1f %% fail at alpha 1 %%; beyond 1.96: %.1f %%, %.1f %%\n",
+            rows[i].law, rows[i].count, rows[i].blur ? ", blurred" : "", failed / 10.0,
+            neighbours / 10.0, batches / 10.0);
+        assert_in_range(failed, 0, 29);
+        assert_in_range(neighbours, 15, 96);
+        assert_in_range(batches, 15, 96);
+    }
+}
+
+static void fewer_than_it_takes_is_said(void **state)
+{
+    (void)state;
+    uint64_t seed = 5;
+    struct replicates r = draw_all(LAW_NORMAL, 3, false, &seed);
+    struct independence t = test(&r, 1e-6);
+    assert_false(t.tested);
+    replicates_free(&r);
+    /* 63 noisy blocks of 1024 pixels: blocks are of 4 x 4 here, 64 of them. */
+    r = draw_all(LAW_NORMAL, 8, false, &seed);
+    for (int k = 1; k < 8; k++)
+        for (int y = 0; y < 4; y++)
+            memcpy(r.luminance + k * PIXELS + y * SIDE, r.luminance + y * SIDE, 4 * sizeof(float));
+    t = test(&r, 1e-6);
+    assert_int_equal(t.pixels, PIXELS - 16);
+    assert_false(t.tested);
+    replicates_free(&r);
+}
+
+static void assert_refused(const struct replicates *r, const char *why)
+{
+    struct err e = {""};
+    json_t *manifest = json_object();
+    if (independence_check(r, manifest, &e))
+        fail_msg("passed, although: %s", why);
+    if (strstr(e.msg, why) == NULL)
+        fail_msg("'%s' does not say '%s'", e.msg, why);
+    assert_true(
+        json_is_false(json_object_get(json_object_get(manifest, "independence"), "passed")));
+    json_decref(manifest);
+}
+
+static void a_copy_is_found(void **state)
+{
+    (void)state;
+    uint64_t seed = 1;
+    struct replicates r = draw_all(LAW_EXPONENTIAL, 16, false, &seed);
+    memcpy(r.luminance + 11 * PIXELS, r.luminance + 4 * PIXELS, PIXELS * sizeof *r.luminance);
+    assert_refused(&r, "replicates 4 and 11 are not independent");
+    replicates_free(&r);
+}
+
+/* Replicate j becomes weight x replicate i + sqrt(1 - weight^2) x itself, of noise of variance 1. */
+static void mix(struct replicates *r, int j, int i, double weight)
+{
+    float *to = r->luminance + j * PIXELS;
+    const float *from = r->luminance + i * PIXELS;
+    for (int p = 0; p < PIXELS; p++) {
+        double m = 1 + p % 7;
+        to[p] = (float)(m + weight * (from[p] - m) + sqrt(1 - weight * weight) * (to[p] - m));
+    }
+}
+
+/* One standard deviation of a correlation is 1/32 here, the limit 5.9 of them, 0.18: a pair of correlation
+ * 0.4 (z = 12) is found, at alpha = 1e-6, in 50 of 50 sets; chance of a miss below 1e-9 each. Likewise
+ * neighbours of correlation 0.1 (15 pairs: one standard deviation is 0.008, z = 12). */
+static void correlated_replicates_are_found(void **state)
+{
+    (void)state;
+    uint64_t seed = 77;
+    for (int n = 0; n < 50; n++) {
+        struct replicates r = draw_all(LAW_NORMAL, 16, false, &seed);
+        mix(&r, 9, 2, 0.4);
+        assert_refused(&r, "replicates 2 and 9 are not independent");
+        replicates_free(&r);
+        r = draw_all(LAW_NORMAL, 16, false, &seed);
+        for (int k = 1; k < 16; k++)
+            mix(&r, k, k - 1, 0.1);
+        assert_refused(&r, "successive replicates are not independent");
+        replicates_free(&r);
+    }
+}
+
+/* Four groups of four that share 8 % of their variance, as replicates of one machine might: no pair
+ * (correlation 0.08, z = 2.6) is conspicuous; the means of groups vary 1 + 3 x 0.08 times too much. */
+static void groups_are_found(void **state)
+{
+    (void)state;
+    uint64_t seed = 99;
+    for (int n = 0; n < 50; n++) {
+        struct replicates r = draw_all(LAW_NORMAL, 20, false, &seed);
+        for (int k = 0; k < 16; k++)
+            mix(&r, k, 16 + k / 4, sqrt(0.08));
+        r.num = 16;
+        struct independence t = test(&r, 1e-6);
+        assert_true(fabs(t.pair_z) < t.pair_limit);
+        assert_true(t.batches_z > t.limit);
+        assert_false(t.passed);
+        replicates_free(&r);
+    }
+}
+
+/* The reported correlation of pixels, as it was built: neighbours in a row 1/2, so of the 6 pairs in a square of 2
+ * two are correlated: 1/6 on average. One standard error at 32 replicates: 1/sqrt(1536 x 31) = 0.005. A row of n has
+ * the variance 2n - 1 of n: in a square of 4, 7/4 = 1.75 times too much, refused (one standard error of that
+ * is 15/sqrt(64 x 120 x 31) = 0.03, the limit 5 of them above 1.5). */
+static void correlated_pixels_are_measured(void **state)
+{
+    (void)state;
+    uint64_t seed = 3;
+    struct replicates r = draw_all(LAW_NORMAL, 32, true, &seed);
+    struct independence t = test(&r, 1e-6);
+    assert_false(t.passed);
+    assert_true(t.square_failed >= 4);
+    assert_float_equal(t.square_se[0], 1 / sqrt(1536 * 31.0), 1e-9);
+    assert_float_equal(t.square_r[0], 1 / 6.0, 0.03);
+    replicates_free(&r);
+    r = draw_all(LAW_NORMAL, 32, false, &seed);
+    t = test(&r, 1e-6);
+    assert_true(t.passed);
+    assert_float_equal(t.square_r[0], 0, 0.025);
+    replicates_free(&r);
+}
+
+/* Adds one normal number to all pixels of each replicate, with `variance` of a pixel's own. */
+static void share(struct replicates *r, double variance, uint64_t *state)
+{
+    for (int k = 0; k < r->num; k++) {
+        double g = sqrt(variance) * (draw(LAW_NORMAL, state) - 1);
+        for (int p = 0; p < PIXELS; p++)
+            r->luminance[k * PIXELS + p] += (float)(g * (1 + p % 7));
+    }
+}
+
+/* One number added to all pixels of a replicate, with 2 % of the variance of each: no pair of pixels is
+ * conspicuous, but sums over 16 x 16 vary 1 + 255 x 0.02 = 6 times too much (48
+ * replicates, 4 squares of 256 pixels: one standard error of r is 1/sqrt(4 x 32640 x 47) = 0.0004). Control: with 0.05 % the ratio is 1.13, allowed. */
+static void pixels_that_share_noise_are_refused(void **state)
+{
+    (void)state;
+    uint64_t seed = 11;
+    for (int n = 0; n < 20; n++) {
+        struct replicates r = draw_all(LAW_NORMAL, 48, false, &seed);
+        struct independence before = test(&r, 1e-6);
+        assert_true(before.passed);
+        share(&r, 0.0005, &seed);
+        assert_true(test(&r, 1e-6).square_failed == 0);
+        share(&r, 0.02, &seed);
+        assert_true(test(&r, 1e-6).square_failed == 16);
+        assert_refused(&r, "pixels share their noise: sums over 16 x 16 pixels");
+        replicates_free(&r);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(independent_replicates_pass),
+        cmocka_unit_test(fewer_than_it_takes_is_said),
+        cmocka_unit_test(a_copy_is_found),
+        cmocka_unit_test(correlated_replicates_are_found),
+        cmocka_unit_test(groups_are_found),
+        cmocka_unit_test(correlated_pixels_are_measured),
+        cmocka_unit_test(pixels_that_share_noise_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,429 @@
+/* The closed forms against other routes to the same number: explicit sums, vector arithmetic,
+ * adaptive quadrature over the emitter, Lambert's polygon formula, conservation of energy. All
+ * comparisons use one tolerance, and the same tolerance must reject forms with a known mistake. */
+#include "reference/truth/truth.h"
+#include "reference/truth/truth_one_lamp.h"
+#include "tests/support/quadrature.h"
+
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_integration.h>
+#include <gsl/gsl_math.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* The sum's closed form E (1 - rho^(m+1)) / (1 - rho), and its limits rho = 0, rho = 1. */
+static void furnace_is_the_geometric_series(void **state)
+{
+    (void)state;
+    static const double albedo[] = {0.1, 0.2, 0.5, 0.8, 0.99};
+    for (size_t i = 0; i < COUNT(albedo); i++)
+        for (int m = 0; m <= 20; m++) {
+            double rho = albedo[i];
+            assert_true(
+                same(truth_furnace(2.5, rho, m), 2.5 * (1 - gsl_pow_int(rho, m + 1)) / (1 - rho)));
+            /* One bounce too few or too many must be seen, until the term itself is below the
+             * tolerance. */
+            if (m > 0 && gsl_pow_int(rho, m + 1) > 1e-7) {
+                assert_false(same(truth_furnace(2.5, rho, m - 1), truth_furnace(2.5, rho, m)));
+                assert_false(same(truth_furnace(2.5, rho, m + 1), truth_furnace(2.5, rho, m)));
+            }
+        }
+    assert_true(same(truth_furnace(3, 0, 7), 3));
+    assert_true(same(truth_furnace(3, 1, 7), 24));
+}
+
+/* Points spread over the plane, under the sources and far from them. */
+static const double plane_points[][2] = {
+    {0, 0},  {0.3, -0.2},     {1.25, 0.875}, {-1.25, 1.125}, {0.85, -0.375}, {0.4, -0.2},
+    {5, -7}, {-0.001, 0.002}, {0.5, -0.05},  {0.5, 0.3},     {-40, 25}};
+
+/* What a faulty renderer might have computed instead. */
+enum mistake { NONE, NO_RECEIVER_COSINE, NO_EMITTER_COSINE, NO_FALLOFF, ONE_OVER_R };
+
+/* Irradiance at p with normal +Y from a point light of intensity 1 at l, by vectors. */
+static double point_by_vectors(const double l[3], double px, double pz, enum mistake mistake)
+{
+    const double n[3] = {0, 1, 0}, d[3] = {l[0] - px, l[1], l[2] - pz};
+    double r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const double w[3] = {d[0] / r, d[1] / r, d[2] / r};
+    double cosine = n[0] * w[0] + n[1] * w[1] + n[2] * w[2];
+    return (mistake == NO_RECEIVER_COSINE ? 1 : cosine) / (mistake == NO_FALLOFF   ? 1
+                                                           : mistake == ONE_OVER_R ? r
+                                                                                   : r * r);
+}
+
+static void point_light_matches_vector_arithmetic(void **state)
+{
+    (void)state;
+    const double light[3] = {0.85, 0.5, -0.375};
+    for (size_t i = 0; i < COUNT(plane_points); i++) {
+        double x = plane_points[i][0], z = plane_points[i][1];
+        double form = truth_point_irradiance(light, x, z);
+        assert_true(same(form, point_by_vectors(light, x, z, NONE)));
+        assert_false(same(form, point_by_vectors(light, x, z, NO_FALLOFF)));
+        assert_false(same(form, point_by_vectors(light, x, z, ONE_OVER_R)));
+        /* Straight below the light the cosine is 1 and cannot be missed. */
+        if (x != light[0] || z != light[2])
+            assert_false(same(form, point_by_vectors(light, x, z, NO_RECEIVER_COSINE)));
+    }
+}
+
+static double ring(double r, void *light)
+{
+    return 2 * M_PI * r * truth_point_irradiance(light, r, 0);
+}
+
+/* An infinite plane catches half of the 4 pi W of an isotropic light of 1 W/sr, at any height. */
+static void plane_catches_half_the_flux(void **state)
+{
+    (void)state;
+    static const double height[] = {0.1, 0.5, 3};
+    gsl_integration_workspace *w = gsl_integration_workspace_alloc(1000);
+    for (size_t i = 0; i < COUNT(height); i++) {
+        double light[3] = {0, height[i], 0}, flux, error;
+        gsl_function f = {ring, light};
+        assert_int_equal(gsl_integration_qagiu(&f, 0, 0, 1e-10, 1000, w, &flux, &error),
+                         GSL_SUCCESS);
+        assert_true(same(flux, 2 * M_PI));
+    }
+    gsl_integration_workspace_free(w);
+}
+
+struct rectangle {
+    double height, x[2], z[2];
+};
+
+struct receiver {
+    const struct rectangle *r;
+    double x, z;
+    enum mistake mistake;
+};
+
+/* cos cos / d^2 between the emitter's point and the receiver, radiance 1. */
+static double transfer(double ex, double ez, const void *ctx)
+{
+    const struct receiver *p = ctx;
+    double dx = ex - p->x, dz = ez - p->z, h = p->r->height;
+    double d = sqrt(dx * dx + dz * dz + h * h), cosine = h / d;
+    double receiver = p->mistake == NO_RECEIVER_COSINE ? 1 : cosine;
+    double emitter = p->mistake == NO_EMITTER_COSINE ? 1 : cosine;
+    double falloff = p->mistake == NO_FALLOFF ? 1 : p->mistake == ONE_OVER_R ? d : d * d;
+    return receiver * emitter / falloff;
+}
+
+static double rectangle_by_quadrature(const struct rectangle *r, double x, double z,
+                                      enum mistake mistake)
+{
+    struct receiver p = {r, x, z, mistake};
+    return integrate_plane(transfer, &p, r->x, r->z);
+}
+
+/* Lambert's formula: E = L/2 |sum over edges of (angle the edge subtends) (unit normal of the plane
+ * through edge and receiver) . n|. */
+static double rectangle_by_edges(const struct rectangle *r, double x, double z)
+{
+    const double corner[4][3] = {{r->x[0] - x, r->height, r->z[0] - z},
+                                 {r->x[1] - x, r->height, r->z[0] - z},
+                                 {r->x[1] - x, r->height, r->z[1] - z},
+                                 {r->x[0] - x, r->height, r->z[1] - z}};
+    double sum = 0;
+    for (int i = 0; i < 4; i++) {
+        const double *a = corner[i], *b = corner[(i + 1) % 4];
+        double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                       a[0] * b[1] - a[1] * b[0]};
+        double norm = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+        sum += atan2(norm, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) * c[1] / norm;
+    }
+    return fabs(sum) / 2;
+}
+
+static const struct rectangle rectangles[] = {
+    {0.6, {0.15, 0.65}, {-0.35, -0.05}}, /* that of 13_square_patch */
+    {0.5, {-0.5, 1.1}, {-0.7, 0.5}},     /* that of 15_square_overhead */
+    {0.05, {-1, 2}, {0.1, 0.3}},
+    {3, {-0.01, 0.01}, {-2, 5}},
+};
+
+static void rectangle_matches_quadrature_and_edges(void **state)
+{
+    (void)state;
+    static const enum mistake mistakes[] = {NO_RECEIVER_COSINE, NO_EMITTER_COSINE, NO_FALLOFF,
+                                            ONE_OVER_R};
+    for (size_t i = 0; i < COUNT(rectangles); i++)
+        for (size_t j = 0; j < COUNT(plane_points); j++) {
+            const struct rectangle *r = &rectangles[i];
+            double x = plane_points[j][0], z = plane_points[j][1];
+            double form = truth_rectangle_irradiance(r->height, r->x, r->z, x, z);
+            /* The four corner terms, each up to pi/4, nearly cancel far away. */
+            double lost = 1e-15 / 1e-9;
+            if (form < lost)
+                continue;
+            assert_true(same(form, rectangle_by_quadrature(r, x, z, NONE)));
+            assert_true(same(form, rectangle_by_edges(r, x, z)));
+            for (size_t m = 0; m < COUNT(mistakes); m++)
+                assert_false(same(form, rectangle_by_quadrature(r, x, z, mistakes[m])));
+        }
+}
+
+/* On the axis of a rectangle 2a x 2b at height h: 2 [a/u atan(b/u) + b/w atan(a/w)],
+ * u^2 = h^2 + a^2, w^2 = h^2 + b^2. Of 15_square_overhead, the number in its .md. */
+static void rectangle_on_axis(void **state)
+{
+    (void)state;
+    double u = sqrt(0.25 + 0.64), w = sqrt(0.25 + 0.36);
+    double axis = 2 * (0.8 / u * atan(0.6 / u) + 0.6 / w * atan(0.8 / w));
+    const struct rectangle *r = &rectangles[1];
+    assert_true(same(truth_rectangle_irradiance(r->height, r->x, r->z, 0.3, -0.1), axis));
+    assert_false(same(truth_rectangle_irradiance(r->height, r->x, r->z, 0.3, -0.0999), axis));
+    assert_true(fabs(axis - 2.18589) < 5e-6);
+}
+
+/* An infinite lid of radiance 1 gives the irradiance pi. With half-width a the error is that of the
+ * far rim, 4 sides of order (h/a)^2. */
+static void wide_rectangle_gives_pi(void **state)
+{
+    (void)state;
+    const double wide[2] = {-1e6, 1e6};
+    assert_true(same(truth_rectangle_irradiance(1, wide, wide, 0.3, -0.2), M_PI));
+    const double narrow[2] = {-1e3, 1e3};
+    assert_false(same(truth_rectangle_irradiance(1, narrow, narrow, 0.3, -0.2), M_PI));
+}
+
+static void pictures_are_exact_moments(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"11_furnace", "12_point_plane", "13_square_patch"};
+    for (size_t s = 0; s < COUNT(names); s++) {
+        struct moments m;
+        render_truth(names[s], 64, 48, &m);
+        assert_int_equal(m.width, 64);
+        assert_int_equal(m.height, 48);
+        assert_string_equal(m.unit, "exact");
+        assert_true(m.spp == 0);
+        for (size_t i = 0; i < 64 * 48; i++) {
+            assert_true(m.n[i] == 1);
+            for (size_t c = 3 * i; c < 3 * i + 3; c++)
+                assert_true(m.mean[c] > 0 && m.m2[c] == 0 && m.m3[c] == 0);
+        }
+        moments_free(&m);
+    }
+}
+
+/* 11_furnace: E = (.5, 1, 2), rho = (.8, .5, .2), five bounces, each written as a fraction:
+ * .5 (1-.8^6)/.2 = 1.84464, (1-.5^6)/.5 = 1.96875, 2 (1-.2^6)/.8 = 2.49984. */
+static void furnace_picture_is_flat(void **state)
+{
+    (void)state;
+    static const double expected[3] = {1.84464, 1.96875, 2.49984};
+    struct moments m;
+    render_truth("11_furnace", 64, 64, &m);
+    for (size_t i = 0; i < 3 * 64 * 64; i++)
+        assert_true(same(m.mean[i], expected[i % 3]));
+    moments_free(&m);
+}
+
+static double point_12(double x, double z, const void *ctx)
+{
+    (void)ctx;
+    return point_by_vectors((double[3]){0.85, 0.5, -0.375}, x, z, NONE);
+}
+
+static double rectangle_13(double x, double z, const void *ctx)
+{
+    (void)ctx;
+    return rectangle_by_edges(&rectangles[0], x, z);
+}
+
+static double rectangle_15(double x, double z, const void *ctx)
+{
+    (void)ctx;
+    return rectangle_by_edges(&rectangles[1], x, z);
+}
+
+/* Numbers of the plane scenes as their .dae has them, with the footprint of the camera: centre
+ * below the eye, half side = height x tan(half angle) = 2 x 1/2 = 0.5 x 2 = 1, image up = -Z. */
+static const struct plane_scene {
+    const char *name;
+    double (*irradiance)(double, double, const void *);
+    double source[3], albedo[3], left, top;
+    int bright_col, bright_row; /* the pixel below the source's centre */
+    bool symmetric;
+} plane_scenes[] = {
+    /* light at (.85, -.375): (.85 + .75) * 32 = 51.2, (-.375 + 1.125) * 32 = 24 */
+    {"12_point_plane", point_12, {3, 2, 1}, {0.5, 0.6, 0.7}, 0.25 - 1, -0.125 - 1, 51, 24, false},
+    /* centre at (.4, -.2): (.4 + 1.25) * 32 = 52.8, (-.2 + .875) * 32 = 21.6 */
+    {"13_square_patch",
+     rectangle_13,
+     {12, 10, 6},
+     {0.3, 0.5, 0.7},
+     -0.25 - 1,
+     0.125 - 1,
+     52,
+     21,
+     false},
+    /* centre at (.3, -.1), in the middle. Half side: .4 x 2.5 = 1 */
+    {"15_square_overhead",
+     rectangle_15,
+     {1, 1.5, 2},
+     {0.8, 0.6, 0.4},
+     0.3 - 1,
+     -0.1 - 1,
+     32,
+     32,
+     true},
+};
+
+static void pixels_are_box_filtered(void **state)
+{
+    (void)state;
+    static const int pixels[][2] = {{0, 0},   {63, 0},  {0, 63}, {63, 63},
+                                    {51, 24}, {52, 21}, {17, 40}};
+    for (size_t s = 0; s < COUNT(plane_scenes); s++) {
+        const struct plane_scene *p = &plane_scenes[s];
+        struct moments m;
+        render_truth(p->name, 64, 64, &m);
+        for (size_t i = 0; i < COUNT(pixels); i++) {
+            int col = pixels[i][0], row = pixels[i][1];
+            double side = 2.0 / 64, x = p->left + side * col, z = p->top + side * row;
+            double mean = integrate_plane(p->irradiance, NULL, (double[2]){x, x + side},
+                                          (double[2]){z, z + side}) /
+                          (side * side);
+            for (int c = 0; c < 3; c++)
+                assert_true(
+                    same(mean_at(&m, col, row, c), p->albedo[c] * p->source[c] * mean / M_PI));
+            /* A value at the pixel's centre instead of its mean must be seen. */
+            double centre = p->irradiance(x + side / 2, z + side / 2, NULL);
+            assert_false(
+                same(mean_at(&m, col, row, 0), p->albedo[0] * p->source[0] * centre / M_PI));
+        }
+        moments_free(&m);
+    }
+}
+
+/* A picture of twice the resolution, averaged 2 x 2, is the same picture: the quadrature over a
+ * pixel has converged, and pixels tile the footprint. */
+static void pixels_do_not_depend_on_resolution(void **state)
+{
+    (void)state;
+    for (size_t s = 0; s < COUNT(plane_scenes); s++) {
+        struct moments coarse, fine;
+        render_truth(plane_scenes[s].name, 64, 64, &coarse);
+        render_truth(plane_scenes[s].name, 128, 128, &fine);
+        for (int row = 0; row < 64; row++)
+            for (int col = 0; col < 64; col++)
+                for (int c = 0; c < 3; c++) {
+                    double mean = (mean_at(&fine, 2 * col, 2 * row, c) +
+                                   mean_at(&fine, 2 * col + 1, 2 * row, c) +
+                                   mean_at(&fine, 2 * col, 2 * row + 1, c) +
+                                   mean_at(&fine, 2 * col + 1, 2 * row + 1, c)) /
+                                  4;
+                    assert_true(same(mean_at(&coarse, col, row, c), mean));
+                }
+        moments_free(&coarse);
+        moments_free(&fine);
+    }
+}
+
+/* Where the bright spot lies (the pixel, or its neighbour if the spot is on their border), and that
+ * each flip, turn or transposition of the picture would put it elsewhere. */
+static void pictures_are_the_right_way_round(void **state)
+{
+    (void)state;
+    for (size_t s = 0; s < COUNT(plane_scenes); s++) {
+        struct moments m;
+        render_truth(plane_scenes[s].name, 64, 64, &m);
+        int best = 0;
+        for (int i = 0; i < 64 * 64; i++)
+            if (m.mean[3 * i] > m.mean[3 * best])
+                best = i;
+        assert_in_range(best % 64, (size_t)plane_scenes[s].bright_col - 1,
+                        (size_t)plane_scenes[s].bright_col);
+        assert_in_range(best / 64, (size_t)plane_scenes[s].bright_row - 1,
+                        (size_t)plane_scenes[s].bright_row);
+        for (int symmetry = 1; symmetry < 8 && !plane_scenes[s].symmetric; symmetry++) {
+            int col = best % 64, row = best / 64;
+            int x = symmetry & 4 ? row : col, y = symmetry & 4 ? col : row;
+            double other = mean_at(&m, symmetry & 1 ? 63 - x : x, symmetry & 2 ? 63 - y : y, 0);
+            assert_true(other < 0.5 * m.mean[3 * best]);
+        }
+        moments_free(&m);
+    }
+}
+
+#define POINT_REST "\"albedo\":[0.5,0.5,0.5],\"footprint\":{\"x\":[-1,1],\"z\":[-1,1]}"
+#define RECT_REST                                                                                  \
+    "\"radiance\":[1,1,1],\"albedo\":[0.5,0.5,0.5],\"footprint\":{\"x\":[-1,1],\"z\":[-1,1]}"
+
+static const struct bad {
+    const char *kind, *values;
+    int depth;
+    const char *message; /* a part of it; NULL: must be accepted */
+} bad[] = {
+    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0.5,1]}", 0, NULL},
+    {"furnace", "{\"emission\":[1,1,1]}", 1, "albedo"},
+    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0,0],\"extra\":1}", 1, "extra"},
+    {"furnace", "{\"emission\":[1,1],\"albedo\":[0,0,0]}", 1, "2"},
+    {"furnace", "{\"emission\":[1,1,1,1],\"albedo\":[0,0,0]}", 1, "left unpacked"},
+    {"furnace", "{\"emission\":[1,1,\"1\"],\"albedo\":[0,0,0]}", 1, "string"},
+    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0,1.01]}", 1, "albedo[2] is 1.01"},
+    {"furnace", "{\"emission\":[1,-1,1],\"albedo\":[0,0,0]}", 1, "emission[1] is -1"},
+    {"lambda", "{}", 1, "truth 'lambda': unknown closed form"},
+    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 1, NULL},
+    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 7, NULL},
+    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 0,
+     "depth is 0"},
+    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,0,0]," POINT_REST "}", 1,
+     "not above the plane"},
+    {"point_over_plane", "{\"intensity\":[1,1,-1],\"light\":[0,1,0]," POINT_REST "}", 1,
+     "intensity[2]"},
+    {"point_over_plane",
+     "{\"intensity\":[1,1,1],\"light\":[0,1,0],\"albedo\":[0.5,0.5,0.5],"
+     "\"footprint\":{\"x\":[1,1],\"z\":[-1,1]}}",
+     1, "footprint has no area"},
+    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1e-3,0]," POINT_REST "}", 1,
+     "not converged"},
+    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[0,1],\"z\":[0,1]}," RECT_REST "}",
+     1, NULL},
+    {"rectangle_over_plane", "{\"height\":-1,\"emitter\":{\"x\":[0,1],\"z\":[0,1]}," RECT_REST "}",
+     1, "not above the plane"},
+    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[1,0],\"z\":[0,1]}," RECT_REST "}",
+     1, "emitter has no area"},
+    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[0,1],\"y\":[0,1]}," RECT_REST "}",
+     1, "z"},
+    {"rectangle_over_plane",
+     "{\"height\":1e-4,\"emitter\":{\"x\":[0.1,0.2],\"z\":[0.1,0.2]}," RECT_REST "}", 1,
+     "not converged"},
+};
+
+static void impossible_values_are_refused(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(bad); i++)
+        expect_refusal(bad[i].kind, bad[i].values, bad[i].depth, bad[i].message);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(furnace_is_the_geometric_series),
+        cmocka_unit_test(point_light_matches_vector_arithmetic),
+        cmocka_unit_test(plane_catches_half_the_flux),
+        cmocka_unit_test(rectangle_matches_quadrature_and_edges),
+        cmocka_unit_test(rectangle_on_axis),
+        cmocka_unit_test(wide_rectangle_gives_pi),
+        cmocka_unit_test(pictures_are_exact_moments),
+        cmocka_unit_test(furnace_picture_is_flat),
+        cmocka_unit_test(pixels_are_box_filtered),
+        cmocka_unit_test(pixels_do_not_depend_on_resolution),
+        cmocka_unit_test(pictures_are_the_right_way_round),
+        cmocka_unit_test(impossible_values_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,464 @@
+/* The closed forms of a rough metal and of skies against other routes to the same number: quadrature
+ * over visible normals, over the wall, over directions, over the texels of the map. Points are
+ * compared to 1e-9, and the same tolerance must reject forms with a known mistake. */
+#include "reference/truth/truth_ggx.h"
+#include "reference/truth/truth_sky.h"
+#include "reference/truth/truth_pixel_mean.h"
+#include "tests/support/optics.h"
+#include "reference/base/image_oiio.h"
+
+#include <gsl/gsl_integration.h>
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const double tolerance = 1e-9; /* relative */
+
+#define COUNT(a) (sizeof(a) / sizeof *(a))
+
+static bool same(double a, double b)
+{
+    return fabs(a - b) <= tolerance * fabs(b);
+}
+
+static double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double next_number(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 9007199254740992.0;
+}
+
+static void unit_vector(uint64_t *state, double n[3])
+{
+    double z = 2 * next_number(state) - 1, phi = 2 * M_PI * next_number(state);
+    n[0] = sqrt(1 - z * z) * cos(phi);
+    n[1] = z;
+    n[2] = sqrt(1 - z * z) * sin(phi);
+}
+
+/* Nested adaptive quadrature over [a0,a1] x [b0,b1], relative error 1e-11. */
+struct double_integral {
+    double (*f)(double a, double b, const void *data);
+    const void *data;
+    double a, b0, b1;
+    gsl_integration_workspace *inner;
+};
+
+enum { INTERVALS = 500 };
+
+static double over_b(double b, void *p)
+{
+    const struct double_integral *in = p;
+    return in->f(in->a, b, in->data);
+}
+
+static double over_a(double a, void *p)
+{
+    struct double_integral *in = p;
+    double value, error;
+    in->a = a;
+    gsl_function g = {over_b, in};
+    assert_int_equal(gsl_integration_qag(&g, in->b0, in->b1, 1e-13, 1e-12, INTERVALS,
+                                         GSL_INTEG_GAUSS31, in->inner, &value, &error),
+                     0);
+    return value;
+}
+
+static double integrate(double (*f)(double, double, const void *), const void *data, double a0,
+                        double a1, double b0, double b1)
+{
+    gsl_integration_workspace *outer = gsl_integration_workspace_alloc(INTERVALS);
+    struct double_integral in = {f, data, 0, b0, b1, gsl_integration_workspace_alloc(INTERVALS)};
+    gsl_function g = {over_a, &in};
+    double value, error;
+    assert_int_equal(gsl_integration_qag(&g, a0, a1, 1e-12, 1e-11, INTERVALS, GSL_INTEG_GAUSS31,
+                                         outer, &value, &error),
+                     0);
+    gsl_integration_workspace_free(in.inner);
+    gsl_integration_workspace_free(outer);
+    return value;
+}
+
+/* A rough metal seen under cos_o: the mean of F G2/G1 over the normals m visible from wo, whose density
+ * is D (wo.m) G1 / cos_o, as long as they reflect to above the surface. */
+enum metal_mistake { RIGHT, SEPARABLE, NO_SHADOWING, SCHLICK, NO_FRESNEL, SQUARED_ALPHA };
+
+struct metal {
+    double alpha, eta, k, cos_o;
+    enum metal_mistake mistake;
+};
+
+static double lambda(double alpha, double z)
+{
+    return 0.5 * (sqrt(1 + alpha * alpha * (1 - z * z) / (z * z)) - 1);
+}
+
+static double metal_fresnel(const struct metal *m, double c)
+{
+    double complex n = m->eta + m->k * _Complex_I;
+    if (m->mistake == NO_FRESNEL)
+        return 1;
+    if (m->mistake == SCHLICK)
+        return optics_fresnel(1, n) + (1 - optics_fresnel(1, n)) * pow(1 - c, 5);
+    return optics_fresnel(c, n);
+}
+
+/* psi: azimuth of m from wo's. t: tan(theta_m) over its value where wi is at the horizon. With slope =
+ * tan(theta_m) and c = sin(theta_o) cos(psi), wi.z = 2 (wo.m) m.z - cos_o > 0 means
+ * cos_o slope^2 - 2 c slope - cos_o < 0. */
+static double visible_normal(double psi, double t, const void *data)
+{
+    const struct metal *m = data;
+    double alpha = m->mistake == SQUARED_ALPHA ? m->alpha * m->alpha : m->alpha, z = m->cos_o;
+    double c = sqrt(1 - z * z) * cos(psi), horizon = (c + sqrt(c * c + z * z)) / z;
+    double slope = t * horizon, cos_m = 1 / sqrt(1 + slope * slope);
+    double cos_om = cos_m * (z + slope * c), wi_z = 2 * cos_om * cos_m - z;
+    if (!(wi_z > 0 && cos_om > 0))
+        return 0;
+    double lo = lambda(alpha, z), li = lambda(alpha, wi_z);
+    double g2 = 1 / (1 + lo + li);
+    if (m->mistake == SEPARABLE)
+        g2 = 1 / ((1 + lo) * (1 + li));
+    if (m->mistake == NO_SHADOWING)
+        g2 = 1 / (1 + lo);
+    /* D dm = slope dslope dpsi / (pi alpha^2 cos_m (1 + slope^2/alpha^2)^2) [Walter07 eq. 33] */
+    double e = 1 + slope * slope / (alpha * alpha);
+    return metal_fresnel(m, cos_om) * g2 * cos_om / z * slope * horizon /
+           (M_PI * alpha * alpha * cos_m * e * e);
+}
+
+static double albedo_by_normals(const struct metal *m)
+{
+    return 2 * integrate(visible_normal, m, 0, M_PI, 0, 1);
+}
+
+static const double metal_alpha = 0.5, metal_eta[3] = {.2, .9, 1.3}, metal_k[3] = {3.9, 2.5, 2.3};
+
+static void metal_albedo_both_ways(void **state)
+{
+    (void)state;
+    static const double cosine[] = {1, 0.9, 0.7, 0.5, 0.35, 0.237};
+    for (size_t i = 0; i < COUNT(cosine); i++)
+        for (int c = 0; c < 3; c++) {
+            struct metal m = {metal_alpha, metal_eta[c], metal_k[c], cosine[i], RIGHT};
+            double a = truth_ggx_albedo(m.alpha, m.eta, m.k, m.cos_o, 96);
+            assert_true(same(a, albedo_by_normals(&m)));
+        }
+    for (enum metal_mistake wrong = SEPARABLE; wrong <= SQUARED_ALPHA; wrong++)
+        for (size_t i = 1; i < COUNT(cosine); i += 2) {
+            struct metal m = {metal_alpha, metal_eta[0], metal_k[0], cosine[i], wrong};
+            double a = truth_ggx_albedo(m.alpha, m.eta, m.k, m.cos_o, 96);
+            double off = albedo_by_normals(&m) / a - 1;
+            print_message("mistake %d at cosine %g: %+.3f %%\n", (int)wrong, cosine[i], 100 * off);
+            assert_true(fabs(off) > 1e-5);
+        }
+}
+
+static void conductor_of_amplitudes(void **state)
+{
+    (void)state;
+    for (int i = 1; i <= 100; i++)
+        for (int c = 0; c < 3; c++)
+            assert_true(same(truth_fresnel_conductor(i / 100.0, metal_eta[c], metal_k[c]),
+                             optics_fresnel(i / 100.0, metal_eta[c] + metal_k[c] * _Complex_I)));
+    /* Without absorption it is a dielectric. */
+    assert_true(same(truth_fresnel_conductor(0.6, 1.5, 0), optics_fresnel(0.6, 1.5)));
+}
+
+/* White facets, alpha = 1, seen from above: D = 1/pi, G1(wo) = 1 and, with c = cos(theta_i), theta_i =
+ * 2 theta_m, G2 = 2c/(1 + c). So A = integral of 2 sin cos G2 over theta_m from 0 to pi/4, which is that
+ * of c/(1 + c) over c from 0 to 1: 1 - ln 2. A very large k makes facets white. */
+static void white_metal_from_above(void **state)
+{
+    (void)state;
+    assert_true(same(truth_ggx_albedo(1, 1, 1e12, 1, 96), 1 - M_LN2));
+}
+
+struct wall_point {
+    double distance, height;
+    int mistake; /* 1: one cosine missing, 2: cosines exchanged for those of a lid */
+};
+
+/* Share of dy dz of the wall: cos(floor) cos(wall) / (pi d^2), with cosines y/d and distance/d. */
+static double wall_element(double y, double z, const void *data)
+{
+    const struct wall_point *p = data;
+    double d2 = p->distance * p->distance + y * y + z * z;
+    if (p->mistake == 1)
+        return y / (M_PI * d2 * sqrt(d2));
+    if (p->mistake == 2)
+        return p->distance * p->distance / (M_PI * d2 * d2);
+    return y * p->distance / (M_PI * d2 * d2);
+}
+
+static void wall_share_both_ways(void **state)
+{
+    (void)state;
+    uint64_t s = 34;
+    for (int i = 0; i < 60; i++) {
+        struct wall_point p = {0.15 + 2 * next_number(&s), 0.5 + 2 * next_number(&s), 0};
+        double z[2] = {-1.5 + 2 * next_number(&s), 0};
+        z[1] = z[0] + 0.2 + 2 * next_number(&s);
+        double share = truth_wall_share(p.distance, z, p.height);
+        assert_true(same(share, integrate(wall_element, &p, 0, p.height, z[0], z[1])));
+        for (p.mistake = 1; p.mistake <= 2; p.mistake++)
+            assert_false(same(share, integrate(wall_element, &p, 0, p.height, z[0], z[1])));
+    }
+    /* A wall without end hides half of the sky from a point at its foot. */
+    const double wide[2] = {-1e9, 1e9};
+    assert_true(same(truth_wall_share(1e-9, wide, 1e3), 0.5));
+}
+
+/* The sky of 35_sky_gradient, its numbers once more. */
+static const struct truth_gradient sky = {.mean = {1, .8, .9},
+                                          .gradient = {{.6, -.1, .2}, {.2, .5, .1}, {.1, .2, -.6}}};
+
+struct sky_point {
+    double n[3], s[3], t[3];
+    int channel;
+    bool no_cosine;
+};
+
+static void make_frame(struct sky_point *p)
+{
+    int least = fabs(p->n[0]) < 0.5 ? 0 : 1;
+    double a[3] = {least == 0, least == 1, 0}, c = dot3(a, p->n);
+    for (int k = 0; k < 3; k++)
+        p->s[k] = (a[k] - c * p->n[k]) / sqrt(1 - c * c);
+    for (int k = 0; k < 3; k++)
+        p->t[k] = p->n[(k + 1) % 3] * p->s[(k + 2) % 3] - p->n[(k + 2) % 3] * p->s[(k + 1) % 3];
+}
+
+/* L cos(theta) sin(theta) / pi */
+static double sky_element(double theta, double phi, const void *data)
+{
+    const struct sky_point *p = data;
+    double slope = 0;
+    for (int k = 0; k < 3; k++)
+        slope += sky.gradient[k][p->channel] *
+                 (cos(theta) * p->n[k] + sin(theta) * (cos(phi) * p->s[k] + sin(phi) * p->t[k]));
+    return (sky.mean[p->channel] + slope) * sin(theta) * (p->no_cosine ? 0.5 : cos(theta)) / M_PI;
+}
+
+static void gradient_both_ways(void **state)
+{
+    (void)state;
+    uint64_t s = 35;
+    for (int i = 0; i < 60; i++) {
+        struct sky_point p = {.channel = i % 3};
+        unit_vector(&s, p.n);
+        make_frame(&p);
+        double form = truth_gradient_reflected(&sky, p.channel, p.n);
+        assert_true(same(form, integrate(sky_element, &p, 0, M_PI_2, 0, 2 * M_PI)));
+        p.no_cosine = true;
+        assert_false(same(form, integrate(sky_element, &p, 0, M_PI_2, 0, 2 * M_PI)));
+        const double turned[3] = {p.n[2], p.n[1], -p.n[0]};
+        assert_false(same(form, truth_gradient_reflected(&sky, p.channel, turned)));
+    }
+}
+
+enum { MAP_WIDTH = 64, MAP_HEIGHT = 32 };
+
+static void read_map(struct image *im)
+{
+    struct err e = {""};
+    bool half;
+    if (!image_read("reference/scenes/35_sky_gradient.exr", im, &half, &e))
+        fail_msg("%s", e.msg);
+    assert_false(half);
+    assert_int_equal(im->width, MAP_WIDTH);
+    assert_int_equal(im->height, MAP_HEIGHT);
+    assert_int_equal(image_channel(im, "R"), 0);
+    assert_int_equal(image_channel(im, "B"), 2);
+}
+
+static void map_is_what_make_sky_writes(void **state)
+{
+    (void)state;
+    struct image im;
+    read_map(&im);
+    for (int row = 0; row < MAP_HEIGHT; row++)
+        for (int col = 0; col < MAP_WIDTH; col++)
+            for (int c = 0; c < 3; c++) {
+                float expected =
+                    (float)truth_gradient_texel(&sky, c, MAP_WIDTH, MAP_HEIGHT, col, row);
+                float v = im.data[(row * MAP_WIDTH + col) * im.channels + c];
+                /* mathematical functions may differ in the last digit between libraries */
+                assert_true(fabsf(v - expected) <= 2e-7f * expected && v > 0);
+            }
+    image_free(&im);
+}
+
+/* What a surface of albedo 1 reflects under the map itself, bilinear between the middles of texels and
+ * constant beyond the middles of the outer rows: Gauss-Legendre over a sixteenth of each cell, in the
+ * directions in front of the surface. texel[row][col]. The edge of the hemisphere runs through cells, where
+ * the integrand has a kink; the error that leaves is of order 1e-6. */
+static double reflected_under_map(const struct image *im, int channel, const double n[3])
+{
+    enum { PARTS = 8, POINTS = 4 };
+    gsl_integration_glfixed_table *rule = gsl_integration_glfixed_table_alloc(POINTS);
+    double sum = 0;
+    for (int j = 0; j < MAP_HEIGHT * PARTS; j++)
+        for (size_t a = 0; a < POINTS; a++) {
+            double y, wy;
+            gsl_integration_glfixed_point((double)j / PARTS, (j + 1.0) / PARTS, a, &y, &wy, rule);
+            double theta = M_PI * y / MAP_HEIGHT, in_y = fmin(fmax(y - 0.5, 0), MAP_HEIGHT - 1.0);
+            int row = (int)fmin(in_y, MAP_HEIGHT - 2);
+            for (int i = 0; i < MAP_WIDTH * PARTS; i++)
+                for (size_t b = 0; b < POINTS; b++) {
+                    double x, wx;
+                    gsl_integration_glfixed_point((double)i / PARTS, (i + 1.0) / PARTS, b, &x, &wx,
+                                                  rule);
+                    double phi = 2 * M_PI * x / MAP_WIDTH - M_PI;
+                    double w[3] = {sin(theta) * cos(phi), cos(theta), -sin(theta) * sin(phi)};
+                    double c = dot3(n, w);
+                    if (c <= 0)
+                        continue;
+                    double in_x = x - 0.5 + (x < 0.5 ? MAP_WIDTH : 0);
+                    int col = (int)in_x, next = (col + 1) % MAP_WIDTH;
+                    const float *top = im->data + 3 * row * MAP_WIDTH + channel;
+                    const float *low = top + 3 * MAP_WIDTH;
+                    double s = in_x - col, t = in_y - row;
+                    double light = (1 - t) * ((1 - s) * top[3 * col] + s * top[3 * next]) +
+                                   t * ((1 - s) * low[3 * col] + s * low[3 * next]);
+                    sum += wx * wy * light * c * sin(theta);
+                }
+        }
+    gsl_integration_glfixed_table_free(rule);
+    return sum * (M_PI / MAP_HEIGHT) * (2 * M_PI / MAP_WIDTH) / M_PI;
+}
+
+/* So the form may be used for the map: what the texels' steepness is there for. */
+static void map_stands_for_the_gradient(void **state)
+{
+    (void)state;
+    struct image im, plain;
+    double worst = 0, worst_plain = 0;
+    uint64_t s = 350;
+    read_map(&im);
+    read_map(&plain);
+    for (int i = 0; i < 3 * MAP_WIDTH * MAP_HEIGHT; i++) {
+        /* As if texels simply had the value in their middle. */
+        int col = i / 3 % MAP_WIDTH, row = i / 3 / MAP_WIDTH;
+        double theta = M_PI * (row + 0.5) / MAP_HEIGHT,
+               phi = 2 * M_PI * (col + 0.5) / MAP_WIDTH - M_PI;
+        double w[3] = {sin(theta) * cos(phi), cos(theta), -sin(theta) * sin(phi)};
+        double v = sky.mean[i % 3];
+        for (int k = 0; k < 3; k++)
+            v += sky.gradient[k][i % 3] * w[k];
+        plain.data[i] = (float)v;
+    }
+    for (int i = 0; i < 24; i++) {
+        double n[3] = {i == 0, i == 1, i == 2};
+        if (i > 2)
+            unit_vector(&s, n);
+        double form = truth_gradient_reflected(&sky, i % 3, n);
+        worst = fmax(worst, fabs(reflected_under_map(&im, i % 3, n) / form - 1));
+        worst_plain = fmax(worst_plain, fabs(reflected_under_map(&plain, i % 3, n) / form - 1));
+    }
+    print_message("worst error %.2e, of texels with the plain values %.2e\n", worst, worst_plain);
+    assert_true(worst < 1e-5);
+    assert_true(worst_plain > 1e-4);
+    image_free(&im);
+    image_free(&plain);
+}
+
+/* Of the shipped pictures: one pixel's mean by the midpoints of 40 x 40 cells of it, exact to 1e-6, with
+ * the camera's geometry written once more. */
+static void render(const char *name, struct moments *out)
+{
+    struct suite suite;
+    struct err e;
+    if (!suite_load("reference/scenes", &suite, &e))
+        fail_msg("%s", e.msg);
+    const struct suite_scene *scene = suite_find(&suite, name);
+    assert_non_null(scene);
+    assert_string_equal(scene->reference[0].engine, "truth");
+    if (!truth_render(scene, &scene->reference[0], out, &e))
+        fail_msg("%s", e.msg);
+    suite_free(&suite);
+}
+
+static double floor_seen_down(double u, double v, int channel)
+{
+    static const double sky_radiance[3] = {1, .8, .6}, albedo[3] = {.8, .6, .4};
+    double x = 0.4 + u, z = 0.1 + v, local[2] = {-1.2 - z, 0.4 - z};
+    if (x > 1.025)
+        return sky_radiance[channel];
+    return sky_radiance[channel] * albedo[channel] * (1 - truth_wall_share(x + 0.75, local, 1.5));
+}
+
+/* Sine of the angle between the ray and the axis, times distance over radius. */
+static double metal_seen(double u, double v, int channel)
+{
+    static const double sky_radiance[3] = {1, .9, .8};
+    double t2 = 0.0865 * 0.0865 * (u * u + v * v), sin_i2 = 64 * t2 / (1 + t2);
+    return sky_radiance[channel] *
+           truth_ggx_albedo(0.5, metal_eta[channel], metal_k[channel], sqrt(1 - sin_i2), 48);
+}
+
+static double gradient_seen(double u, double v, int channel)
+{
+    static const double albedo[3] = {.8, .7, .6};
+    double x = 0.0865 * u, y = -0.0865 * v, length = sqrt(1 + x * x + y * y), d[3], n[3];
+    const double eye[3] = {6, 3, 6};
+    d[0] = (-2 + 2 * x + y) / (3 * length);
+    d[1] = (-1 - 2 * x + 2 * y) / (3 * length);
+    d[2] = (-2 - x - 2 * y) / (3 * length);
+    double half = -dot3(eye, d), t = half - sqrt(half * half - 81 + 1.125 * 1.125);
+    for (int k = 0; k < 3; k++)
+        n[k] = (eye[k] + t * d[k]) / 1.125;
+    return albedo[channel] * truth_gradient_reflected(&sky, channel, n);
+}
+
+static void pixels_lie_where_they_should(void **state)
+{
+    (void)state;
+    enum { CELLS = 40 };
+    static const struct {
+        const char *name;
+        double (*seen)(double u, double v, int channel);
+        int cells; /* the metal is slow, and smooth */
+    } scenes[] = {{"34_sky_constant", floor_seen_down, CELLS},
+                  {"23_ggx_furnace", metal_seen, 6},
+                  {"35_sky_gradient", gradient_seen, CELLS}};
+    static const int at[][2] = {{0, 0}, {51, 10}, {52, 10}, {10, 50}, {63, 63}, {2, 30}};
+    for (size_t s = 0; s < COUNT(scenes); s++) {
+        struct moments m;
+        render(scenes[s].name, &m);
+        int cells = scenes[s].cells;
+        for (size_t i = 0; i < COUNT(at); i++) {
+            double sum = 0, mean = m.mean[3 * (64 * at[i][1] + at[i][0]) + (int)i % 3];
+            for (int k = 0; k < cells * cells; k++)
+                sum += scenes[s].seen((at[i][0] + (k % cells + 0.5) / cells) / 32 - 1,
+                                      (at[i][1] + (k / cells + 0.5) / cells) / 32 - 1, (int)i % 3);
+            assert_true(fabs(mean - sum / (cells * cells)) < (cells == CELLS ? 2e-6 : 1e-4) * mean);
+        }
+        moments_free(&m);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(metal_albedo_both_ways),
+        cmocka_unit_test(conductor_of_amplitudes),
+        cmocka_unit_test(white_metal_from_above),
+        cmocka_unit_test(wall_share_both_ways),
+        cmocka_unit_test(gradient_both_ways),
+        cmocka_unit_test(map_is_what_make_sky_writes),
+        cmocka_unit_test(map_stands_for_the_gradient),
+        cmocka_unit_test(pixels_lie_where_they_should),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

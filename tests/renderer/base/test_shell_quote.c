@@ -1,0 +1,157 @@
+/* Words to a command line and back: by a shell, and by our own reader. */
+#include "renderer/base/shell_quote.h"
+#include "tools/results/claim_result.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char *const words[] = {
+    "pathtracer", "-f",      "it's here.exr", "",           "a  b", "$(id)", "\\",
+    "''",         "ünïcode", "*?[",           "--name=x y", "a\nb", NULL};
+enum { NUM_WORDS = sizeof words / sizeof words[0] - 1 };
+
+static void expect_words(const char *text, const char *const *want)
+{
+    int num;
+    struct err e = {""};
+    char **got = shell_split(text, &num, &e);
+    assert_non_null(got);
+    for (int i = 0; i < num; i++)
+        assert_string_equal(got[i], want[i]);
+    assert_null(want[num]);
+    assert_null(got[num]);
+    free(got);
+}
+
+static void what_was_joined_is_split(void **state)
+{
+    (void)state;
+    char *text = shell_join(NULL, words);
+    expect_words(text, words);
+    free(text);
+    text = shell_join(words[0], words + 1);
+    expect_words(text, words);
+    free(text);
+    text = shell_join(NULL, words + NUM_WORDS);
+    assert_string_equal(text, "");
+    free(text);
+}
+
+static char *ascii_of(const char *const *word)
+{
+    char *text = shell_join(NULL, word), *ascii = shell_ascii(text);
+    free(text);
+    assert_non_null(ascii);
+    for (const char *c = ascii; *c != '\0'; c++)
+        assert_in_range(*c, ' ', '~');
+    return ascii;
+}
+
+/* Every byte but zero, in one word and each in its own. */
+static void any_bytes_become_ascii_and_are_read_back(void **state)
+{
+    (void)state;
+    enum { BYTES = 255 };
+    char all[BYTES + 1] = "", one[BYTES][2];
+    const char *each[BYTES + 2] = {all};
+    for (int i = 0; i < BYTES; i++) {
+        all[i] = one[i][0] = (char)(i + 1);
+        one[i][1] = '\0';
+        each[i + 1] = one[i];
+    }
+    char *text = ascii_of(each);
+    expect_words(text, each);
+    free(text);
+    text = ascii_of((const char *const[]){"it's", "a\nb\r\377", NULL});
+    assert_string_equal(text, "'it'\\''s' 'a'$'\\012''b'$'\\015\\377'''");
+    free(text);
+}
+
+/* Three quarters of a megabyte, each word of it as long in quotes as a word can get. */
+static void no_word_is_lost_however_many(void **state)
+{
+    (void)state;
+    enum { MANY = 6000 };
+    static const char *many[MANY + 1];
+    for (int i = 0; i < MANY; i++)
+        many[i] = i % 2 == 0 ? "''''''''''''''''''''''''''''''''" : "b";
+    char *text = shell_join(NULL, many);
+    assert_int_equal(strlen(text), MANY / 2 * (2 + 4 * 32 + 1) + MANY - 1);
+    expect_words(text, many);
+    free(text);
+}
+
+/* What results.json says of its origin, too. */
+static void the_command_of_results_is_read_back(void **state)
+{
+    (void)state;
+    static const char *const want[] = {"assay", "compare", "it's a.exr", "b  c.exr", "", NULL};
+    char *argv[] = {"compare", "it's a.exr", "b  c.exr", "", NULL};
+    struct err e = {""};
+    json_t *root = results_new(4, argv, 0.01, &e);
+    assert_non_null(root);
+    expect_words(json_string_value(json_object_get(root, "command")), want);
+    json_decref(root);
+}
+
+/* The shell is another reader: printf prints each of its arguments and a bar. */
+static void expect_of_a_shell(const char *before, char *text, const char *after)
+{
+    char command[1200], got[1024] = "", want[1024] = "";
+    int length = snprintf(command, sizeof command, "%sprintf '%%s|' %s%s", before, text, after);
+    assert_in_range(length, 1, sizeof command - 1);
+    free(text);
+    FILE *f = popen(command, "r");
+    assert_non_null(f);
+    size_t n = fread(got, 1, sizeof got - 1, f);
+    assert_int_equal(pclose(f), 0);
+    got[n] = '\0';
+    for (int i = 0; i < NUM_WORDS; i++) {
+        strcat(want, words[i]);
+        strcat(want, "|");
+    }
+    assert_string_equal(got, want);
+}
+
+static void a_shell_reads_the_same_words(void **state)
+{
+    (void)state;
+    expect_of_a_shell("", shell_join(NULL, words), "");
+    expect_of_a_shell("bash <<'END'\n", ascii_of(words), "\nEND\n");
+}
+
+static void what_a_shell_would_act_on_is_refused(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {"a; b",    "a | b",   "$HOME",  "`id`",     "a > b",
+                                      "'open",   "\"a\"",   "a & b",  "*",        "a\nb",
+                                      "~",       "$'a'",    "$'\\n'", "$'\\000'", "$'\\400'",
+                                      "$'\\08'", "$'\\012", "$'",     "$'\\1'"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        int num;
+        struct err e = {""};
+        if (shell_split(bad[i], &num, &e) != NULL)
+            fail_msg("'%s' is accepted", bad[i]);
+        assert_non_null(strstr(e.msg, "not a plain command"));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_was_joined_is_split),
+        cmocka_unit_test(any_bytes_become_ascii_and_are_read_back),
+        cmocka_unit_test(no_word_is_lost_however_many),
+        cmocka_unit_test(the_command_of_results_is_read_back),
+        cmocka_unit_test(a_shell_reads_the_same_words),
+        cmocka_unit_test(what_a_shell_would_act_on_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,224 @@
+/* Hierarchies against brute force: the same nearest hit, bit for bit, and the same answer on
+ * occlusion; and intersections against closed forms. */
+#include "renderer/bvh/bvh.h"
+#include "renderer/math/sampler.h"
+#include "renderer/scene/shape.h"
+#include "renderer/math/warp.h"
+#include "tests/support/build_scene.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { KINDS = BVH_WIDE + 1 };
+
+enum layout { SCATTERED, COINCIDENT, FLAT, WIDE_RANGE, ONE, NUM_LAYOUTS };
+
+static vec3 random_point(uint32_t i, uint32_t k)
+{
+    struct sample4 s = sampler_get(11, i, k, 0, 0);
+    return v3(2 * s.u[0] - 1, 2 * s.u[1] - 1, 2 * s.u[2] - 1);
+}
+
+static struct scene make_scene(enum layout layout)
+{
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
+    uint32_t n = layout == ONE ? 1 : 700;
+    for (uint32_t i = 0; i < n; i++) {
+        vec3 c = random_point(i, 0), d = scale(random_point(i, 1), 0.2f);
+        vec3 f = scale(random_point(i, 2), 0.2f);
+        if (layout == COINCIDENT)
+            c = v3(0, 0, 0); /* centroids of triangle pairs fall together */
+        if (layout == FLAT)
+            c.y = d.y = f.y = 0;
+        if (layout == WIDE_RANGE)
+            c = scale(c, exp2f((float)(i % 40) - 20));
+        if (layout != FLAT && i % 3 == 0)
+            build_sphere(&s, c, layout == ONE ? 0.7f : 0.02f + 0.05f * fabsf(d.x), 1, m);
+        else
+            build_triangle(&s, c, add(c, d), add(c, f), m);
+        if (layout == COINCIDENT)
+            build_triangle(&s, neg(c), neg(d), neg(f), m);
+    }
+    struct err e = {0};
+    if (!scene_finish(&s, "test", &e))
+        fail_msg("%s", e.msg);
+    return s;
+}
+
+/* Rays from around, from inside, along axes and through vertices. */
+static ray make_ray(const struct scene *s, uint32_t i)
+{
+    struct sample4 u = sampler_get(12, i, 0, 0, 0);
+    vec3 o = scale(random_point(i, 3), i % 2 ? 3 : 0.5f), d = warp_uniform_sphere(u.u[0], u.u[1]);
+    if (i % 5 == 0)
+        d = v3(i % 3 == 0, i % 3 == 1, i % 3 == 2);
+    if (i % 7 == 0 && s->num_triangles > 0)
+        d = sub(s->position[i % (3 * s->num_triangles)], o);
+    if (length(d) == 0)
+        d = v3(0, 0, 1);
+    return (ray){o, normalize(d), 0, i % 4 ? INFINITY : 0.5f + u.u[2]};
+}
+
+static void hierarchies_equal_brute_force(void **state)
+{
+    (void)state;
+    struct err e = {0};
+    for (enum layout layout = SCATTERED; layout < NUM_LAYOUTS; layout++) {
+        struct scene s = make_scene(layout);
+        struct bvh *tree[KINDS];
+        for (int k = 0; k < KINDS; k++) {
+            tree[k] = bvh_build(&s, (enum bvh_kind)k, &e);
+            assert_non_null(tree[k]);
+        }
+        struct rays r;
+        uint16_t lane[BATCH_LANES];
+        uint32_t hits = 0, rays = 0;
+        struct bvh_stats stats[KINDS] = {{0}};
+        for (uint32_t first = 0; first < 20 * BATCH_LANES; first += BATCH_LANES) {
+            for (int i = 0; i < BATCH_LANES; i++) {
+                rays_set(&r, i, make_ray(&s, first + (uint32_t)i));
+                r.ignore[i] = NO_HIT;
+                lane[i] = (uint16_t)i;
+            }
+            struct hits h[KINDS];
+            bool occluded[KINDS][BATCH_LANES];
+            for (int k = 0; k < KINDS; k++) {
+                bvh_closest(tree[k], &r, lane, BATCH_LANES, &h[k], &stats[k]);
+                bvh_occluded(tree[k], &r, lane, BATCH_LANES, occluded[k], &stats[k]);
+            }
+            for (int k = 1; k < KINDS; k++)
+                for (int i = 0; i < BATCH_LANES; i++) {
+                    /* Two primitives at the very same distance may swap; nothing else may. */
+                    assert_true(h[k].t[i] == h[0].t[i]);
+                    assert_true((h[k].prim[i] == NO_HIT) == (h[0].prim[i] == NO_HIT));
+                    assert_true(occluded[k][i] == occluded[0][i]);
+                    assert_true(occluded[k][i] == (h[k].prim[i] != NO_HIT));
+                }
+            for (int i = 0; i < BATCH_LANES; i++)
+                hits += h[0].prim[i] != NO_HIT;
+            rays += BATCH_LANES;
+        }
+        /* The comparison has to have seen both answers. */
+        assert_true(hits > rays / 1000 && hits < rays);
+        if (layout == SCATTERED)
+            for (int k = 1; k < KINDS; k++)
+                assert_true(stats[k].primitive_tests < stats[0].primitive_tests / 10);
+        for (int k = 0; k < KINDS; k++) {
+            assert_true(stats[k].rays == 2 * rays);
+            bvh_free(tree[k]);
+        }
+        scene_free(&s);
+    }
+}
+
+static bool meets(const struct triangle *tri, const ray *r, float *t, float *u, float *v)
+{
+    struct shear s = shear_of(r);
+    return triangle_intersect(tri, r, &s, t, u, v);
+}
+
+/* Triangle (0,0,0) (1,0,0) (0,1,0) and rays along -Z at places with known barycentrics. */
+static void triangle_closed_form(void **state)
+{
+    (void)state;
+    const struct triangle tri = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+    static const struct {
+        float x, y;
+        bool hit;
+    } places[] = {{0.25f, 0.5f, true}, {0.0f, 0.0f, true},    {0.5f, 0.5f, true},
+                  {0.6f, 0.5f, false}, {-0.01f, 0.5f, false}, {0.5f, -0.01f, false}};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++)
+        for (int side = -1; side <= 1; side += 2) {
+            ray r = {{places[i].x, places[i].y, 2.0f * (float)side}, {0, 0, (float)-side}, 0, 10};
+            float t, u, v;
+            assert_true(meets(&tri, &r, &t, &u, &v) == places[i].hit);
+            if (places[i].hit)
+                assert_true(t == 2 && u == places[i].x && v == places[i].y);
+            r.tmax = 1.999f;
+            assert_false(meets(&tri, &r, &t, &u, &v));
+            r.tmax = 10;
+            r.tmin = 2.001f;
+            assert_false(meets(&tri, &r, &t, &u, &v));
+        }
+    ray parallel = {{-1, 0.2f, 0}, {1, 0, 0}, 0, 10};
+    float t, u, v;
+    assert_false(meets(&tri, &parallel, &t, &u, &v));
+}
+
+/* At distance D from the centre and impact parameter b: t = sqrt(D^2-b^2) -+ sqrt(r^2-b^2). */
+static void sphere_closed_form(void **state)
+{
+    (void)state;
+    const struct sphere s = {{0, 0, 0}, 0.5f, 1};
+    for (int k = 0; k < 100; k++) {
+        float b = 0.006f * (float)k;
+        ray r = {{b, 0, 1000}, {0, 0, -1}, 0, INFINITY};
+        float t;
+        bool hit = sphere_intersect(&s, &r, &t);
+        if (b < 0.4999f) {
+            assert_true(hit);
+            assert_true(fabs(t - (1000 - sqrt(0.25 - (double)b * b))) < 2e-4);
+        } else if (b > 0.5001f) {
+            assert_false(hit);
+        }
+        /* From inside only the far side counts. */
+        r.o = v3(b * 0.8f, 0, 0);
+        assert_true(sphere_intersect(&s, &r, &t));
+        assert_true(fabs(t - sqrt(0.25 - 0.64 * (double)b * b)) < 1e-6);
+    }
+}
+
+/* A ray that leaves a surface does not meet it again: from 10^5 places of a slanted triangle with
+ * large coordinates and of a sphere, in grazing directions too. */
+static void no_self_intersection(void **state)
+{
+    (void)state;
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
+    build_triangle(&s, v3(100, 3, -50), v3(103, 7, -48), v3(99, 8, -53), m);
+    build_sphere(&s, v3(5, 6, 7), 0.3f, 1, m);
+    struct err e = {0};
+    assert_true(scene_finish(&s, "test", &e));
+    struct bvh *bvh = bvh_build(&s, BVH_BRUTE_FORCE, &e);
+    struct bvh_stats stats = {0};
+    for (uint32_t i = 0; i < 100000; i++) {
+        struct sample4 u = sampler_get(13, i, 0, 0, 0);
+        uint32_t prim = i % 2;
+        struct surface at;
+        if (prim == 0) {
+            float b1, b2;
+            warp_triangle(u.u[0], u.u[1], &b1, &b2);
+            at = surface_at(&s, 0, &(ray){0}, 0, b1, b2);
+        } else {
+            vec3 d = warp_uniform_sphere(u.u[0], u.u[1]);
+            at = surface_at(&s, 1, &(ray){.o = mad(v3(5, 6, 7), 2, d), .d = neg(d)}, 1.7f, 0, 0);
+        }
+        vec3 local = warp_uniform_hemisphere(u.u[2], u.u[3]);
+        local.z *= i % 3 ? 1 : 1e-3f;
+        frame f = frame_from_normal(at.ng);
+        vec3 wi = normalize(frame_to_world(&f, local));
+        struct rays r;
+        rays_set(&r, 0, (ray){surface_origin(&at, wi), wi, 0, INFINITY});
+        struct hits h;
+        const uint16_t lane = 0;
+        bvh_closest(bvh, &r, &lane, 1, &h, &stats);
+        assert_true(h.prim[0] != prim);
+    }
+    bvh_free(bvh);
+    scene_free(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hierarchies_equal_brute_force),
+        cmocka_unit_test(triangle_closed_form),
+        cmocka_unit_test(sphere_closed_form),
+        cmocka_unit_test(no_self_intersection),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

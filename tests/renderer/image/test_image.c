@@ -1,0 +1,332 @@
+/* Our readers and writers of picture files against OpenImageIO's, a route of its own: the same bits of
+ * every channel, whichever way OpenEXR and RGBE pack them; and files that are cut short or damaged. */
+#include "renderer/base/fs.h"
+#include "reference/base/image_oiio.h"
+#include "renderer/math/sampler.h"
+#include "reference/base/process.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+enum { WIDTH = 37, HEIGHT = 29, CHANNELS = 5, MAX_FILE = 1 << 16 };
+static const char *const channel[CHANNELS] = {"R", "G", "B", "variance.R", "Z"};
+
+static char dir[] = "/tmp/assay-image-XXXXXX";
+
+static const char *path_of(char path[256], const char *name)
+{
+    snprintf(path, 256, "%s/%s", dir, name);
+    return path;
+}
+
+/* Positive numbers of many magnitudes, with smooth parts that pack well. */
+static struct image make_image(void)
+{
+    struct image im;
+    struct err e = {""};
+    assert_true(image_alloc(&im, WIDTH, HEIGHT, CHANNELS, channel, &e));
+    for (int i = 0; i < WIDTH * HEIGHT * CHANNELS; i++) {
+        struct sample4 u = sampler_get(5, (uint32_t)i, 0, 0, 0);
+        im.data[i] = i % 3 == 0 ? 0.25f : u.u[0] * (u.u[1] < 0.1f ? 1000 : 1);
+    }
+    assert_true(image_set_attr(&im, "assay:unit", "sample", &e));
+    assert_true(image_set_attr(&im, "assay:empty", "", &e));
+    return im;
+}
+
+static void write_source(void)
+{
+    char path[256];
+    struct err e = {""};
+    struct image im = make_image();
+    if (!image_write_exr(path_of(path, "source.exr"), &im, &e))
+        fail_msg("%s", e.msg);
+    image_free(&im);
+}
+
+/* Converts source.exr by a program that does not use our code. */
+static void oiiotool(const char *const *options, const char *to)
+{
+    char from[256], path[256];
+    struct err e = {""};
+    const char *argv[16] = {"oiiotool", path_of(from, "source.exr")};
+    int n = 2;
+    for (; *options != NULL; options++)
+        argv[n++] = *options;
+    argv[n++] = "-o";
+    argv[n++] = path_of(path, to);
+    const struct process p = {.argv = argv, .timeout_s = 60};
+    if (!process_run(&p, NULL, &e))
+        fail_msg("%s", e.msg);
+}
+
+static void assert_same(const struct image *a, const struct image *b)
+{
+    assert_int_equal(a->width, b->width);
+    assert_int_equal(a->height, b->height);
+    assert_int_equal(a->channels, b->channels);
+    for (int c = 0; c < a->channels; c++) {
+        int other = image_channel(b, a->names[c]);
+        assert_true(other >= 0);
+        for (size_t i = 0; i < (size_t)a->width * (size_t)a->height; i++) {
+            size_t n = (size_t)a->channels;
+            assert_memory_equal(&a->data[n * i + (size_t)c], &b->data[n * i + (size_t)other],
+                                sizeof(float));
+        }
+    }
+}
+
+/* What both readers find; ours comes back. */
+static struct image read_both(const char *name, bool is_half)
+{
+    char path[256];
+    struct image ours, theirs;
+    bool half = !is_half;
+    struct err e = {""};
+    path_of(path, name);
+    bool is_hdr = strstr(name, ".hdr") != NULL;
+    if (is_hdr ? !image_read_hdr(path, &ours, &e) : !image_read_exr(path, &ours, &half, &e))
+        fail_msg("%s", e.msg);
+    if (!image_read(path, &theirs, NULL, &e))
+        fail_msg("%s", e.msg);
+    assert_true(is_hdr || half == is_half);
+    assert_same(&ours, &theirs);
+    image_free(&theirs);
+    return ours;
+}
+
+static void exr_round_trip(void **state)
+{
+    (void)state;
+    struct image want = make_image(), got = read_both("source.exr", false);
+    assert_same(&want, &got);
+    assert_string_equal(image_get_attr(&got, "assay:unit"), "sample");
+    assert_string_equal(image_get_attr(&got, "assay:empty"), "");
+    image_free(&want);
+    image_free(&got);
+}
+
+/* Chunks of sixteen rows, whole, cut short or of a single number, of noise in every bit, which no packing makes
+ * shorter, and of one value. */
+static void exr_of_any_shape(void **state)
+{
+    (void)state;
+    static const int shape[][3] = {{1, 1, 1}, {3, 16, 1}, {61, 17, 3}, {40, 33, 5}};
+    for (size_t k = 0; k < 2 * sizeof shape / sizeof shape[0]; k++) {
+        const int *s = shape[k / 2];
+        char path[256];
+        struct image im;
+        struct err e = {""};
+        assert_true(image_alloc(&im, s[0], s[1], s[2], channel, &e));
+        for (int i = 0; i < s[0] * s[1] * s[2]; i++) {
+            struct sample4 u = sampler_get(6, (uint32_t)i, 0, 0, 0);
+            uint32_t bits = (uint32_t)(u.u[0] * 65536) << 16 | (uint32_t)(u.u[1] * 65536);
+            if (k % 2 == 0)
+                bits &= ~(1u << 30); /* finite */
+            else
+                bits = 0x3f800000;
+            memcpy(&im.data[i], &bits, sizeof bits);
+        }
+        if (!image_write_exr(path_of(path, "shape.exr"), &im, &e))
+            fail_msg("%s", e.msg);
+        struct image got = read_both("shape.exr", false);
+        assert_same(&im, &got);
+        image_free(&im);
+        image_free(&got);
+    }
+}
+
+static void exr_as_others_write_it(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *options[8];
+        bool is_half;
+    } cases[] = {
+        {{"--compression", "none", NULL}, false},
+        {{"--compression", "rle", NULL}, false},
+        {{"--compression", "zips", NULL}, false},
+        {{"--compression", "piz", "-d", "half", NULL}, true},
+        {{"--compression", "pxr24", "-d", "half", NULL}, true},
+        {{"--compression", "dwaa", "-d", "half", NULL}, true},
+        {{"--compression", "zip", "--tile", "16", "8", NULL}, false},
+        {{"--compression", "piz", "-d", "half", "--tile", "64", "64", NULL}, true},
+        {{"--origin", "+11-7", NULL}, false},
+        {{"--origin", "-5+3", "--tile", "16", "16", NULL}, false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        oiiotool(cases[i].options, "other.exr");
+        struct image im = read_both("other.exr", cases[i].is_half);
+        image_free(&im);
+    }
+}
+
+static void hdr_as_others_write_it(void **state)
+{
+    (void)state;
+    static const char *const wide[] = {"--ch", "R,G,B", NULL};
+    static const char *const narrow[] = {"--ch",    "R,G,B",        "--crop",
+                                         "5x4+0+0", "--fullpixels", NULL};
+    const char *const *const options[] = {wide, narrow};
+    for (int i = 0; i < 2; i++) {
+        oiiotool(options[i], "other.hdr");
+        struct image im = read_both("other.hdr", false);
+        assert_int_equal(im.width, i == 0 ? WIDTH : 5);
+        image_free(&im);
+    }
+}
+
+static void png_round_trip(void **state)
+{
+    (void)state;
+    char path[256], copy[256];
+    uint8_t pixel[WIDTH * HEIGHT * 3], *bytes = NULL;
+    size_t size = 0;
+    struct image got;
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof pixel; i++)
+        pixel[i] = (uint8_t)(i * 7 + i / 50);
+    if (!image_write_png(path_of(path, "a.png"), WIDTH, HEIGHT, pixel, &e) ||
+        !image_encode_png(WIDTH, HEIGHT, pixel, &bytes, &size, &e))
+        fail_msg("%s", e.msg);
+    FILE *f = fopen(path_of(copy, "b.png"), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+    free(bytes);
+    for (int k = 0; k < 2; k++) {
+        if (!image_read(k == 0 ? path : copy, &got, NULL, &e))
+            fail_msg("%s", e.msg);
+        assert_true(got.width == WIDTH && got.height == HEIGHT && got.channels == 3);
+        for (size_t i = 0; i < sizeof pixel; i++)
+            assert_int_equal(lroundf(got.data[i] * 255), pixel[i]);
+        image_free(&got);
+    }
+    assert_false(image_write_png("/nowhere/a.png", WIDTH, HEIGHT, pixel, &e));
+    assert_non_null(strstr(e.msg, "/nowhere/a.png: cannot write: "));
+}
+
+/* Texts of ASCII, of UTF-8 and long ones, read back by libpng and by OpenImageIO. */
+static void png_texts(void **state)
+{
+    (void)state;
+    char path[256];
+    static char words[20000];
+    memset(words, 'w', sizeof words - 1);
+    const struct image_attr text[] = {
+        {"assay:command", "pathtracer 'it'\\''s a scene.dae'"},
+        {"assay:scene", "sc\xc3\xa8ne \xe2\x82\xac"},
+        {"assay:settings", words},
+    };
+    enum { NUM = sizeof text / sizeof text[0] };
+    uint8_t pixel[WIDTH * HEIGHT * 3];
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof pixel; i++)
+        pixel[i] = (uint8_t)(i * 11 + i / 70);
+    if (!image_write_png_texts(path_of(path, "texts.png"), WIDTH, HEIGHT, pixel, text, NUM, &e))
+        fail_msg("%s", e.msg);
+    assert_true(image_is_png(path));
+    for (int k = 0; k < 2; k++) {
+        struct image got;
+        if (!(k == 0 ? image_read_png(path, &got, &e) : image_read(path, &got, NULL, &e)))
+            fail_msg("%s", e.msg);
+        assert_true(got.width == WIDTH && got.height == HEIGHT && got.channels == 3);
+        for (size_t i = 0; i < sizeof pixel; i++)
+            assert_int_equal(lroundf(got.data[i] * (k == 0 ? 1 : 255)), pixel[i]);
+        for (size_t i = 0; i < NUM; i++) {
+            assert_non_null(image_get_attr(&got, text[i].name));
+            assert_string_equal(image_get_attr(&got, text[i].name), text[i].value);
+        }
+        assert_null(image_get_attr(&got, "assay:seed"));
+        image_free(&got);
+    }
+    assert_false(image_is_png(path_of(path, "source.exr")));
+    assert_false(image_is_png(path_of(path, "none")));
+}
+
+static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, struct err *e)
+{
+    char path[256];
+    struct image im;
+    FILE *f = fopen(path_of(path, name), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+    bool ok = strstr(name, ".hdr") != NULL   ? image_read_hdr(path, &im, e)
+              : strstr(name, ".png") != NULL ? image_read_png(path, &im, e)
+                                             : image_read_exr(path, &im, NULL, e);
+    if (ok)
+        image_free(&im);
+    return ok;
+}
+
+/* Every file that ends too early is refused, with a line that names it. Damage to a byte is refused or
+ * read as other numbers; the sanitizers watch. */
+static void damaged_files(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"source.exr", "tiled.exr", "other.hdr", "texts.png"};
+    static const char *const tiles[] = {"--compression", "zip", "--tile", "16", "8", NULL};
+    oiiotool(tiles, "tiled.exr");
+    static uint8_t bytes[MAX_FILE];
+    for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
+        char path[256];
+        struct err e = {""};
+        FILE *f = fopen(path_of(path, names[k]), "rb");
+        assert_non_null(f);
+        size_t size = fread(bytes, 1, MAX_FILE, f);
+        assert_true(size > 100 && size < MAX_FILE && fclose(f) == 0);
+        char name[16];
+        snprintf(name, sizeof name, "damaged%s", strrchr(names[k], '.'));
+        assert_true(read_bytes(name, bytes, size, &e));
+        for (size_t end = 0; end < size; end += 1 + size / 97) {
+            e.msg[0] = '\0';
+            if (read_bytes(name, bytes, end, &e))
+                fail_msg("%s: its first %zu of %zu bytes are taken for all", names[k], end, size);
+            assert_non_null(strstr(e.msg, name));
+            assert_null(strchr(e.msg, '\n'));
+        }
+        for (uint32_t i = 0; i < 400; i++) {
+            struct sample4 u = sampler_get(6, i, (uint32_t)k, 0, 0);
+            size_t at = (size_t)((i % 2 ? u.u[0] : u.u[0] * 0.1f) * (float)size);
+            uint8_t before = bytes[at];
+            bytes[at] ^= (uint8_t)(1 + 254 * u.u[1]);
+            (void)!read_bytes(name, bytes, size, &e);
+            bytes[at] = before;
+        }
+    }
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    if (mkdtemp(dir) == NULL)
+        return -1;
+    write_source();
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    struct err e;
+    return remove_tree(dir, &e) ? 0 : -1;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(exr_round_trip),         cmocka_unit_test(exr_of_any_shape),
+        cmocka_unit_test(exr_as_others_write_it), cmocka_unit_test(hdr_as_others_write_it),
+        cmocka_unit_test(png_round_trip),         cmocka_unit_test(png_texts),
+        cmocka_unit_test(damaged_files),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

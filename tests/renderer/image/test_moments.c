@@ -1,0 +1,231 @@
+/* Moments against two passes over the same numbers, and their files. */
+#include "renderer/image/moments.h"
+#include "renderer/math/sampler.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+enum { N = 1000 };
+
+/* A skewed law with a large offset: what naive sums of squares lose digits on. */
+static double observation(uint32_t i, int c)
+{
+    return 1e4 * c - log(1 - sampler_get(5, i, (uint32_t)c, 0, 0).u[0]);
+}
+
+static void two_pass(uint32_t first, uint32_t last, int c, double out[3])
+{
+    double sum = 0, n = last - first;
+    for (uint32_t i = first; i < last; i++)
+        sum += observation(i, c);
+    out[0] = sum / n;
+    out[1] = out[2] = 0;
+    for (uint32_t i = first; i < last; i++) {
+        double d = observation(i, c) - out[0];
+        out[1] += d * d;
+        out[2] += d * d * d;
+    }
+}
+
+static void add_range(struct moments *m, uint32_t first, uint32_t last)
+{
+    for (uint32_t i = first; i < last; i++)
+        moments_add(m, 0, (double[3]){observation(i, 0), observation(i, 1), observation(i, 2)});
+}
+
+static void check(const struct moments *m, uint32_t first, uint32_t last)
+{
+    for (int c = 0; c < 3; c++) {
+        double expected[3];
+        two_pass(first, last, c, expected);
+        assert_true(fabs(m->mean[c] - expected[0]) < 1e-12 * (1 + fabs(expected[0])));
+        assert_true(fabs(m->m2[c] - expected[1]) < 1e-8 * expected[1]);
+        assert_true(fabs(m->m3[c] - expected[2]) < 1e-7 * fabs(expected[2]));
+        double n = last - first;
+        assert_true(fabs(moments_var_of_mean(m, 0, c) - expected[1] / (n - 1) / n) <
+                    1e-8 * expected[1]);
+    }
+}
+
+static void online_equals_two_pass(void **state)
+{
+    (void)state;
+    struct err e;
+    struct moments m;
+    assert_true(moments_alloc(&m, 1, 1, &e));
+    assert_true(isnan(moments_var_of_mean(&m, 0, 0)));
+    add_range(&m, 0, N);
+    check(&m, 0, N);
+    moments_free(&m);
+}
+
+static void merged_in_any_grouping(void **state)
+{
+    (void)state;
+    struct err e;
+    static const uint32_t cuts[][4] = {
+        {0, 1, 2, N}, {0, 500, 999, N}, {0, 0, 0, N}, {0, N, N, N}, {0, 333, 666, N}};
+    for (size_t k = 0; k < sizeof cuts / sizeof cuts[0]; k++) {
+        struct moments part[3];
+        for (int i = 0; i < 3; i++) {
+            assert_true(moments_alloc(&part[i], 1, 1, &e));
+            add_range(&part[i], cuts[k][i], cuts[k][i + 1]);
+        }
+        assert_true(moments_merge(&part[1], &part[2], &e));
+        assert_true(moments_merge(&part[0], &part[1], &e));
+        assert_true(part[0].n[0] == N);
+        check(&part[0], 0, N);
+        for (int i = 0; i < 3; i++)
+            moments_free(&part[i]);
+    }
+}
+
+static void unlike_moments_do_not_merge(void **state)
+{
+    (void)state;
+    struct err e;
+    struct moments a, b;
+    assert_true(moments_alloc(&a, 2, 2, &e));
+    assert_true(moments_alloc(&b, 2, 1, &e));
+    assert_false(moments_merge(&a, &b, &e));
+    assert_non_null(strstr(e.msg, "2 x 2 and 2 x 1"));
+    moments_free(&b);
+    assert_true(moments_alloc(&b, 2, 2, &e));
+    strcpy(b.unit, "replicate");
+    assert_false(moments_merge(&a, &b, &e));
+    moments_free(&a);
+    moments_free(&b);
+}
+
+static char dir[] = "/tmp/assay_moments_XXXXXX";
+
+static int make_dir(void **state)
+{
+    (void)state;
+    return mkdtemp(dir) == NULL;
+}
+
+static int remove_dir(void **state)
+{
+    (void)state;
+    return rmdir(dir);
+}
+
+static void write_and_read(void **state)
+{
+    (void)state;
+    struct err e = {0};
+    struct moments m, back;
+    struct image im;
+    char path[64];
+    snprintf(path, sizeof path, "%s/m.exr", dir);
+    assert_true(moments_alloc(&m, 3, 2, &e));
+    for (size_t p = 0; p < 6; p++)
+        for (uint32_t i = 0; i < 10 + p; i++)
+            moments_add(&m, p, (double[3]){observation(i, 0) + (double)p, 1, observation(i, 2)});
+    strcpy(m.unit, "replicate");
+    m.spp = 256;
+    const struct image_attr attr = {"assay:seed", "17"};
+    if (!moments_write(path, &m, &attr, 1, &e) || !moments_read(path, &back, &im, &e))
+        fail_msg("%s", e.msg);
+    assert_string_equal(back.unit, "replicate");
+    assert_true(back.spp == 256 && back.width == 3 && back.height == 2);
+    assert_string_equal(image_get_attr(&im, "assay:seed"), "17");
+    for (size_t p = 0; p < 6; p++) {
+        assert_true(back.n[p] == m.n[p]);
+        for (size_t c = 3 * p; c < 3 * p + 3; c++) {
+            assert_true((float)m.mean[c] == back.mean[c]);
+            assert_true((float)m.m2[c] == back.m2[c]);
+            assert_true((float)m.m3[c] == back.m3[c]);
+        }
+    }
+    moments_free(&m);
+    moments_free(&back);
+    image_free(&im);
+    unlink(path);
+}
+
+/* Each fault has its own line and no moments. */
+static void bad_files(void **state)
+{
+    (void)state;
+    static const char *const names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
+                                          "M2.B", "M3.R", "M3.G", "M3.B", "n"};
+    static const struct {
+        int channels;
+        const char *unit, *spp;
+        int at;
+        float value;
+        const char *expect;
+    } fault[] = {{10, "sample", "1", 0, NAN, "not finite"},
+                 {10, "sample", "1", 4, -1, "negative M2"},
+                 {10, "sample", "1", 9, 1.5f, "count"},
+                 {10, "sample", "1", 8, INFINITY, "not finite"},
+                 {9, "sample", "1", 0, 1, "not a moments EXR"},
+                 {10, NULL, "1", 0, 1, "not a moments EXR"},
+                 {10, "sample", NULL, 0, 1, "not a moments EXR"},
+                 {10, "fortnight", "1", 0, 1, "unknown unit"},
+                 {10, "sample", "-2", 0, 1, "spp"},
+                 {10, "sample", "many", 0, 1, "spp"}};
+    char path[64];
+    snprintf(path, sizeof path, "%s/bad.exr", dir);
+    for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
+        struct err e = {0};
+        struct image im;
+        struct moments m;
+        assert_true(image_alloc(&im, 2, 2, fault[k].channels, names, &e));
+        im.data[(size_t)fault[k].channels * 3 + (size_t)fault[k].at] = fault[k].value;
+        if (fault[k].unit)
+            assert_true(image_set_attr(&im, "assay:unit", fault[k].unit, &e));
+        if (fault[k].spp)
+            assert_true(image_set_attr(&im, "assay:spp", fault[k].spp, &e));
+        assert_true(image_write_exr(path, &im, &e));
+        assert_false(moments_read(path, &m, NULL, &e));
+        if (strstr(e.msg, fault[k].expect) == NULL || strncmp(e.msg, path, strlen(path)) != 0)
+            fail_msg("fault %zu: '%s' lacks '%s'", k, e.msg, fault[k].expect);
+        image_free(&im);
+    }
+    /* Cut off in the middle, and not an image at all. */
+    FILE *f = fopen(path, "r+b");
+    assert_non_null(f);
+    assert_int_equal(ftruncate(fileno(f), 200), 0);
+    fclose(f);
+    struct err e = {0};
+    struct moments m;
+    assert_false(moments_read(path, &m, NULL, &e));
+    unlink(path);
+    assert_false(moments_read(path, &m, NULL, &e));
+    assert_non_null(strstr(e.msg, "No such file"));
+}
+
+/* Nothing appears where a write fails, and no temporary stays. */
+static void failed_write_leaves_nothing(void **state)
+{
+    (void)state;
+    struct err e = {0};
+    struct moments m;
+    assert_true(moments_alloc(&m, 2, 2, &e));
+    assert_false(moments_write("/nonexistent/m.exr", &m, NULL, 0, &e));
+    assert_true(strncmp(e.msg, "/nonexistent/m.exr", 18) == 0);
+    moments_free(&m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(online_equals_two_pass),
+        cmocka_unit_test(merged_in_any_grouping),
+        cmocka_unit_test(unlike_moments_do_not_merge),
+        cmocka_unit_test(write_and_read),
+        cmocka_unit_test(bad_files),
+        cmocka_unit_test(failed_write_leaves_nothing),
+    };
+    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+}

@@ -1,0 +1,170 @@
+/* Camera files: what is refused, with the file's name, and where the rays of one that is read go. */
+#include "renderer/scene/camera.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+/* The lines of a file: angles and clip distances; position and target; the assignment's own idea of
+ * both; the matrix by rows; the screen; focal distance and lens radius. */
+#define ANGLES   "50 35 1.5 0.1 100\n"
+#define POSITION "0.1 0.9 4.2 0 0.8 0\n"
+#define ORBIT    "90 0 4.2 0.01 100\n"
+#define UPRIGHT  "1 0 0 0 1 0 0 0 1\n"
+#define SCREEN   "480 360 570\n"
+#define LENS     "4.7 0.05\n"
+
+static bool read_text(const char *text, struct camera *c, struct err *e)
+{
+    char path[] = "/tmp/assay_camera_XXXXXX";
+    int fd = mkstemp(path);
+    assert_true(fd >= 0 && write(fd, text, strlen(text)) == (ssize_t)strlen(text));
+    close(fd);
+    *c = (struct camera){.width = 40, .height = 30};
+    bool ok = camera_read_file(c, path, e);
+    unlink(path);
+    if (!ok)
+        assert_memory_equal(e->msg, path, strlen(path));
+    return ok;
+}
+
+static void refuses_what_has_no_rays(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *why;
+    } bad[] = {
+        {"179.99999 35 1.5 0.1 100\n" POSITION ORBIT UPRIGHT SCREEN LENS, "angles of view"},
+        {"0 35 1.5 0.1 100\n" POSITION ORBIT UPRIGHT SCREEN LENS, "angles of view"},
+        {"50 35 1.5 2 1\n" POSITION ORBIT UPRIGHT SCREEN LENS, "clip distances"},
+        {ANGLES "0 -2e18 0 0 0 0\n" ORBIT UPRIGHT SCREEN LENS, "beyond 1e+18"},
+        {ANGLES POSITION ORBIT "1 0 0 0 2 0 0 0 1\n" SCREEN LENS, "column 2"},
+        {ANGLES POSITION ORBIT "1 .6 0 0 .8 0 0 0 1\n" SCREEN LENS, "not a rotation"},
+        {ANGLES POSITION ORBIT "-1 0 0 0 1 0 0 0 1\n" SCREEN LENS, "not a rotation"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN "0 0.05\n", "focal distance"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN "1e300 0.05\n", "focal distance"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN "4.7 -1\n", "lens radius"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN "4.7 nan\n", "'nan' is not a number"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN "4.7\n", "29 numbers"},
+        {ANGLES POSITION ORBIT UPRIGHT SCREEN LENS "1", "more than the 30"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct camera c;
+        struct err e = {""};
+        assert_false(read_text(bad[i].text, &c, &e));
+        if (strstr(e.msg, bad[i].why) == NULL)
+            fail_msg("'%s' does not say '%s'", e.msg, bad[i].why);
+    }
+}
+
+/* A point of the plane in focus is where all rays of its pixel meet: the pixel that sees (sx, sy) of
+ * the image plane looks at eye + 2 (sx tan(25), sy tan(17.5), -1) for a focal distance of 2, by the
+ * thin lens. The eye is 2^20 away, where float32 has steps of 1/8: the positions are lost in them, the
+ * directions must not be. */
+static void lens_far_from_the_origin(void **state)
+{
+    (void)state;
+    struct camera c;
+    struct err e = {""};
+    assert_true(read_text(ANGLES "1048576 0 0 0 0 0\n" ORBIT UPRIGHT SCREEN "2 0.01\n", &c, &e));
+    const double degree = acos(-1) / 180;
+    double sx = 2 * 10.5 / 40 - 1, sy = 1 - 2 * 20.5 / 30;
+    double focus[3] = {2 * sx * tan(25 * degree), 2 * sy * tan(17.5 * degree), -2};
+    for (int i = 0; i < 64; i++) {
+        float u = ((float)(i % 8) + .5f) / 8, v = ((float)(i / 8) + .5f) / 8;
+        ray r = camera_ray(&c, 10.5f, 20.5f, u, v);
+        assert_true(fabsf(length(r.d) - 1) < 1e-6f);
+        /* Back along the ray from the focus to the lens, z = 0: within its radius of the axis. */
+        double t = 2 / -(double)r.d.z, x = focus[0] - t * r.d.x, y = focus[1] - t * r.d.y;
+        assert_true(x * x + y * y < 1.001 * .01 * .01);
+        /* And not all through its middle. */
+        if (i == 0)
+            assert_true(x * x + y * y > .5 * .01 * .01);
+    }
+}
+
+static bool near(vec3 a, double x, double y, double z)
+{
+    return fabs((double)a.x - x) < 1e-5 && fabs((double)a.y - y) < 1e-5 &&
+           fabs((double)a.z - z) < 1e-5;
+}
+
+/* A box of 4 x 4 x 7 about (1, 2, 3): its diagonal is 9, so the eye stands 13.5 from (1, 2, 3) towards where the file's camera
+ * looks from, whatever place the file gives it. The angle is the vertical one of 35 degrees at 800 x 600 where the file's angles
+ * are those of a wider shape, else such that the horizontal one fits; fewer pixels see less. */
+static void the_assignment_frames_the_scene(void **state)
+{
+    (void)state;
+    const double degree = acos(-1) / 180;
+    struct scene s = {.dialect = DIALECT_CGL,
+                      .frame_min = {-1, 0, -0.5f},
+                      .frame_max = {3, 4, 6.5f},
+                      .camera = {.present = true, .eye = {9, 9, 9}, .backward = {0, 3, 4}}};
+    struct camera c;
+    struct err e;
+    s.camera.hfov = (float)(40 * degree);
+    s.camera.vfov = (float)(35 * degree);
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, 2 + 13.5 * 0.6, 3 + 13.5 * 0.8));
+    assert_true(near(c.backward, 0, 0.6, 0.8) && near(c.right, 1, 0, 0) &&
+                near(c.up, 0, 0.8, -0.6));
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree)) < 1e-6);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    /* 400 x 300 crops to the middle, unless the whole is asked for. */
+    assert_true(camera_init(&c, &s, 400, 300, &e));
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree) / 2) < 1e-6);
+    camera_show_whole(&c);
+    assert_true(fabs((double)c.tan_v - tan(17.5 * degree)) < 1e-6);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    /* A shape of its own: as much as fits. */
+    assert_true(camera_init(&c, &s, 400, 600, &e));
+    camera_show_whole(&c);
+    assert_true(fabs((double)c.tan_h - tan(17.5 * degree) * 4 / 3) < 1e-6);
+    assert_true(fabs((double)c.tan_v - 1.5 * (double)c.tan_h) < 1e-6);
+    s.camera.hfov = (float)(90 * degree);
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(fabs((double)c.tan_h - 1) < 1e-6 && fabs((double)c.tan_v - 0.75) < 1e-6);
+    /* From straight above, north is up; from below, too. */
+    s.camera.backward = (vec3){0, 2, 0};
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, 15.5, 3) && near(c.up, 0, 0, -1) && near(c.right, 1, 0, 0));
+    s.camera.backward = (vec3){0, -2, 0};
+    assert_true(camera_init(&c, &s, 800, 600, &e));
+    assert_true(near(c.eye, 1, -11.5, 3) && near(c.up, 0, 0, 1) && near(c.right, 1, 0, 0));
+}
+
+/* COLLADA: the file's horizontal angle, or its vertical one, and square pixels. */
+static void collada_keeps_the_angle_of_the_file(void **state)
+{
+    (void)state;
+    struct scene s = {.dialect = DIALECT_COLLADA, .camera = {.present = true, .vfov = 1}};
+    struct camera c;
+    struct err e = {""};
+    assert_true(camera_init(&c, &s, 300, 200, &e));
+    assert_true(fabs((double)c.tan_v - tan(0.5)) < 1e-6 &&
+                fabs((double)c.tan_h - 1.5 * tan(0.5)) < 1e-6);
+    s.camera.hfov = 1;
+    assert_true(camera_init(&c, &s, 300, 200, &e));
+    assert_true(fabs((double)c.tan_h - tan(0.5)) < 1e-6 &&
+                fabs((double)c.tan_v - tan(0.5) / 1.5) < 1e-6);
+    s.camera.present = false;
+    assert_false(camera_init(&c, &s, 300, 200, &e));
+    assert_non_null(strstr(e.msg, "no camera"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(refuses_what_has_no_rays),
+        cmocka_unit_test(lens_far_from_the_origin),
+        cmocka_unit_test(the_assignment_frames_the_scene),
+        cmocka_unit_test(collada_keeps_the_angle_of_the_file),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

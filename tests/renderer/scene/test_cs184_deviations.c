@@ -1,0 +1,126 @@
+/* The defects of the assignment's starter code that --starter does on purpose, against what they should come to. */
+#include "renderer/shading/light.h"
+#include "renderer/scene/cs184_deviations.h"
+#include "tests/support/build_scene.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+/* A lamp of unit radiance that faces down, about (0, height, 0). */
+static struct scene lamp(float width, float depth, float height, unsigned bits)
+{
+    struct scene s = build_scene();
+    struct err e = {""};
+    uint32_t m = build_material(&s, grey(0), grey(1));
+    build_quad(&s, v3(-width / 2, height, -depth / 2), v3(width, 0, 0), v3(0, 0, depth), m);
+    if (!scene_finish(&s, "test", &e))
+        fail_msg("%s", e.msg);
+    assert_int_equal(s.num_lights, 1);
+    starter_apply(&s, bits);
+    return s;
+}
+
+/* Irradiance at p, normal +Y, by light sampling on a grid of 128 x 128 numbers for each of the two triangles. *most: the largest |x| and |z| sampled. */
+static double sampled_irradiance(const struct scene *s, vec3 p, vec3 *most)
+{
+    enum { SIDE = 128 };
+    struct err e = {""};
+    struct light_table *t = light_table_build(s, &e);
+    assert_non_null(t);
+    double sum = 0;
+    *most = v3(0, 0, 0);
+    for (int i = 0; i < 2 * SIDE * SIDE; i++) {
+        const float u[4] = {((float)(i / 2 % SIDE) + 0.5f) / SIDE,
+                            ((float)(i / 2 / SIDE) + 0.5f) / SIDE, i % 2 ? 0.25f : 0.75f, 0.5f};
+        struct light_sample l = light_sample_direction(t, 0, p, u);
+        if (l.pdf_w > 0)
+            sum += (double)(l.radiance.g * l.wi.y / l.pdf_w);
+        vec3 q = mad(p, l.distance, l.wi);
+        *most = vmax(*most, v3(fabsf(q.x), fabsf(q.y), fabsf(q.z)));
+    }
+    light_table_free(t);
+    return sum / (2 * SIDE * SIDE);
+}
+
+/* The same by the rectangle's area, in double: cos cos / d^2 at 400 x 400 places. `times_distance`: what a density
+ * without its factor of 1/distance makes of it. */
+static double irradiance(float width, float depth, float height, vec3 p, bool times_distance)
+{
+    enum { SIDE = 400 };
+    double sum = 0, area = (double)width * (double)depth;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double x = (double)width * ((i % SIDE + 0.5) / SIDE - 0.5) - (double)p.x;
+        double z = (double)depth * ((i / SIDE + 0.5) / SIDE - 0.5) - (double)p.z;
+        double y = (double)(height - p.y), d2 = x * x + y * y + z * z;
+        sum += y * y / (d2 * d2) * (times_distance ? sqrt(d2) : 1);
+    }
+    return sum * area / (SIDE * SIDE);
+}
+
+static void expect(double got, double want)
+{
+    if (!(fabs(got - want) < 2e-3 * want))
+        fail_msg("%.6g instead of %.6g", got, want);
+}
+
+/* Without a defect this is the rectangle; each of three heights, so that 1/r is told from 1/r^2. */
+static void a_density_without_a_distance(void **state)
+{
+    (void)state;
+    const vec3 p = v3(0.3f, 0, -0.2f);
+    for (float height = 0.5f; height < 3; height *= 2)
+        for (int defect = 0; defect < 2; defect++) {
+            vec3 most;
+            struct scene s = lamp(1, 0.5f, height, defect ? 1u << STARTER_LIGHT_PDF : 0);
+            expect(sampled_irradiance(&s, p, &most), irradiance(1, 0.5f, height, p, defect != 0));
+            scene_free(&s);
+        }
+}
+
+/* Seen is the turned rectangle, sampled the one of the file, with its own density. */
+static void a_lamp_that_is_turned(void **state)
+{
+    (void)state;
+    const vec3 p = v3(1.2f, 0, 0.1f);
+    vec3 most;
+    struct scene s = lamp(2, 0.5f, 1, 1u << STARTER_TURNED_LAMP);
+    vec3 seen = v3(0, 0, 0);
+    for (int i = 0; i < 6; i++) {
+        assert_true(fabsf(s.position[i].y - 1) < 1e-6f);
+        seen = vmax(seen, v3(fabsf(s.position[i].x), 0, fabsf(s.position[i].z)));
+    }
+    assert_true(fabsf(seen.x - 0.25f) < 1e-6f && fabsf(seen.z - 1) < 1e-6f);
+    assert_true(s.bounds_max.z >= 1 && s.bounds_min.z <= -1);
+    double got = sampled_irradiance(&s, p, &most);
+    assert_true(most.x < 1.0001f && most.x > 0.98f && most.z < 0.2501f && most.z > 0.24f);
+    expect(got, irradiance(2, 0.5f, 1, p, false));
+    /* Told from what is seen. */
+    assert_true(fabs(irradiance(0.5f, 2, 1, p, false) / got - 1) > 0.1);
+    scene_free(&s);
+}
+
+/* Only lamps of two triangles are rectangles. */
+static void other_lamps_stay(void **state)
+{
+    (void)state;
+    struct err e = {""};
+    struct scene s = build_scene();
+    build_triangle(&s, v3(0, 1, 0), v3(1, 1, 0), v3(0, 1, 1), build_material(&s, grey(0), grey(1)));
+    if (!scene_finish(&s, "test", &e))
+        fail_msg("%s", e.msg);
+    starter_apply(&s, 1u << STARTER_TURNED_LAMP);
+    assert_true(s.position[1].x == 1 && s.position[1].z == 0 && s.position[2].z == 1);
+    scene_free(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_density_without_a_distance),
+        cmocka_unit_test(a_lamp_that_is_turned),
+        cmocka_unit_test(other_lamps_stay),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,398 @@
+/* Environments by themselves: where a map's texels are in the sky, whether directions are chosen
+ * with the density that is told, which files are taken. */
+#include "renderer/math/discrete.h"
+#include "renderer/math/sampler.h"
+#include "tests/support/sky.h"
+
+#include <gsl/gsl_cdf.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+/* All 2^24 numbers of the sampler are counted: each thing is picked as often as it says. */
+static void choice_is_exact(void **state)
+{
+    (void)state;
+    enum { N = 7 };
+    const double weight[N] = {0, 1e-12, 3, 0, 1, 1e-30, 0};
+    uint32_t end[N];
+    uint32_t *count = calloc(N, sizeof *count);
+    assert_non_null(count);
+    assert_true(fabs(discrete_build(weight, N, end) - 4) < 1e-9);
+    for (uint32_t step = 0; step < DISCRETE_STEPS; step++)
+        count[discrete_pick(end, N, (float)step / DISCRETE_STEPS)]++;
+    for (uint32_t i = 0; i < N; i++) {
+        assert_true(discrete_probability(end, i) == (float)count[i] / DISCRETE_STEPS);
+        assert_int_equal(count[i] > 0, weight[i] > 0);
+        assert_true(fabs(count[i] / (double)DISCRETE_STEPS - weight[i] / 4) < 1e-6);
+    }
+    free(count);
+    const double nothing[2] = {0, 0};
+    assert_true(discrete_build(nothing, 2, end) == 0);
+    assert_int_equal(end[1], 0);
+}
+
+/* The left edge of the map is -X, and columns go from there by +Z, +X and -Z. 4 x 2 texels, so the
+ * middle of column 0 faces between -X and +Z, at 45 degrees above the horizon in row 0; towards an
+ * axis all texels around it have equal parts. */
+static void orientation(void **state)
+{
+    (void)state;
+    const struct sky s = {.width = 4, .height = 2, .value = {1, 2, 4, 8, 16, 32, 64, 128}};
+    static const float signs[4][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}; /* of x and z */
+    static const struct {
+        float x, z;
+        int left, right;
+    } horizon[4] = {{-1, 0, 3, 0}, {0, 1, 0, 1}, {1, 0, 1, 2}, {0, -1, 2, 3}};
+    struct environment *env = sky_environment(&s);
+    for (int row = 0; row < 2; row++)
+        for (int c = 0; c < 4; c++) {
+            vec3 w =
+                v3(0.5f * signs[c][0], row == 0 ? 0.70710678f : -0.70710678f, 0.5f * signs[c][1]);
+            rgb le = environment_radiance(env, w);
+            float expected = s.value[4 * row + c];
+            assert_true(fabsf(le.r - expected) < 1e-4f * 128);
+            assert_true(fabsf(le.b - 3 * expected) < 3e-4f * 128);
+        }
+    for (int k = 0; k < 4; k++) {
+        rgb le = environment_radiance(env, v3(horizon[k].x, 0, horizon[k].z));
+        int l = horizon[k].left, r = horizon[k].right;
+        float expected = (s.value[l] + s.value[r] + s.value[4 + l] + s.value[4 + r]) / 4;
+        assert_true(fabsf(le.r - expected) < 1e-4f * expected);
+    }
+    environment_free(env);
+}
+
+static struct sample4 draw(uint32_t i)
+{
+    return sampler_get(7, 0, i, 0, PURPOSE_LIGHT);
+}
+
+/* A sample is told the radiance of its direction, which is that of the tents; and the density of
+ * its direction, but for those that float32 puts into the next cell, of which 1 in 1000 is
+ * allowed. */
+static void samples_are_what_they_say(void **state)
+{
+    (void)state;
+    enum { N = 20000 };
+    struct sky s = sky_uneven(64, 32);
+    struct environment *env = sky_environment(&s);
+    int other_cell = 0;
+    for (uint32_t i = 0; i < N; i++) {
+        struct sample4 u = draw(i);
+        struct environment_sample e = environment_sample_direction(env, u.u);
+        assert_true(fabsf(length(e.wi) - 1) < 1e-6f);
+        assert_true(e.pdf_w > 0);
+        double theta = acos((double)e.wi.y), phi = atan2(-(double)e.wi.z, e.wi.x) + M_PI;
+        double expected = sky_radiance(&s, phi / (2 * M_PI) * 64, theta / M_PI * 32);
+        assert_true(fabs((double)e.radiance.r - expected) < 1e-3 * (expected + 0.01));
+        assert_true(fabs((double)environment_radiance(env, e.wi).g - 2 * expected) <
+                    2e-3 * (expected + 0.01));
+        other_cell += environment_pdf_w(env, e.wi) != e.pdf_w;
+    }
+    assert_true(other_cell <= N / 1000);
+    environment_free(env);
+}
+
+enum { HEIGHTS = 12, TURNS = 24, BINS = HEIGHTS * TURNS };
+
+/* Probability of each bin (equal in height and in azimuth) by the density, 64 x 64 points each. */
+static void expect_bins(const struct environment *env, double p[BINS])
+{
+    enum { FINE = 64 };
+    for (int i = 0; i < BINS; i++) {
+        p[i] = 0;
+        for (int a = 0; a < FINE; a++)
+            for (int b = 0; b < FINE; b++) {
+                double y = 1 - 2 * (i / TURNS + (a + 0.5) / FINE) / HEIGHTS;
+                double phi = 2 * M_PI * (i % TURNS + (b + 0.5) / FINE) / TURNS;
+                double r = sqrt(1 - y * y);
+                vec3 w = v3((float)(r * cos(phi)), (float)y, (float)(r * sin(phi)));
+                p[i] += (double)environment_pdf_w(env, w) * 4 * M_PI / (BINS * FINE * FINE);
+            }
+    }
+}
+
+/* p-value of Pearson's chi-square; bins expected below 10 go together. */
+static double chi_square(const double *p, const uint32_t *count, uint32_t n)
+{
+    double sum = 0, rest = 0, rest_count = 0;
+    int bins = 0;
+    for (int i = 0; i < BINS; i++) {
+        double expected = p[i] * n;
+        if (expected < 10) {
+            rest += expected;
+            rest_count += count[i];
+            continue;
+        }
+        sum += (count[i] - expected) * (count[i] - expected) / expected;
+        bins++;
+    }
+    if (rest > 0) {
+        sum += (rest_count - rest) * (rest_count - rest) / rest;
+        bins++;
+    } else if (rest_count > 0) {
+        return 0;
+    }
+    return gsl_cdf_chisq_Q(sum, bins - 1);
+}
+
+/* H0: directions have the density that is told. Pearson's chi-square, up to 288 bins, n = 50000,
+ * alpha = 1e-5 each, fixed numbers. Power: a map turned by one texel of 32, and a density that
+ * forgets the sine of theta, are rejected. */
+static void directions_have_their_density(void **state)
+{
+    (void)state;
+    enum { N = 50000 };
+    struct err e;
+    struct sky uneven = sky_uneven(32, 16), turned = uneven;
+    memmove(turned.value + 1, turned.value, (32 * 16 - 1) * sizeof turned.value[0]);
+    struct environment *env[] = {environment_constant(grey(1), &e),
+                                 environment_upper_half(grey(1), &e), sky_environment(&uneven),
+                                 sky_environment(&turned)};
+    for (int k = 0; k < 4; k++) {
+        uint32_t count[BINS] = {0};
+        double p[BINS], total = 0, wrong[BINS], wrong_total = 0;
+        for (uint32_t i = 0; i < N; i++) {
+            struct sample4 u = draw(i);
+            vec3 w = environment_sample_direction(env[k], u.u).wi;
+            int height = (int)((1 - (double)w.y) / 2 * HEIGHTS);
+            double phi = atan2((double)w.z, w.x);
+            int turn = (int)((phi < 0 ? phi + 2 * M_PI : phi) / (2 * M_PI) * TURNS);
+            count[(height < HEIGHTS ? height : HEIGHTS - 1) * TURNS +
+                  (turn < TURNS ? turn : TURNS - 1)]++;
+        }
+        expect_bins(env[k], p);
+        for (int i = 0; i < BINS; i++)
+            total += p[i];
+        /* The density integrates to 1; what the points of a bin miss at edges of cells is small. */
+        if (fabs(total - 1) > 2e-3)
+            fail_msg("environment %d: density integrates to %.6f", k, total);
+        double p_value = chi_square(p, count, N);
+        if (p_value < 1e-5)
+            fail_msg("environment %d: p = %.3g", k, p_value);
+        for (int i = 0; i < BINS; i++) {
+            double y = 1 - (2 * (i / TURNS) + 1.0) / HEIGHTS;
+            wrong[i] = p[i] / sqrt(1 - y * y);
+            wrong_total += wrong[i];
+        }
+        for (int i = 0; i < BINS; i++)
+            wrong[i] /= wrong_total;
+        assert_true(chi_square(wrong, count, N) < 1e-5);
+        if (k == 2) {
+            expect_bins(env[3], p);
+            assert_true(chi_square(p, count, N) < 1e-5);
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        environment_free(env[k]);
+}
+
+/* The sum over directions, which power is made of: 4 pi and 2 pi of luminance 1; of a map, within
+ * 1 % the tents summed over 128 x 128 pieces of the sphere. */
+static void totals(void **state)
+{
+    (void)state;
+    struct err e;
+    struct environment *all = environment_constant(grey(1), &e);
+    struct environment *half = environment_upper_half(grey(1), &e);
+    assert_true(fabs(environment_total(all) - 4 * M_PI) < 1e-6);
+    assert_true(fabs(environment_total(half) - 2 * M_PI) < 1e-6);
+    assert_true(environment_is_hidden(half) && !environment_is_hidden(all));
+    assert_true(environment_radiance(half, v3(0.6f, -0.8f, 0)).r == 0);
+    assert_true(environment_pdf_w(half, v3(0.6f, -0.8f, 0)) == 0);
+    environment_free(all);
+    environment_free(half);
+
+    struct sky s = sky_uneven(32, 16);
+    struct environment *env = sky_environment(&s);
+    double sum = 0, luminance_factor = 0.2126 * 1 + 0.7152 * 2 + 0.0722 * 3;
+    for (int j = 0; j < 8 * 16; j++)
+        for (int i = 0; i < 4 * 32; i++)
+            sum += sky_radiance(&s, (i + 0.5) / 4, (j + 0.5) / 8) *
+                   (cos(M_PI * j / 128) - cos(M_PI * (j + 1) / 128)) * 2 * M_PI / 128;
+    assert_true(fabs(environment_total(env) / (sum * luminance_factor) - 1) < 1e-2);
+    environment_free(env);
+}
+
+static void must_refuse(const struct sky *s, const char *drop, const char *keyword)
+{
+    struct err e = {""};
+    struct image im = sky_image(s);
+    if (drop != NULL)
+        strcpy(im.names[image_channel(&im, drop)], "Z");
+    struct environment *env = environment_from_image(&im, "x.exr", &e);
+    image_free(&im);
+    if (env != NULL)
+        fail_msg("taken, but should fail with '%s'", keyword);
+    if (strncmp(e.msg, "x.exr: ", 7) != 0 || strstr(e.msg, keyword) == NULL)
+        fail_msg("expected '%s', got '%s'", keyword, e.msg);
+}
+
+static void bad_texels_are_named(void **state)
+{
+    (void)state;
+    const struct sky good = {.width = 4, .height = 2, .value = {1, 2, 4, 8, 16, 32, 64, 128}};
+    struct sky s = good;
+    s.value[6] = NAN;
+    must_refuse(&s, NULL, "pixel (2, 1) from the top left: channel R is");
+    s.value[6] = INFINITY;
+    must_refuse(&s, NULL, "pixel (2, 1) from the top left: channel R is inf");
+    s.value[3] = -0.5f;
+    must_refuse(&s, NULL, "pixel (3, 0) from the top left: channel R is -0.5");
+    must_refuse(&good, "G", "no channel G");
+    memset(s.value, 0, sizeof s.value);
+    must_refuse(&s, NULL, "black everywhere");
+    environment_free(sky_environment(&good));
+}
+
+static void put32(uint8_t **p, uint32_t v)
+{
+    for (int i = 0; i < 4; i++)
+        *(*p)++ = (uint8_t)(v >> 8 * i);
+}
+
+static void put_attribute(uint8_t **p, const char *name, const char *type, uint32_t size)
+{
+    *p = (uint8_t *)stpcpy((char *)*p, name) + 1;
+    *p = (uint8_t *)stpcpy((char *)*p, type) + 1;
+    put32(p, size);
+}
+
+/* An OpenEXR file of 2 x 1 half pixels, byte by byte: R 1 and 0.5, G 2 and 1, B 3 and 1.5. */
+static size_t half_exr(uint8_t *out)
+{
+    static const uint16_t rows[3][2] = {{0x4200, 0x3E00}, {0x4000, 0x3C00}, {0x3C00, 0x3800}};
+    static const char channels[3] = {'B', 'G', 'R'};
+    uint8_t *p = out;
+    put32(&p, 20000630);
+    put32(&p, 2);
+    put_attribute(&p, "channels", "chlist", 3 * 18 + 1);
+    for (int c = 0; c < 3; c++) {
+        *p++ = (uint8_t)channels[c];
+        *p++ = 0;
+        put32(&p, 1); /* half */
+        put32(&p, 0);
+        put32(&p, 1); /* sampling */
+        put32(&p, 1);
+    }
+    *p++ = 0;
+    put_attribute(&p, "compression", "compression", 1);
+    *p++ = 0;
+    static const char *const windows[] = {"dataWindow", "displayWindow"};
+    for (int k = 0; k < 2; k++) {
+        put_attribute(&p, windows[k], "box2i", 16);
+        put32(&p, 0);
+        put32(&p, 0);
+        put32(&p, 1);
+        put32(&p, 0);
+    }
+    put_attribute(&p, "lineOrder", "lineOrder", 1);
+    *p++ = 0;
+    put_attribute(&p, "pixelAspectRatio", "float", 4);
+    put32(&p, 0x3F800000);
+    put_attribute(&p, "screenWindowCenter", "v2f", 8);
+    put32(&p, 0);
+    put32(&p, 0);
+    put_attribute(&p, "screenWindowWidth", "float", 4);
+    put32(&p, 0x3F800000);
+    *p++ = 0;
+    put32(&p, (uint32_t)(p - out) + 8); /* offset of the only row */
+    put32(&p, 0);
+    put32(&p, 0);
+    put32(&p, 12);
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < 2; i++) {
+            *p++ = (uint8_t)(rows[c][i] & 255);
+            *p++ = (uint8_t)(rows[c][i] >> 8);
+        }
+    return (size_t)(p - out);
+}
+
+/* The same picture in RGBE: m 2^(e-136), so (64, 128, 192) with e = 130 is 1 2 3. */
+static size_t radiance_hdr(uint8_t *out)
+{
+    static const uint8_t pixels[8] = {64, 128, 192, 130, 32, 64, 96, 130};
+    uint8_t *p =
+        (uint8_t *)stpcpy((char *)out, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n");
+    memcpy(p, pixels, sizeof pixels);
+    return (size_t)(p - out) + sizeof pixels;
+}
+
+static void write_bytes(const char *path, const void *bytes, size_t size)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* Column 0 of a map of 2 x 1 faces +Z, column 1 faces -Z. */
+static void check_two_texels(const char *path)
+{
+    struct err e = {""};
+    struct environment *env = environment_read(path, &e);
+    if (env == NULL)
+        fail_msg("%s", e.msg);
+    rgb front = environment_radiance(env, v3(0, 0, 1));
+    rgb back = environment_radiance(env, v3(0, 0, -1));
+    environment_free(env);
+    assert_true(fabsf(front.r - 1) < 1e-5f && fabsf(front.g - 2) < 1e-5f);
+    assert_true(fabsf(front.b - 3) < 1e-5f && fabsf(back.r - 0.5f) < 1e-5f);
+    assert_true(fabsf(back.g - 1) < 1e-5f && fabsf(back.b - 1.5f) < 1e-5f);
+}
+
+static void files(void **state)
+{
+    (void)state;
+    char dir[] = "/tmp/assay-sky-XXXXXX", path[64];
+    uint8_t bytes[1024];
+    struct err e = {""};
+    assert_non_null(mkdtemp(dir));
+
+    snprintf(path, sizeof path, "%s/half.exr", dir);
+    write_bytes(path, bytes, half_exr(bytes));
+    check_two_texels(path);
+    assert_int_equal(unlink(path), 0);
+
+    snprintf(path, sizeof path, "%s/light.hdr", dir);
+    write_bytes(path, bytes, radiance_hdr(bytes));
+    check_two_texels(path);
+    assert_int_equal(unlink(path), 0);
+
+    snprintf(path, sizeof path, "%s/float.exr", dir);
+    const struct sky s = {.width = 2, .height = 1, .value = {1, 0.5f}};
+    struct image im = sky_image(&s);
+    assert_true(image_write_exr(path, &im, &e));
+    image_free(&im);
+    check_two_texels(path);
+    assert_int_equal(unlink(path), 0);
+
+    assert_null(environment_read(path, &e));
+    assert_non_null(strstr(e.msg, "float.exr: cannot read"));
+    snprintf(path, sizeof path, "%s/sky.png", dir);
+    assert_null(environment_read(path, &e));
+    assert_non_null(strstr(e.msg, "sky.png: an environment map must be an .exr or .hdr file"));
+    assert_int_equal(rmdir(dir), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(choice_is_exact),
+        cmocka_unit_test(orientation),
+        cmocka_unit_test(samples_are_what_they_say),
+        cmocka_unit_test(directions_have_their_density),
+        cmocka_unit_test(totals),
+        cmocka_unit_test(bad_texels_are_named),
+        cmocka_unit_test(files),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,256 @@
+/* scene_finish(): lights of emissive objects, areas, bounds, and what it refuses. */
+#include "renderer/scene/scene.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void *copy(const void *data, size_t size)
+{
+    void *p = malloc(size);
+    assert_non_null(p);
+    memcpy(p, data, size);
+    return p;
+}
+
+/* Object 0: two triangles that do not emit. Object 1: two triangles that do, right angles with legs
+ * 1,1 and 3,4, so 0.5 + 6 in area. Object 2: two emissive spheres of radius 2 and 0.5. One point
+ * light comes first. */
+static struct scene make_scene(void)
+{
+    const vec3 position[12] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 0, 0}, {6, 0, 0}, {5, 1, 0},
+                               {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {0, 0, 9}, {3, 0, 9}, {0, 4, 9}};
+    vec3 normal[12];
+    for (int i = 0; i < 12; i++)
+        normal[i] = v3(0, 0, 1);
+    const uint32_t tri_material[4] = {0, 0, 1, 1}, tri_object[4] = {0, 0, 1, 1};
+    const struct sphere spheres[2] = {{{-3, 0, 0}, 2, 1}, {{0, -7, 0}, 0.5f, -1}};
+    const uint32_t sphere_material[2] = {1, 1}, sphere_object[2] = {2, 2};
+    const struct material materials[2] = {
+        {.name = "paint", .reflectance = {0.5f, 0.5f, 0.5f}},
+        {.name = "lamp", .radiance = {1, 2, 3}, .reflectance = {0.1f, 0, 0}}};
+    const struct object objects[3] = {
+        {"wall", 0, 2, 0, 0, 0}, {"panel", 2, 2, 0, 0, 1}, {"bulbs", 4, 0, 0, 2, 1}};
+    const struct light point = {.kind = LIGHT_POINT, .value = {1, 1, 1}, .attenuation = {0, 0, 1}};
+    return (struct scene){.num_triangles = 4,
+                          .num_spheres = 2,
+                          .num_materials = 2,
+                          .num_lights = 1,
+                          .num_objects = 3,
+                          .position = copy(position, sizeof position),
+                          .normal = copy(normal, sizeof normal),
+                          .tri_material = copy(tri_material, sizeof tri_material),
+                          .tri_object = copy(tri_object, sizeof tri_object),
+                          .spheres = copy(spheres, sizeof spheres),
+                          .sphere_material = copy(sphere_material, sizeof sphere_material),
+                          .sphere_object = copy(sphere_object, sizeof sphere_object),
+                          .materials = copy(materials, sizeof materials),
+                          .lights = copy(&point, sizeof point),
+                          .objects = copy(objects, sizeof objects)};
+}
+
+static void area_lights_follow_delta_lights(void **state)
+{
+    (void)state;
+    struct scene s = make_scene();
+    struct err e = {""};
+    assert_true(scene_finish(&s, "test", &e));
+    assert_int_equal(s.num_lights, 4);
+    assert_int_equal(s.lights[0].kind, LIGHT_POINT);
+    assert_int_equal(s.lights[1].kind, LIGHT_TRIANGLES);
+    assert_int_equal(s.lights[1].first, 2);
+    assert_int_equal(s.lights[1].count, 2);
+    assert_true(fabsf(s.lights[1].area - 6.5f) < 1e-6f);
+    const float pi = 3.14159265f;
+    for (uint32_t k = 0; k < 2; k++) {
+        float r = k == 0 ? 2 : 0.5f;
+        assert_int_equal(s.lights[2 + k].kind, LIGHT_SPHERE);
+        assert_int_equal(s.lights[2 + k].first, k);
+        assert_true(fabsf(s.lights[2 + k].area - 4 * pi * r * r) < 1e-5f);
+        assert_int_equal(s.sphere_light[k], 2 + k);
+    }
+    const int32_t expected[4] = {-1, -1, 1, 1};
+    assert_memory_equal(s.tri_light, expected, sizeof expected);
+    scene_free(&s);
+}
+
+/* Corners by hand: the first sphere reaches x = -5, y = 2, z = +-2; the second y = -7.5. */
+static void bounds_hold_triangles_and_spheres(void **state)
+{
+    (void)state;
+    struct scene s = make_scene();
+    struct err e = {""};
+    assert_true(scene_finish(&s, "test", &e));
+    const vec3 lo = {-5, -7.5f, -2}, hi = {6, 4, 9};
+    assert_memory_equal(&s.bounds_min, &lo, sizeof lo);
+    assert_memory_equal(&s.bounds_max, &hi, sizeof hi);
+    assert_memory_equal(&s.frame_min, &lo, sizeof lo);
+    assert_memory_equal(&s.frame_max, &hi, sizeof hi);
+    scene_free(&s);
+}
+
+static void free_zeroes(void **state)
+{
+    (void)state;
+    struct scene s = make_scene();
+    static const struct scene zero;
+    scene_free(&s);
+    assert_null(s.position);
+    assert_int_equal(s.num_triangles, 0);
+    assert_memory_equal(&s, &zero, sizeof s);
+    scene_free(&s);
+}
+
+/* One way of spoiling make_scene(), and a word of the line it must cause. */
+struct spoil {
+    void (*apply)(struct scene *s);
+    const char *keyword;
+};
+
+static void spoil_empty(struct scene *s)
+{
+    s->num_triangles = s->num_spheres = 0;
+}
+static void spoil_position(struct scene *s)
+{
+    s->position[7].y = NAN;
+}
+static void spoil_normal(struct scene *s)
+{
+    s->normal[3] = v3(0, 0, 2);
+}
+static void spoil_reflectance_high(struct scene *s)
+{
+    s->materials[0].reflectance.g = 1.01f;
+}
+static void spoil_reflectance_negative(struct scene *s)
+{
+    s->materials[0].reflectance.b = -0.01f;
+}
+static void spoil_radiance(struct scene *s)
+{
+    s->materials[1].radiance.r = INFINITY;
+}
+static void spoil_object_material(struct scene *s)
+{
+    s->objects[0].material = 2;
+}
+static void spoil_tri_material(struct scene *s)
+{
+    s->tri_material[1] = 1;
+}
+static void spoil_tri_object(struct scene *s)
+{
+    s->tri_object[3] = 3;
+}
+static void spoil_tri_run(struct scene *s)
+{
+    s->tri_object[0] = 1;
+}
+static void spoil_run(struct scene *s)
+{
+    s->objects[1].first_triangle = 1;
+}
+static void spoil_run_end(struct scene *s)
+{
+    s->objects[1].num_triangles = 1;
+    s->objects[2].first_triangle = 3;
+}
+static void spoil_sphere_object(struct scene *s)
+{
+    s->sphere_object[1] = 0;
+}
+static void spoil_radius(struct scene *s)
+{
+    s->spheres[0].radius = 0;
+}
+static void spoil_side(struct scene *s)
+{
+    s->spheres[0].normal_out = 0;
+}
+static void spoil_light_value(struct scene *s)
+{
+    s->lights[0].value.g = -1;
+}
+static void spoil_attenuation(struct scene *s)
+{
+    s->lights[0].attenuation[2] = 0;
+}
+static void spoil_light_direction(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_DIRECTIONAL;
+}
+static void spoil_spot_axis(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_SPOT;
+}
+static void spoil_spot_cone(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_SPOT;
+    s->lights[0].axis = v3(0, 1, 0);
+    s->lights[0].cos_cutoff = 1;
+}
+static void spoil_environment(struct scene *s)
+{
+    s->lights[0].kind = LIGHT_ENVIRONMENT;
+}
+static void spoil_lamp_area(struct scene *s)
+{
+    for (int k = 6; k < 12; k++)
+        s->position[k] = v3(1, 1, 1);
+}
+
+static void bad_scenes_are_refused(void **state)
+{
+    (void)state;
+    static const struct spoil SPOILS[] = {
+        {spoil_empty, "no triangles"},
+        {spoil_position, "triangle 2: position"},
+        {spoil_normal, "triangle 1: normal"},
+        {spoil_reflectance_high, "'paint': reflectance"},
+        {spoil_reflectance_negative, "'paint': reflectance"},
+        {spoil_radiance, "'lamp': radiance"},
+        {spoil_object_material, "'wall': no material 2"},
+        {spoil_tri_material, "triangle 1: not the material"},
+        {spoil_tri_object, "triangle 3: not of object"},
+        {spoil_tri_run, "triangle 0: not of object"},
+        {spoil_run, "'panel': its primitives"},
+        {spoil_run_end, "differ in number"},
+        {spoil_sphere_object, "sphere 1: not of object"},
+        {spoil_radius, "sphere 0: centre or radius"},
+        {spoil_side, "normal_out"},
+        {spoil_light_value, "light 0: value"},
+        {spoil_attenuation, "light 0: attenuation"},
+        {spoil_light_direction, "light 0: direction"},
+        {spoil_spot_axis, "light 0: direction"},
+        {spoil_spot_cone, "light 0: cone"},
+        {spoil_environment, "light 0: more than one environment, or none"},
+        {spoil_lamp_area, "'panel': emits, but its area is 0"},
+    };
+    for (size_t i = 0; i < sizeof SPOILS / sizeof *SPOILS; i++) {
+        struct scene s = make_scene();
+        struct err e = {""};
+        SPOILS[i].apply(&s);
+        if (scene_finish(&s, "room.dae", &e))
+            fail_msg("'%s' was accepted", SPOILS[i].keyword);
+        if (strncmp(e.msg, "room.dae: ", 10) != 0 || strstr(e.msg, SPOILS[i].keyword) == NULL)
+            fail_msg("expected '%s', got '%s'", SPOILS[i].keyword, e.msg);
+        scene_free(&s);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(area_lights_follow_delta_lights),
+        cmocka_unit_test(bounds_hold_triangles_and_spheres),
+        cmocka_unit_test(free_zeroes),
+        cmocka_unit_test(bad_scenes_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

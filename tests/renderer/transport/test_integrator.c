@@ -1,0 +1,382 @@
+/* Estimators against closed forms. H0 of every z-test: the mean of the pixel's samples is the
+ * closed form. Two-sided at alpha = 1e-6 (|z| < 4.89), one seed, fixed n, no retry. With n = 4e4 or
+ * more samples of moderate skew the normal limit is good to a factor of two there. Each group has a
+ * negative control: a value that a known bug would give must be rejected by the same test. */
+#include "tests/support/render_check.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#define Z_LIMIT 4.89
+
+static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
+                                                       .direct = DIRECT_MIS,
+                                                       .max_bounces = 1,
+                                                       .light_samples = 1,
+                                                       .roulette = ROULETTE_THROUGHPUT,
+                                                       .sampler = {SAMPLER_INDEPENDENT, 20260101}};
+
+/* A sphere seen from inside that reflects rho and emits E: L = E sum_{k=0..m} rho^k for every m,
+ * because every point sees the same radiance in all directions. */
+static void furnace_at_every_depth(void **state)
+{
+    (void)state;
+    const double rho[3] = {0.8, 0.5, 0.2}, emitted[3] = {1, 2, 4};
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
+    build_sphere(&s, v3(0.1f, -0.2f, 0.3f), 1, -1, m);
+    build_camera(&s, v3(0.3f, 0, 0.5f), 60);
+    check_finish(&s);
+    for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
+        for (int depth = 0; depth <= 6; depth += depth < 2 ? 1 : 4) {
+            struct integrator_options io = path_options;
+            io.direct = (enum direct_kind)direct;
+            io.max_bounces = depth;
+            struct moments film = check_render(&s, io, 8, 8, 1024);
+            for (int c = 0; c < 3; c++) {
+                double sum = 0, term = emitted[c];
+                for (int k = 0; k <= depth; k++, term *= rho[c])
+                    sum += term;
+                check_mean(&film, c, sum, direct_kind_names[direct]);
+                /* Negative control: depth counted one too high. Hemisphere sampling is too noisy to
+                 * see that in the deep sums; everything else has to. */
+                if (term > 1e-3 * sum && (direct != DIRECT_HEMISPHERE || depth < 2))
+                    assert_false(check_agrees(&film, c, sum + term));
+            }
+            moments_free(&film);
+        }
+    scene_free(&s);
+}
+
+/* Irradiance at the origin, normal +Y, of a polygon of unit radiance above the horizon: Lambert's
+ * formula E = 1/2 sum_i angle(v_i, v_i+1) n . (v_i x v_i+1)/|..|, orientation by the sign. */
+static double polygon_irradiance(const double (*v)[3], int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        const double *a = v[i], *b = v[(i + 1) % n];
+        double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                       a[0] * b[1] - a[1] * b[0]};
+        double lc = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+        double ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        sum += atan2(lc, ab) * c[1] / lc;
+    }
+    return fabs(sum) / 2;
+}
+
+/* A floor patch at the origin seen from a distance through a pinhole so narrow that irradiance is
+ * constant over the picture. */
+static struct scene floor_scene(float albedo)
+{
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(albedo), grey(0));
+    build_quad(&s, v3(-3, 0, 3), v3(6, 0, 0), v3(0, 0, -6), m);
+    build_camera(&s, v3(0, 0, 0), 0.02f);
+    /* From (0, 2, 2) towards the origin. */
+    const float h = 0.70710678f;
+    s.camera.eye = v3(0, 2, 2);
+    s.camera.backward = v3(0, h, h);
+    s.camera.up = v3(0, h, -h);
+    return s;
+}
+
+static void rectangle_light(void **state)
+{
+    (void)state;
+    /* Parallel, off axis; upright and near (grazing); both face the patch. */
+    static const float quads[2][9] = {{0.2f, 1, -0.7f, 0.9f, 0, 0, 0, 0, 0.5f},
+                                      {0.3f, 0.05f, 0.5f, 0, 0, -1, 0, 0.8f, 0}};
+    for (int q = 0; q < 2; q++) {
+        struct scene s = floor_scene(0.6f);
+        uint32_t lamp = build_material(&s, grey(0), grey(5));
+        const float *f = quads[q];
+        vec3 p = v3(f[0], f[1], f[2]), u = v3(f[3], f[4], f[5]), v = v3(f[6], f[7], f[8]);
+        /* The front has to see the origin. */
+        if (dot(cross(u, v), neg(p)) < 0)
+            build_quad(&s, p, v, u, lamp);
+        else
+            build_quad(&s, p, u, v, lamp);
+        check_finish(&s);
+        double corner[4][3] = {{p.x, p.y, p.z},
+                               {p.x + u.x, p.y + u.y, p.z + u.z},
+                               {p.x + u.x + v.x, p.y + u.y + v.y, p.z + u.z + v.z},
+                               {p.x + v.x, p.y + v.y, p.z + v.z}};
+        double expected = 0.6 / M_PI * 5 * polygon_irradiance((const double(*)[3])corner, 4);
+        for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
+            for (int l = 1; l <= 3; l += 2) {
+                struct integrator_options io = path_options;
+                io.direct = (enum direct_kind)direct;
+                io.light_samples = l;
+                struct moments film = check_render(&s, io, 8, 8, 4096);
+                check_mean(&film, 1, expected, direct_kind_names[direct]);
+                /* Negative control: the assignment's pdf lacks 1/d, so its image is brighter by a
+                 * mean distance of about 1.1 here; 5 % would already be rejected. */
+                assert_false(check_agrees(&film, 1, 1.05 * expected));
+                moments_free(&film);
+            }
+        scene_free(&s);
+    }
+}
+
+/* E = pi L (r/d)^2 cos(theta) for a sphere wholly above the horizon [a uniform sphere is seen as a
+ * disk of that solid angle's projection]. */
+static void sphere_light(void **state)
+{
+    (void)state;
+    static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
+    for (int q = 0; q < 3; q++) {
+        struct scene s = floor_scene(0.5f);
+        uint32_t lamp = build_material(&s, grey(0), grey(3));
+        vec3 c = v3(centre[q][0], centre[q][1], centre[q][2]);
+        build_sphere(&s, c, 0.25f, 1, lamp);
+        check_finish(&s);
+        double d2 = (double)dot(c, c), cos_theta = c.y / sqrt(d2);
+        double expected = 0.5 / M_PI * (M_PI * 3 * 0.0625 / d2 * cos_theta);
+        for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
+            struct integrator_options io = path_options;
+            io.direct = (enum direct_kind)direct;
+            struct moments film = check_render(&s, io, 8, 8, 4096);
+            check_mean(&film, 0, expected, direct_kind_names[direct]);
+            assert_false(check_agrees(&film, 0, expected / cos_theta * 0.9));
+            moments_free(&film);
+        }
+        scene_free(&s);
+    }
+}
+
+/* Point: rho/pi I cos/d^2. Directional: rho/pi E cos. No noise but that of the pixel's width. */
+static void delta_lights(void **state)
+{
+    (void)state;
+    struct scene s = floor_scene(0.7f);
+    build_light(&s, (struct light){.kind = LIGHT_POINT,
+                                   .value = {2, 3, 4},
+                                   .position = {0.6f, 0.8f, -0.5f},
+                                   .attenuation = {0, 0, 1}});
+    vec3 sun = normalize(v3(-1, 2, 0.5f));
+    build_light(&s,
+                (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
+    check_finish(&s);
+    struct moments film = check_render(&s, path_options, 4, 4, 64);
+    double d2 = 0.36 + 0.64 + 0.25, cos_point = 0.8 / sqrt(d2);
+    double cos_sun = 2 / sqrt(1 + 4 + 0.25);
+    const double intensity[3] = {2, 3, 4}, irradiance[3] = {1, 0, 0.5};
+    for (int c = 0; c < 3; c++) {
+        double expected = 0.7 / M_PI * (intensity[c] * cos_point / d2 + irradiance[c] * cos_sun);
+        check_mean(&film, c, expected, "delta lights");
+        assert_false(check_agrees(&film, c, expected * 1.001));
+    }
+    moments_free(&film);
+    scene_free(&s);
+}
+
+/* A plate between light and patch: no light; taken away from the line of sight: all of it. */
+static void shadow(void **state)
+{
+    (void)state;
+    for (int blocked = 0; blocked < 2; blocked++) {
+        struct scene s = floor_scene(0.7f);
+        uint32_t black = build_material(&s, grey(0), grey(0));
+        build_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
+                   black);
+        build_light(&s, (struct light){.kind = LIGHT_POINT,
+                                       .value = {1, 1, 1},
+                                       .position = {0, 1, 0},
+                                       .attenuation = {0, 0, 1}});
+        check_finish(&s);
+        struct moments film = check_render(&s, path_options, 4, 4, 16);
+        check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
+        moments_free(&film);
+        scene_free(&s);
+    }
+}
+
+/* A box with two spheres and a lamp; enough of everything for the metamorphic tests. */
+static struct scene box_scene(float radiance)
+{
+    struct scene s = build_scene();
+    uint32_t white = build_material(&s, grey(0.6f), grey(0));
+    uint32_t red = build_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
+    uint32_t lamp = build_material(&s, grey(0), grey(radiance));
+    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
+    build_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
+    build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
+    build_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
+    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
+    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
+    build_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, red);
+    build_camera(&s, v3(0, 0.75f, 3), 49);
+    check_finish(&s);
+    return s;
+}
+
+static bool same_bits(const struct moments *a, const struct moments *b)
+{
+    size_t n = (size_t)a->width * (size_t)a->height;
+    return memcmp(a->n, b->n, n * sizeof *a->n) == 0 &&
+           memcmp(a->mean, b->mean, 3 * n * sizeof *a->mean) == 0 &&
+           memcmp(a->m2, b->m2, 3 * n * sizeof *a->m2) == 0 &&
+           memcmp(a->m3, b->m3, 3 * n * sizeof *a->m3) == 0;
+}
+
+static void same_bits_for_any_threads(void **state)
+{
+    (void)state;
+    struct scene s = box_scene(10);
+    struct integrator_options io = path_options;
+    io.max_bounces = 5;
+    struct moments one = check_render(&s, io, 50, 38, 8);
+    for (int threads = 2; threads <= 7; threads += 5) {
+        struct moments many = check_render_with(&s, io, 50, 38, 8, threads, BVH_SAH);
+        assert_true(same_bits(&one, &many));
+        moments_free(&many);
+    }
+    /* Negative control: another seed is another picture. */
+    io.sampler.seed++;
+    struct moments other = check_render(&s, io, 50, 38, 8);
+    assert_false(same_bits(&one, &other));
+    moments_free(&other);
+    moments_free(&one);
+    scene_free(&s);
+}
+
+/* A cell, and a range of samples, are the same numbers as in the whole picture. */
+static void cells_and_sample_ranges_add_up(void **state)
+{
+    (void)state;
+    struct err e = {0};
+    struct scene s = box_scene(10);
+    struct camera c;
+    struct render_stats stats;
+    struct progress p;
+    progress_start(&p, "test", NULL, true);
+    assert_true(camera_init(&c, &s, 40, 30, &e));
+    struct bvh *bvh = bvh_build(&s, BVH_SAH, &e);
+    struct integrator_options io = path_options;
+    io.max_bounces = 3;
+    struct render_options o = {
+        .integrator = io, .width = 40, .height = 30, .num_samples = 6, .threads = 2};
+    struct moments whole, cell, first, rest;
+    assert_true(render(&s, &c, bvh, &o, &p, &whole, &stats, &e));
+    o.num_samples = 2;
+    assert_true(render(&s, &c, bvh, &o, &p, &first, &stats, &e));
+    o.first_sample = 2;
+    o.num_samples = 4;
+    assert_true(render(&s, &c, bvh, &o, &p, &rest, &stats, &e));
+    assert_true(moments_merge(&first, &rest, &e));
+    o = (struct render_options){.integrator = io,
+                                .x = 7,
+                                .y = 11,
+                                .width = 21,
+                                .height = 13,
+                                .num_samples = 6,
+                                .threads = 1};
+    assert_true(render(&s, &c, bvh, &o, &p, &cell, &stats, &e));
+    for (int y = 0; y < 13; y++)
+        assert_memory_equal(cell.mean + 3 * (size_t)y * 21,
+                            whole.mean + 3 * ((size_t)(y + 11) * 40 + 7), 21 * 3 * sizeof(double));
+    for (size_t i = 0; i < 3 * 40 * 30; i++) {
+        assert_true(fabs(first.mean[i] - whole.mean[i]) <= 1e-12 * (1 + fabs(whole.mean[i])));
+        assert_true(fabs(first.m2[i] - whole.m2[i]) <= 1e-10 * (1 + fabs(whole.m2[i])));
+    }
+    bvh_free(bvh);
+    moments_free(&whole);
+    moments_free(&cell);
+    moments_free(&first);
+    moments_free(&rest);
+    scene_free(&s);
+}
+
+/* Bounces 0..4 rendered one by one add up to the picture that accumulates them: the same random
+ * numbers, so up to float rounding and not only in the mean. */
+static void bounces_add_up(void **state)
+{
+    (void)state;
+    struct scene s = box_scene(10);
+    for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
+        struct integrator_options io = path_options;
+        io.direct = (enum direct_kind)direct;
+        io.max_bounces = 4;
+        struct moments all = check_render(&s, io, 16, 12, 16);
+        double sum[16 * 12 * 3] = {0};
+        for (int k = 0; k <= 4; k++) {
+            io.first_bounce = io.max_bounces = k;
+            struct moments only = check_render(&s, io, 16, 12, 16);
+            for (size_t i = 0; i < 16 * 12 * 3; i++)
+                sum[i] += only.mean[i];
+            moments_free(&only);
+        }
+        for (size_t i = 0; i < 16 * 12 * 3; i++)
+            assert_true(fabs(sum[i] - all.mean[i]) <= 1e-5 * (0.01 + all.mean[i]));
+        moments_free(&all);
+    }
+    scene_free(&s);
+}
+
+static void twice_the_light_twice_the_image(void **state)
+{
+    (void)state;
+    struct integrator_options io = path_options;
+    io.max_bounces = 4;
+    struct scene one = box_scene(5), two = box_scene(10);
+    struct moments a = check_render(&one, io, 16, 12, 16);
+    struct moments b = check_render(&two, io, 16, 12, 16);
+    for (size_t i = 0; i < 16 * 12 * 3; i++)
+        assert_true(b.mean[i] == 2 * a.mean[i]);
+    moments_free(&a);
+    moments_free(&b);
+    scene_free(&one);
+    scene_free(&two);
+}
+
+/* All estimators, roulette or not, have the same mean. Cornell-like box, depth 4, 64 x 48 pixels,
+ * 64 samples: relative standard error about 0.3 % (light, mis), so a loss of 3 % is found. */
+static void estimators_agree(void **state)
+{
+    (void)state;
+    struct scene s = box_scene(10);
+    struct integrator_options io = path_options;
+    io.max_bounces = 4;
+    io.roulette = ROULETTE_OFF;
+    struct moments reference = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
+    for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
+        for (int roulette = ROULETTE_OFF; roulette <= ROULETTE_FIXED; roulette++) {
+            io.sampler.seed++;
+            io.direct = (enum direct_kind)direct;
+            io.roulette = (enum roulette_kind)roulette;
+            io.survival = 0.7f;
+            struct moments film = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
+            double z = check_z(&film, &reference, 0);
+            if (fabs(z) > Z_LIMIT)
+                fail_msg("%s, roulette %d: z = %.2f", direct_kind_names[direct], roulette, z);
+            moments_free(&film);
+        }
+    /* Negative control: one bounce less. */
+    io.max_bounces = 3;
+    struct moments shallow = check_render_with(&s, io, 64, 48, 256, 2, BVH_SAH);
+    assert_true(fabs(check_z(&shallow, &reference, 0)) > Z_LIMIT);
+    moments_free(&shallow);
+    moments_free(&reference);
+    scene_free(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(furnace_at_every_depth),
+        cmocka_unit_test(rectangle_light),
+        cmocka_unit_test(sphere_light),
+        cmocka_unit_test(delta_lights),
+        cmocka_unit_test(shadow),
+        cmocka_unit_test(same_bits_for_any_threads),
+        cmocka_unit_test(cells_and_sample_ranges_add_up),
+        cmocka_unit_test(bounces_add_up),
+        cmocka_unit_test(twice_the_light_twice_the_image),
+        cmocka_unit_test(estimators_agree),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,59 @@
+/* The pictures of tests/studies/anchors/make_anchors.c: many renders of one scene by our renderer, each with a seed of
+ * its own, a long render as Mitsuba's rule asks for one, and what is done to a picture to make it
+ * wrong by a known amount. */
+#ifndef ASSAY_TESTS_ANCHOR_IMAGES_H
+#define ASSAY_TESTS_ANCHOR_IMAGES_H
+
+#include "anchor_rules.h"
+
+/* Calls fn(arg, i, thread) for i = 0 .. n-1 from that many threads, in any order, `thread` from 0. */
+void anchor_parallel(int n, int threads, void (*fn)(void *arg, int i, int thread), void *arg);
+
+struct anchor_pool {
+    char title[128];
+    int side, spp, num_renders;
+    struct moments *render;             /* num_renders of them, unit "sample", n = spp */
+    struct mitsuba_reference reference; /* one render of reference_spp samples, in XYZ */
+    struct moments expected;            /* the same render in RGB: the mean */
+    double
+        *bounced;   /* 3 a pixel, in [0, 1]: the share of `expected` that is not light of an emitter
+                        seen directly */
+    int num_places; /* regions where a local error is put: of the nine squares at 4, 24 and 44 in x
+                        and y, those with at least half of the picture's mean of bounced light */
+    int place[9][2];
+};
+
+struct anchor_job {
+    const char *scene; /* of reference/scenes, with its own depth */
+    int side, spp, num_renders, reference_spp;
+    uint64_t seed; /* of the reference; the renders' count up from there */
+    int threads;
+    /* A file that keeps the pictures, so that a change of a rule need not render again; NULL: none. It
+     * is believed if it was made for the same job and its first picture is still what the renderer
+     * draws, bit for bit; else it is written again. */
+    const char *kept;
+    void (*progress)(double share); /* from 0 to 1; NULL: none */
+};
+
+/* The caller frees. */
+bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct err *e)
+    __attribute__((warn_unused_result));
+void anchor_pool_free(struct anchor_pool *p);
+
+/* The standard deviation of one sample over the mean, of the picture's luminance: a scene's noise. */
+double anchor_noise(const struct anchor_pool *p);
+
+enum anchor_error {
+    ANCHOR_GLOBAL,  /* all light times 1 + b */
+    ANCHOR_BOUNCED, /* light that has bounced times 1 + b */
+    ANCHOR_REGION,  /* the same in one square of ANCHOR_REGION_SIDE pixels */
+    NUM_ANCHOR_ERRORS
+};
+enum { ANCHOR_REGION_SIDE = 16 };
+
+/* out = in with an error of size b; `place` counts the region. out has the size of in. The noise is
+ * scaled with the mean. */
+void anchor_make_wrong(const struct anchor_pool *p, const struct moments *in,
+                       enum anchor_error kind, double b, int place, struct moments *out);
+
+#endif

@@ -1,0 +1,105 @@
+#include "anchor_rules.h"
+
+#include "tools/stats/distributions.h"
+
+#include <math.h>
+
+void anchor_xyz(const double light[3], double xyz[3])
+{
+    static const double m[3][3] = {{0.412391, 0.357584, 0.180481},
+                                   {0.212639, 0.715169, 0.072192},
+                                   {0.019331, 0.119195, 0.950532}};
+    for (int k = 0; k < 3; k++)
+        xyz[k] = m[k][0] * light[0] + m[k][1] * light[1] + m[k][2] * light[2];
+}
+
+void mitsuba_z(const struct moments *a, const struct mitsuba_reference *r, double *z)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    for (size_t p = 0; p < pixels; p++) {
+        double xyz[3];
+        anchor_xyz(&a->mean[3 * p], xyz);
+        for (size_t k = 0; k < 3; k++) {
+            double var = fmax(r->var[3 * p + k], MITSUBA_FLOOR);
+            z[3 * p + k] = fabs(xyz[k] - r->mean[3 * p + k]) * sqrt(a->n[p] / var);
+        }
+    }
+}
+
+double mitsuba_critical_z(double level, size_t pixels)
+{
+    return stats_normal_quantile(-expm1(log1p(-level) / (double)pixels) / 2);
+}
+
+size_t mitsuba_failures(const double *z, size_t pixels, double critical_z)
+{
+    size_t failures = 0;
+    for (size_t i = 0; i < 3 * pixels; i++)
+        failures += z[i] >= critical_z;
+    return failures;
+}
+
+size_t mitsuba_allowed(double share, size_t pixels)
+{
+    size_t allowed = 0;
+    while ((double)(3 * pixels - allowed - 1) / 3 >= share * (double)pixels)
+        allowed++;
+    return allowed;
+}
+
+/* The k-th largest, k = 0 the largest [Hoare61, in Wirth's form]. */
+static double kth_largest(double *x, ptrdiff_t n, ptrdiff_t k)
+{
+    ptrdiff_t lo = 0, hi = n - 1;
+    while (lo < hi) {
+        double pivot = x[k];
+        ptrdiff_t i = lo, j = hi;
+        while (i <= j) {
+            while (x[i] > pivot)
+                i++;
+            while (x[j] < pivot)
+                j--;
+            if (i > j)
+                break;
+            double t = x[i];
+            x[i++] = x[j];
+            x[j--] = t;
+        }
+        if (j < k)
+            lo = i;
+        if (k < i)
+            hi = j;
+    }
+    return x[k];
+}
+
+double mitsuba_score(double *z, size_t pixels, size_t allowed)
+{
+    return kth_largest(z, (ptrdiff_t)(3 * pixels), (ptrdiff_t)allowed);
+}
+
+double welch_log10_p(const struct moments *a, const struct moments *b)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height, tested = 0;
+    double best_z = 0, smallest = 0;
+    for (size_t p = 0; p < pixels; p++)
+        for (int c = 0; c < 3; c++) {
+            double va = moments_var_of_mean(a, p, c), vb = moments_var_of_mean(b, p, c);
+            if (!(va + vb > 0))
+                continue;
+            tested++;
+            double t =
+                fabs(a->mean[3 * p + (size_t)c] - b->mean[3 * p + (size_t)c]) / sqrt(va + vb);
+            double nu = stats_welch_dof(va, a->n[p], vb, b->n[p]), z = stats_z_of_t(t, nu);
+            /* The exact p only where it may be the smallest: the equivalent is good to 3 %. */
+            if (z < 0.94 * best_z)
+                continue;
+            best_z = fmax(best_z, z);
+            smallest = fmin(smallest, stats_t_log10_p(t, nu));
+        }
+    if (tested == 0)
+        return 0;
+    if (smallest < -15) /* 1 - (1-p)^n = n p to the last digit */
+        return smallest + log10((double)tested);
+    return log10(-expm1((double)tested * log1p(-pow(10, smallest))));
+}

@@ -1,0 +1,32 @@
+/* `make bench`: what each part of it measures, and what all are told. Every figure is a ratio of CPU times
+ * taken one right after the other in this process or in child processes, the median over rounds; before any
+ * ratio what both found is checked to be the same. */
+#ifndef ASSAY_BENCH_H
+#define ASSAY_BENCH_H
+
+#include "renderer/base/isa.h"
+
+#include <jansson.h>
+
+enum { BENCH_MAX_ROUNDS = 99 };
+
+struct bench_options {
+    enum isa isa;
+    int rounds;
+    bool smoke; /* one tiny case of each part, to see that all of it runs; figures mean nothing */
+    const char *build;       /* where pathtracer is */
+    const char *out;         /* directory of results.json and the plots; exists */
+    const char *const *only; /* names of scenes, NULL at the end; none: all */
+};
+
+/* True if the scene was asked for. */
+bool bench_wanted(const struct bench_options *o, const char *scene);
+
+/* Each prints its table and gives what it shows, a new reference. *wrong: results differ, which is also
+ * said; nothing is then timed. A failure to measure is a line in *e and NULL. */
+json_t *bench_rays(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_paths(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_jobs(const struct bench_options *o, bool *wrong, struct err *e);
+json_t *bench_scaling(const struct bench_options *o, bool *wrong, struct err *e);
+
+#endif

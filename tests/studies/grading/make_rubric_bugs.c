@@ -1,0 +1,340 @@
+/* make_rubric_bugs BUILD PATCHES RUBRIC: writes the catalogue of known bugs that the rubric's line `bugs` names, beside the rubric
+ * (tools/grade/rubric_bugs.h). Every bug of PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only),
+ * the correct renderer is BUILD/pathtracer.
+ *
+ * The correct pictures are the references. Of each view, each bug and the correct renderer make BATCHES pictures of a
+ * quarter of the samples asked for, with the same seeds, so that what a bug does not touch has no noise in the
+ * difference; with all samples where their number is a fact. The effect is the mean of the differences; its variance that of
+ * independent pictures times the level at which the batches scatter, and what one picture with the bug has more noise than
+ * one without. A bug that changes no pixel of a picture of one sample has no effect on it, nor on it with deviations; an
+ * effect within its noise is stored as none. Pictures are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
+#include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
+#include "tools/grade/rubric_bugs.h"
+
+#include <dirent.h>
+#include <limits.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BATCHES = 2, SEED = 40260, MOST_BUGS = 512, LEAST_SPP = 4 };
+
+struct maker {
+    char build[PATH_MAX];
+    struct suite suite;
+    struct rubric *rubric;
+    struct answers *answers;
+    struct catalogue made;
+    int picture[RUBRIC_SETS * RUBRIC_PICTURES], set[RUBRIC_SETS * RUBRIC_PICTURES]; /* of a view */
+    struct sight (*batch)[BATCHES]; /* of a view: the correct renderer's */
+    struct moments *one;            /* likewise, one sample a pixel; of views without deviations */
+    pthread_mutex_t lock;
+    int next;
+    bool ok;
+    struct err e;
+};
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const struct bug *)a)->name, ((const struct bug *)b)->name);
+}
+
+static bool list_bugs(const char *dir, struct catalogue *c, struct err *e)
+{
+    DIR *d = opendir(dir);
+    bool ok = d != NULL || err_set(e, "%s: cannot be read", dir);
+    c->bug = calloc(MOST_BUGS, sizeof *c->bug);
+    for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
+        char path[4400];
+        const char *dot = strrchr(entry->d_name, '.');
+        snprintf(path, sizeof path, "%s/%s", dir, entry->d_name);
+        if (dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST_BUGS)
+            ok = bug_of_patch(path, &c->bug[c->num_bugs++], e);
+    }
+    if (d != NULL)
+        closedir(d);
+    qsort(c->bug, (size_t)c->num_bugs, sizeof *c->bug, by_name);
+    return ok && (c->num_bugs > 0 || err_set(e, "%s: no patch", dir));
+}
+
+/* Where a program's pictures are kept; hash tells its versions apart. */
+static bool open_cache(const struct maker *m, const char *name, const char *hash,
+                       const char *program, char cache[PATH_MAX], struct answer_options *opt,
+                       struct err *e)
+{
+    char stage[PATH_MAX];
+    snprintf(cache, PATH_MAX, "%.3900s/rubric-bugs/%s-%.8s", m->build, name, hash);
+    snprintf(stage, sizeof stage, "%.4000s/scene", cache);
+    *opt = (struct answer_options){.pathtracer = program,
+                                   .golden_dir = "golden",
+                                   .cache = cache,
+                                   .threads = 1,
+                                   .timeout_s = 3600};
+    return make_dirs(cache, e) && submission_stage(m->rubric, stage, e);
+}
+
+static bool render(const struct maker *m, int view, int batch, const struct answer_options *opt,
+                   struct sight *out, struct err *e)
+{
+    const struct rubric *r = m->rubric;
+    int picture = m->picture[view], spp = r->picture[picture].spp;
+    bool counts = rubric_bugs_counts(r, picture);
+    char words[1024];
+    struct moments made;
+    snprintf(words, sizeof words, "--seed %d %s", SEED + batch, r->set[m->set[view]].words);
+    spp = counts || spp / 4 < LEAST_SPP ? spp : spp / 4;
+    if (!answer_render(r, picture, counts, words, spp, opt, &made, e))
+        return false;
+    bool ok = rubric_bugs_sight(r, picture, &made, out, e);
+    moments_free(&made);
+    return ok;
+}
+
+/* One sample a pixel, by the bug: as by the correct renderer? */
+static bool is_same(const struct maker *m, int view, const struct answer_options *bug, bool *same,
+                    struct err *e)
+{
+    struct moments a;
+    const struct moments *b = &m->one[view];
+    if (!answer_render(m->rubric, m->picture[view], false, "", 1, bug, &a, e))
+        return false;
+    *same = a.width == b->width && a.height == b->height &&
+            memcmp(a.mean, b->mean, 3 * (size_t)a.width * (size_t)a.height * sizeof *a.mean) == 0;
+    moments_free(&a);
+    return true;
+}
+
+/* For the variance of one picture: c->n is to that of a picture as the variances are. */
+static double of_one(const struct rubric *r, int picture, const struct sight *s, int i)
+{
+    return s->var[i] * s->n / ((double)r->picture[picture].spp * s->cell * s->cell);
+}
+
+static void set_effect(const struct maker *m, int view, const struct sight *bug, struct effect *out)
+{
+    const struct sight *correct = m->batch[view];
+    int values = 3 * bug->columns * bug->rows, noisy = 0;
+    double level = 0, chi2 = 0;
+    struct sight a = sight_average(bug, BATCHES), c = sight_average(correct, BATCHES);
+    for (int i = 0; i < values; i++) {
+        double shape = a.var[i] + c.var[i], squares = 0;
+        for (int k = 0; k < BATCHES; k++)
+            squares += pow(bug[k].mean[i] - correct[k].mean[i] - (a.mean[i] - c.mean[i]), 2);
+        if (shape > 0) {
+            level += squares / (BATCHES - 1) / BATCHES / shape;
+            noisy++;
+        }
+    }
+    level = fmax(noisy > 0 ? level / noisy : 0, 1e-3);
+    *out = (struct effect){0};
+    for (int i = 0; i < values; i++) {
+        double mean = a.mean[i] - c.mean[i], var = level * (a.var[i] + c.var[i]);
+        double rounding = 1e-6 * (a.mean[i] + c.mean[i]);
+        double more = of_one(m->rubric, m->picture[view], &bug[0], i) -
+                      of_one(m->rubric, m->picture[view], &correct[0], i);
+        chi2 += mean * mean / (var + rounding * rounding + 1e-300);
+        out->mean[i] = (float)mean;
+        out->var[i] = (float)(var + fmax(0, more));
+    }
+    out->pixels = chi2 > values + 6 * sqrt(2.0 * 3 * values);
+    if (!out->pixels) {
+        memset(out->mean, 0, sizeof out->mean);
+        memset(out->var, 0, sizeof out->var);
+    }
+    for (int f = 0; f < NUM_FACTS; f++) {
+        out->fact[f] = a.fact[f];
+        out->fact_sd[f] = a.fact_sd[f];
+    }
+}
+
+static bool is_needed(const struct effect *e, const struct sight *correct)
+{
+    double far = e->fact[FACT_SAMPLES] - correct->fact[FACT_SAMPLES]; /* NAN: not counted */
+    return e->pixels || fabs(far) > 0.01;
+}
+
+static bool make_view(struct maker *m, int view, int b, const struct answer_options *bug,
+                      struct err *e)
+{
+    struct sight s[BATCHES];
+    struct view *v = &m->made.view[view];
+    const struct view *plain = &m->made.view[0];
+    bool same = false, counts = rubric_bugs_counts(m->rubric, m->picture[view]);
+    for (int k = 0; k < view; k++)
+        if (m->picture[k] == m->picture[view] && m->set[k] == 0)
+            plain = &m->made.view[k];
+    if (m->set[view] > 0 && plain->effect[b] == NULL)
+        return true;
+    if (m->set[view] == 0 && !counts && !is_same(m, view, bug, &same, e))
+        return false;
+    if (same)
+        return true;
+    for (int k = 0; k < BATCHES; k++)
+        if (!render(m, view, k, bug, &s[k], e))
+            return false;
+    struct effect *effect = calloc(1, sizeof *effect);
+    if (effect == NULL)
+        return err_set(e, "out of memory");
+    set_effect(m, view, s, effect);
+    if (is_needed(effect, &v->correct))
+        v->effect[b] = effect;
+    else
+        free(effect);
+    return true;
+}
+
+static bool make_bug(struct maker *m, int b, struct err *e)
+{
+    char cache[PATH_MAX], program[PATH_MAX];
+    struct answer_options bug;
+    const struct bug *what = &m->made.bug[b];
+    snprintf(program, sizeof program, "%.3900s/mutants/%s/pathtracer", m->build, what->name);
+    if (!open_cache(m, what->name, what->patch_sha256, program, cache, &bug, e))
+        return false;
+    for (int v = 0; v < m->made.num_views; v++)
+        if (!make_view(m, v, b, &bug, e))
+            return err_prefix(e, "%s", what->name);
+    return true;
+}
+
+static void *work(void *ctx)
+{
+    struct maker *m = ctx;
+    for (;;) {
+        struct err e = {""};
+        pthread_mutex_lock(&m->lock);
+        int b = m->ok ? m->next++ : m->made.num_bugs;
+        pthread_mutex_unlock(&m->lock);
+        if (b >= m->made.num_bugs)
+            return NULL;
+        bool ok = make_bug(m, b, &e);
+        int seen = 0;
+        for (int v = 0; v < m->made.num_views; v++)
+            seen += m->made.view[v].effect[b] != NULL;
+        pthread_mutex_lock(&m->lock);
+        if (!ok) {
+            m->ok = false;
+            m->e = e;
+        }
+        printf("%-36s changes %2d of %d views\n", m->made.bug[b].name, seen, m->made.num_views);
+        fflush(stdout);
+        pthread_mutex_unlock(&m->lock);
+    }
+}
+
+/* What is right: the reference; of adaptive sampling, whose mean it is not, the batches. */
+static bool make_correct(struct maker *m, int view, const struct answer_options *ours,
+                         struct err *e)
+{
+    struct view *v = &m->made.view[view];
+    int picture = m->picture[view];
+    for (int k = 0; k < BATCHES; k++)
+        if (!render(m, view, k, ours, &m->batch[view][k], e))
+            return false;
+    if (m->set[view] == 0 &&
+        !answer_render(m->rubric, picture, false, "", 1, ours, &m->one[view], e))
+        return false;
+    if (!rubric_bugs_counts(m->rubric, picture))
+        return rubric_bugs_sight(m->rubric, picture, &m->answers->of[m->set[view]][picture].m,
+                                 &v->correct, e);
+    v->correct = sight_average(m->batch[view], BATCHES);
+    return true;
+}
+
+static bool add_views(struct maker *m, const struct answer_options *ours, struct err *e)
+{
+    const struct rubric *r = m->rubric;
+    size_t most = (size_t)r->num_sets * (size_t)r->num_pictures;
+    m->made.view = calloc(most, sizeof *m->made.view);
+    m->batch = calloc(most, sizeof *m->batch);
+    m->one = calloc(most, sizeof *m->one);
+    if (m->made.view == NULL || m->batch == NULL || m->one == NULL)
+        return err_set(e, "out of memory");
+    for (int k = 0; k < r->num_sets; k++)
+        for (int i = 0; i < r->num_pictures; i++) {
+            if (!rubric_bugs_sees(r, i) || rubric_bugs_set(m->answers, k, i) != k ||
+                (k > 0 && r->set[k].words[0] == '\0'))
+                continue;
+            int at = m->made.num_views++;
+            struct view *v = &m->made.view[at];
+            *v = (struct view){.width = r->picture[i].width,
+                               .height = r->picture[i].height,
+                               .spp = r->picture[i].spp > 2 ? r->picture[i].spp : 3,
+                               .renders = 1,
+                               .fixed_spp = true,
+                               .seed = SEED,
+                               .effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *))};
+            m->picture[at] = i;
+            m->set[at] = k;
+            if (v->effect == NULL)
+                return err_set(e, "out of memory");
+            if (!rubric_bugs_key(r, i, k, v->name, v->scene_sha256, e) ||
+                !make_correct(m, at, ours, e))
+                return false;
+        }
+    return true;
+}
+
+static bool make(struct maker *m, const char *patches, struct err *e)
+{
+    enum { MOST = 64 };
+    pthread_t thread[MOST];
+    char cache[PATH_MAX], ours[PATH_MAX], out[2 * PATH_MAX];
+    struct answer_options opt;
+    int started = 0, workers = cli_processors() < MOST ? cli_processors() : MOST;
+    snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
+    if (!list_bugs(patches, &m->made, e) ||
+        !open_cache(m, "correct", "references", ours, cache, &opt, e) ||
+        !answers_make(m->rubric, &opt, m->answers, e) || !add_views(m, &opt, e))
+        return false;
+    while (started < workers && pthread_create(&thread[started], NULL, work, m) == 0)
+        started++;
+    for (int i = 0; i < started; i++)
+        pthread_join(thread[i], NULL);
+    *e = m->e;
+    snprintf(out, sizeof out, "%s/%s", m->rubric->dir, m->rubric->bugs);
+    return m->ok && (started > 0 || err_set(e, "no thread could be started")) &&
+           catalogue_write(out, &m->made, e);
+}
+
+int main(int argc, char **argv)
+{
+    struct err e = {""};
+    struct rubric_mistakes mistakes = {0};
+    static struct maker m = {.lock = PTHREAD_MUTEX_INITIALIZER, .ok = true};
+    if (argc != 4) {
+        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC\n");
+        return 3;
+    }
+    m.rubric = calloc(1, sizeof *m.rubric);
+    m.answers = calloc(1, sizeof *m.answers);
+    char dir[2 * PATH_MAX];
+    bool ok = m.rubric != NULL && m.answers != NULL && realpath(argv[1], m.build) != NULL &&
+              suite_load("reference/scenes", &m.suite, &e) &&
+              rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
+    if (ok && m.rubric->bugs[0] != '\0') { /* that it is not there is a mistake */
+        snprintf(dir, sizeof dir, "%s/%s", m.rubric->dir, m.rubric->bugs);
+        ok = make_dirs(dir, &e) && rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
+    }
+    if (ok && mistakes.num > 0)
+        ok = err_set(&e, "%s:%d: %s", argv[3], mistakes.at[0].line, mistakes.at[0].text);
+    if (ok && m.rubric->bugs[0] == '\0')
+        ok = err_set(&e, "%s: no line 'bugs DIR'", argv[3]);
+    ok = ok && make(&m, argv[2], &e);
+    if (!ok)
+        fprintf(stderr, "make_rubric_bugs: %s\n", e.msg);
+    for (int v = 0; m.one != NULL && v < m.made.num_views; v++)
+        moments_free(&m.one[v]);
+    catalogue_free(&m.made);
+    if (m.answers != NULL)
+        answers_free(m.answers);
+    suite_free(&m.suite);
+    free(m.one);
+    free(m.batch);
+    free(m.answers);
+    free(m.rubric);
+    return ok ? 0 : 3;
+}

@@ -1,0 +1,20 @@
+/* Scenes built in C, so that tests of the renderer do not lean on the loader. */
+#ifndef ASSAY_BUILD_SCENE_H
+#define ASSAY_BUILD_SCENE_H
+
+#include "renderer/scene/scene.h"
+
+/* An empty scene with room for a few hundred primitives; the helpers below append to it, and
+ * scene_finish() completes it. Abort on overflow. */
+struct scene build_scene(void);
+
+uint32_t build_material(struct scene *s, rgb reflectance, rgb radiance);
+/* Parallelogram p, p+u, p+u+v, p+v as two triangles of one object; front side u x v. */
+void build_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material);
+void build_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material);
+void build_sphere(struct scene *s, vec3 centre, float radius, float normal_out, uint32_t material);
+void build_light(struct scene *s, struct light light);
+/* Pinhole at `eye` looking along -Z with Y up, full horizontal angle in degrees. */
+void build_camera(struct scene *s, vec3 eye, float hfov_degrees);
+
+#endif

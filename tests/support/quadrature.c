@@ -1,0 +1,113 @@
+#include "quadrature.h"
+
+#include "reference/truth/truth.h"
+
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_integration.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+bool same(double a, double b)
+{
+    return fabs(a - b) <= 1e-9 * fabs(b);
+}
+
+struct integrand {
+    double (*f)(double x, double z, const void *ctx);
+    const void *ctx;
+    double z[2], x;
+    gsl_integration_cquad_workspace *inner;
+};
+
+static double over_z(double z, void *p)
+{
+    const struct integrand *in = p;
+    return in->f(in->x, z, in->ctx);
+}
+
+static double over_x(double x, void *p)
+{
+    struct integrand *in = p;
+    in->x = x;
+    gsl_function g = {over_z, in};
+    double value, error;
+    assert_int_equal(
+        gsl_integration_cquad(&g, in->z[0], in->z[1], 0, 1e-12, in->inner, &value, &error, NULL),
+        GSL_SUCCESS);
+    return value;
+}
+
+double integrate_plane(double (*f)(double, double, const void *), const void *ctx,
+                       const double x[2], const double z[2])
+{
+    gsl_integration_cquad_workspace *outer = gsl_integration_cquad_workspace_alloc(1000);
+    struct integrand in = {f, ctx, {z[0], z[1]}, 0, gsl_integration_cquad_workspace_alloc(1000)};
+    gsl_function g = {over_x, &in};
+    double value, error;
+    assert_int_equal(gsl_integration_cquad(&g, x[0], x[1], 0, 1e-11, outer, &value, &error, NULL),
+                     GSL_SUCCESS);
+    gsl_integration_cquad_workspace_free(in.inner);
+    gsl_integration_cquad_workspace_free(outer);
+    return value;
+}
+
+void render_truth(const char *name, int width, int height, struct moments *out)
+{
+    struct suite suite;
+    struct err e;
+    if (!suite_load("reference/scenes", &suite, &e))
+        fail_msg("%s", e.msg);
+    const struct suite_scene *shipped = suite_find(&suite, name);
+    assert_non_null(shipped);
+    struct suite_scene scene = *shipped;
+    scene.width = width;
+    scene.height = height;
+    const struct suite_reference *truth = NULL;
+    for (int i = 0; i < scene.num_references; i++)
+        if (strcmp(scene.reference[i].engine, "truth") == 0)
+            truth = &scene.reference[i];
+    assert_non_null(truth);
+    if (!truth_render(&scene, truth, out, &e))
+        fail_msg("%s", e.msg);
+    suite_free(&suite);
+}
+
+double mean_at(const struct moments *m, int col, int row, int channel)
+{
+    return m->mean[3 * (row * m->width + col) + channel];
+}
+
+void expect_refusal(const char *kind, const char *text, int depth, const char *message)
+{
+    json_error_t why;
+    json_t *values = json_loads(text, 0, &why);
+    assert_non_null(values);
+    struct suite_scene scene = {.name = "19_bad",
+                                .width = 4,
+                                .height = 4,
+                                .depth = depth,
+                                .lens_radius = 0.25,
+                                .focal_distance = 2};
+    struct suite_reference ref = {.engine = "truth", .values = values};
+    snprintf(ref.kind, sizeof ref.kind, "%s", kind);
+    struct moments m;
+    struct err e = {""};
+    bool ok = truth_render(&scene, &ref, &m, &e);
+    if (ok != (message == NULL))
+        fail_msg("%s %s: %s", kind, text, ok ? "accepted" : e.msg);
+    if (ok) {
+        moments_free(&m);
+    } else {
+        assert_ptr_equal(strstr(e.msg, "19_bad: truth '"), e.msg);
+        if (strstr(e.msg, message) == NULL)
+            fail_msg("%s %s: no '%s' in: %s", kind, text, message, e.msg);
+    }
+    json_decref(values);
+}

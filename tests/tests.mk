@@ -1,0 +1,195 @@
+# What tests the programs, measures them and looks at them. Lines that begin with "#: " are a part of `make help`.
+
+SECONDS_EACH ?= 60
+DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+  $(if $(shell command -v npm),,nodejs npm)
+DEPS_LINT := clang-tidy cppcheck llvm
+DEPS_SLURM := slurm-wlm munge
+$(BUILD)/deps-test: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_TEST))
+$(BUILD)/deps-lint: | $(BUILD)/deps-test
+	$(call install_missing,$(DEPS_LINT))
+$(BUILD)/deps-slurm: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_SLURM))
+
+# Sources of the tests, and of programs that measure or make what is stored. Names are unique in the tree, so that
+# all programs stand side by side, in BUILD/tests and BUILD/san/tests.
+TESTS    := $(wildcard tests/*/test_*.c tests/*/*/test_*.c)
+PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c tests/studies/grading/grade_table.c \
+  tests/end_to_end/student_tracer.c tests/studies/bench/bench.c
+BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
+# What several tests share: a library, of which each takes what it wants.
+SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c tests/support/alloc_fail.c, \
+  $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c))
+# Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
+RATES   := $(addprefix test_,calibration compare_rates converge permutation alpha_spending noise_estimate statistics)
+program  = $(addprefix $(1)/tests/,$(basename $(notdir $(2))))
+CHECKED  = $(filter-out $(addprefix %/,$(RATES)),$(call program,$(BUILD)/san,$(TESTS))) $(RATES:%=$(BUILD)/tests/%)
+
+# -g1: file and line are all that a finding says, and -g doubles the time that the kernels take to compile.
+SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
+# The same under sanitizers; all of it by clang, to see that it has no warning there too, and for the fuzzers; on demand
+# under ThreadSanitizer, and with clang's counts of what ran.
+$(BUILD)/san/%: OPT := $(SANITIZE)
+$(BUILD)/san/%: WERROR := 1
+$(BUILD)/clang/%: CC := clang
+$(BUILD)/clang/%: CXX := clang++
+$(BUILD)/clang/%: OPT := $(SANITIZE),fuzzer-no-link
+$(BUILD)/clang/%: WERROR := 1
+$(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
+$(BUILD)/cov/%: CC := clang
+$(BUILD)/cov/%: CXX := clang++
+$(BUILD)/cov/%: OPT := -O2 -g -fprofile-instr-generate -fcoverage-mapping
+$(BUILD)/cov/%: WERROR := 1
+# No fuzzer traces a ray; the tests do, in san/.
+$(patsubst %,$(BUILD)/clang/%.o,$(filter-out renderer/bvh/sah_split%,$(KERNELS))): OPT := -O1
+$(foreach b,san clang tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
+
+define test_program
+$(call program,$(1),$(2)): $(1)/$(2).o
+endef
+define test_tree
+$(1)/libtests.a: $(call obj,$(1),$(SUPPORT))
+	$$(archive)
+$(foreach t,$(TESTS) $(PROGRAMS),$(eval $(call test_program,$(1),$(t))))
+$(call program,$(1),$(TESTS) $(PROGRAMS)): $(1)/tests/support/asan_options.c.o $(1)/libtests.a $(1)/libassay.a | $(1)/oiio.so
+	$$(link)
+$(1)/tests/%: TEST_LIBS := -lcmocka
+# With a malloc() of their own, which can fail.
+$(filter $(1)/tests/test_memory%,$(call program,$(1),$(TESTS))): $(1)/tests/support/alloc_fail.c.o
+$(1)/tests/test_embree $(1)/tests/bench: TEST_LIBS := -lcmocka -lembree3
+endef
+$(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/tsan $(BUILD)/cov,$(eval $(call test_tree,$(b))))
+$(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/support/asan_options.c.o
+$(call obj,$(BUILD),$(BENCH) $(SUPPORT) tests/support/asan_options.c): | $(BUILD)/deps-test
+$(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH))
+# The peer gets all that this machine has; ours chooses when it starts.
+$(BUILD)/tests/studies/bench/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
+# playwright-core, by which the page is tested in Debian's chromium.
+$(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
+	$(call say,NPM,$@)
+	$(Q)mkdir -p $(@D) && cp tests/browser/package.json $(@D) && cp $< $(@D)/lock.json && cd $(@D) && \
+	  mv lock.json package-lock.json && npm ci --silent --ignore-scripts --no-audit --no-fund
+
+END_TO_END := $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
+check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz $(CHECKED) $(END_TO_END)
+	tests/run.sh $(BUILD) $(CHECKED)
+
+programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay $(BUILD)/san/oiio.so
+# What the fuzzers are linked from, and all the rest as far as clang's warnings look.
+programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,$(MAINS) $(wildcard tests/support/*.c tests/[a-eg-z]*/*.c tests/*/*/*.c))
+$(BUILD)/clang/%.c.ok: %.c | $(BUILD)/deps-test
+	$(call say,CC,$@)
+	$(Q)mkdir -p $(@D) && $(CC) $(cflags) -MMD -MP -MF $@.d -MT $@ -fsyntax-only $< && touch $@
+
+# Readers of files under libFuzzer: one program for each tests/fuzz/fuzz_NAME.c.
+FUZZ := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+$(BUILD)/clang/fuzz_%: TEST_LIBS := -fsanitize=fuzzer
+$(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): $(BUILD)/clang/fuzz_%: $(BUILD)/clang/tests/fuzz/fuzz_%.c.o \
+  $(call obj,$(BUILD)/clang,tests/fuzz/fuzz.c tests/support/asan_options.c) $(BUILD)/clang/libassay.a | $(BUILD)/clang/oiio.so
+	$(link)
+programs-fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ))
+#: make fuzz       readers of files under libFuzzer (SECONDS_EACH=60; ONLY="collada engine": some of them)
+fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
+	tests/fuzz/run.sh $(BUILD) $(SECONDS_EACH) $(or $(ONLY),$(FUZZ))
+
+# clang-tidy (.clang-tidy) over the programs, cppcheck over all C (.cppcheck-suppressions): no finding.
+#: make lint       clang-tidy and cppcheck, no finding (minutes; a part of make check)
+LINT := $(MAINS) $(SOURCES)
+lint: $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
+	@echo '$(words $(LINT) $(KERNELS)) files, no finding'
+# A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
+# every va_list but the first file's for one that was never started.
+define clang_tidy
+	$(call say,TIDY,$<)
+	$(Q)mkdir -p $(@D); clang-tidy --quiet $< -- -std=c17 -I. -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) >$@.log 2>&1 || { cat $@.log; exit 1; }; touch $@
+endef
+$(patsubst %,$(BUILD)/lint/%.ok,$(LINT)): $(BUILD)/lint/%.ok: % .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
+	$(call clang_tidy,-DASSAY_VERSION='""' -DASSAY_COMMIT='""')
+define kernel_lint
+$(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
+	$$(call clang_tidy,$(call isa_flags,$(2)))
+endef
+$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),$(eval $(call kernel_lint,$(k),$(i)))))
+# Both are asked about planted faults first: who does not see them sees nothing (cppcheck is silent about a file that it cannot read).
+cppcheck = cppcheck --enable=warning,performance,portability --std=c11 --quiet --inline-suppr --error-exitcode=1 \
+  --suppressions-list=.cppcheck-suppressions -I. -D_XOPEN_SOURCE=700 -DISA=avx2 --include=tests/lint/jansson.h
+$(BUILD)/lint/planted.ok: tests/lint/planted.c tests/lint/jansson.h .clang-tidy .cppcheck-suppressions | $(BUILD)/deps-lint
+	$(Q)mkdir -p $(@D); ! $(cppcheck) $< 2>/dev/null || { echo 'cppcheck does not see a planted fault' >&2; exit 1; }
+	$(Q)! clang-tidy --quiet $< -- -std=c17 $(pkg_cflags) >/dev/null 2>&1 || { echo 'clang-tidy does not see a planted fault' >&2; exit 1; }
+	$(Q)touch $@
+$(BUILD)/lint/cppcheck.ok: $(BUILD)/lint/planted.ok $(LINT) $(HEADERS) $(wildcard tests/*/*.[ch] tests/*/*/*.[ch])
+	$(call say,CHECK,cppcheck)
+	$(Q)$(cppcheck) -i tests/lint renderer reference tools tests && touch $@
+
+#: make threads    the same bits on 1 to 16 threads, on every scene; make tsan: no race
+threads: $(BUILD)/pathtracer
+	tests/end_to_end/threads.sh $(BUILD)/pathtracer
+THREADED := $(addprefix test_,bvh_wide integrator widths render)
+tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(BUILD)/tsan/oiio.so $(THREADED:%=$(BUILD)/tsan/tests/%)
+	tests/end_to_end/tsan.sh $(BUILD)/tsan $(THREADED)
+
+#: make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)
+faults: $(BUILD)/pathtracer $(BUILD)/assay
+	tests/end_to_end/faults.sh $(BUILD) 200 1 $(ONLY)
+
+#: make coverage   lines of renderer/, reference/ and tools/ that the tests reach (12 minutes)
+coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(BUILD)/cov/oiio.so $(call program,$(BUILD)/cov,$(TESTS)) \
+  $(BUILD)/cov/tests/student_tracer $(END_TO_END)
+	tests/end_to_end/coverage.sh $(BUILD) $(call program,$(BUILD)/cov,$(TESTS))
+
+#: make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)
+slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
+	tests/studies/scale/slurm.sh $(BUILD)
+#: make scale-live live references and validations in jobs, with Blender and POV-Ray (minutes)
+scale-live: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-live
+	tests/studies/scale/scale_live.sh $(BUILD)
+#: make large      an image of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)
+large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
+	tests/studies/scale/large.sh $(BUILD) $(or $(SIDE),16384)
+#: make scale      simulate a class, a suite and a large image on up to 1000 nodes (tools/SCALE.md)
+scale: $(BUILD)/tests/make_scale
+	$<
+
+#: make mutants    build each known bug into a renderer and see the suite find it (many minutes; ONLY="NAME ...")
+mutants: all $(BUILD)/libassay.a
+	tests/mutants/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
+#: make catalogue  bring what assay diagnose knows of these bugs up to date (golden/diagnose)
+catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
+	tests/mutants/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_catalogue $(BUILD) tests/mutants golden/diagnose
+#: make diagnose-rates  measure how often it is right (an hour)
+diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
+	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
+	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
+#: make calibrate  measure error rates and power, write tests/studies/calibration/ (SHARE=0.01: a part of it)
+calibrate: $(BUILD)/tests/make_calibration
+	$< --threads $(shell nproc) $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/studies/calibration)
+#: make anchors    what our tests and the rules of other renderers find on the same images
+#:                 (tests/studies/anchors; 20 CPU minutes, 900 MB)
+anchors: $(BUILD)/tests/make_anchors $(BUILD)/oiio.so
+	$< tests/studies/anchors $(BUILD)/anchors
+#: make bench      speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it
+bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
+	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))
+#: make bvh-table  time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)
+bvh-table: $(BUILD)/pathtracer
+	tests/studies/bench/bvh_table.sh $(BUILD)
+#: make grade-show  grade a class of fifty, write tests/studies/grading/
+grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
+	tests/studies/grading/grade_show.sh $(BUILD)
+#: make rubric-bugs what known bugs do to the images of a rubric (RUBRIC=tools/rubrics/cs184.rubric)
+rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
+	tests/mutants/mutants.sh --build-only $(BUILD)
+	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRIC)
+
+# For tests/mutants/mutants.sh.
+print-compile:
+	@echo $(CC) $(filter-out -g,$(cflags))
+print-libs:
+	@echo $(LIBS)
+print-kernels:
+	@$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
+
+.PHONY: check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
+  bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz

@@ -1,0 +1,455 @@
+/* The sandbox against programs that want out of it. Each is a shell script of a few words; what it must not
+ * reach, or may not use up, is known by construction. Every attack has its control: without the limit, or from
+ * outside, the same thing works. Skipped, with a line, on a machine that has no sandbox. */
+#define _GNU_SOURCE
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "renderer/base/fs.h"
+#include "tools/base/sandbox.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/socket.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
+enum { MIB = 1 << 20 };
+
+static struct sandbox box;
+static bool has_sandbox;
+static char out_dir[700];
+
+static const struct sandbox_limits small = {.wall_s = 60,
+                                            .cpu_s = 30,
+                                            .memory = (size_t)256 * MIB,
+                                            .disk = (size_t)32 * MIB,
+                                            .file = (size_t)8 * MIB,
+                                            .processes = 24};
+
+static struct sandbox_result run_with(const char *script, struct sandbox_limits limit,
+                                      const char *tree)
+{
+    struct err e = {""}, ignored;
+    struct sandbox_result r;
+    if (!has_sandbox)
+        skip();
+    assert_true(remove_tree(out_dir, &ignored));
+    const struct sandbox_job job = {.argv = (const char *const[]){"sh", "-c", script, NULL},
+                                    .tree = tree,
+                                    .keep = (const char *const[]){"out.png", "second", NULL},
+                                    .out = out_dir,
+                                    .limit = limit};
+    if (!sandbox_run(&box, &job, &r, &e))
+        fail_msg("%s", e.msg);
+    return r;
+}
+
+static struct sandbox_result run(const char *script)
+{
+    return run_with(script, small, NULL);
+}
+
+/* What the program left under that name; NULL: nothing. Static. */
+static const char *kept(const char *name)
+{
+    static char text[4096];
+    char path[800];
+    snprintf(path, sizeof path, "%s/%s", out_dir, name);
+    FILE *f = fopen(path, "rb");
+    if (f == NULL)
+        return NULL;
+    text[fread(text, 1, sizeof text - 1, f)] = '\0';
+    fclose(f);
+    return text;
+}
+
+static int open_sandbox(void **state)
+{
+    (void)state;
+    struct err e;
+    has_sandbox = sandbox_open(false, NULL, &box, &e);
+    if (!has_sandbox)
+        printf("skipped: %s\n", e.msg);
+    else
+        snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
+    return 0;
+}
+
+static int close_sandbox(void **state)
+{
+    (void)state;
+    if (has_sandbox)
+        sandbox_close(&box);
+    return 0;
+}
+
+static void a_file_that_it_writes_comes_back(void **state)
+{
+    (void)state;
+    struct sandbox_result r =
+        run("pwd; printf hello >out.png; cp out.png /tmp/x; echo nobody asked >other");
+    assert_int_equal(r.end, SANDBOX_OK);
+    assert_string_equal(r.why, "");
+    assert_string_equal(kept("out.png"), "hello");
+    assert_null(kept("other"));
+    assert_null(kept("second"));
+    assert_null(kept(".report"));
+}
+
+static void a_crash_is_told_with_its_last_words(void **state)
+{
+    (void)state;
+    struct sandbox_result r = run("echo before; kill -SEGV $$");
+    assert_int_equal(r.end, SANDBOX_FAILED);
+    assert_int_equal(r.status, 139);
+    assert_non_null(strstr(r.why, "killed by signal 11"));
+    assert_non_null(strstr(r.why, "before"));
+    r = run("echo only; exit 7");
+    assert_int_equal(r.end, SANDBOX_FAILED);
+    assert_string_equal(r.why, "exit status 7: only");
+    r = run("exec ./none");
+    assert_int_equal(r.end, SANDBOX_FAILED);
+}
+
+/* Ignores SIGTERM, and so does its child in a session of its own. */
+static void a_hang_ends_with_all_its_processes(void **state)
+{
+    (void)state;
+    struct sandbox_limits limit = small;
+    limit.wall_s = 2;
+    char script[128];
+    snprintf(script, sizeof script,
+             "trap '' TERM; setsid sleep 98765.%d & while :; do sleep 1; done", getpid());
+    struct sandbox_result r = run_with(script, limit, NULL);
+    assert_int_equal(r.end, SANDBOX_WALL);
+    assert_true(r.wall_s < 30);
+    char find[128];
+    snprintf(find, sizeof find, "sleep 0.5; ! grep -qs [9]8765.%d /proc/[0-9]*/cmdline", getpid());
+    assert_int_equal(system(find), 0);
+}
+
+static void a_busy_loop_ends_by_processor_time(void **state)
+{
+    (void)state;
+    struct sandbox_limits limit = small;
+    limit.cpu_s = 1;
+    struct sandbox_result r = run_with("while :; do :; done", limit, NULL);
+    assert_int_equal(r.end, SANDBOX_CPU);
+    assert_true(r.cpu_s >= 0.8 && r.cpu_s < 2.5);
+    assert_int_equal(run_with("trap '' XCPU; while :; do :; done", limit, NULL).end, SANDBOX_CPU);
+}
+
+/* Every copy starts two more. The number that ran at a time cannot pass the limit: the kernel says "cannot
+ * fork". What is left of it is gone when the run returns. */
+static void a_fork_bomb_stays_inside(void **state)
+{
+    (void)state;
+    struct sandbox_limits limit = small;
+    limit.wall_s = 5;
+    struct sandbox_result r = run_with(
+        "b() { b | b & }; b; sleep 1; ls /proc | grep -c '^[0-9]' >out.png; exit 0", limit, NULL);
+    if (kept("out.png") != NULL)
+        assert_true(atoi(kept("out.png")) <= limit.processes + 4);
+    assert_true(r.wall_s < 30);
+    /* The limit is what stops it: 16 sleepers are fine, 40 are not. */
+    const char *sleepers = "i=0; while [ $i -lt $N ]; do sleep 1 & i=$((i+1)); done; wait";
+    char script[128];
+    snprintf(script, sizeof script, "N=16; %s", sleepers);
+    assert_int_equal(run(script).end, SANDBOX_OK);
+    snprintf(script, sizeof script, "N=40; %s", sleepers);
+    assert_int_equal(run(script).end, SANDBOX_FAILED);
+}
+
+static void a_file_of_100_gb_is_cut_off(void **state)
+{
+    (void)state;
+    assert_int_equal(run("exec head -c 100G /dev/zero >out.png").end, SANDBOX_FILE_SIZE);
+    struct sandbox_result r = run("exec truncate -s 100G out.png");
+    assert_int_not_equal(r.end, SANDBOX_OK);
+    assert_int_equal(run("exec head -c 7M /dev/zero >out.png").end, SANDBOX_OK);
+}
+
+/* 10 files of 7 MB: each is allowed, all together are not. The same in every other place. */
+static void many_files_fill_only_their_own_disk(void **state)
+{
+    (void)state;
+    static const char fill[] =
+        "cd %s && for i in 1 2 3 4 5 6 7 8 9 10; do head -c 7M /dev/zero >f$i || exit 1; done";
+    char script[256];
+    snprintf(script, sizeof script, fill, "/box");
+    assert_int_equal(run(script).end, SANDBOX_DISK);
+    snprintf(script, sizeof script, fill, "/tmp");
+    assert_int_equal(run(script).end, SANDBOX_FAILED);
+    snprintf(script, sizeof script, fill, "/dev/shm");
+    assert_int_equal(run(script).end, SANDBOX_FAILED);
+    struct sandbox_limits limit = small;
+    limit.disk = (size_t)128 * MIB;
+    snprintf(script, sizeof script, fill, "/box");
+    assert_int_equal(run_with(script, limit, NULL).end, SANDBOX_OK);
+}
+
+static void memory_is_bounded_for_one_process_and_for_all(void **state)
+{
+    (void)state;
+    /* `tail` keeps the last line, 1 GB without an end of line. */
+    struct sandbox_result r = run(
+        "head -c 1G /dev/zero | tail -n 1 | wc -c >out.png; [ \"$(cat out.png)\" -gt 900000000 ]");
+    assert_int_not_equal(r.end, SANDBOX_OK);
+    /* Four with 100 MB each, under 256 MiB for each of them. */
+    r = run(
+        "for i in 1 2 3 4; do (head -c 100M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait");
+    assert_int_equal(r.end, SANDBOX_MEMORY);
+    assert_true(r.wall_s < 20);
+    r = run("(head -c 100M /dev/zero; sleep 1) | tail -n 1 >/dev/null");
+    assert_int_equal(r.end, SANDBOX_OK);
+}
+
+/* A file of ours outside, that everybody may read. */
+static void links_lead_nowhere(void **state)
+{
+    (void)state;
+    if (!has_sandbox)
+        skip();
+    char secret[600], script[4096];
+    snprintf(secret, sizeof secret, "%s/secret", box.dir.path);
+    FILE *f = fopen(secret, "w");
+    assert_non_null(f);
+    fputs("the golden\n", f);
+    fclose(f);
+    assert_int_equal(chmod(secret, 0644), 0);
+    snprintf(script, sizeof script, "ln -s %s out.png; ln -s /etc/passwd second; true", secret);
+    assert_int_equal(run(script).end, SANDBOX_OK);
+    assert_null(kept("out.png"));
+    assert_null(kept("second"));
+    snprintf(script, sizeof script, "cat %s >out.png", secret);
+    assert_int_equal(run(script).end, SANDBOX_FAILED);
+    assert_string_equal(kept("out.png"), "");
+    /* What is no file is no output, and nobody waits for it. */
+    struct sandbox_result r = run("mkfifo out.png; mkdir second");
+    assert_int_equal(r.end, SANDBOX_OK);
+    assert_true(r.wall_s < 30);
+    assert_null(kept("out.png"));
+    /* Links in the submission itself. */
+    char tree[600], dir[600], command[4096];
+    struct err e;
+    snprintf(dir, sizeof dir, "%s/submission", box.dir.path);
+    snprintf(tree, sizeof tree, "%s/tree.tar", box.dir.path);
+    snprintf(command, sizeof command,
+             "mkdir %s && ln -s %s %s/out.png && ln -s / %s/scene && echo own >%s/second", dir,
+             secret, dir, dir, dir);
+    assert_int_equal(system(command), 0);
+    assert_true(sandbox_pack(dir, tree, MIB, &e));
+    assert_int_equal(run_with("cat out.png", small, tree).end, SANDBOX_FAILED);
+    assert_null(kept("out.png"));
+    assert_string_equal(kept("second"), "own\n");
+}
+
+/* The checkout, the goldens and the user's home are not there; what lies below /usr can be hidden. */
+static void nothing_of_ours_can_be_read(void **state)
+{
+    (void)state;
+    if (!has_sandbox)
+        skip();
+    char here[512], script[1200];
+    assert_non_null(getcwd(here, sizeof here));
+    assert_int_equal(access("golden/diagnose/manifest.json", R_OK), 0);
+    snprintf(
+        script, sizeof script,
+        "ls %s && echo seen >out.png; ls / >second; find / -name manifest.json >>second 2>/dev/null; true",
+        here);
+    run(script);
+    assert_null(kept("out.png"));
+    assert_null(strstr(kept("second"), "manifest.json"));
+    assert_null(strstr(kept("second"), "home"));
+    struct sandbox other;
+    struct err e;
+    assert_true(
+        sandbox_open(false, (const char *const[]){"/usr/share", "/nowhere", NULL}, &other, &e));
+    const struct sandbox ours = box;
+    box = other;
+    run("ls /usr/share | wc -l >out.png");
+    box = ours;
+    assert_string_equal(kept("out.png"), "0\n");
+    sandbox_close(&other);
+    run("ls /usr/share | wc -l >out.png");
+    assert_true(atoi(kept("out.png")) > 3);
+}
+
+/* A server of ours on the loopback, which a program outside reaches. */
+static void there_is_no_network(void **state)
+{
+    (void)state;
+    if (!has_sandbox)
+        skip();
+    int s = socket(AF_INET, SOCK_STREAM, 0);
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    socklen_t size = sizeof at;
+    assert_int_equal(bind(s, (struct sockaddr *)&at, size), 0);
+    assert_int_equal(listen(s, 4), 0);
+    assert_int_equal(getsockname(s, (struct sockaddr *)&at, &size), 0);
+    char script[256], outside[512];
+    snprintf(script, sizeof script, "exec 3<>/dev/tcp/127.0.0.1/%d", ntohs(at.sin_port));
+    snprintf(outside, sizeof outside, "bash -c '%s' 2>/dev/null", script);
+    assert_int_equal(system(outside), 0);
+    snprintf(outside, sizeof outside, "bash -c '%s'", script);
+    assert_int_equal(run(outside).end, SANDBOX_FAILED);
+    run("cat /proc/net/dev | grep -c : >out.png");
+    assert_string_equal(kept("out.png"), "1\n"); /* lo */
+    close(s);
+}
+
+static void the_environment_stays_outside(void **state)
+{
+    (void)state;
+    assert_int_equal(setenv("ASSAY_SECRET", "token", 1), 0);
+    run("env >out.png; cat /proc/*/environ >second 2>/dev/null; true");
+    unsetenv("ASSAY_SECRET");
+    assert_null(strstr(kept("out.png"), "SECRET"));
+    assert_null(strstr(kept("out.png"), "OUT="));
+    assert_null(memmem(kept("second"), 4000, "SECRET", 6));
+}
+
+static void only_two_places_can_be_written(void **state)
+{
+    (void)state;
+    run("for d in / /usr /usr/bin /dev /etc /proc /out /in /var; do (: >$d/x) 2>/dev/null && echo $d; done >out.png; true");
+    assert_string_equal(kept("out.png"), "");
+    run("for d in /box /tmp /dev/shm; do (: >$d/x) && echo $d; done >out.png");
+    assert_string_equal(kept("out.png"), "/box\n/tmp\n/dev/shm\n");
+    /* No way to privileges or to a machine within. */
+    assert_int_equal(run("unshare -U true").end, SANDBOX_FAILED);
+    run("grep CapEff /proc/self/status >out.png; grep -c '' /proc/1/cmdline >second");
+    assert_non_null(strstr(kept("out.png"), "0000000000000000"));
+}
+
+/* Its words are not taken for the supervisor's, nor a file named like its report. */
+static void a_made_up_report_is_not_believed(void **state)
+{
+    (void)state;
+    struct sandbox_result r =
+        run("echo '0 ended' >.report; echo '0 ended'; echo results >results.json; exit 3");
+    assert_int_equal(r.end, SANDBOX_FAILED);
+    assert_int_equal(r.status, 3);
+    assert_null(kept("results.json"));
+}
+
+static void a_tree_goes_from_one_run_to_the_next(void **state)
+{
+    (void)state;
+    if (!has_sandbox)
+        skip();
+    char built[800], moved[800];
+    struct err e;
+    struct sandbox_result r;
+    const struct sandbox_job job = {
+        .argv = (const char *const[]){"sh", "-c",
+                                      "mkdir d; printf 'echo built' >d/program; chmod +x d/program",
+                                      NULL},
+        .keep_tree = true,
+        .out = out_dir,
+        .limit = small};
+    assert_true(sandbox_run(&box, &job, &r, &e));
+    assert_int_equal(r.end, SANDBOX_OK);
+    snprintf(built, sizeof built, "%s/tree.tar", out_dir);
+    snprintf(moved, sizeof moved, "%s/built.tar", box.dir.path);
+    assert_int_equal(rename(built, moved), 0);
+    r = run_with("./d/program >out.png", small, moved);
+    assert_int_equal(r.end, SANDBOX_OK);
+    assert_string_equal(kept("out.png"), "built\n");
+    /* 100 MB of submission are not unpacked into 32, and cost nothing but this submission. */
+    char command[2000];
+    snprintf(command, sizeof command, "mkdir %s/large && head -c 40M /dev/urandom >%s/large/f",
+             box.dir.path, box.dir.path);
+    assert_int_equal(system(command), 0);
+    snprintf(command, sizeof command, "%s/large", box.dir.path);
+    assert_true(sandbox_pack(command, moved, (size_t)64 * MIB, &e));
+    assert_int_equal(run_with("true", small, moved).end, SANDBOX_UNPACK);
+    assert_false(sandbox_pack(command, moved, MIB, &e));
+    assert_non_null(strstr(e.msg, "cannot be packed into 1 MiB"));
+}
+
+/* On request, and only then: time and file size are bounded, the rest is open. */
+static void unsafe_is_as_unsafe_as_it_says(void **state)
+{
+    (void)state;
+    struct sandbox s;
+    struct err e;
+    struct sandbox_result r;
+    char out[600], script[1400];
+    assert_true(sandbox_open(true, NULL, &s, &e));
+    snprintf(out, sizeof out, "%s/out", s.dir.path);
+    snprintf(script, sizeof script, "test -d %s && printf hello >out.png", s.dir.path);
+    struct sandbox_job job = {.argv = (const char *const[]){"sh", "-c", script, NULL},
+                              .keep = (const char *const[]){"out.png", NULL},
+                              .out = out,
+                              .limit = small};
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    assert_int_equal(r.end, SANDBOX_OK);
+    snprintf(out_dir, sizeof out_dir, "%s", out);
+    assert_string_equal(kept("out.png"), "hello");
+    job.argv = (const char *const[]){"sh", "-c", "exec head -c 100G /dev/zero >out.png", NULL};
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    assert_int_equal(r.end, SANDBOX_FILE_SIZE);
+    /* Of root only that is left that nobody has: no file of ours, and no way back. */
+    char secret[600];
+    snprintf(secret, sizeof secret, "%s/secret", s.dir.path);
+    FILE *f = fopen(secret, "w");
+    assert_true(f != NULL && fchmod(fileno(f), 0600) == 0 && fputs("mine", f) >= 0);
+    fclose(f);
+    snprintf(script, sizeof script, "id -u >out.png; cat %s; ln -sf %s x", secret, secret);
+    job.argv = (const char *const[]){"sh", "-c", script, NULL};
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    if (geteuid() == 0)
+        assert_string_equal(kept("out.png"), "65533\n");
+    snprintf(script, sizeof script, "cat %s >out.png", secret);
+    assert_true(sandbox_run(&s, &job, &r, &e));
+    assert_int_equal(r.end, geteuid() == 0 ? SANDBOX_FAILED : SANDBOX_OK);
+    sandbox_close(&s);
+    assert_int_not_equal(access(s.dir.path, F_OK), 0);
+    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
+}
+
+/* Without bwrap in PATH there is a line, not a run. */
+static void without_bubblewrap_it_refuses(void **state)
+{
+    (void)state;
+    struct sandbox s;
+    struct err e;
+    char path[4096];
+    snprintf(path, sizeof path, "%s", getenv("PATH"));
+    setenv("PATH", "/nowhere", 1);
+    bool ok = sandbox_open(false, NULL, &s, &e);
+    setenv("PATH", path, 1);
+    assert_false(ok);
+    assert_non_null(strstr(e.msg, "no sandbox for other people's programs on this machine: "));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_file_that_it_writes_comes_back),
+        cmocka_unit_test(a_crash_is_told_with_its_last_words),
+        cmocka_unit_test(a_hang_ends_with_all_its_processes),
+        cmocka_unit_test(a_busy_loop_ends_by_processor_time),
+        cmocka_unit_test(a_fork_bomb_stays_inside),
+        cmocka_unit_test(a_file_of_100_gb_is_cut_off),
+        cmocka_unit_test(many_files_fill_only_their_own_disk),
+        cmocka_unit_test(memory_is_bounded_for_one_process_and_for_all),
+        cmocka_unit_test(links_lead_nowhere),
+        cmocka_unit_test(nothing_of_ours_can_be_read),
+        cmocka_unit_test(there_is_no_network),
+        cmocka_unit_test(the_environment_stays_outside),
+        cmocka_unit_test(only_two_places_can_be_written),
+        cmocka_unit_test(a_made_up_report_is_not_believed),
+        cmocka_unit_test(a_tree_goes_from_one_run_to_the_next),
+        cmocka_unit_test(unsafe_is_as_unsafe_as_it_says),
+        cmocka_unit_test(without_bubblewrap_it_refuses),
+    };
+    return cmocka_run_group_tests(tests, open_sandbox, close_sandbox);
+}

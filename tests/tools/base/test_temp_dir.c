@@ -1,0 +1,210 @@
+/* Directories of a run's own: made, removed, and where a kill left one, removed by the next run, but no other. */
+#include "tools/base/temp_dir.h"
+#include "renderer/base/fs.h"
+
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char temp[] = "/tmp/assay_test_XXXXXX";
+
+static int set_up(void **state)
+{
+    (void)state;
+    return mkdtemp(temp) == NULL || setenv("TMPDIR", temp, 1) != 0;
+}
+
+static int tear_down(void **state)
+{
+    struct err e;
+    (void)state;
+    return !remove_tree(temp, &e);
+}
+
+static bool write_file(const char *dir, const char *text)
+{
+    char path[600];
+    snprintf(path, sizeof path, "%s/file", dir);
+    FILE *f = fopen(path, "w");
+    bool ok = f != NULL && fputs(text, f) >= 0;
+    return f != NULL && fclose(f) == 0 && ok;
+}
+
+static bool is_there(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0;
+}
+
+/* A process that has a directory of that name with a file in it; its path. It waits for a signal. */
+static pid_t hold(const char *name, char path[512])
+{
+    int ends[2];
+    assert_int_equal(pipe(ends), 0);
+    pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (pid == 0) {
+        struct temp_dir d;
+        struct err e;
+        if (!temp_dir_open(&d, name, &e) || !write_file(d.path, "kept") ||
+            write(ends[1], d.path, sizeof d.path) != sizeof d.path)
+            _exit(1);
+        alarm(60); /* where the test fails before it ends this one */
+        for (;;)
+            pause();
+    }
+    close(ends[1]);
+    assert_int_equal(read(ends[0], path, 512), 512);
+    close(ends[0]);
+    return pid;
+}
+
+static void end(pid_t pid)
+{
+    int status;
+    assert_int_equal(kill(pid, SIGKILL), 0);
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    assert_true(WIFSIGNALED(status));
+}
+
+static void it_is_ours_and_removed(void **state)
+{
+    (void)state;
+    struct temp_dir d;
+    struct err e = {""};
+    struct stat st;
+    assert_true(temp_dir_open(&d, "one", &e));
+    assert_memory_equal(d.path, temp, strlen(temp));
+    assert_int_equal(stat(d.path, &st), 0);
+    assert_int_equal(st.st_mode & 0777, 0700);
+    assert_int_equal(st.st_uid, geteuid());
+    assert_true(write_file(d.path, "x"));
+    char path[512];
+    strcpy(path, d.path);
+    assert_true(temp_dir_close(&d, &e));
+    assert_false(is_there(path));
+    assert_true(temp_dir_close(&d, &e)); /* again: nothing */
+    d = (struct temp_dir){0};
+    assert_true(temp_dir_close(&d, &e));
+}
+
+static void what_a_kill_left_is_removed_by_the_next(void **state)
+{
+    (void)state;
+    char dead[512], alive[512], other[512];
+    struct temp_dir d;
+    struct err e = {""};
+    pid_t a = hold("kill", dead), b = hold("kill", alive), c = hold("other", other);
+    end(a);
+    assert_true(is_there(dead));
+    end(c);
+    assert_true(temp_dir_open(&d, "kill", &e));
+    assert_false(is_there(dead));
+    assert_true(is_there(alive));
+    assert_true(is_there(other)); /* of another name */
+    end(b);
+    assert_true(is_there(alive));
+    assert_true(temp_dir_close(&d, &e));
+    assert_true(temp_dir_open(&d, "kill", &e));
+    assert_false(is_there(alive));
+    assert_true(temp_dir_close(&d, &e));
+}
+
+/* What has such a name and is no such directory. */
+static void nothing_else_is_removed(void **state)
+{
+    (void)state;
+    struct temp_dir d;
+    struct err e = {""};
+    char link[600], file[600], target[600], longer[600];
+    assert_true(temp_dir_open(&d, "like", &e));
+    size_t start = strlen(d.path) - 6;
+    snprintf(link, sizeof link, "%.*sabcdef", (int)start, d.path);
+    snprintf(file, sizeof file, "%.*sghijkl", (int)start, d.path);
+    snprintf(longer, sizeof longer, "%.*sabcdefg", (int)start, d.path);
+    snprintf(target, sizeof target, "%s/precious", temp);
+    assert_true(temp_dir_close(&d, &e));
+    assert_int_equal(mkdir(target, 0700), 0);
+    assert_int_equal(mkdir(longer, 0700), 0);
+    assert_true(write_file(target, "precious"));
+    assert_int_equal(symlink(target, link), 0);
+    assert_int_equal(mkdir(file, 0700), 0); /* what there is to remove: the control */
+    assert_true(temp_dir_open(&d, "like", &e));
+    assert_false(is_there(file));
+    assert_true(is_there(link));
+    assert_true(is_there(longer));
+    strcat(target, "/file");
+    assert_true(is_there(target));
+    assert_true(temp_dir_close(&d, &e));
+}
+
+/* Eight processes that each open and close 200 times: none finds its file gone, or fails, and nothing stays. */
+static void many_at_once(void **state)
+{
+    (void)state;
+    enum { PROCESSES = 8, TIMES = 200 };
+    pid_t pid[PROCESSES];
+    for (int i = 0; i < PROCESSES; i++) {
+        pid[i] = fork();
+        assert_true(pid[i] >= 0);
+        for (int k = 0; pid[i] == 0 && k < TIMES; k++) {
+            struct temp_dir d;
+            struct err e;
+            char path[600];
+            if (!temp_dir_open(&d, "many", &e) || !write_file(d.path, "x"))
+                _exit(1);
+            snprintf(path, sizeof path, "%s/file", d.path);
+            if (!is_there(path) || !temp_dir_close(&d, &e))
+                _exit(2);
+        }
+        if (pid[i] == 0)
+            _exit(0);
+    }
+    for (int i = 0; i < PROCESSES; i++) {
+        int status;
+        assert_int_equal(waitpid(pid[i], &status, 0), pid[i]);
+        assert_true(WIFEXITED(status));
+        assert_int_equal(WEXITSTATUS(status), 0);
+    }
+    struct temp_dir d;
+    struct err e;
+    assert_true(temp_dir_open(&d, "many", &e));
+    assert_true(temp_dir_close(&d, &e));
+    char command[700];
+    snprintf(command, sizeof command, "! ls '%s' | grep -q many", temp);
+    assert_int_equal(system(command), 0); /* NOLINT(cert-env33-c) */
+}
+
+static void no_room_is_a_line(void **state)
+{
+    (void)state;
+    struct temp_dir d;
+    struct err e = {""};
+    assert_int_equal(setenv("TMPDIR", "/nonexistent", 1), 0);
+    assert_false(temp_dir_open(&d, "none", &e));
+    assert_string_equal(e.msg,
+                        "/nonexistent: no temporary directory in it: No such file or directory");
+    assert_true(temp_dir_close(&d, &e));
+    assert_int_equal(setenv("TMPDIR", temp, 1), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(it_is_ours_and_removed),
+        cmocka_unit_test(what_a_kill_left_is_removed_by_the_next),
+        cmocka_unit_test(nothing_else_is_removed),
+        cmocka_unit_test(many_at_once),
+        cmocka_unit_test(no_room_is_a_line),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

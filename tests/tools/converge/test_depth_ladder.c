@@ -1,0 +1,178 @@
+/* The depth ladder of a furnace, whose closed form is E (1 - rho^(d+1))/(1 - rho) at every depth d, rendered by the program
+ * beside this test; and its plot, read by libxml2. */
+#include "reference/suite/suite.h"
+#include "renderer/base/fs.h"
+#include "tools/converge/depth_ladder.h"
+
+#include <libgen.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <libxml/HTMLparser.h>
+#include <libxml/xpath.h>
+
+#include <cmocka.h>
+
+static double number(const json_t *rungs, size_t i, const char *name)
+{
+    const json_t *v = json_object_get(json_array_get(rungs, i), name);
+    assert_true(json_is_number(v));
+    return json_number_value(v);
+}
+
+/* H0: the mean at each depth is the closed form of the suite's 11_furnace, within its standard error (an upper bound) and
+ * 1e-5 for single precision. Two-sided at 1e-6 over 6 depths: 5.2 standard errors. n: 16 x 16 pixels of 16 samples, one
+ * seed. Control: one bounce more or fewer, a change of at least 0.2^5 in blue and 0.8^5 in red, is rejected everywhere. */
+static void furnace(void **state)
+{
+    (void)state;
+    struct suite suite;
+    struct err e = {""};
+    char self[4096], program[4200], dir[] = "/tmp/test_depths_XXXXXX";
+    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
+    assert_true(n > 0);
+    self[n] = '\0';
+    snprintf(program, sizeof program, "%.4000s/../pathtracer", dirname(self));
+    assert_non_null(mkdtemp(dir));
+    if (!suite_load("reference/scenes", &suite, &e))
+        fail_msg("%s", e.msg);
+    const struct suite_scene *scene = suite_find(&suite, "11_furnace");
+    assert_non_null(scene);
+    struct suite_scene small = *scene;
+    small.width = small.height = 16;
+    const struct converge_job job = {.scene = &small,
+                                     .pathtracer = program,
+                                     .dir = dir,
+                                     .seed = 1,
+                                     .threads = 1,
+                                     .timeout_s = 60};
+    json_t *depths;
+    if (!depths_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e))
+        fail_msg("%s", e.msg);
+    assert_true(depths_check(depths, "x", &e));
+    const json_t *rungs = json_object_get(depths, "rungs");
+    assert_int_equal(json_array_size(rungs), 6);
+    /* Emission 0.5, 1, 2 and albedo 0.8, 0.5, 0.2 (11_furnace.json). */
+    static const double emission[3] = {0.5, 1, 2}, albedo[3] = {0.8, 0.5, 0.2};
+    static const double luma[3] = {0.2126, 0.7152, 0.0722};
+    double want[7];
+    for (int d = 0; d < 7; d++) {
+        want[d] = 0;
+        for (int c = 0; c < 3; c++)
+            want[d] += luma[c] * emission[c] * (1 - pow(albedo[c], d + 1)) / (1 - albedo[c]);
+    }
+    for (size_t d = 0; d < 6; d++) {
+        double mean = number(rungs, d, "mean"),
+               allowed = 5.2 * number(rungs, d, "se") + 1e-5 * want[d];
+        assert_int_equal(number(rungs, d, "depth"), d);
+        assert_true(fabs(number(rungs, d, "truth") - want[d]) < 1e-9);
+        if (!(fabs(mean - want[d]) <= allowed))
+            fail_msg("depth %zu: %g instead of %g, %g allowed", d, mean, want[d], allowed);
+        assert_true(fabs(mean - want[d + 1]) > allowed);
+        assert_true(d == 0 || fabs(mean - want[d - 1]) > allowed);
+    }
+    json_decref(depths);
+
+    struct converge_job none = job;
+    none.pathtracer = "/nonexistent";
+    assert_false(depths_measure(&none, NULL, 16, &depths, &e));
+    assert_true(remove_tree(dir, &e));
+    suite_free(&suite);
+}
+
+static htmlDocPtr page_of(const char *json)
+{
+    json_t *depths = json_loads(json, 0, NULL);
+    char *text = NULL;
+    size_t size;
+    struct err e = {""};
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(depths);
+    assert_true(depths_check(depths, "x", &e));
+    report_depths(f, depths);
+    fclose(f);
+    htmlDocPtr doc =
+        htmlReadMemory(text, (int)size, "x", "utf-8", HTML_PARSE_NOERROR | HTML_PARSE_NOWARNING);
+    assert_non_null(doc);
+    free(text);
+    json_decref(depths);
+    return doc;
+}
+
+static double evaluate(htmlDocPtr doc, const char *xpath)
+{
+    xmlXPathContext *c = xmlXPathNewContext(doc);
+    xmlXPathObject *o = xmlXPathEvalExpression((const xmlChar *)xpath, c);
+    assert_non_null(o);
+    double v = xmlXPathCastToNumber(o);
+    xmlXPathFreeObject(o);
+    xmlXPathFreeContext(c);
+    return v;
+}
+
+static void plot(void **state)
+{
+    (void)state;
+    htmlDocPtr doc = page_of(
+        "{\"samples\": 64, \"rungs\": [{\"depth\": 0, \"mean\": 0, \"se\": 0, \"truth\": 0}, "
+        "{\"depth\": 1, \"mean\": 1, \"se\": 0.1, \"truth\": 0.8}, "
+        "{\"depth\": 3, \"mean\": 2, \"se\": 0.1}]}");
+    assert_int_equal(evaluate(doc, "count(//circle[title])"), 3);
+    /* In proportion: depth 1 at a third of the way to 3, mean 1 at half the way to 2. */
+    double x[3], y[3];
+    for (int i = 0; i < 3; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "//circle[%d]/@cx", i + 1);
+        x[i] = evaluate(doc, path);
+        snprintf(path, sizeof path, "//circle[%d]/@cy", i + 1);
+        y[i] = evaluate(doc, path);
+    }
+    assert_true(fabs((x[1] - x[0]) - (x[2] - x[0]) / 3) < 0.11 && x[2] - x[0] > 100);
+    assert_true(fabs((y[0] - y[1]) - (y[0] - y[2]) / 2) < 0.11 && y[0] - y[2] > 100);
+    /* (1 - 0.8)/0.1 */
+    assert_int_equal(
+        evaluate(doc, "count(//figcaption[contains(., 'known at 2 of 3 depths, at most 2 ')])"), 1);
+    assert_int_equal(evaluate(doc, "count(//a[@download='depths.csv'])"), 1);
+    xmlFreeDoc(doc);
+    doc = page_of("{\"error\": \"<b>no\"}");
+    assert_int_equal(evaluate(doc, "count(//p[contains(., '<b>no')])"), 1);
+    xmlFreeDoc(doc);
+}
+
+static void bad_ladders(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {
+        "{}",
+        "{\"samples\": 1, \"rungs\": []}",
+        "{\"samples\": 1.5, \"rungs\": [{\"depth\": 0, \"mean\": 1, \"se\": 0}]}",
+        "{\"samples\": 1, \"rungs\": [{\"depth\": -1, \"mean\": 1, \"se\": 0}]}",
+        "{\"samples\": 1, \"rungs\": [{\"depth\": 0, \"mean\": 1, \"se\": -1}]}",
+        "{\"samples\": 1, \"rungs\": [{\"depth\": 0, \"mean\": \"1\", \"se\": 0}]}",
+        "{\"samples\": 1, \"rungs\": [{\"depth\": 0, \"mean\": 1, \"se\": 0, \"truth\": null}]}",
+        "{\"samples\": 1, \"rungs\": [{\"depth\": 2, \"mean\": 1, \"se\": 0}, {\"depth\": 2, \"mean\": 1, \"se\": 0}]}",
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct err e = {""};
+        json_t *j = json_loads(bad[i], 0, NULL);
+        assert_non_null(j);
+        assert_false(depths_check(j, "file: scene", &e));
+        assert_non_null(strstr(e.msg, "file: scene: 'depths'"));
+        json_decref(j);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(furnace),
+        cmocka_unit_test(plot),
+        cmocka_unit_test(bad_ladders),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,407 @@
+/* The catalogue of bugs and the diagnosis, on looks drawn from the catalogue itself: the correct mean (plus a bug's
+ * effect), each moved by a normal error of the stored variance, and noise of a gamma law with the variance that the
+ * correct renderer has at the view's number of samples. Real renders: tests/end_to_end/end_to_end.sh and make diagnose-rates. */
+#include "renderer/base/fs.h"
+#include "tools/diagnose/diagnose.h"
+#include "tests/support/simulate.h"
+
+#include <gsl/gsl_randist.h>
+#include <gsl/gsl_rng.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#define CATALOGUE "golden/diagnose"
+#define PATCHES   "tests/mutants"
+
+static const double alpha = 1e-6;
+
+struct fixture {
+    struct catalogue c;
+    struct clue *clue;
+    gsl_rng *rng;
+    char dir[64];
+};
+
+static int setup(void **state)
+{
+    static struct fixture f;
+    struct err e;
+    if (!catalogue_read(CATALOGUE, &f.c, &e)) {
+        print_error("%s\n", e.msg);
+        return -1;
+    }
+    f.clue = calloc((size_t)f.c.num_views, sizeof *f.clue);
+    f.rng = gsl_rng_alloc(gsl_rng_mt19937);
+    strcpy(f.dir, "/tmp/test_diagnose.XXXXXX");
+    *state = &f;
+    return f.clue != NULL && f.rng != NULL && mkdtemp(f.dir) != NULL ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    struct fixture *f = *state;
+    struct err e;
+    catalogue_free(&f->c);
+    free(f->clue);
+    gsl_rng_free(f->rng);
+    return remove_tree(f->dir, &e) ? 0 : -1;
+}
+
+/* ---- files */
+
+static void copy(const char *from_dir, const char *name, const char *to_dir, long changed_byte)
+{
+    char from[512], to[512];
+    snprintf(from, sizeof from, "%s/%s", from_dir, name);
+    snprintf(to, sizeof to, "%s/%s", to_dir, name);
+    FILE *in = fopen(from, "rb"), *out = fopen(to, "wb");
+    assert_true(in != NULL && out != NULL);
+    int byte;
+    for (long i = 0; (byte = fgetc(in)) != EOF; i++)
+        fputc(i == changed_byte ? byte ^ 1 : byte, out);
+    fclose(in);
+    assert_int_equal(fclose(out), 0);
+}
+
+static void copy_patches(const struct fixture *f, const char *to, const char *changed,
+                         const char *left_out)
+{
+    struct err e;
+    assert_true(make_dirs(to, &e));
+    for (int b = 0; b < f->c.num_bugs; b++) {
+        char name[80];
+        const char *bug = f->c.bug[b].name;
+        snprintf(name, sizeof name, "%s.patch", bug);
+        if (strcmp(bug, left_out) != 0)
+            copy(PATCHES, name, to, strcmp(bug, changed) == 0 ? 5 : -1);
+    }
+}
+
+static void test_every_patch_is_in_the_catalogue(void **state)
+{
+    struct fixture *f = *state;
+    struct err e = {""};
+    if (!catalogue_current(&f->c, PATCHES, &e))
+        fail_msg("%s", e.msg);
+}
+
+static void test_what_a_patch_is_by(void **state)
+{
+    struct fixture *f = *state;
+    static const char head[] = "Bug: b\nWhere: w\n\n--- a/x.c\n+++ b/x.c\n";
+    static const struct {
+        const char *text;
+        bool same;
+    } cases[] = {
+        {"@@ -1,3 +1,3 @@\n one;\n-two;\n+three;\n four;\n", true},
+        {"@@ -9,2 +9,2 @@\n other;\n\n-two;\n+three;\n", true},
+        {"@@ -1,3 +1,3 @@\n one;\n-two;\n+thre;\n four;\n", false},
+        {"@@ -1,3 +1,3 @@\n one;\n-too;\n+three;\n four;\n", false},
+        {"@@ -1,3 +1,4 @@\n one;\n-two;\n+three;\n+\n four;\n", false},
+    };
+    struct bug first, bug;
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char path[200];
+        snprintf(path, sizeof path, "%s/one.patch", f->dir);
+        FILE *out = fopen(path, "w");
+        assert_non_null(out);
+        fprintf(out, "%s%s", head, cases[i].text);
+        assert_int_equal(fclose(out), 0);
+        assert_true(bug_of_patch(path, &bug, &e));
+        assert_string_equal(bug.what, "b");
+        assert_string_equal(bug.where, "w");
+        if (i == 0)
+            first = bug;
+        assert_int_equal(strcmp(bug.patch_sha256, first.patch_sha256) == 0, cases[i].same);
+    }
+}
+
+static void test_a_stale_catalogue_is_refused(void **state)
+{
+    struct fixture *f = *state;
+    struct err e = {""};
+    char dir[100];
+    const char *first = f->c.bug[0].name, *second = f->c.bug[1].name;
+    snprintf(dir, sizeof dir, "%s/same", f->dir);
+    copy_patches(f, dir, "", "");
+    assert_true(catalogue_current(&f->c, dir, &e));
+    snprintf(dir, sizeof dir, "%s/changed", f->dir);
+    copy_patches(f, dir, second, "");
+    assert_false(catalogue_current(&f->c, dir, &e));
+    assert_non_null(strstr(e.msg, second));
+    assert_non_null(strstr(e.msg, "has changed"));
+    snprintf(dir, sizeof dir, "%s/fewer", f->dir);
+    copy_patches(f, dir, "", first);
+    assert_false(catalogue_current(&f->c, dir, &e));
+    snprintf(dir, sizeof dir, "%s/more", f->dir);
+    copy_patches(f, dir, "", "");
+    char name[80], path[200];
+    snprintf(name, sizeof name, "%s.patch", first);
+    snprintf(path, sizeof path, "%s/a_new_one.patch", dir);
+    copy(PATCHES, name, f->dir, -1);
+    char from[200];
+    snprintf(from, sizeof from, "%s/%s", f->dir, name);
+    assert_int_equal(rename(from, path), 0);
+    assert_false(catalogue_current(&f->c, dir, &e));
+    assert_non_null(strstr(e.msg, "a_new_one"));
+}
+
+static void test_a_damaged_catalogue_is_refused(void **state)
+{
+    struct fixture *f = *state;
+    struct err e = {""};
+    struct catalogue c;
+    char dir[100], name[160];
+    snprintf(dir, sizeof dir, "%s/damaged", f->dir);
+    assert_true(make_dirs(dir, &e));
+    copy(CATALOGUE, "manifest.json", dir, -1);
+    assert_false(catalogue_read(dir, &c, &e)); /* no pictures */
+    for (int v = 0; v < f->c.num_views; v++) {
+        snprintf(name, sizeof name, "%s.exr", f->c.view[v].name);
+        copy(CATALOGUE, name, dir, v == 1 ? 3000 : -1);
+    }
+    assert_false(catalogue_read(dir, &c, &e));
+    assert_non_null(strstr(e.msg, f->c.view[1].name));
+    snprintf(name, sizeof name, "%s.exr", f->c.view[1].name);
+    copy(CATALOGUE, name, dir, -1);
+    assert_true(catalogue_read(dir, &c, &e));
+    catalogue_free(&c);
+}
+
+/* ---- sights */
+
+/* Cells by brute force: the mean of the pixels, and the sum of their variances of the mean over the square of
+ * their number. */
+static void test_a_sight_pools_pixels(void **state)
+{
+    (void)state;
+    struct err e;
+    struct sight s;
+    uint64_t seed = 4;
+    struct moments m = new_moments(48, 24, "sample");
+    simulate(&m, LAW_EXPONENTIAL, 2, 9, false, &seed);
+    assert_true(sight_of(&m, 16, 18, &s, &e));
+    assert_int_equal(s.columns, 16);
+    assert_int_equal(s.rows, 8);
+    for (int cell = 0; cell < 128; cell += 37) {
+        double mean = 0, var = 0;
+        for (int y = 0; y < 24; y++)
+            for (int x = 0; x < 48; x++)
+                if (x / 3 == cell % 16 && y / 3 == cell / 16) {
+                    mean += m.mean[3 * (48 * y + x) + 1] / 9;
+                    var += moments_var_of_mean(&m, (size_t)(48 * y + x), 1) / 81;
+                }
+        assert_true(fabs(s.mean[3 * cell + 1] - mean) < 1e-12 * mean);
+        assert_true(fabs(s.var[3 * cell + 1] - var) < 1e-12 * var);
+    }
+    /* 9 of 18 samples that were asked for. */
+    assert_true(fabs(s.fact[FACT_SAMPLES] - log(0.5)) < 1e-12);
+    moments_free(&m);
+    m = new_moments(30, 30, "sample");
+    assert_false(sight_of(&m, 16, 0, &s, &e));
+    assert_non_null(strstr(e.msg, "30 x 30"));
+    moments_free(&m);
+    m = new_moments(32, 32, "stratified");
+    assert_false(sight_of(&m, 16, 0, &s, &e));
+    assert_non_null(strstr(e.msg, "does not state its error"));
+    moments_free(&m);
+}
+
+/* Two averaged renders are one of twice the samples: half the variance. */
+static void test_an_average_of_sights(void **state)
+{
+    (void)state;
+    struct err e;
+    struct sight s[2];
+    uint64_t seed = 5;
+    for (int k = 0; k < 2; k++) {
+        struct moments m = new_moments(16, 16, "sample");
+        simulate(&m, LAW_NORMAL, 1, 50, true, &seed);
+        assert_true(sight_of(&m, 16, 50, &s[k], &e));
+        moments_free(&m);
+    }
+    struct sight a = sight_average(s, 2);
+    for (int i = 0; i < SIGHT_VALUES; i += 101) {
+        assert_true(fabs(a.mean[i] - (s[0].mean[i] + s[1].mean[i]) / 2) < 1e-12);
+        assert_true(fabs(a.var[i] - (s[0].var[i] + s[1].var[i]) / 4) < 1e-12);
+    }
+    assert_true(a.n == 100);
+}
+
+/* ---- looks drawn from the catalogue */
+
+/* How many times the variance that it states a cell's mean has under a bug: R, and as many times more as pixels
+ * of a cell share their random numbers. */
+static double understated(const struct fixture *f, int bug, int cell)
+{
+    double factor = 1;
+    for (int v = 0; bug >= 0 && v < f->c.num_views; v++) {
+        const struct effect *e = f->c.view[v].effect[bug];
+        if (e == NULL || isnan(e->fact[FACT_IMAGE]))
+            continue;
+        double r = exp(e->fact[FACT_PIXELS]), s = exp(e->fact[FACT_IMAGE]);
+        factor = (r > 1.25 ? r : 1) * (s > 10 ? fmin(s, cell * cell) : 1);
+    }
+    return factor;
+}
+
+/* bug NULL: correct. noise: times the variance that is stated. */
+static void draw_look(struct fixture *f, int view, const struct effect *bug, double amplitude,
+                      double noise)
+{
+    const struct view *v = &f->c.view[view];
+    const struct sight *c = &v->correct;
+    struct clue *out = &f->clue[view];
+    *out = (struct clue){.view = v, .seen = *c, .is_consistent = true};
+    struct sight *a = &out->seen;
+    a->n = (double)v->spp * v->renders * a->cell * a->cell;
+    for (int i = 0; i < 3 * a->columns * a->rows; i++) {
+        double mean = c->mean[i] + gsl_ran_gaussian(f->rng, sqrt(c->var[i]));
+        if (bug != NULL)
+            mean += amplitude *
+                    ((double)bug->mean[i] + gsl_ran_gaussian(f->rng, sqrt((double)bug->var[i])));
+        a->var[i] = c->var[i] * c->n / a->n;
+        a->k3[i] = c->k3[i] * pow(c->n / a->n, 2);
+        a->mean[i] = 0;
+        if (mean > 0)
+            a->mean[i] = a->var[i] > 0 ? gsl_ran_gamma(f->rng, mean * mean / (noise * a->var[i]),
+                                                       noise * a->var[i] / mean)
+                                       : mean;
+    }
+    for (int k = 0; k < NUM_FACTS; k++) {
+        a->fact_sd[k] = k == FACT_IMAGE ? 0.6 : 0.02;
+        if (bug != NULL && !isnan(bug->fact[k]))
+            a->fact[k] += amplitude * (bug->fact[k] - a->fact[k]);
+        a->fact[k] += k == FACT_SAMPLES ? 0 : gsl_ran_gaussian(f->rng, a->fact_sd[k]);
+    }
+    if (!isnan(a->fact[FACT_PIXELS]))
+        out->is_consistent = fabs(a->fact[FACT_PIXELS]) < 0.4 && a->fact[FACT_IMAGE] < log(20);
+}
+
+static struct diagnosis look(struct fixture *f, int bug, double amplitude, const char *without)
+{
+    struct err e = {""};
+    struct diagnosis d;
+    for (int v = 0; v < f->c.num_views; v++)
+        draw_look(f, v, bug >= 0 ? f->c.view[v].effect[bug] : NULL, amplitude,
+                  understated(f, bug, f->c.view[v].correct.cell));
+    const struct diagnose_options opt = {.alpha = alpha, .without = without};
+    if (!diagnose(&f->c, f->clue, f->c.num_views, &opt, &d, &e))
+        fail_msg("%s", e.msg);
+    return d;
+}
+
+static bool is_named(const struct diagnosis *d, int bug)
+{
+    for (int i = 0; i < d->num_named; i++)
+        if (d->candidate[i].bug == bug)
+            return true;
+    return false;
+}
+
+/* H0: correct. Each look accuses with at most 1e-6, so any of 500 with 5e-4. */
+static void test_a_correct_look_is_not_accused(void **state)
+{
+    struct fixture *f = *state;
+    double largest = -INFINITY;
+    gsl_rng_set(f->rng, 11);
+    for (int t = 0; t < 500; t++) {
+        struct diagnosis d = look(f, -1, 0, NULL);
+        largest = fmax(largest, d.largest_lead);
+        if (d.finding != FINDING_CORRECT)
+            fail_msg("look %d: %s", t, d.gate);
+    }
+    /* P(any lead of any bug above log(500 bugs / 1e-3)) is at most 1e-3, by the argument for the bound. */
+    assert_true(largest < log(500 * f->c.num_bugs / 1e-3));
+}
+
+/* Negative control: stripes, brighter and darker, are wrong and no known bug. */
+static void test_an_unknown_difference_is_not_named(void **state)
+{
+    struct fixture *f = *state;
+    struct err e;
+    struct diagnosis d;
+    gsl_rng_set(f->rng, 13);
+    for (int v = 0; v < f->c.num_views; v++) {
+        draw_look(f, v, NULL, 0, 1);
+        for (int i = 0; i < SIGHT_VALUES; i++)
+            f->clue[v].seen.mean[i] *= i % 7 < 3 ? 1.3 : 0.9;
+    }
+    const struct diagnose_options opt = {.alpha = alpha};
+    assert_true(diagnose(&f->c, f->clue, f->c.num_views, &opt, &d, &e));
+    assert_int_equal(d.finding, FINDING_UNKNOWN);
+    assert_int_equal(d.num_named, 0);
+    assert_true(d.gate[0] != '\0');
+}
+
+static void test_every_bug_is_named(void **state)
+{
+    struct fixture *f = *state;
+    int named = 0, first = 0;
+    gsl_rng_set(f->rng, 14);
+    for (int b = 0; b < f->c.num_bugs; b++) {
+        struct diagnosis d = look(f, b, 1, NULL);
+        named += is_named(&d, b);
+        first += is_named(&d, b) && d.candidate[0].bug == b;
+        if (!is_named(&d, b))
+            print_message("%s: not named (%s)\n", f->c.bug[b].name,
+                          d.finding == FINDING_CORRECT ? "nothing wrong"
+                                                       : f->c.bug[d.candidate[0].bug].name);
+    }
+    print_message("%d of %d named, %d first\n", named, f->c.num_bugs, first);
+    assert_true(first >= 0.9 * f->c.num_bugs);
+}
+
+/* A bug at 40 % of its strength is named as that bug, or as unknown, and its amplitude is found. */
+static void test_an_amplitude_is_found(void **state)
+{
+    struct fixture *f = *state;
+    int named = 0, right = 0;
+    gsl_rng_set(f->rng, 15);
+    for (int b = 0; b < f->c.num_bugs; b += 4) {
+        struct diagnosis d = look(f, b, 0.4, NULL);
+        if (!is_named(&d, b))
+            continue;
+        named++;
+        right += fabs(d.candidate[0].amplitude - 0.4) < 0.05;
+    }
+    print_message("of %d bugs at 40 %%, %d named, %d with the amplitude\n", (f->c.num_bugs + 3) / 4,
+                  named, right);
+    assert_true(right >= 0.6 * ((f->c.num_bugs + 3) / 4));
+}
+
+static void test_another_shape_is_refused(void **state)
+{
+    struct fixture *f = *state;
+    struct err e = {""};
+    struct diagnosis d;
+    draw_look(f, 0, NULL, 0, 1);
+    f->clue[0].seen.rows = 4;
+    const struct diagnose_options opt = {.alpha = alpha};
+    assert_false(diagnose(&f->c, f->clue, 1, &opt, &d, &e));
+    assert_non_null(strstr(e.msg, "another shape"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_patch_is_in_the_catalogue),
+        cmocka_unit_test(test_what_a_patch_is_by),
+        cmocka_unit_test(test_a_stale_catalogue_is_refused),
+        cmocka_unit_test(test_a_damaged_catalogue_is_refused),
+        cmocka_unit_test(test_a_sight_pools_pixels),
+        cmocka_unit_test(test_an_average_of_sights),
+        cmocka_unit_test(test_a_correct_look_is_not_accused),
+        cmocka_unit_test(test_an_unknown_difference_is_not_named),
+        cmocka_unit_test(test_every_bug_is_named),
+        cmocka_unit_test(test_an_amplitude_is_found),
+        cmocka_unit_test(test_another_shape_is_refused),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,388 @@
+/* What may replace a stored reference: candidates whose truth is known, since they are drawn here. */
+#include "reference/base/json_file.h"
+#include "reference/base/process.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/sha256.h"
+#include "tools/golden/approve.h"
+#include "tests/support/simulate.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 64, REPLICATES = 16 };
+
+struct fixture {
+    char dir[64], from[96], golden[96];
+    struct suite_scene scene;
+    struct suite_reference ref;
+    struct approve_options opt;
+    char said[4096]; /* what the last approve() printed */
+    struct err e;
+};
+
+static int setup(void **state)
+{
+    struct fixture *f = calloc(1, sizeof *f);
+    strcpy(f->dir, "/tmp/test_approve.XXXXXX");
+    assert_non_null(mkdtemp(f->dir));
+    snprintf(f->from, sizeof f->from, "%s/from", f->dir);
+    snprintf(f->golden, sizeof f->golden, "%s/golden", f->dir);
+    f->scene = (struct suite_scene){.name = "12_plane",
+                                    .references_of = "12_plane",
+                                    .sha256 = "abc",
+                                    .width = SIDE,
+                                    .height = SIDE,
+                                    .depth = 5,
+                                    .tile = 16};
+    f->ref = (struct suite_reference){.engine = "cycles",
+                                      .replicates = REPLICATES,
+                                      .spp = 4,
+                                      .margin_global = 0.02,
+                                      .margin_tile = 0.1};
+    f->scene.reference[0] = f->ref;
+    f->scene.num_references = 1;
+    f->opt = (struct approve_options){.from_dir = f->from, .golden_dir = f->golden, .alpha = 1e-3};
+    *state = f;
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    struct fixture *f = *state;
+    struct err e;
+    bool ok = remove_tree(f->dir, &e);
+    free(f);
+    return ok ? 0 : -1;
+}
+
+/* Writes a reference of mean `scale` into a directory; noise of 30 % in each of 16 replicates, so one
+ * standard error of the image is 0.12 %, of a tile 0.5 %. */
+static void render(struct fixture *f, const char *dir, double scale, uint64_t seed)
+{
+    struct moments m = new_moments(f->scene.width, f->scene.height, "replicate");
+    simulate(&m, LAW_NORMAL, scale, REPLICATES, true, &seed);
+    m.spp = 4;
+    json_t *manifest = json_pack(
+        "{ss,ss,ss,ss,si,si,si,si,si,si,sI,ss,ss,s[I]}", "scene", "12_plane", "scene_sha256",
+        f->scene.sha256, "engine", f->ref.engine, "unit", "replicate", "width", m.width, "height",
+        m.height, "depth", 5, "replicates", REPLICATES, "spp", 4, "subgrid", 0, "seed",
+        (json_int_t)seed, "version", "Blender 3.4.1", "key", "k", "seeds", (json_int_t)77);
+    struct err e;
+    if (!golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e))
+        fail_msg("%s", e.msg);
+    json_decref(manifest);
+    moments_free(&m);
+}
+
+static enum approval run(struct fixture *f)
+{
+    FILE *out = fmemopen(f->said, sizeof f->said, "w");
+    f->e = (struct err){0};
+    enum approval done = approve(&f->opt, &f->scene, &f->ref, out, &f->e);
+    fclose(out);
+    return done;
+}
+
+static void hash(const char *dir, const char *file, char hex[65])
+{
+    char path[256];
+    struct err e;
+    memset(hex, 0, 65);
+    snprintf(path, sizeof path, "%s/12_plane/%s", dir, file);
+    if (access(path, F_OK) != 0)
+        strcpy(hex, "none");
+    else if (!sha256_file(path, hex, &e))
+        fail_msg("%s", e.msg);
+}
+
+/* Both files of the store, so that a refusal can be shown to leave them alone. */
+static void hash_store(struct fixture *f, char hex[2][65])
+{
+    hash(f->golden, "cycles.exr", hex[0]);
+    hash(f->golden, "manifest.json", hex[1]);
+}
+
+static void assert_refused(struct fixture *f, enum approval how, const char *why)
+{
+    char before[2][65], after[2][65];
+    hash_store(f, before);
+    assert_int_equal(run(f), how);
+    if (strstr(how == APPROVE_IMPOSSIBLE ? f->e.msg : f->said, why) == NULL)
+        fail_msg("neither '%s' nor '%s' says '%s'", f->said, f->e.msg, why);
+    hash_store(f, after);
+    assert_memory_equal(before, after, sizeof before);
+}
+
+/* The stored entry's newest change; the caller frees. */
+static json_t *last_change(struct fixture *f, size_t count)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/12_plane/manifest.json", f->golden);
+    json_t *all = json_load_file(path, 0, NULL);
+    json_t *changes = json_object_get(json_object_get(all, "cycles"), "changes");
+    assert_int_equal(json_array_size(changes), count);
+    json_t *last = json_deep_copy(json_array_get(changes, count - 1));
+    json_decref(all);
+    assert_non_null(json_object_get(last, "date"));
+    return last;
+}
+
+static void assert_accepted(struct fixture *f, size_t count, const char *verdict)
+{
+    char candidate[65], stored[65];
+    if (run(f) != APPROVE_ACCEPTED)
+        fail_msg("refused: %s%s", f->said, f->e.msg);
+    hash(f->from, "cycles.exr", candidate);
+    hash(f->golden, "cycles.exr", stored);
+    assert_string_equal(candidate, stored);
+    struct golden g;
+    golden_inspect(f->golden, &f->scene, &f->ref, &g);
+    assert_int_equal(g.state, GOLDEN_CURRENT);
+    golden_free(&g);
+    json_t *change = last_change(f, count);
+    assert_string_equal(json_string_value(json_object_get(change, "verdict")), verdict);
+    json_decref(change);
+}
+
+static void a_new_one_has_to_be_called_new(void **state)
+{
+    struct fixture *f = *state;
+    render(f, f->from, 1, 1);
+    f->opt.why = "because";
+    assert_refused(f, APPROVE_IMPOSSIBLE, "12_plane/cycles: nothing is stored");
+    f->opt.accept_new = true;
+    assert_accepted(f, 1, "NEW");
+    assert_int_equal(run(f), APPROVE_UNCHANGED); /* the same bits again */
+    assert_non_null(strstr(f->said, "IDENTICAL"));
+    strcpy(f->scene.sha256, "def"); /* another scene file that changed nothing */
+    render(f, f->from, 1, 1);
+    assert_accepted(f, 2, "IDENTICAL");
+}
+
+/* A kill before the image's last rename: the manifest is the new one, so nothing is left to approve, but the image is not yet
+ * in its place. */
+static void an_interrupted_approval_is_ended(void **state)
+{
+    struct fixture *f = *state;
+    char exr[256], next[sizeof exr + 8], old[65], now[65];
+    snprintf(exr, sizeof exr, "%s/12_plane/cycles.exr", f->golden);
+    snprintf(next, sizeof next, "%s.next", exr);
+    render(f, f->from, 1, 2);
+    render(f, f->golden, 1, 2);
+    hash(f->golden, "cycles.exr", old);
+    assert_int_equal(rename(exr, next), 0);
+    FILE *stale = fopen(exr, "w");
+    assert_non_null(stale);
+    fclose(stale);
+    assert_int_equal(run(f), APPROVE_UNCHANGED);
+    hash(f->golden, "cycles.exr", now);
+    assert_string_equal(now, old);
+    hash(f->golden, "cycles.exr.next", now);
+    assert_string_equal(now, "none");
+}
+
+static void other_seeds_are_accepted_with_their_effect(void **state)
+{
+    struct fixture *f = *state;
+    render(f, f->golden, 1, 1);
+    render(f, f->from, 1, 2);
+    assert_accepted(f, 1, "EQUIVALENT");
+    assert_non_null(strstr(f->said, "difference "));
+    assert_non_null(strstr(f->said, "smallest detectable: image "));
+    assert_non_null(strstr(f->said, "stored    Blender 3.4.1, 1 seeds of seed "));
+    json_t *change = last_change(f, 1);
+    double d = json_number_value(json_object_get(change, "difference"));
+    json_t *ci = json_object_get(change, "ci");
+    /* Both means are 1 up to 0.12 %: five standard errors of their difference. */
+    assert_float_equal(d, 0, 0.0085);
+    assert_true(json_number_value(json_array_get(ci, 0)) < d &&
+                d < json_number_value(json_array_get(ci, 1)));
+    assert_string_equal(
+        json_string_value(json_object_get(json_object_get(change, "was"), "scene_sha256")), "abc");
+    json_decref(change);
+}
+
+static void a_difference_needs_a_reason(void **state)
+{
+    struct fixture *f = *state;
+    render(f, f->golden, 1, 1);
+    render(f, f->from, 1.1, 2);
+    f->opt.accept_new = true;
+    assert_refused(f, APPROVE_DIFFERENT, "--accept-difference");
+    assert_non_null(strstr(f->said, "DIFFERENT"));
+    f->opt.why = "the lamp is brighter now";
+    assert_accepted(f, 1, "DIFFERENT");
+    json_t *change = last_change(f, 1);
+    assert_string_equal(json_string_value(json_object_get(change, "why")),
+                        "the lamp is brighter now");
+    assert_float_equal(json_number_value(json_object_get(change, "difference")), 0.1, 0.01);
+    json_decref(change);
+    f->opt.why = NULL;
+    render(f, f->from, 1.1, 3);
+    assert_accepted(f, 2, "EQUIVALENT"); /* the log goes on */
+}
+
+/* Equal means, but margins far below what the noise of the two can show. */
+static void an_inconclusive_one_is_refused_whatever_is_said(void **state)
+{
+    struct fixture *f = *state;
+    render(f, f->golden, 1, 1);
+    render(f, f->from, 1, 2);
+    f->ref.margin_global = 0.001;
+    f->ref.margin_tile = 0.004;
+    f->opt.accept_new = true;
+    f->opt.why = "I want it";
+    assert_refused(f, APPROVE_INCONCLUSIVE, "INCONCLUSIVE");
+}
+
+static void what_is_missing_or_damaged_is_refused(void **state)
+{
+    struct fixture *f = *state;
+    char path[256];
+    f->opt.accept_new = true;
+    f->opt.why = "I want it";
+    render(f, f->golden, 1, 1);
+    assert_refused(f, APPROVE_IMPOSSIBLE, "no candidate in ");
+    render(f, f->from, 1, 2);
+    strcpy(f->scene.sha256, "def");
+    assert_refused(f, APPROVE_IMPOSSIBLE, "stale candidate");
+    strcpy(f->scene.sha256, "abc");
+    snprintf(path, sizeof path, "%s/12_plane/cycles.exr", f->from);
+    FILE *out = fopen(path, "ab");
+    fputc('x', out);
+    fclose(out);
+    assert_refused(f, APPROVE_IMPOSSIBLE, "damaged candidate");
+    render(f, f->from, 1, 2);
+    snprintf(path, sizeof path, "%s/12_plane/cycles.exr", f->golden);
+    assert_int_equal(unlink(path), 0);
+    assert_refused(f, APPROVE_IMPOSSIBLE, "nothing to compare with");
+}
+
+/* The stored one is of the scene as it was; only its size cannot be compared. */
+static void a_stale_one_is_what_is_compared_with(void **state)
+{
+    struct fixture *f = *state;
+    strcpy(f->scene.sha256, "old");
+    render(f, f->golden, 1, 1);
+    strcpy(f->scene.sha256, "abc");
+    render(f, f->from, 1.1, 2);
+    assert_refused(f, APPROVE_DIFFERENT, "DIFFERENT");
+    render(f, f->from, 1, 2);
+    assert_accepted(f, 1, "EQUIVALENT");
+    f->scene.width = 32;
+    render(f, f->from, 1, 2);
+    assert_refused(f, APPROVE_DIFFERENT, "NOT COMPARABLE: 32 x 64 pixels, stored are 64 x 64");
+    f->opt.why = "smaller is enough";
+    assert_accepted(f, 2, "NOT COMPARABLE");
+}
+
+static void states_have_names_and_orphans_are_found(void **state)
+{
+    struct fixture *f = *state;
+    struct suite suite = {.scene = &f->scene, .num_scenes = 1};
+    json_t *names;
+    struct err e;
+    assert_true(golden_orphans(f->golden, &suite, &names, &e));
+    assert_int_equal(json_object_size(names), 0); /* no directory yet */
+    json_decref(names);
+    render(f, f->golden, 1, 1);
+    strcpy(f->ref.engine, "povray");
+    render(f, f->golden, 1, 1);
+    assert_true(golden_orphans(f->golden, &suite, &names, &e));
+    assert_int_equal(json_object_size(names), 1);
+    assert_true(json_is_true(json_object_get(names, "12_plane/povray")));
+    json_decref(names);
+    assert_true(golden_remove(f->golden, "12_plane", "povray", &e));
+    assert_true(golden_remove(f->golden, "12_plane", "povray", &e)); /* gone: fine */
+    assert_true(golden_remove(f->golden, "12_other", "povray", &e));
+    struct golden g;
+    golden_inspect(f->golden, &f->scene, &f->ref, &g);
+    assert_int_equal(g.state, GOLDEN_MISSING);
+    golden_free(&g);
+    render(f, f->golden, 1, 1);
+    suite.num_scenes = 0;
+    assert_true(golden_orphans(f->golden, &suite, &names, &e));
+    assert_int_equal(json_object_size(names), 2);
+    json_decref(names);
+    assert_string_equal(golden_state_name(GOLDEN_STALE), "stale");
+}
+
+/* Renders a small reference of a real scene twice with one seed and once with another. */
+static void render_twice(struct fixture *f, const char *program, struct suite_scene scene,
+                         struct suite_reference ref)
+{
+    char path[4096], exr[256], hex[3][65], key[3][65];
+    if (!process_find(program, path, sizeof path))
+        skip();
+    for (int i = 0; i < 3; i++) {
+        const struct reference_options opt = {.seed = i < 2 ? 1 : 2,
+                                              .threads = 1 + i, /* threads do not matter */
+                                              .timeout_s = 600,
+                                              .work_dir = f->dir,
+                                              .share_dir = "reference"};
+        struct moments m = {0};
+        json_t *manifest = NULL;
+        struct err e;
+        if (!reference_key(&scene, &ref, &opt, key[i], &e) ||
+            !reference_render(&scene, &ref, &opt, &m, &manifest, &e) ||
+            !golden_write(f->from, scene.name, ref.engine, &m, manifest, &e))
+            fail_msg("%s", e.msg);
+        assert_string_equal(m.unit, "replicate");
+        snprintf(exr, sizeof exr, "%s/%s/%s.exr", f->from, scene.name, ref.engine);
+        assert_true(sha256_file(exr, hex[i], &e));
+        moments_free(&m);
+        json_decref(manifest);
+    }
+    assert_string_equal(hex[0], hex[1]);
+    assert_string_equal(key[0], key[1]);
+    assert_string_not_equal(hex[0], hex[2]);
+    assert_string_not_equal(key[0], key[2]);
+    ref.replicates++;
+    const struct reference_options opt = {.seed = 1, .work_dir = f->dir, .share_dir = "reference"};
+    struct err e;
+    assert_true(reference_key(&scene, &ref, &opt, key[2], &e));
+    assert_string_not_equal(key[0], key[2]);
+}
+
+static const struct suite_scene small_box = {.name = "41_cornell",
+                                             .dae = "reference/scenes/41_cornell.dae",
+                                             .sha256 = "abc",
+                                             .width = 8,
+                                             .height = 8,
+                                             .depth = 2};
+
+static void cycles_gives_the_same_bits_again(void **state)
+{
+    render_twice(*state, "blender", small_box,
+                 (struct suite_reference){.engine = "cycles", .replicates = 3, .spp = 4});
+}
+
+static void povray_gives_the_same_bits_again(void **state)
+{
+    render_twice(*state, "povray", small_box,
+                 (struct suite_reference){.engine = "povray", .replicates = 2, .subgrid = 1});
+}
+
+int main(void)
+{
+#define WITH_FILES(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
+    const struct CMUnitTest tests[] = {
+        WITH_FILES(a_new_one_has_to_be_called_new),
+        WITH_FILES(an_interrupted_approval_is_ended),
+        WITH_FILES(other_seeds_are_accepted_with_their_effect),
+        WITH_FILES(a_difference_needs_a_reason),
+        WITH_FILES(an_inconclusive_one_is_refused_whatever_is_said),
+        WITH_FILES(what_is_missing_or_damaged_is_refused),
+        WITH_FILES(a_stale_one_is_what_is_compared_with),
+        WITH_FILES(states_have_names_and_orphans_are_found),
+        WITH_FILES(cycles_gives_the_same_bits_again),
+        WITH_FILES(povray_gives_the_same_bits_again),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

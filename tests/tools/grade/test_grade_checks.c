@@ -1,0 +1,610 @@
+/* From pictures to points, with pictures whose truth is known: made here from gamma laws, written as 8-bit PNG by
+ * the assignment's curve, and read back as a student's would be.
+ *
+ * The scene: a gradient of mean .02 to .4, a lamp of radiance 8 in a corner. A sample is exponential (a pixel of spp of
+ * them is gamma), one draw for all three channels. The reference has 4096 samples; noise is known from it alone. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "renderer/image/tone.h"
+#include "tools/grade/grade_checks.h"
+#include "tools/grade/rate_image.h"
+
+#include <gsl/gsl_randist.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, SPP = 256, REFERENCE = 4096 };
+
+static gsl_rng *rng;
+static struct moments reference;
+static char dir[64];
+
+static bool is_lamp(size_t p)
+{
+    return p % WIDTH >= 8 && p % WIDTH < 16 && p / WIDTH < 8;
+}
+
+static double truth(size_t p, size_t c)
+{
+    if (is_lamp(p))
+        return 8;
+    return (0.02 + 0.38 * (double)(p / WIDTH) / HEIGHT) * (c == 0 ? 1.2 : c == 1 ? 1 : 0.7);
+}
+
+/* What a program does to the right picture. */
+struct bug {
+    double scale;  /* of everything */
+    double square; /* of the 8 x 8 pixels at 32,24 */
+    double noise;  /* samples for one */
+    int shift;     /* pixels to the right */
+    bool white, lamp_black;
+    bool mark; /* 48 x 5 pixels at the bottom left are of radiance 10 */
+};
+static const struct bug none = {.scale = 1, .square = 1, .noise = 1};
+
+static double with_bug(const struct bug *b, size_t p, size_t c)
+{
+    size_t x = p % WIDTH, y = p / WIDTH;
+    size_t from = b->shift > 0 && x >= (size_t)b->shift ? p - (size_t)b->shift : p;
+    double v = truth(from, c) * b->scale;
+    if (x >= 32 && x < 40 && y >= 24 && y < 32)
+        v *= b->square;
+    if (b->lamp_black && is_lamp(p))
+        v = 0;
+    if (b->mark && x < 48 && y >= HEIGHT - 5)
+        return 10;
+    return b->white ? 9 : v;
+}
+
+/* A render of spp samples as a file. The lamp has no noise. */
+static void write_picture(const char *name, const struct bug *b, double spp, char path[128])
+{
+    static uint8_t rgb8[3 * PIXELS];
+    struct err e;
+    for (size_t p = 0; p < PIXELS; p++) {
+        double g = gsl_ran_gamma(rng, spp * b->noise, 1 / (spp * b->noise));
+        for (size_t c = 0; c < 3; c++)
+            rgb8[3 * p + c] = tone_map(TONE_CGL, with_bug(b, p, c) * (is_lamp(p) ? 1 : g));
+    }
+    snprintf(path, 128, "%s/%s.png", dir, name);
+    if (!image_write_png(path, WIDTH, HEIGHT, rgb8, &e))
+        fail_msg("%s", e.msg);
+}
+
+/* M2 and M3 of an exponential law of the mean that was found: n mean^2, 2 n mean^3. */
+static void make_reference(struct moments *m)
+{
+    struct err e;
+    assert_true(moments_alloc(m, WIDTH, HEIGHT, &e));
+    for (size_t p = 0; p < PIXELS; p++) {
+        double g = gsl_ran_gamma(rng, REFERENCE, 1.0 / REFERENCE);
+        m->n[p] = REFERENCE;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+            m->mean[i] = truth(p, i - 3 * p) * (is_lamp(p) ? 1 : g);
+            m->m2[i] = is_lamp(p) ? 0 : REFERENCE * pow(m->mean[i], 2);
+            m->m3[i] = is_lamp(p) ? 0 : 2 * REFERENCE * pow(m->mean[i], 3);
+        }
+    }
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    rng = gsl_rng_alloc(gsl_rng_mt19937);
+    gsl_rng_set(rng, 20240607);
+    strcpy(dir, "/tmp/assay_grading_XXXXXX");
+    make_reference(&reference);
+    return mkdtemp(dir) == NULL;
+}
+
+static int tear_down(void **state)
+{
+    char command[128];
+    (void)state;
+    gsl_rng_free(rng);
+    moments_free(&reference);
+    snprintf(command, sizeof command, "rm -rf %s", dir);
+    return system(command);
+}
+
+static struct student read_back(const char *path)
+{
+    struct student s;
+    struct err e;
+    if (!student_read(path, "cgl", WIDTH, HEIGHT, &s, &e))
+        fail_msg("%s", e.msg);
+    return s;
+}
+
+static struct rubric *a_rubric(enum check_kind kind, int pictures)
+{
+    struct rubric *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    r->num_checks = r->num_parts = 1;
+    r->num_pictures = pictures;
+    struct rubric_check *c = &r->check[0];
+    c->kind = kind;
+    c->num_pictures = pictures;
+    c->points = 10;
+    c->image = (struct margin){0.01, 0.05, true};
+    c->tile = (struct margin){0.04, 0.2, true};
+    c->log_ratio = (struct margin){0.3, 1, true};
+    c->share = (struct margin){0.01, 0.2, true};
+    for (int i = 0; i < pictures; i++) {
+        c->picture[i] = i;
+        r->picture[i] = (struct rubric_picture){
+            .width = WIDTH, .height = HEIGHT, .spp = SPP, .reference = REFERENCE_OURS};
+        snprintf(r->picture[i].name, sizeof r->picture[i].name, "p%d", i);
+    }
+    return r;
+}
+
+/* One check on pictures with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
+static struct result check(enum check_kind kind, int num, const struct bug *const *bug,
+                           const double *spp, const int *asked, double alpha)
+{
+    struct rubric *r = a_rubric(kind, num);
+    struct handed_in *h = calloc(1, sizeof *h);
+    struct answers *a = calloc(1, sizeof *a);
+    struct result out;
+    struct err e;
+    assert_true(h != NULL && a != NULL);
+    for (int i = 0; i < num; i++) {
+        char path[128], name[16];
+        snprintf(name, sizeof name, "p%d", i);
+        write_picture(name, bug[i], spp[i], path);
+        h->picture[i] = read_back(path);
+        a->of[0][i].m = a->of[0][i].noise = reference;
+        if (asked != NULL)
+            r->picture[i].spp = asked[i];
+    }
+    if (!grading_check(r, &r->check[0], a, 0, h, alpha, &out, &e))
+        fail_msg("%s", e.msg);
+    for (int i = 0; i < num; i++)
+        student_free(&h->picture[i]);
+    free(r);
+    free(h);
+    free(a);
+    return out;
+}
+
+static struct result equal(const struct bug *bug, double spp, double alpha)
+{
+    return check(CHECK_EQUAL, 1, &bug, &spp, NULL, alpha);
+}
+
+/* By hand: distance 0 inside, linear between, the width of the interval counted. */
+static void points_follow_the_interval(void **state)
+{
+    (void)state;
+    const struct margin m = {0.02, 0.06, true};
+    const struct {
+        double lo, hi, share;
+    } cases[] = {
+        {-0.01, 0.01, 1},    {0.02, 0.03, 1}, {0.04, 0.05, 0.5},  {0.06, 0.07, 0},
+        {-0.05, -0.04, 0.5}, {-0.9, -0.8, 0}, {-0.06, 0.06, 1},   {-0.09, 0.09, 0.5},
+        {-0.12, 0.12, 0},    {-5, 5, 0},      {0.05, 0.05, 0.25},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const struct interval v = {(cases[i].lo + cases[i].hi) / 2, cases[i].lo, cases[i].hi, 0.01};
+        assert_true(fabs(score_share(&m, &v) - cases[i].share) < 1e-9);
+    }
+    /* Continuous: no step of the ends by 1e-4 changes it by more than 1e-4 over the narrower slope. */
+    for (double v = -0.2; v < 0.2; v += 1e-4) {
+        const struct interval a = {v, v - 0.01, v + 0.01, 0.002},
+                              b = {v + 1e-4, v - 0.01 + 1e-4, v + 0.01 + 1e-4, 0.002};
+        assert_true(fabs(score_share(&m, &a) - score_share(&m, &b)) <= 1e-4 / 0.04 + 1e-12);
+    }
+    /* 5 sd to the loss of points on one side, 15 on the other: Q(5) = 2.87e-7. */
+    const struct interval at = {0.02, 0.01, 0.03, 0.002};
+    const struct margin wide = {0.02, 0.06, true};
+    assert_true(fabs(score_chance(&wide, &at) / 2.866516e-7 - 1) < 1e-3);
+    const struct interval between = {0.05, 0.04, 0.06, 0.002};
+    assert_true(score_chance(&wide, &between) == 1);
+}
+
+/* What is printed is the chance itself: 20 000 further runs, normal around the estimate, for each place of it. H0: they get
+ * other points as often as it says; 5 standard deviations of that count (binomial), over 60 places, alpha below 1e-4. */
+static void the_chance_is_that_of_another_run(void **state)
+{
+    (void)state;
+    enum { RUNS = 20000 };
+    const struct margin m = {0.02, 0.06, true};
+    int places = 0, likely = 0;
+    for (double at = 0; at < 0.12; at += 0.002) {
+        const double sd = 0.004, half = 0.01;
+        const struct interval i = {at, at - half, at + half, sd};
+        double share = score_share(&m, &i), chance = score_chance(&m, &i);
+        if (share > 0 && share < 1)
+            continue; /* where every run has others */
+        int other = 0;
+        for (int k = 0; k < RUNS; k++) {
+            double v = at + gsl_ran_gaussian(rng, sd);
+            const struct interval again = {v, v - half, v + half, sd};
+            other += score_share(&m, &again) != share;
+        }
+        if (fabs(other - RUNS * chance) > 5 * sqrt(RUNS * chance * (1 - chance)) + 1)
+            fail_msg("at %g: %d of %d runs have other points, %g is said", at, other, RUNS, chance);
+        places++;
+        likely += chance > 0.1;
+    }
+    assert_true(places >= 30 && likely >= 3);
+}
+
+/* Of a right program: below 1e-4, printed, and no point is lost. Control: one that is off by as much as costs nothing. */
+static void a_right_program_keeps_its_score(void **state)
+{
+    (void)state;
+    enum { RUNS = 100 };
+    double most = 0;
+    for (int k = 0; k < RUNS; k++) {
+        struct result r = equal(&none, SPP, 1e-5);
+        assert_true(r.share == 1);
+        most = fmax(most, r.chance);
+        result_free(&r);
+    }
+    printf("largest chance of other points, of %d right pictures: %.2g\n", RUNS, most);
+    assert_true(most < 1e-4);
+    const struct bug near = {.scale = 1.03, .square = 1, .noise = 1};
+    struct result r = equal(&near, SPP, 1e-5);
+    assert_true(r.chance > 1e-4);
+    result_free(&r);
+}
+
+/* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 pictures; by
+ * chance more than 34 have a probability below 1e-3 (binomial). Control: 3 % too bright. */
+static void a_right_picture_keeps_its_points(void **state)
+{
+    (void)state;
+    enum { RUNS = 400 };
+    int misses = 0, lost = 0, found = 0;
+    for (int k = 0; k < RUNS; k++) {
+        struct result r = equal(&none, SPP, 0.05);
+        bool miss = false;
+        for (int c = 0; c < NUM_CHANNELS; c++)
+            miss |= interval_distance(&r.agreement.image[c]) > 0;
+        miss |= interval_distance(&r.agreement.tile) > 0;
+        misses += miss;
+        lost += r.share < 1;
+        assert_true(r.agreement.tiles >= 40);
+        result_free(&r);
+    }
+    if (misses > 34)
+        fail_msg("%d of %d intervals miss the truth", misses, RUNS);
+    printf("intervals that miss the truth at 5 %%: %d of %d; less than full points: %d\n", misses,
+           RUNS, lost);
+    assert_int_equal(lost, 0);
+    const struct bug bright = {.scale = 1.03, .square = 1, .noise = 1};
+    for (int k = 0; k < 40; k++) {
+        struct result r = equal(&bright, SPP, 0.05);
+        found += interval_distance(&r.agreement.image[CHANNEL_LUMINANCE]) > 0;
+        result_free(&r);
+    }
+    assert_int_equal(found, 40);
+}
+
+/* Noisier than ours by 4, or by a quarter: known from the picture, still right. By 100: too noisy to be worth points. */
+static void noise_is_not_bias(void **state)
+{
+    (void)state;
+    static const double samples[] = {0.25, 1, 4};
+    for (int i = 0; i < 3; i++) {
+        struct bug b = none;
+        b.noise = samples[i];
+        struct result r = equal(&b, SPP, 1e-5);
+        if (r.share < 1)
+            fail_msg("samples x %g: %g points, %s", samples[i], r.share, r.seen);
+        assert_true(fabs(log(r.agreement.kappa * samples[i])) < 0.3);
+        result_free(&r);
+    }
+    struct bug b = none;
+    b.noise = 1.0 / 64;
+    struct result r = equal(&b, SPP, 1e-5);
+    assert_true(r.share < 1);
+    result_free(&r);
+}
+
+static void bugs_cost_points(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        struct bug bug;
+        double most; /* share of the points that may be left */
+    } bugs[] = {
+        {"20 % too bright", {.scale = 1.2, .square = 1, .noise = 1}, 0},
+        {"a dark square", {.scale = 1, .square = 0.5, .noise = 1}, 0},
+        {"black", {.scale = 0, .square = 1, .noise = 1}, 0},
+        {"white", {.scale = 1, .square = 1, .noise = 1, .white = true}, 0},
+        {"no lamp", {.scale = 1, .square = 1, .noise = 1, .lamp_black = true}, 0},
+        {"shifted by 8", {.scale = 1, .square = 1, .noise = 1, .shift = 8}, 0},
+        {"4 % too bright", {.scale = 1.04, .square = 1, .noise = 1}, 0.9},
+    };
+    for (size_t i = 0; i < sizeof bugs / sizeof *bugs; i++) {
+        struct result r = equal(&bugs[i].bug, SPP, 1e-5);
+        if (r.share > bugs[i].most)
+            fail_msg("%s: %g of the points are left: %s", bugs[i].name, r.share, r.seen);
+        result_free(&r);
+    }
+}
+
+/* The reference as a file, with the noise that it has and no other. */
+static void a_copy_of_the_reference_is_seen(void **state)
+{
+    (void)state;
+    static uint8_t rgb8[3 * PIXELS];
+    char path[128];
+    struct err e;
+    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
+    struct handed_in *h = calloc(1, sizeof *h);
+    struct answers *a = calloc(1, sizeof *a);
+    struct result out;
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        rgb8[i] = tone_map(TONE_CGL, reference.mean[i]);
+    snprintf(path, sizeof path, "%s/copy.png", dir);
+    assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
+    h->picture[0] = read_back(path);
+    a->of[0][0].m = a->of[0][0].noise = reference;
+    assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+    assert_true(out.share == 0);
+    assert_non_null(strstr(out.flag, "copy"));
+    result_free(&out);
+    student_free(&h->picture[0]);
+    free(r);
+    free(h);
+    free(a);
+}
+
+/* What is accepted: everything 1.2 times as bright. A program that does that loses nothing, one that has a dark square besides
+ * does, one that is right or 1.5 times too bright is not said to have it. */
+static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
+{
+    (void)state;
+    static const struct {
+        struct bug bug;
+        int set;
+        double share;
+    } cases[] = {{{.scale = 1.2, .square = 1, .noise = 1}, 1, 1},
+                 {{.scale = 1.2, .square = 0.5, .noise = 1}, 0, 0},
+                 {{.scale = 1, .square = 1, .noise = 1}, 0, 1},
+                 {{.scale = 1.5, .square = 1, .noise = 1}, 0, 0}};
+    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
+    struct answers *a = calloc(1, sizeof *a);
+    struct err e;
+    assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
+    r->num_sets = 2;
+    strcpy(r->set[1].name, "bright");
+    a->of[0][0].m = a->of[0][0].noise = reference;
+    struct moments *m = &a->of[1][0].m;
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        m->n[i / 3] = REFERENCE;
+        m->mean[i] = 1.2 * reference.mean[i];
+        m->m2[i] = 1.2 * 1.2 * reference.m2[i];
+        m->m3[i] = 1.2 * 1.2 * 1.2 * reference.m3[i];
+    }
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct handed_in *h = calloc(1, sizeof *h);
+        struct result out;
+        char path[128];
+        int set = -1;
+        assert_non_null(h);
+        write_picture("accepted", &cases[k].bug, SPP, path);
+        h->picture[0] = read_back(path);
+        if (!grading_all(r, a, h, 1e-5, &out, &set, &e))
+            fail_msg("%s", e.msg);
+        if (set != cases[k].set || out.share != cases[k].share)
+            fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
+        assert_string_equal(out.accepted, set == 1 ? "bright" : "");
+        result_free(&out);
+        student_free(&h->picture[0]);
+        free(h);
+    }
+    moments_free(m);
+    free(a);
+    free(r);
+}
+
+/* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
+static void a_watermark_is_masked(void **state)
+{
+    (void)state;
+    static const struct {
+        int mask[4];
+        struct bug bug;
+        bool all;
+    } cases[] = {{{0, 0, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, true},
+                 {{0, 0, 0, 0}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 1, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
+                 {{0, 0, 48, 5}, {.scale = 1, .square = 0.5, .noise = 1, .mark = true}, false}};
+    for (int kind = 0; kind < 2; kind++)
+        for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+            struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
+            struct handed_in *h = calloc(1, sizeof *h);
+            struct answers *a = calloc(1, sizeof *a);
+            struct result out;
+            struct err e;
+            char path[128];
+            assert_true(h != NULL && a != NULL);
+            memcpy(r->mask, cases[k].mask, sizeof r->mask);
+            write_picture("mark", &cases[k].bug, SPP, path);
+            h->picture[0] = read_back(path);
+            a->of[0][0].m = a->of[0][0].noise = reference;
+            assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+            if ((out.share == 1) != cases[k].all)
+                fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
+            result_free(&out);
+            student_free(&h->picture[0]);
+            free(r);
+            free(h);
+            free(a);
+        }
+}
+
+static void two_estimators_agree_or_not(void **state)
+{
+    (void)state;
+    const struct bug bright = {.scale = 1.2, .square = 1, .noise = 1},
+                     noisy = {.scale = 1, .square = 1, .noise = 0.3};
+    const double spp[] = {SPP, SPP};
+    struct result r =
+        check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &noisy}, spp, NULL, 1e-5);
+    if (r.share < 1)
+        fail_msg("%g: %s", r.share, r.seen);
+    result_free(&r);
+    r = check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &bright}, spp, NULL, 1e-5);
+    assert_true(r.share == 0);
+    result_free(&r);
+}
+
+/* A third and two thirds; the lamp in all of them is saturated and says nothing. */
+static void parts_add_up_or_not(void **state)
+{
+    (void)state;
+    const struct bug third = {.scale = 1.0 / 3, .square = 1, .noise = 1},
+                     rest = {.scale = 2.0 / 3, .square = 1, .noise = 1};
+    const double spp[] = {4 * SPP, 4 * SPP, 4 * SPP};
+    struct result r =
+        check(CHECK_SUM, 3, (const struct bug *const[]){&none, &third, &rest}, spp, NULL, 1e-5);
+    if (r.share < 1)
+        fail_msg("%g: %s", r.share, r.seen);
+    result_free(&r);
+    r = check(CHECK_SUM, 3, (const struct bug *const[]){&none, &rest, &rest}, spp, NULL, 1e-5);
+    assert_true(r.share == 0);
+    result_free(&r);
+}
+
+/* The second picture is asked for with 16 times the samples, and has them; or has as many as the first. */
+static void noise_falls_or_not(void **state)
+{
+    (void)state;
+    const struct bug *const two[] = {&none, &none};
+    const int asked[] = {SPP / 4, 4 * SPP};
+    struct result r = check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 4 * SPP}, asked, 1e-5);
+    if (r.share < 1)
+        fail_msg("%g: %s", r.share, r.seen);
+    result_free(&r);
+    r = check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, SPP / 4}, asked, 1e-5);
+    if (r.share > 0)
+        fail_msg("%g: %s", r.share, r.seen);
+    result_free(&r);
+}
+
+static void pixels_are_exact_or_not(void **state)
+{
+    (void)state;
+    const struct bug *right = &none;
+    const struct bug square = {.scale = 1, .square = 0.2, .noise = 1};
+    const struct bug *wrong = &square;
+    const double spp = SPP;
+    struct result r = check(CHECK_EXACT, 1, &right, &spp, NULL, 1e-5);
+    if (r.share < 1)
+        fail_msg("%g: %s", r.share, r.seen);
+    result_free(&r);
+    r = check(CHECK_EXACT, 1, &wrong, &spp, NULL, 1e-5);
+    assert_true(r.share < 1);
+    assert_non_null(strstr(r.seen, "64 of 3072 pixels differ (2.08 %), the first at 32,24"));
+    result_free(&r);
+}
+
+/* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
+static void rates_are_whole_batches_or_not(void **state)
+{
+    (void)state;
+    static uint8_t rgb8[3 * PIXELS];
+    char path[128];
+    struct rates r;
+    struct err e;
+    static double ours[PIXELS];
+    snprintf(path, sizeof path, "%s/rate.png", dir);
+    for (size_t p = 0; p < PIXELS; p++) {
+        const uint8_t quarter[3] = {0, 127, 127}, all[3] = {255, 0, 0}, odd[3] = {0, 60, 195};
+        ours[p] = p < 1024 ? 16 : 64;
+        memcpy(rgb8 + 3 * p, p < 1024 ? quarter : p < 3000 ? all : odd, 3);
+    }
+    assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
+    assert_true(rates_read(path, WIDTH, HEIGHT, 64, 16, ours, &r, &e));
+    assert_true(r.odd == PIXELS - 3000);
+    assert_true(r.early == 1024 + PIXELS - 3000);
+    /* The odd ones (rate .118 of 64 is 7.5) are nearest to 16: 72 pixels have 48 too few. */
+    double mean = (1024.0 * 16 + 1976.0 * 64 + 72.0 * 16) / PIXELS,
+           right = (1024.0 * 16 + 2048.0 * 64) / PIXELS;
+    assert_true(fabs(r.mean - mean) < 1e-9 && fabs(r.more - (mean / right - 1)) < 1e-9);
+    assert_true(fabs(r.sd * right - 48 * sqrt(72.0 / PIXELS * (1 - 72.0 / PIXELS) / PIXELS)) <
+                1e-9);
+    assert_false(rates_read(path, 32, 32, 64, 16, ours, &r, &e));
+    assert_false(rates_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
+}
+
+/* Files that are no pictures, and one that says it is large: the header alone is read. */
+static void bad_pictures_get_a_line(void **state)
+{
+    (void)state;
+    static const unsigned char bomb[] = {
+        0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49,
+        0x48, 0x44, 0x52, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x08, 0x02,
+        0x00, 0x00, 0x00, 0xe3, 0xe6, 0xa7, 0xb4, 0,    0,    0,    16,   'I',  'D',
+        'A',  'T',  0x78, 0x9c, 0,    0,    0,    0,    0,    0,    0,    0,    0,
+        0,    0,    0,    0,    0,    0,    0,    0,    0};
+    static const struct {
+        const char *name;
+        const void *bytes;
+        size_t size;
+    } files[] = {{"empty", "", 0},
+                 {"text", "not a picture", 13},
+                 {"short", "\x89PNG", 4},
+                 {"bomb", bomb, sizeof bomb},
+                 {"pfm", "PF\n100000 100000\n-1.0\n", 22},
+                 {"nan", "PF\n64 48\n-1.0\n", 14},
+                 {"svg", "<svg></svg>", 11}};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        char path[128];
+        struct student s;
+        struct err e = {""};
+        snprintf(path, sizeof path, "%s/%s", dir, files[i].name);
+        FILE *f = fopen(path, "wb");
+        assert_non_null(f);
+        fwrite(files[i].bytes, 1, files[i].size, f);
+        for (int k = 0; k < 3 * PIXELS && strcmp(files[i].name, "nan") == 0; k++)
+            fwrite(&(float){(float)NAN}, sizeof(float), 1, f);
+        fclose(f);
+        assert_false(student_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
+        assert_true(e.msg[0] != '\0' && strchr(e.msg, '\n') == NULL);
+        if (strcmp(files[i].name, "bomb") == 0)
+            assert_non_null(strstr(e.msg, "65536 x 65536"));
+    }
+    struct student s;
+    struct err e;
+    char path[128];
+    write_picture("right", &none, SPP, path);
+    assert_false(student_read(path, "cgl", WIDTH, WIDTH, &s, &e));
+    assert_string_equal(e.msg, "the picture is 64 x 48 pixels, not 64 x 64");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points_follow_the_interval),
+        cmocka_unit_test(the_chance_is_that_of_another_run),
+        cmocka_unit_test(a_right_program_keeps_its_score),
+        cmocka_unit_test(a_right_picture_keeps_its_points),
+        cmocka_unit_test(noise_is_not_bias),
+        cmocka_unit_test(bugs_cost_points),
+        cmocka_unit_test(a_copy_of_the_reference_is_seen),
+        cmocka_unit_test(what_is_accepted_costs_nothing_and_hides_nothing),
+        cmocka_unit_test(a_watermark_is_masked),
+        cmocka_unit_test(two_estimators_agree_or_not),
+        cmocka_unit_test(parts_add_up_or_not),
+        cmocka_unit_test(noise_falls_or_not),
+        cmocka_unit_test(pixels_are_exact_or_not),
+        cmocka_unit_test(rates_are_whole_batches_or_not),
+        cmocka_unit_test(bad_pictures_get_a_line),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,257 @@
+/* Rubrics: what is read, and that every mistake is named with its line. Each text below has one mistake (or those
+ * that are listed), put in by hand. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "tools/grade/rubric.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static struct suite suite;
+static struct rubric *rubric;
+static struct rubric_mistakes mistakes;
+
+static int load(void **state)
+{
+    (void)state;
+    struct err e;
+    rubric = calloc(1, sizeof *rubric);
+    if (rubric == NULL || !suite_load("reference/scenes", &suite, &e))
+        fail_msg("%s", rubric == NULL ? "memory" : e.msg);
+    return 0;
+}
+
+static int unload(void **state)
+{
+    (void)state;
+    suite_free(&suite);
+    free(rubric);
+    return 0;
+}
+
+static void read_text(const char *text)
+{
+    char path[] = "/tmp/assay_rubric_XXXXXX";
+    int fd = mkstemp(path);
+    struct err e;
+    assert_true(fd >= 0);
+    assert_int_equal(write(fd, text, strlen(text)), (ssize_t)strlen(text));
+    close(fd);
+    if (!rubric_read(path, &suite, rubric, &mistakes, &e))
+        fail_msg("%s", e.msg);
+    unlink(path);
+}
+
+static const char head[] = "rubric A course\n"           /* 1 */
+                           "picture p\n"                 /* 2 */
+                           " scene 12_point_plane\n"     /* 3 */
+                           " size 64 64\n"               /* 4 */
+                           " spp 16\n"                   /* 5 */
+                           " bounces 1\n"                /* 6 */
+                           " reference truth\n"          /* 7 */
+                           "part 1 Light  # a remark\n"; /* 8 */
+static const char check[] = "check c 4 equal p\n"        /* 9 */
+                            " image 0.01 0.05\n"         /* 10 */
+                            " tile 0.03 0.1\n";          /* 11 */
+
+/* The text has one mistake, in that line, with these words. */
+static void expect(int line, const char *words, const char *text)
+{
+    read_text(text);
+    for (int i = 0; i < mistakes.num; i++)
+        if (mistakes.num != 1 || mistakes.at[i].line != line ||
+            strstr(mistakes.at[i].text, words) == NULL)
+            fail_msg("expected %d: %s, got %d mistakes, %d: %s", line, words, mistakes.num,
+                     mistakes.at[i].line, mistakes.at[i].text);
+    assert_int_equal(mistakes.num, 1);
+}
+
+/* A line of head, or of check, replaced by another. */
+static const char *with(int line, const char *other)
+{
+    static char out[4096];
+    char text[2048];
+    size_t n = 0;
+    int k = 0;
+    snprintf(text, sizeof text, "%s%s", head, check);
+    for (char *at = text; *at != '\0'; at += strcspn(at, "\n") + 1) {
+        bool here = ++k == line;
+        int length = (int)(here ? strlen(other) : strcspn(at, "\n"));
+        n += (size_t)snprintf(out + n, sizeof out - n, "%.*s\n", length, here ? other : at);
+    }
+    return out;
+}
+
+static void a_right_one_is_read(void **state)
+{
+    (void)state;
+    read_text(with(0, ""));
+    if (mistakes.num > 0)
+        fail_msg("%d: %s", mistakes.at[0].line, mistakes.at[0].text);
+    assert_string_equal(rubric->title, "A course");
+    assert_int_equal(rubric->num_pictures, 1);
+    assert_int_equal(rubric->picture[0].spp, 16);
+    assert_int_equal(rubric->picture[0].lights, 1);
+    assert_int_equal(rubric->picture[0].reference, REFERENCE_TRUTH);
+    assert_string_equal(rubric->part[0].title, "Light");
+    assert_int_equal(rubric->num_checks, 1);
+    assert_int_equal(rubric->check[0].kind, CHECK_EQUAL);
+    assert_true(rubric->check[0].points == 4 && rubric->check[0].image.full == 0.01 &&
+                rubric->check[0].tile.none == 0.1);
+    assert_string_equal(rubric->check[0].visibility, "visible");
+    assert_string_equal(rubric->curve, "cgl");
+    assert_non_null(strstr(rubric->command, "{scene}"));
+    assert_true(rubric_points(rubric) == 4);
+}
+
+static void the_shipped_ones_are_right(void **state)
+{
+    (void)state;
+    static const char *const paths[] = {"tools/rubrics/cs184.rubric",
+                                        "tools/rubrics/template.rubric",
+                                        "tools/rubrics/deviations.rubric"};
+    static const double points[] = {137, 10, 10};
+    static const int sets[] = {4, 1, 8};
+    struct err e;
+    for (int i = 0; i < 3; i++) {
+        assert_true(rubric_read(paths[i], &suite, rubric, &mistakes, &e));
+        if (mistakes.num > 0)
+            fail_msg("%s:%d: %s", paths[i], mistakes.at[0].line, mistakes.at[0].text);
+        assert_true(rubric_points(rubric) == points[i]);
+        assert_int_equal(rubric->num_sets, sets[i]);
+    }
+    /* Every choice, by its bits. */
+    assert_string_equal(rubric->set[0].name, "");
+    assert_string_equal(rubric->set[5].name, "light_pdf, camera_crop");
+    assert_string_equal(rubric->set[5].words, "--starter light-pdf --frame crop");
+    assert_false(rubric_read("/nowhere.rubric", &suite, rubric, &mistakes, &e));
+    assert_non_null(strstr(e.msg, "/nowhere.rubric: cannot read"));
+}
+
+static void each_mistake_is_named_with_its_line(void **state)
+{
+    (void)state;
+    static const struct {
+        int at, line;
+        const char *other, *words;
+    } cases[] = {
+        {1, 1, "rubric", "needs a text"},
+        {1, 1, "", "no 'rubric TITLE'"},
+        {1, 1, "rubric a\ncurve film", "curve 'film'"},
+        {1, 1, "rubric a\ncommand ./x {scene} {outt} {out}", "{outt}"},
+        {1, 1, "rubric a\ncommand ./x {scene}", "without {out}"},
+        {1, 1, "rubric a\noutput ../x.png", "no file name"},
+        {1, 1, "rubric a\noutput x.jpg", "no file name"},
+        {1, 1, "rubric a\nprogram /bin/sh", "not inside"},
+        {1, 1, "rubric a\ntotal 5", "add up to 4"},
+        {1, 1, "rubric a\nbugs nowhere", "no directory 'nowhere'"},
+        {1, 2, "rubric a\nbugs a/b", "no name"},
+        {1, 3, "rubric a\nbugs a\nbugs b", "a second 'bugs'"},
+        {1, 2, "rubric a\nlimit patience 5", "limit patience"},
+        {1, 2, "rubric a\nlimit wall long", "limit wall"},
+        {1, 2, "rubric a\nrubric b", "second"},
+        {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
+        {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
+        {1, 2, "rubric a\naccept slow", "needs a text"},
+        {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
+        {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},
+        {7, 8, " reference truth\n accept x nowhere.exr", "no file"},
+        {2, 2, "picture p/q", "no name"},
+        {3, 3, " scene 99_nothing", "no scene"},
+        {3, 3, " scene nowhere.dae", "no file"},
+        {4, 4, " size 64", "needs a whole number"},
+        {4, 4, " size 60 60", "whole tiles"},
+        {5, 5, " spp many", "spp"},
+        {6, 6, " bounces", "needs a whole number"},
+        {7, 7, " reference luck", "reference 'luck'"},
+        {7, 2, " bounces 3\n reference cycles", "the golden of"},
+        {7, 7, " referense truth", "'referense'"},
+        {8, 8, "part 1 Light\npart 2 Nothing", "has no checks"},
+        {9, 9, "check c 4 equal q", "no picture 'q'"},
+        {9, 9, "check c four equal p", "points"},
+        {9, 9, "check c 4 equals p", "'equals'"},
+        {9, 9, "check c 0 equal p", "worth nothing"},
+        {9, 9, "check c 4 equal p p", "takes 1"},
+        {10, 10, " image 0.05 0.01", "must be less"},
+        {10, 10, " image 0.01 0.05 0.1", "too much"},
+        {10, 9, "", "needs 'image'"},
+        {10, 10, " imagine 0.01 0.05", "'imagine'"},
+        {11, 9, " tile 0.1 0.2\n ratio 0.1 0.2", "not for 'equal'"},
+        {11, 9, " tile 0.1 0.2\n visibility never", "'never'"},
+        {11, 12, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2", "already in line 9"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        read_text(with(cases[i].at, cases[i].other));
+        bool found = false;
+        for (int k = 0; k < mistakes.num; k++)
+            found |= strstr(mistakes.at[k].text, cases[i].words) != NULL;
+        if (!found || mistakes.num < 1)
+            fail_msg("case %zu (%s): no '%s' among %d mistakes, the first: %s", i, cases[i].other,
+                     cases[i].words, mistakes.num, mistakes.num > 0 ? mistakes.at[0].text : "");
+    }
+    /* The line too, where there is one mistake only. */
+    expect(4, "needs a whole number", with(4, " size 64"));
+    expect(10, "must be less", with(10, " image 0.05 0.01"));
+    expect(9, "needs 'image'", with(10, ""));
+    expect(7, "'refer?[31mense?'", with(7, " refer\x1b[31mense\x7f truth\n reference truth"));
+    expect(7, "'referense'", with(7, " referense truth\n reference truth"));
+    expect(12, "already in line 9",
+           with(11, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2"));
+}
+
+static void all_mistakes_are_found_at_once(void **state)
+{
+    (void)state;
+    read_text(with(4, " size 64 64\n sise 4 4\n spp -1"));
+    assert_true(mistakes.num >= 2);
+    for (int i = 1; i < mistakes.num; i++)
+        assert_true(mistakes.at[i - 1].line <= mistakes.at[i].line);
+    read_text("");
+    assert_int_equal(mistakes.num, 2); /* no title, no checks */
+}
+
+/* Bytes that are no text, lines without end, more of everything than there is room for. */
+static void rubbish_is_survived(void **state)
+{
+    (void)state;
+    static char text[1 << 18];
+    srand(7);
+    for (int round = 0; round < 50; round++) {
+        size_t n = (size_t)rand() % (sizeof text - 1);
+        for (size_t i = 0; i < n; i++)
+            text[i] = (char)(1 + rand() % 255);
+        text[n] = '\0';
+        read_text(text);
+        assert_true(mistakes.num > 0);
+    }
+    size_t n = 0;
+    for (int i = 0; i < 400; i++)
+        n += (size_t)sprintf(text + n,
+                             "picture p%d\npart %d x\ncheck c%d 1 equal p%d\naccept a b.exr\n", i,
+                             i, i, i);
+    read_text(text);
+    assert_true(mistakes.num > 64);
+    memset(text, 'x', 100000);
+    text[100000] = '\0';
+    read_text(text);
+    assert_true(mistakes.num >= 1);
+    assert_non_null(strstr(mistakes.at[0].text, "longer than"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_right_one_is_read),
+        cmocka_unit_test(the_shipped_ones_are_right),
+        cmocka_unit_test(each_mistake_is_named_with_its_line),
+        cmocka_unit_test(all_mistakes_are_found_at_once),
+        cmocka_unit_test(rubbish_is_survived),
+    };
+    return cmocka_run_group_tests(tests, load, unload);
+}

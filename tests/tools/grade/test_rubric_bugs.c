@@ -1,0 +1,212 @@
+/* Bugs named by 8-bit pictures alone, with the catalogue that ships. Pictures are made here of what the catalogue says: flat
+ * cells of the right mean and of the bug's effect, normal noise of as much as a render of ours has, written as PNG by the
+ * assignment's curve and read back. So this is about codes, clipping and noise; what real renders give is measured by
+ * make grade-show. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "renderer/base/fs.h"
+#include "renderer/image/tone.h"
+#include "tools/grade/rubric_bugs.h"
+
+#include <gsl/gsl_randist.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static gsl_rng *rng;
+static struct suite suite;
+static struct rubric *rubric;
+static struct answers *answers;
+static struct rubric_bugs bugs;
+static char dir[64];
+
+static const struct view *view_of(int picture, int set)
+{
+    char name[128], key[65];
+    struct err e;
+    if (!rubric_bugs_key(rubric, picture, set, name, key, &e))
+        fail_msg("%s", e.msg);
+    return catalogue_view(&bugs.catalogue, name);
+}
+
+/* The first of the three values of pixel p's cell; the variance of a pixel of one picture. */
+static int value_at(const struct view *v, size_t p)
+{
+    size_t cell = (size_t)v->correct.cell, width = (size_t)v->width;
+    return 3 * (int)(p / width / cell * (size_t)v->correct.columns + p % width / cell);
+}
+
+static double variance_at(const struct view *v, int spp, int i)
+{
+    return v->correct.var[i] * v->correct.n / spp;
+}
+
+/* Flat cells, so that cells of the reference are those of the catalogue. */
+static void make_answer(const struct view *v, int picture, struct moments *m)
+{
+    const struct rubric_picture *p = &rubric->picture[picture];
+    struct err e;
+    assert_true(moments_alloc(m, p->width, p->height, &e));
+    for (size_t i = 0; i < 3 * (size_t)p->width * (size_t)p->height; i++) {
+        int at = value_at(v, i / 3) + (int)(i % 3);
+        double n = p->reference_spp;
+        m->n[i / 3] = n;
+        m->mean[i] = v->correct.mean[at];
+        m->m2[i] = variance_at(v, p->spp, at) * p->spp * (n - 1);
+    }
+}
+
+static int set_up(void **state)
+{
+    struct rubric_mistakes mistakes;
+    struct err e;
+    (void)state;
+    rng = gsl_rng_alloc(gsl_rng_mt19937);
+    gsl_rng_set(rng, 20261121);
+    strcpy(dir, "/tmp/assay_bugs_XXXXXX");
+    rubric = calloc(1, sizeof *rubric);
+    answers = calloc(1, sizeof *answers);
+    if (mkdtemp(dir) == NULL || rubric == NULL || answers == NULL ||
+        !suite_load("reference/scenes", &suite, &e) ||
+        !rubric_read("tools/rubrics/cs184.rubric", &suite, rubric, &mistakes, &e) ||
+        mistakes.num > 0 || !catalogue_read("tools/rubrics/cs184-bugs", &bugs.catalogue, &e))
+        return -1;
+    for (int k = 0; k < rubric->num_sets; k++)
+        for (int i = 0; i < rubric->num_pictures; i++) {
+            /* All deviations together may look like one of them. */
+            const struct view *v = view_of(i, k);
+            for (int j = 1; j < k && v == NULL && k == rubric->num_sets - 1; j++)
+                v = view_of(i, j);
+            if (v != NULL)
+                make_answer(v, i, &answers->of[k][i].m);
+        }
+    catalogue_free(&bugs.catalogue);
+    return rubric_bugs_open(rubric, answers, &bugs, &e) ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+    struct err e;
+    (void)state;
+    rubric_bugs_close(&bugs);
+    answers_free(answers);
+    free(answers);
+    free(rubric);
+    suite_free(&suite);
+    gsl_rng_free(rng);
+    return remove_tree(dir, &e) ? 0 : -1;
+}
+
+/* bug -1: none. Noise: variance over ours. */
+static void hand_in(int set, int bug, double noise, struct handed_in *h)
+{
+    static uint8_t rgb8[3 * 128 * 96];
+    for (int i = 0; i < rubric->num_pictures; i++) {
+        const struct rubric_picture *p = &rubric->picture[i];
+        char path[128];
+        struct err e;
+        if (bugs.view[set][i] < 0)
+            continue;
+        const struct view *v = &bugs.catalogue.view[bugs.view[set][i]];
+        const struct effect *effect = bug >= 0 ? v->effect[bug] : NULL;
+        for (size_t k = 0; k < 3 * (size_t)p->width * (size_t)p->height; k++) {
+            int at = value_at(v, k / 3) + (int)(k % 3);
+            double sd = sqrt(noise * variance_at(v, p->spp, at));
+            double mean = v->correct.mean[at] + (effect != NULL ? (double)effect->mean[at] : 0);
+            rgb8[k] = tone_map(TONE_CGL, fmax(0, mean + gsl_ran_gaussian(rng, sd)));
+        }
+        snprintf(path, sizeof path, "%s/%s.png", dir, p->name);
+        if (!image_write_png(path, p->width, p->height, rgb8, &e) ||
+            !student_read(path, rubric->curve, p->width, p->height, &h->picture[i], &e))
+            fail_msg("%s", e.msg);
+    }
+}
+
+/* The name of the likeliest, "" if there is none. */
+static const char *name(int set, int bug, double noise, int graded, int *with, int *named)
+{
+    struct handed_in *h = calloc(1, sizeof *h);
+    struct diagnosis found;
+    struct err e;
+    assert_non_null(h);
+    hand_in(set, bug, noise, h);
+    if (!rubric_bugs_diagnose(&bugs, rubric, answers, h, graded, 1e-5, &found, with, &e))
+        fail_msg("%s", e.msg);
+    for (int i = 0; i < rubric->num_pictures; i++)
+        student_free(&h->picture[i]);
+    free(h);
+    *named = found.num_named;
+    return found.num_named > 0 ? bugs.catalogue.bug[found.candidate[0].bug].name : "";
+}
+
+/* H0: right programs are told a name with a probability of at most 1e-5 a set. 6 of them, as noisy as ours and 4 times so; and
+ * those with the first accepted deviation, which are graded with it. */
+static void right_pictures_have_no_name(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        int with, named, set = k % 2;
+        const char *bug = name(set, -1, k % 4 < 2 ? 1 : 4, set, &with, &named);
+        if (named > 0)
+            fail_msg("set %d is said to be %s", set, bug);
+    }
+}
+
+/* Bugs of all parts, each with its name first; on top of the accepted deviation as well, graded with it or not. */
+static void bugs_have_their_names(void **state)
+{
+    static const char *const known[] = {
+        "cosine_missing", "diffuse_without_pi",      "depth_one_short", "emission_twice",
+        "mirror_back",    "metal_without_shadowing", "sphere_far_hit",  "roulette_not_divided"};
+    (void)state;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        int bug = catalogue_bug(&bugs.catalogue, known[i]), with, named;
+        assert_true(bug >= 0);
+        const char *found = name(0, bug, 1, 0, &with, &named);
+        if (strcmp(found, known[i]) != 0 || with != 0)
+            fail_msg("%s: '%s', set %d", known[i], found, with);
+    }
+    for (int graded = 0; graded < 2; graded++) {
+        int bug = catalogue_bug(&bugs.catalogue, "indirect_missing"), with, named;
+        const char *found = name(1, bug, 1, graded, &with, &named);
+        if (strcmp(found, "indirect_missing") != 0 || with != 1)
+            fail_msg("on top of set 1, graded with %d: '%s', set %d", graded, found, with);
+    }
+}
+
+static void every_bug_is_in_it(void **state)
+{
+    struct err e;
+    (void)state;
+    if (!catalogue_current(&bugs.catalogue, "tests/mutants", &e))
+        fail_msg("%s (make rubric-bugs)", e.msg);
+}
+
+/* A catalogue of other pictures is refused. */
+static void another_rubric_is_refused(void **state)
+{
+    struct rubric_bugs other;
+    struct err e;
+    (void)state;
+    for (int i = 0; i < rubric->num_pictures; i++)
+        if (strcmp(rubric->picture[i].name, "box") == 0) {
+            rubric->picture[i].bounces++;
+            assert_false(rubric_bugs_open(rubric, answers, &other, &e));
+            assert_non_null(strstr(e.msg, "'box'"));
+            rubric->picture[i].bounces--;
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(right_pictures_have_no_name), cmocka_unit_test(bugs_have_their_names),
+        cmocka_unit_test(every_bug_is_in_it), cmocka_unit_test(another_rubric_is_refused)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

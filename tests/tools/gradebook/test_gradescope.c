@@ -1,0 +1,280 @@
+/* results.json against the fields that Gradescope documents (gradescope-autograders.readthedocs.io, "Autograder specifications"):
+ * names, types, values, and that there is a score or there are tests. The rules are written here from that page, not from
+ * what we write. Each has a control: a file with that mistake is rejected. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "tools/gradebook/grade_batch.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static bool is_one_of(const char *text, const char *const *words)
+{
+    for (; text != NULL && *words != NULL; words++)
+        if (strcmp(text, *words) == 0)
+            return true;
+    return false;
+}
+
+static const char *const visibilities[] = {"hidden", "after_due_date", "after_published", "visible",
+                                           NULL};
+static const char *const formats[] = {"text", "html", "simple_format", "md", "ansi", NULL};
+
+enum kind { NUMBER, TEXT, TEXTS, VISIBILITY, FORMAT, STATUS, ORDER, ANY, TESTS, BOARD };
+struct field {
+    const char *name;
+    enum kind kind;
+};
+
+static const struct field whole[] = {{"score", NUMBER},
+                                     {"execution_time", NUMBER},
+                                     {"output", TEXT},
+                                     {"output_format", FORMAT},
+                                     {"test_output_format", FORMAT},
+                                     {"test_name_format", FORMAT},
+                                     {"visibility", VISIBILITY},
+                                     {"stdout_visibility", VISIBILITY},
+                                     {"extra_data", ANY},
+                                     {"tests", TESTS},
+                                     {"leaderboard", BOARD},
+                                     {0}};
+static const struct field test[] = {{"score", NUMBER},       {"max_score", NUMBER},
+                                    {"status", STATUS},      {"name", TEXT},
+                                    {"name_format", FORMAT}, {"number", TEXT},
+                                    {"output", TEXT},        {"output_format", FORMAT},
+                                    {"tags", TEXTS},         {"visibility", VISIBILITY},
+                                    {"extra_data", ANY},     {0}};
+static const struct field board[] = {{"name", TEXT}, {"value", ANY}, {"order", ORDER}, {0}};
+
+static bool valid_object(const json_t *object, const struct field *fields);
+
+static bool valid_objects(const json_t *array, const struct field *fields)
+{
+    size_t i;
+    json_t *v;
+    json_array_foreach(array, i, v)
+    {
+        if (!valid_object(v, fields))
+            return false;
+    }
+    return json_is_array(array);
+}
+
+static bool valid_value(const json_t *v, enum kind kind)
+{
+    static const char *const statuses[] = {"passed", "failed", NULL};
+    static const char *const orders[] = {"asc", "desc", NULL};
+    size_t i;
+    json_t *each;
+    switch (kind) {
+    case NUMBER: return json_is_number(v) && isfinite(json_number_value(v));
+    case TEXT: return json_is_string(v);
+    case VISIBILITY: return is_one_of(json_string_value(v), visibilities);
+    case FORMAT: return is_one_of(json_string_value(v), formats);
+    case STATUS: return is_one_of(json_string_value(v), statuses);
+    case ORDER: return is_one_of(json_string_value(v), orders);
+    case TESTS: return valid_objects(v, test);
+    case BOARD: return valid_objects(v, board);
+    case ANY: return true;
+    case TEXTS:
+        json_array_foreach(v, i, each)
+        {
+            if (!json_is_string(each))
+                return false;
+        }
+        return json_is_array(v);
+    }
+    return false;
+}
+
+static bool valid_object(const json_t *object, const struct field *fields)
+{
+    const char *name;
+    json_t *v;
+    json_object_foreach((json_t *)object, name, v)
+    {
+        const struct field *f = fields;
+        while (f->name != NULL && strcmp(f->name, name) != 0)
+            f++;
+        if (f->name == NULL || !valid_value(v, f->kind))
+            return false;
+    }
+    return json_is_object(object);
+}
+
+static bool valid_results(const json_t *root)
+{
+    return valid_object(root, whole) && (json_object_get(root, "score") != NULL ||
+                                         json_array_size(json_object_get(root, "tests")) > 0);
+}
+
+static char dir[64];
+
+static int set_up(void **state)
+{
+    (void)state;
+    strcpy(dir, "/tmp/assay_gradescope_XXXXXX");
+    return mkdtemp(dir) == NULL;
+}
+
+static int tear_down(void **state)
+{
+    char command[128];
+    (void)state;
+    snprintf(command, sizeof command, "rm -rf %s", dir);
+    return system(command);
+}
+
+static json_t *a_check(const char *name, double points, double of, const char *visibility)
+{
+    return json_pack("{ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, sn, sn}",
+                     "part", "3", "name", name, "title", "Light <b>\"on\"</b> a floor", "points",
+                     points, "of", of, "share", points / of, "chance", 1e-7, "judged", 1,
+                     "expected", "the mean within 1 %", "seen", "the mean \xc2\xb1 3 %", "hint",
+                     "1/r^2", "where", "Part 3", "visibility", visibility, "accepted", "", "flag",
+                     "", "picture", "floor", "tile", "relative");
+}
+
+/* One of them graded, one whose program is broken, one that we could not grade. */
+static json_t *a_class(void)
+{
+    json_t *checks = json_array(), *grades = json_array();
+    json_array_append_new(checks, a_check("falloff", 4.123456, 6, "visible"));
+    json_array_append_new(checks, a_check("secret", 2, 2, "after_published"));
+    json_array_append_new(
+        grades,
+        json_pack("{ss, ss, sf, sf, sf, sn, sn, ss, so, s[{ss, ss, sf, sf}], s[], "
+                  "s{ss, s[{ss, ss, ss}]}}",
+                  "id", "ada", "rubric", "Light", "points", 6.123456, "of", 8.0, "cpu_s", 3.5,
+                  "trouble", "wrong", "accepted", "", "checks", checks, "parts", "number", "3",
+                  "title", "Light", "points", 6.12, "of", 8.0, "pictures", "diagnosis", "finding",
+                  "bug", "named", "name", "x", "bug", "light falls \"as\" 1/r", "where", "Part 3"));
+    json_array_append_new(
+        grades, json_pack("{ss, ss, sf, sf, sf, sn, ss, ss, s[o], s[], s[], sn}", "id", "bob",
+                          "rubric", "Light", "points", 0.0, "of", 8.0, "cpu_s", 0.0, "trouble",
+                          "wrong", "building it failed: exit status 2", "accepted", "", "checks",
+                          a_check("falloff", 0, 6, "visible"), "parts", "pictures", "diagnosis"));
+    json_array_append_new(grades, json_pack("{ss, ss, sf, sf, sf, ss, sn, s[], s[], s[]}", "id",
+                                            "cyd", "rubric", "Light", "points", 0.0, "of", 8.0,
+                                            "cpu_s", 0.0, "trouble", "no space left on device",
+                                            "wrong", "checks", "parts", "pictures"));
+    return grades;
+}
+
+static json_t *results_of(const char *id)
+{
+    char path[256];
+    json_error_t why;
+    snprintf(path, sizeof path, "%s/%s/results.json", dir, id);
+    json_t *root = json_load_file(path, 0, &why);
+    if (root == NULL)
+        fail_msg("%s: %s", path, why.text);
+    return root;
+}
+
+static void every_file_has_documented_fields_only(void **state)
+{
+    (void)state;
+    static const char *const ids[] = {"ada", "bob", "cyd"};
+    struct err e;
+    json_t *grades = a_class();
+    assert_non_null(grades);
+    for (int i = 0; i < 3; i++) {
+        char path[256];
+        snprintf(path, sizeof path, "%s/%s", dir, ids[i]);
+        assert_int_equal(mkdir(path, 0700), 0);
+    }
+    if (!grade_write(dir, grades, &e))
+        fail_msg("%s", e.msg);
+    json_decref(grades);
+    for (int i = 0; i < 3; i++) {
+        json_t *root = results_of(ids[i]);
+        assert_true(valid_results(root));
+        json_decref(root);
+    }
+    /* What Gradescope adds up is what was given, to a hundredth of a point. */
+    json_t *root = results_of("ada"), *tests = json_object_get(root, "tests"), *t;
+    double sum = 0, most = 0;
+    size_t i;
+    json_array_foreach(tests, i, t)
+    {
+        sum += json_number_value(json_object_get(t, "score"));
+        most += json_number_value(json_object_get(t, "max_score"));
+    }
+    assert_int_equal(i, 2);
+    assert_true(fabs(sum - 6.12) < 1e-9 && most == 8);
+    assert_string_equal(json_string_value(json_object_get(json_array_get(tests, 1), "visibility")),
+                        "after_published");
+    assert_string_equal(json_string_value(json_object_get(json_array_get(tests, 0), "status")),
+                        "failed");
+    assert_non_null(strstr(json_string_value(json_object_get(root, "output")), "as\" 1/r"));
+    json_decref(root);
+    root = results_of("cyd");
+    assert_true(json_number_value(json_object_get(root, "score")) == 0);
+    json_decref(root);
+}
+
+static void other_fields_and_values_are_rejected(void **state)
+{
+    (void)state;
+    static const char *const wrong[] = {
+        "{}",
+        "[]",
+        "{\"tests\": []}",
+        "{\"score\": \"4\"}",
+        "{\"score\": 4, \"points\": 4}",
+        "{\"score\": 4, \"visibility\": \"shown\"}",
+        "{\"score\": 4, \"output_format\": \"markdown\"}",
+        "{\"score\": 4, \"tests\": {}}",
+        "{\"tests\": [{\"score\": true}]}",
+        "{\"tests\": [{\"score\": 1, \"max_score\": null}]}",
+        "{\"tests\": [{\"score\": 1, \"number\": 1.1}]}",
+        "{\"tests\": [{\"score\": 1, \"status\": \"ok\"}]}",
+        "{\"tests\": [{\"score\": 1, \"tags\": [1]}]}",
+        "{\"tests\": [{\"score\": 1, \"hint\": \"look\"}]}",
+        "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"up\"}]}",
+    };
+    static const char *const right[] = {
+        "{\"score\": 4}",
+        ("{\"tests\": [{\"score\": 1, \"max_score\": 2, \"number\": \"1.1\", \"tags\": [\"a\"], "
+         "\"status\": \"passed\", \"visibility\": \"hidden\"}], \"stdout_visibility\": \"hidden\"}"),
+        "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"asc\"}]}",
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        json_t *root = json_loads(wrong[i], 0, NULL);
+        assert_non_null(root);
+        if (valid_results(root))
+            fail_msg("not rejected: %s", wrong[i]);
+        json_decref(root);
+    }
+    for (size_t i = 0; i < sizeof right / sizeof *right; i++) {
+        json_t *root = json_loads(right[i], 0, NULL);
+        if (!valid_results(root))
+            fail_msg("rejected: %s", right[i]);
+        json_decref(root);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    /* A file of another program, say of run_autograder. */
+    if (argc == 2) {
+        json_t *root = json_load_file(argv[1], 0, NULL);
+        bool valid = valid_results(root);
+        json_decref(root);
+        return valid ? 0 : 1;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_file_has_documented_fields_only),
+        cmocka_unit_test(other_fields_and_values_are_rejected),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

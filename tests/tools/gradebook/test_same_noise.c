@@ -1,0 +1,162 @@
+/* Whose noise is the same? Pictures made here, gamma noise of 64 exponential samples a pixel on a gradient, as 8-bit PNG would
+ * have them by the assignment's curve; the reference has 1024 samples, and its noise is in all of them. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "renderer/image/tone.h"
+#include "tools/images/tone_curve.h"
+#include "tools/gradebook/same_noise.h"
+
+#include <gsl/gsl_randist.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, SPP = 64, REFERENCE = 1024 };
+
+static gsl_rng *rng;
+static struct moments reference;
+
+static double truth(size_t p)
+{
+    return 0.05 + 0.25 * (double)(p % WIDTH) / WIDTH + 0.1 * (p / WIDTH > 20);
+}
+
+static int set_up(void **state)
+{
+    struct err e;
+    (void)state;
+    rng = gsl_rng_alloc(gsl_rng_mt19937);
+    gsl_rng_set(rng, 20261122);
+    if (!moments_alloc(&reference, WIDTH, HEIGHT, &e))
+        return -1;
+    for (size_t p = 0; p < PIXELS; p++) {
+        double mean = truth(p) * gsl_ran_gamma(rng, REFERENCE, 1.0 / REFERENCE);
+        reference.n[p] = REFERENCE;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+            reference.mean[i] = mean;
+            reference.m2[i] = REFERENCE * mean * mean;
+        }
+    }
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    gsl_rng_free(rng);
+    moments_free(&reference);
+    return 0;
+}
+
+/* Noise relative to the truth, one factor for each pixel. */
+static void draw(double *factor, double spp)
+{
+    for (size_t p = 0; p < PIXELS; p++)
+        factor[p] = gsl_ran_gamma(rng, spp, 1 / spp);
+}
+
+/* What is known of a picture: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
+static struct alike_noise noise_of(const double *own, const double *other, double share,
+                                   double scale)
+{
+    static double mean[3 * PIXELS], tolerance[3 * PIXELS];
+    static unsigned char clipped[3 * PIXELS];
+    struct student s = {
+        .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
+    struct alike_noise out;
+    struct curve curve;
+    struct err e;
+    double lo, hi;
+    assert_true(curve_parse("cgl", &curve, &e));
+    curve_bin(&curve, 255, 255, &lo, &hi);
+    s.clip = lo;
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        double factor = share * (other != NULL ? other[i / 3] : 0) + (1 - share) * own[i / 3];
+        int code = tone_map(TONE_CGL, scale * truth(i / 3) * factor);
+        curve_bin(&curve, code, 255, &lo, &hi);
+        clipped[i] = code == 255;
+        mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
+        tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;
+    }
+    if (!alike_noise_of(&s, &reference, SPP, &out, &e))
+        fail_msg("%s", e.msg);
+    return out;
+}
+
+/* H0: pictures with noise of their own. All 1770 pairs of 60: T above 2.33 in about 1 % of them (normal law; the bound says
+ * 6.6 %), at most 40 of 1770, and none above the bound at alpha 1e-3 over all. All are 1 % too bright, as within margins a bug
+ * that they share may make them. */
+static void noise_of_their_own(void **state)
+{
+    enum { CLASS = 60, PAIRS = CLASS * (CLASS - 1) / 2 };
+    static struct alike_noise noise[CLASS];
+    static double factor[PIXELS];
+    int tests = 0, high = 0;
+    double most = -INFINITY;
+    (void)state;
+    for (int k = 0; k < CLASS; k++) {
+        draw(factor, SPP);
+        noise[k] = noise_of(factor, NULL, 0, 1.01);
+        for (int j = 0; j < k; j++) {
+            double t = alike_t(&noise[k], &noise[j]);
+            assert_true(isfinite(t));
+            tests++;
+            high += t > 2.33;
+            most = fmax(most, t);
+        }
+    }
+    printf("independent pairs: %d, T above 2.33: %d, largest %.2f, bound %.2f\n", tests, high, most,
+           alike_bound(PAIRS, 1e-3));
+    assert_int_equal(tests, PAIRS);
+    assert_true(high <= 40 && most < alike_bound(PAIRS, 1e-3));
+    for (int k = 0; k < CLASS; k++)
+        alike_noise_free(&noise[k]);
+}
+
+/* Power, each of 20 times, over the pairs and pictures of a class of 300: the same noise, retouched to be 2 % brighter; half of
+ * it and half of one's own. */
+static void noise_of_others(void **state)
+{
+    static double one[PIXELS], two[PIXELS];
+    double bound = alike_bound(300 * 299 / 2 * 20.0, 1e-3), least = INFINITY, half = INFINITY;
+    (void)state;
+    for (int k = 0; k < 20; k++) {
+        draw(one, SPP);
+        draw(two, SPP);
+        struct alike_noise a = noise_of(one, NULL, 0, 1), same = noise_of(one, NULL, 0, 1.02),
+                           mixed = noise_of(two, one, 0.5, 1);
+        least = fmin(least, alike_t(&a, &same));
+        half = fmin(half, alike_t(&a, &mixed));
+        alike_noise_free(&a);
+        alike_noise_free(&same);
+        alike_noise_free(&mixed);
+    }
+    printf("the same noise: T at least %.1f; half of it: %.1f; bound %.1f\n", least, half, bound);
+    assert_true(least > bound && half > bound);
+}
+
+/* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of pictures without noise. */
+static void too_fine_to_tell(void **state)
+{
+    static double one[PIXELS], two[PIXELS];
+    (void)state;
+    draw(one, 1e7);
+    draw(two, 1e7);
+    struct alike_noise a = noise_of(one, NULL, 0, 1), b = noise_of(two, NULL, 0, 1);
+    assert_true(isnan(alike_t(&a, &b)));
+    alike_noise_free(&a);
+    alike_noise_free(&b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(noise_of_their_own),
+                                       cmocka_unit_test(noise_of_others),
+                                       cmocka_unit_test(too_fine_to_tell)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,487 @@
+/* tools/input/input.c and what reads for it: each kind of side against numbers worked by hand, and what must
+ * be refused. What the spatial variance is worth: test_noise_estimate.c. */
+#include "odd_images.h"
+#include "tests/support/simulate.h"
+
+#include "reference/base/image_oiio.h"
+#include "renderer/base/fs.h"
+#include "tools/images/tone_curve.h"
+#include "tools/input/input.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+#include <string.h>
+#include <unistd.h>
+
+static char folder[64];
+static char path_text[4][128];
+
+static const char *file(int slot, const char *name)
+{
+    snprintf(path_text[slot], sizeof path_text[slot], "%s/%s", folder, name);
+    return path_text[slot];
+}
+
+static void assert_near(double got, double want, double tolerance)
+{
+    if (!(fabs(got - want) <= tolerance))
+        fail_msg("got %.15g, want %.15g", got, want);
+}
+
+static void write_floats(const char *path, int width, int height, int channels,
+                         const char *const *names, const float *v)
+{
+    struct image im;
+    struct err e;
+    if (!image_alloc(&im, width, height, channels, names, &e))
+        fail_msg("%s", e.msg);
+    memcpy(im.data, v, (size_t)(width * height * channels) * sizeof *v);
+    if (!image_write_exr(path, &im, &e))
+        fail_msg("%s", e.msg);
+    image_free(&im);
+}
+
+static const char *const rgb_names[3] = {"R", "G", "B"};
+
+static struct input read_side(const char *path, struct input_options opt, struct notes *notes)
+{
+    struct input in;
+    struct err e;
+    if (!input_read(path, 'a', &opt, &in, notes, &e))
+        fail_msg("%s", e.msg);
+    return in;
+}
+
+/* The line says `part` and is one line. */
+static void assert_refused(const char *path, struct input_options opt, const char *part)
+{
+    struct input in;
+    struct notes notes = {0};
+    struct err e = {0};
+    if (input_read(path, 'a', &opt, &in, &notes, &e))
+        fail_msg("%s was read, want: %s", path, part);
+    if (strstr(e.msg, part) == NULL || strchr(e.msg, '\n') != NULL)
+        fail_msg("'%s' does not say '%s'", e.msg, part);
+}
+
+static bool has_note(const struct notes *notes, const char *part)
+{
+    for (int i = 0; i < notes->num; i++)
+        if (strstr(notes->line[i], part) != NULL)
+            return true;
+    return false;
+}
+
+/* Three replicates of 2 x 1 pixels. First pixel: red 1, 2, 6: mean 3, M2 = 4 + 1 + 9 = 14, M3 = -8 -
+ * 1 + 27 = 18; green always 5; blue 0, 0, 3: mean 1, M2 = 6, M3 = -1 - 1 + 8 = 6. */
+static void test_directory(void **state)
+{
+    (void)state;
+    struct err e;
+    struct notes notes = {0};
+    static const float v[3][6] = {{1, 5, 0, 7, 7, 7}, {2, 5, 0, 7, 7, 7}, {6, 5, 3, 7, 7, 7}};
+    assert_true(make_dirs(file(0, "runs"), &e));
+    write_floats(file(1, "runs/s1.exr"), 2, 1, 3, rgb_names, v[0]);
+    odd_pfm(file(1, "runs/s2.pfm"), 2, 1, v[1]);
+    odd_file(file(1, "runs/.hidden"), "not looked at");
+    assert_refused(file(0, "runs"), (struct input_options){0}, "at least 3");
+    write_floats(file(1, "runs/s3.exr"), 2, 1, 3, rgb_names, v[2]);
+    struct input in = read_side(file(0, "runs"), (struct input_options){0}, &notes);
+    assert_int_equal(in.kind, INPUT_REPLICATES);
+    assert_string_equal(in.m.unit, "replicate");
+    assert_true(has_note(&notes, "3 replicates"));
+    static const double mean[3] = {3, 5, 1}, m2[3] = {14, 0, 6}, m3[3] = {18, 0, 6};
+    for (int c = 0; c < 3; c++) {
+        assert_near(in.m.mean[c], mean[c], 1e-12);
+        assert_near(in.m.m2[c], m2[c], 1e-12);
+        assert_near(in.m.m3[c], m3[c], 1e-12);
+    }
+    assert_near(in.m.n[0], 3, 0);
+    input_free(&in);
+
+    write_floats(file(1, "runs/s4.exr"), 2, 1, 3, rgb_names, v[0]);
+    assert_refused(file(0, "runs"), (struct input_options){0},
+                   "s1.exr and s4.exr are the same picture: the seed was ignored");
+    write_floats(file(1, "runs/s4.exr"), 1, 2, 3, rgb_names, v[0]);
+    assert_refused(file(0, "runs"), (struct input_options){0}, "is 1 x 2 pixels, s1.exr is 2 x 1");
+    odd_exr(file(1, "runs/s4.exr"), 2, 1, "BGR", true, 2, v[0]);
+    assert_refused(file(0, "runs"), (struct input_options){0}, "32-bit floats");
+    odd_png(file(1, "runs/s4.exr"), 2, 1, 3, 8, (uint16_t[6]){1, 2, 3, 4, 5, 6});
+    assert_refused(file(0, "runs"), (struct input_options){0}, "32-bit floats");
+    odd_file(file(1, "runs/s4.exr"), "no picture");
+    assert_refused(file(0, "runs"), (struct input_options){0}, "s4.exr: cannot read");
+    assert_int_equal(unlink(file(1, "runs/s4.exr")), 0);
+    assert_refused(file(0, "runs"), (struct input_options){.spp = 4}, "--spp-a");
+}
+
+/* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.
+ * Y: 1, 1: none. Z: 3, 13: 4, M2 = 400. Skewness, log-normal: c = sd/mean = 1/2: 3/2 + 1/8 = 13/8 for
+ * X, so M3 = 100 x 13/8; Z: c = 2/3: 2 + 8/27 = 62/27, M3 = 100 x 62/27 x 8. */
+static void test_mitsuba_integrator(void **state)
+{
+    (void)state;
+    static const char *const names[9] = {"R",      "G",         "B",         "path.X",   "path.Y",
+                                         "path.Z", "m2_path.X", "m2_path.Y", "m2_path.Z"};
+    static const float v[9] = {1, 1, 1, 2, 1, 3, 5, 1, 13};
+    struct notes notes = {0};
+    struct err e;
+    write_floats(file(0, "moment.exr"), 1, 1, 9, names, v);
+    struct input in = read_side(file(0, "moment.exr"), (struct input_options){.spp = 100}, &notes);
+    assert_int_equal(in.kind, INPUT_VARIANCE);
+    assert_true(in.is_xyz && has_note(&notes, "log-normal") && has_note(&notes, "box filter"));
+    static const double mean[3] = {2, 1, 3}, m2[3] = {100, 0, 400};
+    for (int c = 0; c < 3; c++) {
+        assert_near(in.m.mean[c], mean[c], 1e-6);
+        assert_near(in.m.m2[c], m2[c], 1e-3);
+    }
+    /* Paired with moments: M3 is negative on this side, so that it adds to B's. B becomes XYZ: red 1,
+     * M2 4: X = .412453, M2 = .412453^2 4. */
+    struct input b = {.kind = INPUT_MOMENTS, .m = new_moments(1, 1, "sample")};
+    b.m.n[0] = 10;
+    b.m.mean[0] = 1;
+    b.m.m2[0] = 4;
+    b.m.m3[0] = 8;
+    assert_true(input_pair(&in, &b, &notes, &e));
+    assert_true(has_note(&notes, "X, Y and Z"));
+    assert_near(in.m.m3[0], -100 * 13.0 / 8, 1e-3);
+    assert_near(in.m.m3[2], -100 * 62.0 / 27 * 8, 1e-2);
+    assert_near(b.m.mean[0], 0.412453, 1e-12);
+    assert_near(b.m.m2[0], 0.412453 * 0.412453 * 4, 1e-12);
+    assert_near(b.m.m3[0], pow(0.412453, 3) * 8, 1e-12);
+    input_free(&b);
+    /* Two of a kind: opposite signs. */
+    b = read_side(file(0, "moment.exr"), (struct input_options){.spp = 100}, &notes);
+    assert_true(input_pair(&in, &b, &notes, &e));
+    assert_near(in.m.m3[0], 100 * 13.0 / 8, 1e-3);
+    assert_near(b.m.m3[0], -100 * 13.0 / 8, 1e-3);
+    input_free(&in);
+    input_free(&b);
+
+    assert_refused(file(0, "moment.exr"), (struct input_options){0}, "--spp-a");
+    static const char *const two[6] = {"a.X", "m2_a.X", "b.X", "m2_b.X", "R", "G"};
+    write_floats(file(1, "two.exr"), 1, 1, 6, two, v);
+    assert_refused(file(1, "two.exr"), (struct input_options){.spp = 9}, "several integrators");
+    write_floats(file(1, "less.exr"), 1, 1, 8, names, v);
+    assert_refused(file(1, "less.exr"), (struct input_options){.spp = 9}, "not m2_path.Z");
+    static const float negative[9] = {1, 1, 1, 2, 1, 3, 3, 1, 13};
+    write_floats(file(1, "neg.exr"), 1, 1, 9, names, negative);
+    assert_refused(file(1, "neg.exr"), (struct input_options){.spp = 9}, "negative variance");
+    static const char *const pbrt[4] = {"R", "G", "B", "Variance.R"};
+    write_floats(file(1, "pbrt.exr"), 1, 1, 4, pbrt, v);
+    assert_refused(file(1, "pbrt.exr"), (struct input_options){.spp = 9}, "pbrt");
+}
+
+/* Exponential samples (skewness 2; the bound for sd = mean is 4), mean `scale` against 1, M3 forgotten. */
+static enum verdict compare_without_skewness(int n, double scale, uint64_t *state)
+{
+    struct input a = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
+    struct input b = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
+    struct notes notes = {0};
+    struct comparison c;
+    struct compare_options opt = {.alpha = 0.05, .tile = 32};
+    struct err e;
+    simulate(&a.m, LAW_EXPONENTIAL, scale, n, true, state);
+    simulate(&b.m, LAW_EXPONENTIAL, 1, n, true, state);
+    for (int i = 0; i < 3 * 32 * 32; i++)
+        a.m.m3[i] = b.m.m3[i] = 0;
+    if (!input_pair(&a, &b, &notes, &e) || !compare_moments(&a.m, &b.m, &opt, &c, &e))
+        fail_msg("%s", e.msg);
+    enum verdict v = c.verdict;
+    comparison_free(&c);
+    input_free(&a);
+    input_free(&b);
+    return v;
+}
+
+/* The image: N n = 1024 n samples a side, tested if (4/sqrt 2)/sqrt(N n) x^3/3 <= 0.2, x about 3.3 at 5 %
+ * over four tests: from 3e4 samples on. n = 8 is too few whatever differs; n = 128 finds 3 %: sd
+ * sqrt(2/131072) = 0.4 %. Equal: at most 9 of 60 (chance 1e-3 at a true 5 %). */
+static void test_unknown_skewness(void **state)
+{
+    (void)state;
+    uint64_t seed = 12;
+    int different = 0;
+    assert_int_equal(compare_without_skewness(8, 1.5, &seed), VERDICT_INCONCLUSIVE);
+    for (int i = 0; i < 60; i++)
+        different += compare_without_skewness(128, 1, &seed) == VERDICT_DIFFERENT;
+    assert_true(different <= 9);
+    for (int i = 0; i < 10; i++)
+        assert_int_equal(compare_without_skewness(128, 1.03, &seed), VERDICT_DIFFERENT);
+}
+
+/* A reference and its variance: R, G, B of the variance are the matrix' inverse times Var X, Y, Z. With
+ * red alone 1 in both: mean and variance (.412453, .212671, .019334); n = 50. */
+static void test_mitsuba_reference(void **state)
+{
+    (void)state;
+    static const float red[3] = {1, 0, 0};
+    struct notes notes = {0};
+    write_floats(file(0, "ref.exr"), 1, 1, 3, rgb_names, red);
+    write_floats(file(1, "ref_var.exr"), 1, 1, 3, rgb_names, red);
+    struct input in = read_side(file(0, "ref.exr"), (struct input_options){.spp = 50}, &notes);
+    static const double xyz[3] = {0.412453, 0.212671, 0.019334};
+    assert_int_equal(in.kind, INPUT_VARIANCE);
+    assert_true(has_note(&notes, "ref_var.exr"));
+    for (int c = 0; c < 3; c++) {
+        assert_near(in.m.mean[c], xyz[c], 1e-6);
+        assert_near(in.m.m2[c], 50 * xyz[c], 1e-4);
+    }
+    input_free(&in);
+    assert_refused(file(0, "ref.exr"), (struct input_options){0}, "--spp-a");
+    write_floats(file(1, "ref_var.exr"), 1, 2, 3, rgb_names, (float[6]){1, 0, 0, 1, 0, 0});
+    assert_refused(file(0, "ref.exr"), (struct input_options){.spp = 9}, "is 1 x 2 pixels");
+    assert_int_equal(unlink(file(1, "ref_var.exr")), 0);
+}
+
+/* Codes and what they stand for, by the curves' definitions. sRGB: code 255 x 0.5 = 127.5 is 0.214041
+ * (IEC 61966-2-1). */
+static void test_curves(void **state)
+{
+    (void)state;
+    struct curve c;
+    struct err e;
+    double lo, hi;
+    assert_true(curve_parse("srgb", &c, &e));
+    assert_near(curve_decode(&c, 0.5), 0.21404114, 1e-8);
+    assert_near(curve_decode(&c, 0.04), 0.04 / 12.92, 1e-15);
+    assert_near(curve_decode(&c, 1), 1, 1e-15);
+    assert_true(curve_parse("linear", &c, &e));
+    curve_bin(&c, 100, 255, &lo, &hi);
+    assert_near(lo, 99.5 / 255, 1e-15);
+    assert_near(hi, 100.5 / 255, 1e-15);
+    assert_true(curve_parse("gamma=2", &c, &e));
+    curve_bin(&c, 10, 65535, &lo, &hi);
+    assert_near(hi - lo, (10.5 * 10.5 - 9.5 * 9.5) / 65535.0 / 65535.0, 1e-18);
+    assert_true(curve_parse("cgl", &c, &e)); /* cut off: code 51 is all of (51..52)/255 */
+    curve_bin(&c, 51, 255, &lo, &hi);
+    assert_near(lo, pow(0.2, 2.2) / sqrt(2), 1e-15);
+    assert_near(hi, pow(52.0 / 255, 2.2) / sqrt(2), 1e-15);
+    static const char *const bad[] = {"", "rec709", "gamma", "gamma=", "gamma=0", "gamma=x"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_false(curve_parse(bad[i], &c, &e));
+}
+
+/* Linear, 16 bits, code 1000: mean 1000/65535, +- half a step, step^2/12. A grey PNG is all three. */
+static void test_codes(void **state)
+{
+    (void)state;
+    struct notes notes = {0};
+    struct input_options opt = {.curve = "linear"};
+    odd_png(file(0, "deep.png"), 2, 1, 3, 16, (uint16_t[6]){1000, 1, 65534, 0, 5, 5});
+    struct input in = read_side(file(0, "deep.png"), opt, &notes);
+    double step = 1 / 65535.0;
+    assert_int_equal(in.kind, INPUT_PICTURE);
+    assert_near(in.m.mean[0], 1000 * step, 1e-9);
+    assert_near(in.m.tolerance[0], step / 2, 1e-12);
+    assert_near(in.rounding[0], step * step / 12, 1e-18);
+    assert_true(!in.censored[0] && in.censored[1]);
+    input_free(&in);
+    odd_png(file(0, "grey.png"), 3, 1, 1, 8, (uint16_t[3]){51, 255, 254});
+    in = read_side(file(0, "grey.png"), opt, &notes);
+    for (int c = 0; c < 3; c++)
+        assert_near(in.m.mean[c], 0.2, 1e-12);
+    assert_true(!in.censored[0] && in.censored[1] && !in.censored[2]);
+    assert_true(has_note(&notes, "half a code"));
+    input_free(&in);
+    assert_refused(file(0, "grey.png"), (struct input_options){0}, "--curve");
+    assert_refused(file(0, "grey.png"), (struct input_options){.curve = "film"}, "none of");
+    odd_png(file(0, "clear.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 128});
+    assert_refused(file(0, "clear.png"), opt, "not opaque");
+    odd_png(file(0, "opaque.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 255});
+    in = read_side(file(0, "opaque.png"), opt, &notes);
+    input_free(&in);
+}
+
+/* Half floats: 1.5 has 10 binary digits behind the point, so that half a step is 2^-11 of 2^0 <= v < 2^1;
+ * at most 2^-11 v is said. RGBE (128, 64, 0, 129) is (1, 1/2, 0), steps of 2^-7. */
+static void test_rounded_floats(void **state)
+{
+    (void)state;
+    struct notes notes = {0};
+    odd_exr(file(0, "half.exr"), 1, 1, "BGR", true, 1, (float[3]){0, 2.5, 1.5});
+    struct input in = read_side(file(0, "half.exr"), (struct input_options){0}, &notes);
+    assert_near(in.m.mean[0], 1.5, 0);
+    assert_near(in.m.mean[1], 2.5, 0);
+    assert_near(in.m.tolerance[0], 1.5 / 2048, 1e-15);
+    assert_near(in.rounding[0], pow(1.5 / 1024, 2) / 12, 1e-15);
+    assert_true(has_note(&notes, "half floats") && in.censored == NULL);
+    input_free(&in);
+    odd_hdr(file(0, "one.hdr"), 1, 1, (const uint8_t[1][4]){{128, 64, 0, 129}});
+    in = read_side(file(0, "one.hdr"), (struct input_options){0}, &notes);
+    assert_near(in.m.mean[0], 1, 1e-6);
+    assert_near(in.m.mean[1], 0.5, 1e-6);
+    for (int c = 0; c < 3; c++)
+        assert_near(in.m.tolerance[c], 1.0 / 128, 1e-9);
+    assert_true(has_note(&notes, "RGBE"));
+    input_free(&in);
+    /* PFM is stored from the bottom up. */
+    odd_pfm(file(0, "two.pfm"), 1, 2, (float[6]){1, 2, 3, 4, 5, 6});
+    in = read_side(file(0, "two.pfm"), (struct input_options){0}, &notes);
+    assert_near(in.m.mean[0], 1, 0);
+    assert_near(in.m.mean[5], 6, 0);
+    assert_null(in.m.tolerance);
+    input_free(&in);
+}
+
+static void test_hygiene(void **state)
+{
+    (void)state;
+    struct input_options none = {0};
+    float v[4] = {1, 1, 1, 1};
+    odd_exr(file(0, "crop.exr"), 1, 1, "BGR", false, 2, v);
+    assert_refused(file(0, "crop.exr"), none, "data and display windows");
+    odd_exr(file(0, "alpha.exr"), 1, 1, "ABGR", false, 1, (float[4]){.5f, 1, 1, 1});
+    assert_refused(file(0, "alpha.exr"), none, "not opaque (alpha 0.5)");
+    odd_exr(file(0, "nan.exr"), 1, 1, "BGR", false, 1, (float[3]){1, NAN, 1});
+    assert_refused(file(0, "nan.exr"), none, "pixel 0,0 is not a number");
+    odd_exr(file(0, "inf.exr"), 1, 1, "BGR", false, 1, (float[3]){1, 1, INFINITY});
+    assert_refused(file(0, "inf.exr"), none, "infinite");
+    odd_exr(file(0, "xyz.exr"), 1, 1, "XYZ", false, 1, v);
+    assert_refused(file(0, "xyz.exr"), none, "no channels R, G, B");
+    odd_exr(file(0, "ok.exr"), 1, 1, "ABGR", false, 1, v);
+    assert_refused(file(0, "ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
+    struct notes notes = {0};
+    struct input in = read_side(file(0, "ok.exr"), none, &notes);
+    input_free(&in);
+    odd_file(file(0, "words.exr"), "no picture");
+    assert_refused(file(0, "words.exr"), none, "cannot read");
+    assert_refused(file(0, "gone.exr"), none, "gone.exr: cannot read");
+    assert_refused(file(0, "gone.exr"), none, "No such file");
+}
+
+/* 64 x 64 linear codes: A and B noise of a few codes about 100, but a square of 12 x 12 that A has at 255
+ * and B at 30: a gross difference that must not be seen, and must not be called equal either. 144 of
+ * 4096 pixels are 3.5 %, less than 5 %, but 56 % of the tile of 16 x 16 at 0,0. */
+static void fill_codes(uint16_t *code, int side, uint64_t *state)
+{
+    for (int i = 0; i < 3 * side * side; i++)
+        code[i] = (uint16_t)lround(97 + 6 * uniform(state));
+}
+
+static enum verdict compare_files(const char *a, const char *b, struct notes *notes,
+                                  size_t *censored)
+{
+    struct input in[2];
+    struct err e;
+    struct comparison c;
+    struct input_options io = {.curve = "linear"};
+    struct compare_options opt = {
+        .alpha = 1e-3, .tile = 16, .margin_global = 0.05, .margin_tile = 0.2};
+    for (int i = 0; i < 2; i++)
+        if (!input_read(i ? b : a, "ab"[i], &io, &in[i], notes, &e))
+            fail_msg("%s", e.msg);
+    if (!input_pair(&in[0], &in[1], notes, &e) ||
+        !compare_moments(&in[0].m, &in[1].m, &opt, &c, &e))
+        fail_msg("%s", e.msg);
+    input_limit(&in[0], opt.tile, &c);
+    enum verdict v = c.verdict;
+    *censored = in[0].num_censored;
+    comparison_free(&c);
+    input_free(&in[0]);
+    input_free(&in[1]);
+    return v;
+}
+
+static void test_censored(void **state)
+{
+    (void)state;
+    static uint16_t a[3 * 64 * 64], b[3 * 64 * 64];
+    uint64_t seed = 7;
+    size_t censored;
+    struct notes notes = {0};
+    fill_codes(a, 64, &seed);
+    fill_codes(b, 64, &seed);
+    const char *pa = file(0, "a.png"), *pb = file(1, "b.png");
+    odd_png(pa, 64, 64, 3, 8, a);
+    odd_png(pb, 64, 64, 3, 8, b);
+    assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_EQUIVALENT);
+    assert_int_equal(censored, 0);
+    for (int y = 0; y < 12; y++)
+        for (int x = 0; x < 12; x++)
+            for (int c = 0; c < 3; c++) {
+                a[3 * (64 * y + x) + c] = 255;
+                b[3 * (64 * y + x) + c] = 30;
+            }
+    odd_png(pa, 64, 64, 3, 8, a);
+    odd_png(pb, 64, 64, 3, 8, b);
+    assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_INCONCLUSIVE);
+    assert_int_equal(censored, 144);
+    assert_true(has_note(&notes, "144 of 4096"));
+    /* Spread over the tiles: 128 more at 0, 272 are 6.6 %. */
+    for (int i = 0; i < 128; i++)
+        b[3 * (64 * 20 + 17 * i % (64 * 40)) + 1] = 0;
+    odd_png(pb, 64, 64, 3, 8, b);
+    assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_INCONCLUSIVE);
+    assert_int_equal(censored, 144 + 128);
+    /* A difference outside is found all the same: 97 .. 103 codes and now 127 .. 133. */
+    for (int i = 3 * 64 * 32; i < 3 * 64 * 64; i++)
+        a[i] = (uint16_t)(a[i] + 30);
+    odd_png(pa, 64, 64, 3, 8, a);
+    assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_DIFFERENT);
+}
+
+/* Half a code is allowed for: pictures of one code, and of the next, are equal within two halves; two
+ * codes apart they are not. 100 -> 101 -> 102 of 255, margins of 0. Noise: one pixel in 16 one code up
+ * in A, elsewhere in B. */
+static void test_rounding_is_no_difference(void **state)
+{
+    (void)state;
+    static uint16_t a[3 * 64 * 64], b[3 * 64 * 64];
+    for (int step = 1; step <= 2; step++) {
+        uint64_t seed = 11;
+        for (int i = 0; i < 3 * 64 * 64; i++) {
+            a[i] = (uint16_t)(100 + (uniform(&seed) < 1.0 / 16));
+            b[i] = (uint16_t)(100 + step + (uniform(&seed) < 1.0 / 16));
+        }
+        odd_png(file(0, "a.png"), 64, 64, 3, 8, a);
+        odd_png(file(1, "b.png"), 64, 64, 3, 8, b);
+        struct input in[2];
+        struct notes notes = {0};
+        struct err e;
+        struct comparison c;
+        struct compare_options opt = {.alpha = 1e-3, .tile = 16};
+        for (int i = 0; i < 2; i++)
+            in[i] = read_side(file(i, i ? "b.png" : "a.png"),
+                              (struct input_options){.curve = "linear"}, &notes);
+        assert_true(input_pair(&in[0], &in[1], &notes, &e));
+        if (!compare_moments(&in[0].m, &in[1].m, &opt, &c, &e))
+            fail_msg("%s", e.msg);
+        assert_int_equal(c.verdict, step == 1 ? VERDICT_EQUIVALENT : VERDICT_DIFFERENT);
+        comparison_free(&c);
+        input_free(&in[0]);
+        input_free(&in[1]);
+    }
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    strcpy(folder, "/tmp/assay_test_input.XXXXXX");
+    return mkdtemp(folder) == NULL;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    struct err e;
+    return !remove_tree(folder, &e);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_directory),
+        cmocka_unit_test(test_mitsuba_integrator),
+        cmocka_unit_test(test_mitsuba_reference),
+        cmocka_unit_test(test_unknown_skewness),
+        cmocka_unit_test(test_curves),
+        cmocka_unit_test(test_codes),
+        cmocka_unit_test(test_rounded_floats),
+        cmocka_unit_test(test_hygiene),
+        cmocka_unit_test(test_censored),
+        cmocka_unit_test(test_rounding_is_no_difference),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,144 @@
+/* The curves of the page's plots against other routes: the QQ band against sums of binomial probabilities,
+ * the power curve against simulated tests; and its CSV files, decoded again. */
+#include "tools/html/csv_link.h"
+#include "tools/plots/plot_power.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* The i-th smallest of n uniform numbers is at most x if at least i of them are: a binomial tail. */
+static double order_cdf(int i, int n, double x)
+{
+    double sum = 0;
+    for (int k = i; k <= n; k++)
+        sum += exp(lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1) + k * log(x) +
+                   (n - k) * log1p(-x));
+    return sum;
+}
+
+static void qq_band_is_binomial(void **state)
+{
+    (void)state;
+    static const int of[][2] = {{1, 4}, {4, 4}, {1, 64}, {10, 64}, {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
+    for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
+        double low, high;
+        qq_band(of[k][0], of[k][1], &low, &high);
+        assert_float_equal(order_cdf(of[k][0], of[k][1], low), 0.025, 1e-6);
+        assert_float_equal(order_cdf(of[k][0], of[k][1], high), 0.975, 1e-6);
+    }
+}
+
+static double uniform(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return ((*state >> 8) + 0.5) / 16777216.0;
+}
+
+static double normal(uint32_t *state)
+{
+    double r = sqrt(-2 * log(uniform(state)));
+    return r * cos(6.283185307179586 * uniform(state));
+}
+
+static json_t *claim_of(double alpha, double margin, double mdb)
+{
+    json_t *c =
+        json_pack("{sf sf sf s[{ss sf si}]}", "alpha", alpha, "margin_global", margin, "mdb_global",
+                  mdb, "statistics", "name", "image", "share", 0.25, "num_tests", 4);
+    assert_non_null(c);
+    return c;
+}
+
+/* A test of level 0.05 x 0.25 / 4 (two-sided) of a mean with that standard error, 40000 times for each bias.
+ * Frequencies lie within 4 standard errors, at most 0.01, of the curve with 0.9999 each. Control: the curve
+ * of half the bias does not fit. */
+static void power_is_that_of_the_test(void **state)
+{
+    (void)state;
+    enum { TRIALS = 40000 };
+    json_t *claim = claim_of(0.05, 0.003, 0.008);
+    struct power p = power_of(claim);
+    assert_float_equal(power_at(&p, 0.008), 0.95, 1e-9);
+    /* P(|N(0, 1)| > c) = 0.05 x 0.25 / 4 */
+    assert_float_equal(erfc(p.critical / sqrt(2)), 0.003125, 1e-9);
+    static const double bias[] = {0.003, 0.005, -0.006, 0.007, 0.008};
+    uint32_t seed = 11;
+    for (size_t i = 0; i < sizeof bias / sizeof *bias; i++) {
+        int found = 0;
+        for (int k = 0; k < TRIALS; k++)
+            found += (fabs(bias[i] + p.error * normal(&seed)) - p.margin) / p.error > p.critical;
+        assert_float_equal((double)found / TRIALS, power_at(&p, bias[i]), 0.01);
+        if (fabs(bias[i]) > 0.0055)
+            assert_true(fabs((double)found / TRIALS - power_at(&p, bias[i] / 2)) > 0.01);
+    }
+    json_decref(claim);
+    /* No test covers the image. */
+    claim = claim_of(0.05, 0.003, 1e6);
+    p = power_of(claim);
+    assert_float_equal(p.error, 0, 0);
+    json_decref(claim);
+}
+
+/* What a browser saves: the link's data, percent-decoded. */
+static char *saved(const char *link)
+{
+    const char *at = strstr(link, "href=\"data:text/csv;charset=utf-8,");
+    assert_non_null(at);
+    at = strchr(at, ',') + 1;
+    char *out = malloc(strlen(at) + 1), *end = out;
+    assert_non_null(out);
+    for (; *at != '"'; at++) {
+        assert_true(*at != '\0' && *at != '<' && *at != '#' && *at != ' ' && *at != '\'');
+        if (*at == '%') {
+            char hex[3] = {at[1], at[2], '\0'};
+            *end++ = (char)strtol(hex, NULL, 16);
+            at += 2;
+        } else {
+            *end++ = *at;
+        }
+    }
+    *end = '\0';
+    return out;
+}
+
+static void csv_comes_back(void **state)
+{
+    (void)state;
+    char *link = NULL;
+    size_t size;
+    FILE *f = open_memstream(&link, &size);
+    assert_non_null(f);
+    struct csv csv = csv_open(f, "x.csv", "name,a,b");
+    csv_text(&csv, "say \"hi\", <b>&#'\xc3\xa4");
+    csv_number(&csv, -0.25);
+    csv_number(&csv, NAN);
+    csv_line(&csv);
+    csv_text(&csv, "=1+1");
+    csv_number(&csv, 1e-9);
+    csv_number(&csv, 3);
+    csv_line(&csv);
+    csv_close(&csv);
+    fclose(f);
+    char *text = saved(link);
+    assert_string_equal(
+        text, "name,a,b\r\n\"say \"\"hi\"\", <b>&#'\xc3\xa4\",-0.25,\r\n\"'=1+1\",1e-09,3\r\n");
+    free(text);
+    free(link);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(qq_band_is_binomial),
+        cmocka_unit_test(power_is_that_of_the_test),
+        cmocka_unit_test(csv_comes_back),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

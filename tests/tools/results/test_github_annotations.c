@@ -1,0 +1,100 @@
+/* Annotations for GitHub: what is printed for each outcome, by GitHub's rules of escaping (in a message %,
+ * CR and LF are %25, %0D, %0A; in a property : and , are %3A, %2C too). */
+#include "tools/results/github_annotations.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static json_t *judged(const char *scene, const char *expected, const char *verdict)
+{
+    json_t *c = json_pack("{ss ss ss ss ss sb ss sf ss}", "scene", scene, "a", "pathtracer", "b",
+                          "cycles", "expected", expected, "verdict", verdict, "passed",
+                          strcmp(expected, verdict) == 0, "reason", "too bright", "difference",
+                          0.0123, "rerun", "assay validate --only x");
+    assert_non_null(c);
+    return c;
+}
+
+static json_t *not_judged(const char *scene, const char *error)
+{
+    json_t *c = json_pack("{ss ss ss ss sb ss}", "scene", scene, "a", "pathtracer", "b", "cycles",
+                          "expected", "EQUIVALENT", "passed", 0, "error", error);
+    assert_non_null(c);
+    return c;
+}
+
+static char *printed(json_t *claims)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    json_t *results = json_pack("{so}", "claims", claims);
+    annotations_print(f, results);
+    fclose(f);
+    json_decref(results);
+    return text;
+}
+
+static void each_outcome(void **state)
+{
+    (void)state;
+    json_t *claims = json_array();
+    json_array_append_new(claims, judged("good", "EQUIVALENT", "EQUIVALENT"));
+    json_array_append_new(claims, judged("found", "DIFFERENT", "DIFFERENT"));
+    json_array_append_new(claims, judged("bad", "EQUIVALENT", "DIFFERENT"));
+    json_array_append_new(claims, judged("open", "EQUIVALENT", "INCONCLUSIVE"));
+    json_array_append_new(claims, not_judged("lost", "cycles: not installed"));
+    char *text = printed(claims);
+    assert_string_equal(
+        text,
+        "::error title=bad%3A pathtracer against cycles::DIFFERENT, expected EQUIVALENT: too bright "
+        "(difference +1.23 %25)%0Aagain: assay validate --only x\n"
+        "::warning title=open%3A pathtracer against cycles::INCONCLUSIVE, expected EQUIVALENT: "
+        "too bright (difference +1.23 %25)%0Aagain: assay validate --only x\n"
+        "::error title=lost%3A pathtracer against cycles::could not be judged: cycles: not "
+        "installed\n"
+        "::notice title=assay::Of 5 claims 1 came out wrong, 1 stayed undecided and 1 could not "
+        "be judged.\n");
+    free(text);
+}
+
+static void all_is_well(void **state)
+{
+    (void)state;
+    json_t *claims = json_array();
+    json_array_append_new(claims, judged("good", "EQUIVALENT", "EQUIVALENT"));
+    char *text = printed(claims);
+    assert_string_equal(text, "::notice title=assay::All 1 claims came out as expected.\n");
+    free(text);
+}
+
+static void text_cannot_be_a_command(void **state)
+{
+    (void)state;
+    json_t *claims = json_array();
+    json_array_append_new(claims, not_judged("a,b::c\n::set-env x", "50 %\r\n::error::forged"));
+    char *text = printed(claims);
+    assert_string_equal(
+        text,
+        "::error title=a%2Cb%3A%3Ac%0A%3A%3Aset-env x%3A pathtracer against cycles::could not be "
+        "judged: 50 %25%0D%0A::error::forged\n"
+        "::notice title=assay::Of 1 claims 0 came out wrong, 0 stayed undecided and 1 could not "
+        "be judged.\n");
+    free(text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_outcome),
+        cmocka_unit_test(all_is_well),
+        cmocka_unit_test(text_cannot_be_a_command),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

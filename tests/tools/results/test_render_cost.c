@@ -1,0 +1,95 @@
+/* Costs by scene, from results written by hand; expected sums are added by hand. */
+#include "tools/results/render_cost.h"
+#include "tools/report/report_cost.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Two references of one scene share a render of ours; a probe of an engine; a scene that ran out of
+ * time; a claim of consistency; a claim of two files, which has no cost. */
+static const char text[] =
+    "{\"claims\": ["
+    "{\"scene\": \"a\", \"a\": \"pathtracer\", \"b\": \"truth\", \"expected\": \"EQUIVALENT\","
+    " \"verdict\": \"EQUIVALENT\", \"passed\": true, \"cost_s\": {\"a\": 1.5, \"b\": 0},"
+    " \"looks\": [{\"n_a\": 16}, {\"n_a\": 64}]},"
+    "{\"scene\": \"a\", \"a\": \"pathtracer\", \"b\": \"cycles\", \"expected\": \"EQUIVALENT\","
+    " \"verdict\": \"INCONCLUSIVE\", \"passed\": false, \"cost_s\": {\"a\": 4, \"b\": 2},"
+    " \"looks\": [{\"n_a\": 16}, {\"n_a\": 64}, {\"n_a\": 256}]},"
+    "{\"scene\": \"a\", \"a\": \"cycles\", \"b\": \"truth\", \"expected\": \"EQUIVALENT\","
+    " \"verdict\": \"EQUIVALENT\", \"passed\": true, \"cost_s\": {\"a\": 3, \"b\": 0},"
+    " \"looks\": [{\"n_a\": 512}]},"
+    "{\"scene\": \"<b>\", \"a\": \"pathtracer\", \"b\": \"cycles\", \"expected\": \"EQUIVALENT\","
+    " \"verdict\": \"INCONCLUSIVE\", \"passed\": false, \"error\": \"budget spent\","
+    " \"cost_s\": {\"a\": 0, \"b\": 0}, \"looks\": []},"
+    "{\"scene\": \"files\", \"a\": \"x\", \"b\": \"y\", \"expected\": \"EQUIVALENT\","
+    " \"verdict\": \"EQUIVALENT\", \"passed\": true}],"
+    " \"consistency\": [{\"scene\": \"<b>\", \"seconds\": 20}]}";
+
+static json_t *results(void)
+{
+    json_t *root = json_loads(text, 0, NULL);
+    assert_non_null(root);
+    return root;
+}
+
+static void test_gather(void **state)
+{
+    (void)state;
+    json_t *root = results();
+    struct scene_cost c[MAX_COSTS];
+    assert_int_equal(cost_gather(root, c), 2);
+    assert_string_equal(c[0].scene, "<b>");
+    assert_true(c[0].ours_s == 20 && c[0].references_s == 0);
+    assert_true(c[0].claims == 1 && c[0].looks == 0 && c[0].undecided == 1);
+    assert_string_equal(c[1].scene, "a");
+    assert_true(c[1].ours_s == 5.5 && c[1].references_s == 5);
+    assert_true(c[1].claims == 3 && c[1].looks == 6 && c[1].undecided == 1);
+    assert_true(c[1].largest_n == 256);
+    json_decref(root);
+}
+
+static char *printed(void (*print)(FILE *, const json_t *), const json_t *root)
+{
+    char *out = NULL;
+    size_t size;
+    FILE *f = open_memstream(&out, &size);
+    assert_non_null(f);
+    print(f, root);
+    fclose(f);
+    return out;
+}
+
+static void test_print(void **state)
+{
+    (void)state;
+    json_t *root = results();
+    char *line = printed(cost_print, root);
+    assert_string_equal(line, "cost: <b> 20 s of 30.5 s (1 undecided), a 10 s (1 undecided) of "
+                              "processor time\n");
+    free(line);
+    char *table = printed(report_cost, root);
+    assert_non_null(strstr(table, "&lt;b&gt;</th><td class=\"num\">20.00</td>"));
+    assert_null(strstr(table, "<b>"));
+    assert_non_null(strstr(table, "30.5 in all"));
+    free(table);
+    json_object_del(root, "consistency");
+    json_array_clear(json_object_get(root, "claims"));
+    line = printed(cost_print, root);
+    table = printed(report_cost, root);
+    assert_string_equal(line, "");
+    assert_string_equal(table, "");
+    free(line);
+    free(table);
+    json_decref(root);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_gather), cmocka_unit_test(test_print)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

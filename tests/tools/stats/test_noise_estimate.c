@@ -1,0 +1,222 @@
+/* tools/stats/noise_estimate.c: two pictures without moments. Closed forms of what the kernel sees; error rates of
+ * the comparison that is built on it, with noise of a pixel's own and noise that neighbours share. */
+#include "tests/support/simulate.h"
+
+#include "tools/compare/compare.h"
+#include "tools/compare/pyramid.h"
+#include "tools/stats/noise_estimate.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+#include <gsl/gsl_cdf.h>
+#include <string.h>
+
+static double normal(uint64_t *state)
+{
+    return (draw(LAW_NORMAL, state) - 1) / 0.3;
+}
+
+enum noise { OWN, SHARED, SKEWED };
+static const double noise_sd = 0.1;
+
+/* A picture of mean `scale` by a smooth shade, with noise of sd 0.1 of a pixel's own, or sums of 2 x 2
+ * independent ones over 2 (sd 0.1 again, shared by neighbours), or exponential; R, G, B alike. */
+static void paint(struct moments *m, enum noise kind, double scale, uint64_t *state)
+{
+    int w = m->width, h = m->height;
+    double *own = malloc((size_t)((w + 1) * (h + 1)) * sizeof *own);
+    if (own == NULL)
+        abort();
+    for (int i = 0; i < (w + 1) * (h + 1); i++)
+        own[i] = kind == SKEWED ? draw(LAW_EXPONENTIAL, state) - 1 : normal(state);
+    for (int y = 0; y < h; y++)
+        for (int x = 0; x < w; x++) {
+            const double *o = own + y * (w + 1) + x;
+            double z = kind == SHARED ? (o[0] + o[1] + o[w + 1] + o[w + 2]) / 2 : o[0];
+            double shade = 1 + 0.5 * sin(0.1 * x) * cos(0.07 * y);
+            for (int c = 0; c < 3; c++)
+                m->mean[3 * (y * w + x) + c] = scale * (shade + noise_sd * z);
+        }
+    free(own);
+}
+
+/* Sums over the image, red. */
+static struct cell image_cell(const struct moments *a, const struct moments *b)
+{
+    struct pyramid p;
+    struct err e;
+    if (!pyramid_build(a, b, 0, a->width, &p, &e))
+        abort();
+    struct cell c = p.level[p.num_levels - 1].cell[0];
+    pyramid_free(&p);
+    return c;
+}
+
+static void assert_between(double got, double lo, double hi)
+{
+    if (!(got >= lo && got <= hi))
+        fail_msg("got %.9g, want %.9g to %.9g", got, lo, hi);
+}
+
+/* 256 x 256, independent: Var(sum D) = 2 sd^2 N; its estimate has a relative sd of sqrt(2 x 3.78/N) =
+ * 1.1 % times a bound that is at least the factor, 1 +- 4.3 % (4096 means, 3.78 correlated), times what
+ * makes 99.9 % of it: 1 to 1.35. Degrees of freedom: N/6, +- 10 % for what r^4 scatters. The skewness
+ * is 0 +- 6.1/256 = 0.024 (test of four of these). */
+static void test_independent(void **state)
+{
+    (void)state;
+    struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
+    uint64_t seed = 5;
+    struct spatial s;
+    struct err e;
+    paint(&a, OWN, 1, &seed);
+    paint(&b, OWN, 1, &seed);
+    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    struct cell c = image_cell(&a, &b);
+    double n = 65536, v = c.va + c.vb;
+    assert_between(v / (2 * noise_sd * noise_sd * n), 0.97, 1.35);
+    assert_between(2 * v * v / c.var_v / n, 0.9 / 6, 1.1 / 6);
+    assert_between(s.factor[0], 0.85, 1.15);
+    assert_between(s.skewness[0], -4 * 0.024, 4 * 0.024);
+    assert_between(s.skew_error[0], 0.018, 0.032);
+    assert_string_equal(a.unit, "picture");
+    moments_free(&a);
+    moments_free(&b);
+}
+
+/* Shared by 2 x 2: the sum's variance is 4 times that of independent pixels of the same sd (each own
+ * number enters four pixels at half its size), up to the rim. What is found must not be less. */
+static void test_shared(void **state)
+{
+    (void)state;
+    struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
+    uint64_t seed = 6;
+    struct spatial s;
+    struct err e;
+    paint(&a, SHARED, 1, &seed);
+    paint(&b, SHARED, 1, &seed);
+    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    struct cell c = image_cell(&a, &b);
+    double independent = 2 * noise_sd * noise_sd * 65536;
+    assert_true(s.factor[0] > 2);
+    assert_between((c.va + c.vb) / independent, 2.5, 5);
+    moments_free(&a);
+    moments_free(&b);
+}
+
+/* A - B = f(x) + g(y), steps and all: nothing the kernel sees, so no noise. */
+static void test_blind_to_sums(void **state)
+{
+    (void)state;
+    struct moments a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
+    struct spatial s;
+    struct err e;
+    for (int i = 0; i < 32 * 32; i++)
+        for (int c = 0; c < 3; c++) {
+            b.mean[3 * i + c] = 8;
+            a.mean[3 * i + c] = 8 + (i % 32 > 11 ? 3 : 0) + (i / 32) % 5;
+        }
+    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    for (int i = 0; i < 3 * 32 * 32; i++)
+        assert_true(a.m2[i] == 0 && b.m2[i] == 0);
+    moments_free(&a);
+    moments_free(&b);
+}
+
+static void test_refused(void **state)
+{
+    (void)state;
+    struct moments a = new_moments(32, 31, "sample"), b = new_moments(32, 31, "sample");
+    struct spatial s;
+    struct err e;
+    uint64_t seed = 1;
+    paint(&a, OWN, 1, &seed);
+    paint(&b, OWN, 1, &seed);
+    assert_false(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_non_null(strstr(e.msg, "32 x 32"));
+    memcpy(b.mean, a.mean, 3 * 32 * 31 * sizeof *a.mean);
+    assert_false(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_non_null(strstr(e.msg, "same picture"));
+    moments_free(&a);
+    moments_free(&b);
+    a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
+    unsigned char censored[32 * 32];
+    memset(censored, 1, sizeof censored);
+    memset(censored, 0, 40);
+    paint(&a, OWN, 1, &seed);
+    paint(&b, OWN, 1, &seed);
+    assert_false(spatial_variance(&a, &b, NULL, NULL, censored, &s, &e));
+    assert_non_null(strstr(e.msg, "saturated"));
+    moments_free(&a);
+    moments_free(&b);
+}
+
+/* How many of `runs` pairs come out DIFFERENT; pixels independent by decree: the variance that the
+ * kernel sees, without what neighbours share. */
+static int count_different(enum noise kind, double scale, double alpha, int runs, bool decree,
+                           uint64_t seed)
+{
+    struct moments a = new_moments(64, 64, "sample"), b = new_moments(64, 64, "sample");
+    struct compare_options opt = {.alpha = alpha, .tile = 16};
+    int different = 0;
+    for (int i = 0; i < runs; i++) {
+        struct spatial s;
+        struct comparison c;
+        struct err e;
+        paint(&a, kind, scale, &seed);
+        paint(&b, kind, 1, &seed);
+        if (!spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e))
+            fail_msg("%s", e.msg);
+        double f = 1.5 * s.factor[0];
+        for (int k = 0; decree && k < 3 * 64 * 64; k++) {
+            a.m2[k] /= f;
+            b.m2[k] /= f;
+            a.m3[k] /= f * sqrt(f);
+            b.m3[k] /= f * sqrt(f);
+        }
+        if (!compare_moments(&a, &b, &opt, &c, &e))
+            fail_msg("%s", e.msg);
+        different += c.verdict == VERDICT_DIFFERENT;
+        comparison_free(&c);
+    }
+    moments_free(&a);
+    moments_free(&b);
+    return different;
+}
+
+/* H0: the same mean. alpha 5 %, 400 pairs a law: more than 36 (9 %) would have a chance of 1e-4 at a
+ * true rate of 5 %. Negative control: without the factor for what neighbours share, it is exceeded. */
+static void test_false_alarms(void **state)
+{
+    (void)state;
+    int most = 36;
+    assert_true(gsl_cdf_binomial_Q(36, 0.05, 400) < 1e-3);
+    int own = count_different(OWN, 1, 0.05, 400, false, 21);
+    int shared = count_different(SHARED, 1, 0.05, 400, false, 22);
+    int skewed = count_different(SKEWED, 1, 0.05, 400, false, 23);
+    int control = count_different(SHARED, 1, 0.05, 100, true, 24);
+    print_message("false DIFFERENT of 400: own %d, shared %d, skewed %d; control %d of 100\n", own,
+                  shared, skewed, control);
+    assert_true(own <= most && shared <= most && skewed <= most);
+    assert_true(control > 40);
+}
+
+/* Power: sd of the relative difference of the image is 0.1 sqrt(2)/64 = 0.22 %; 3 % are found in all of
+ * 50 pairs, at alpha 1e-3. */
+static void test_power(void **state)
+{
+    (void)state;
+    assert_int_equal(count_different(OWN, 1.03, 1e-3, 50, false, 31), 50);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_independent),   cmocka_unit_test(test_shared),
+        cmocka_unit_test(test_blind_to_sums), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_false_alarms),  cmocka_unit_test(test_power),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

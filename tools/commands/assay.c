@@ -1,0 +1,94 @@
+/* assay: one program, several verbs. */
+#include "reference/base/gsl_errors.h"
+#include "reference/base/image_oiio.h"
+#include "renderer/image/image.h"
+#include "renderer/base/version.h"
+#include "tools/results/results.h"
+#include "commands.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char **argv, struct err *e);
+    const char *help;
+} verbs[] = {
+    {"validate", verb_validate, "render the suite and judge it against its references"},
+    {"compare", verb_compare, "judge two renders, of any kind of file"},
+    {"diagnose", verb_diagnose, "name the known bug that explains how a renderer is wrong"},
+    {"converge", verb_converge, "measure variance, convergence and efficiency of engines"},
+    {"grade", verb_grade, "grade students' pictures and programs by a rubric"},
+    {"report", verb_report, "make the HTML page of a results.json"},
+    {"watch", verb_watch, "show the latest page of a folder in a browser while runs go on"},
+    {"golden", verb_golden, "render, inspect and approve the stored references"},
+    {"reference", verb_reference, "the same as golden render: with Cycles and POV-Ray"},
+    {"import-check", verb_import_check, "hold our COLLADA loader against Blender's"},
+    {"merge", verb_merge, "add renders of cells or sample ranges of one picture"},
+    {"reproduce", verb_reproduce, "render again what made a picture, and compare bits"},
+    {"plan", verb_plan, "cut a render, a batch, a validation or references into jobs"},
+    {"run-job", verb_run_job, "make some of the jobs of a plan"},
+    {"gather", verb_gather, "put the jobs of a plan together"},
+    {"slurm", verb_slurm, "all three, the jobs on a Slurm cluster"},
+    {"export", verb_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
+};
+
+static void print_help(void)
+{
+    puts("usage: assay VERB [options]\n");
+    for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++)
+        printf("  %-12s %s\n", verbs[i].name, verbs[i].help);
+    puts("\n`assay VERB --help` lists its options.\n"
+         "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive,\n"
+         "3 could not judge, with one line on stderr.");
+}
+
+/* For jansson, whose calls add to documents in hundreds of places: a result that silently lacks a part would be worse
+ * than none, so without memory for it the program ends here, before anything is written. */
+static void *json_memory(size_t size)
+{
+    void *p = malloc(size);
+    if (p == NULL) {
+        fputs("assay: out of memory\n", stderr);
+        _exit(EXIT_NOT_JUDGED);
+    }
+    return p;
+}
+
+int main(int argc, char **argv)
+{
+    json_set_alloc_funcs(json_memory, free);
+    gsl_errors_of_memory_return();
+    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
+        print_help();
+        return 0;
+    }
+    if (argc > 1 && strcmp(argv[1], "--version") == 0) {
+        struct err why;
+        const char *oiio = image_oiio_version(&why);
+        printf("assay %s, %s, %s, jansson %s\n", assay_version, image_library_version(),
+               oiio != NULL ? oiio : why.msg, JANSSON_VERSION);
+        return 0;
+    }
+    struct err e = {0};
+    int code = EXIT_NOT_JUDGED;
+    bool found = false;
+    for (size_t i = 0; argc > 1 && i < sizeof verbs / sizeof verbs[0]; i++)
+        if (strcmp(argv[1], verbs[i].name) == 0) {
+            found = true;
+            code = verbs[i].run(argc - 1, argv + 1, &e);
+        }
+    if (argc < 2)
+        err_set(&e, "no verb given (see --help)");
+    else if (!found)
+        err_set(&e, "unknown verb '%s' (see --help)", argv[1]);
+    if (fflush(stdout) != 0 && e.msg[0] == '\0') {
+        err_set(&e, "cannot write to standard output");
+        code = EXIT_NOT_JUDGED;
+    }
+    if (e.msg[0] != '\0')
+        fprintf(stderr, "assay: %s\n", e.msg);
+    return code;
+}

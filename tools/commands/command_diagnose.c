@@ -1,0 +1,201 @@
+#include "reference/base/json_file.h"
+#include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
+#include "tools/diagnose/diagnose_gather.h"
+#include "tools/diagnose/diagnose_print.h"
+#include "tools/base/data_dirs.h"
+#include "tools/results/results.h"
+#include "tools/base/temp_dir.h"
+#include "commands.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum option {
+    OPT_PATHTRACER,
+    OPT_SCENE,
+    OPT_JSON,
+    OPT_ALPHA,
+    OPT_SEED,
+    OPT_WITHOUT,
+    OPT_CATALOGUE,
+    OPT_SUITE,
+    OPT_THREADS,
+    OPT_TIMEOUT,
+    OPT_QUIET,
+    OPT_HELP
+};
+
+static const struct cli_option options[] = {
+    [OPT_PATHTRACER] = {0, "pathtracer", 1, "PROGRAM",
+                        "the renderer to look at (the one beside this program)"},
+    [OPT_SCENE] = {0, "scene", 1, "VIEW", "what the picture shows: one of the views below"},
+    [OPT_JSON] = {0, "json", 1, "FILE", "write the diagnosis as JSON too"},
+    [OPT_ALPHA] = {0, "alpha", 1, "A", "chance of accusing a correct renderer (1e-6)"},
+    [OPT_SEED] = {0, "seed", 1, "N", "of the renders (1)"},
+    [OPT_WITHOUT] = {0, "without", 1, "BUG", "leave a bug out, as if it were not known"},
+    [OPT_CATALOGUE] = {0, "catalogue", 1, "DIR", "the stored effects of bugs (golden/diagnose)"},
+    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
+    [OPT_THREADS] = {'t', "threads", 1, "N", "threads of a render; 0: all processors (0)"},
+    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds that one render may take (600)"},
+    [OPT_QUIET] = {'q', "quiet", 0, "", "print nothing; the exit code says it"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this, and the views"},
+    {0}};
+
+struct settings {
+    const char *pathtracer, *view, *input, *json, *catalogue_dir, *suite_dir;
+    struct diagnose_options diagnose;
+    uint64_t seed;
+    int threads;
+    double timeout_s;
+    bool quiet, help;
+};
+
+static bool parse(int argc, char **argv, struct settings *s, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true, has_program = false;
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        const char *v = c.value[0];
+        if (i == CLI_POSITIONAL) {
+            if (s->input != NULL)
+                return err_set(e, "diagnose takes one file, '%s' is one more", v);
+            s->input = v;
+            continue;
+        }
+        switch ((enum option)i) {
+        case OPT_PATHTRACER:
+            s->pathtracer = v;
+            has_program = true;
+            break;
+        case OPT_SCENE: s->view = v; break;
+        case OPT_JSON: s->json = v; break;
+        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.1, &s->diagnose.alpha, e); break;
+        case OPT_SEED: ok = cli_uint64("--seed", v, &s->seed, e); break;
+        case OPT_WITHOUT: s->diagnose.without = v; break;
+        case OPT_CATALOGUE: s->catalogue_dir = v; break;
+        case OPT_SUITE: s->suite_dir = v; break;
+        case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &s->threads, e); break;
+        case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &s->timeout_s, e); break;
+        case OPT_QUIET: s->quiet = true; break;
+        case OPT_HELP: s->help = true; break;
+        }
+    }
+    if (ok && s->view != NULL && s->input == NULL && !s->help)
+        return err_set(e, "--scene needs the picture that shows it (see --help)");
+    if (ok && has_program && s->input != NULL)
+        return err_set(e, "either a program or a file is looked at, not both");
+    return ok;
+}
+
+static void print_help(const struct catalogue *c)
+{
+    puts("usage: assay diagnose [options]                       render the views and look at them\n"
+         "       assay diagnose [options] results.json          the pictures of a validation\n"
+         "       assay diagnose [options] --scene VIEW X.exr    one moments image\n\n"
+         "Names the known bug that explains how pictures differ from the correct ones.\n");
+    cli_print_options(stdout, options);
+    puts(
+        "\nviews, the size of their renders, and what the width of any other picture of the same shape "
+        "has\nto be a multiple of:");
+    for (int i = 0; i < c->num_views; i++)
+        printf("  %-36s %d x %d, %d spp, %d\n", c->view[i].name, c->view[i].width,
+               c->view[i].height, c->view[i].spp, c->view[i].correct.columns);
+    puts(
+        "\nExit code: 0 nothing wrong found, 1 a bug named or wrong in an unknown way, 3 could not\n"
+        "judge.");
+}
+
+static bool gather(const struct settings *s, const struct gather_options *g, struct clue *clue,
+                   int *num, json_t *skipped, struct err *e)
+{
+    if (s->input == NULL)
+        return gather_program(g, s->pathtracer, clue, num, e);
+    if (s->view == NULL)
+        return gather_results(g, s->input, clue, num, skipped, e);
+    *num = 1;
+    return gather_picture(g, s->view, s->input, clue, e);
+}
+
+static bool run(const struct settings *s, const struct gather_options *g, struct clue *clue,
+                struct diagnosis *d, struct err *e)
+{
+    int num = 0;
+    json_t *skipped = json_array();
+    bool ok = skipped != NULL || err_set(e, "out of memory");
+    ok = ok && gather(s, g, clue, &num, skipped, e) &&
+         diagnose(g->catalogue, clue, num, &s->diagnose, d, e);
+    if (ok && !s->quiet)
+        diagnosis_print(stdout, g->catalogue, clue, num, d, skipped);
+    if (ok && s->json != NULL) {
+        json_t *root = diagnosis_json(g->catalogue, clue, num, d, skipped);
+        ok = (root != NULL || err_set(e, "out of memory")) && json_write(s->json, root, e);
+        json_decref(root);
+    }
+    json_decref(skipped);
+    return ok;
+}
+
+static int look(const struct settings *s, const struct catalogue *c, struct err *e)
+{
+    struct temp_dir work;
+    struct suite suite;
+    struct diagnosis d;
+    struct clue *clue = calloc((size_t)c->num_views, sizeof *clue);
+    if (clue == NULL) {
+        err_set(e, "out of memory");
+        return EXIT_NOT_JUDGED;
+    }
+    if (!temp_dir_open(&work, "diagnose", e)) {
+        free(clue);
+        return EXIT_NOT_JUDGED;
+    }
+    const struct gather_options g = {.catalogue = c,
+                                     .suite = &suite,
+                                     .alpha = s->diagnose.alpha,
+                                     .seed = s->seed,
+                                     .threads = s->threads == 0 ? cli_processors() : s->threads,
+                                     .timeout_s = s->timeout_s,
+                                     .work_dir = work.path};
+    bool ok = suite_load(s->suite_dir, &suite, e);
+    if (ok) {
+        ok = run(s, &g, clue, &d, e);
+        suite_free(&suite);
+    }
+    free(clue);
+    struct err removing;
+    if (!temp_dir_close(&work, &removing) && ok)
+        ok = err_set(e, "%s", removing.msg);
+    return !ok ? EXIT_NOT_JUDGED : d.finding == FINDING_CORRECT ? EXIT_EQUIVALENT : EXIT_DIFFERENT;
+}
+
+int verb_diagnose(int argc, char **argv, struct err *e)
+{
+    char pathtracer[4096], suite[4096], catalogue[4096];
+    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    struct settings s = {
+        .pathtracer = pathtracer,
+        .diagnose = {.alpha = 1e-6},
+        .seed = 1,
+        .timeout_s = 600,
+        .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
+        .catalogue_dir = find_dir(catalogue, sizeof catalogue, "golden/diagnose",
+                                  "../share/assay/golden/diagnose")};
+    struct catalogue c;
+    int code = EXIT_NOT_JUDGED;
+    if (!parse(argc, argv, &s, e) || !catalogue_read(s.catalogue_dir, &c, e))
+        return code;
+    if (s.help) {
+        print_help(&c);
+        code = 0;
+    } else if (s.diagnose.without != NULL && catalogue_bug(&c, s.diagnose.without) < 0) {
+        err_set(e, "--without: the catalogue has no bug '%s'", s.diagnose.without);
+    } else {
+        code = look(&s, &c, e);
+    }
+    catalogue_free(&c);
+    return code;
+}

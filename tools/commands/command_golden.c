@@ -1,0 +1,275 @@
+/* assay golden render | status | approve: from rendering a reference to storing it. */
+#include "renderer/base/cli.h"
+#include "tools/golden/approve.h"
+#include "tools/results/results.h"
+#include "commands.h"
+
+#include <string.h>
+
+enum { MAX_NAMES = 256 };
+
+enum option { OPT_ALL, OPT_FROM, OPT_GOLDEN, OPT_SUITE, OPT_NEW, OPT_ACCEPT, OPT_ALPHA, OPT_HELP };
+
+static const struct cli_option options[] = {
+    [OPT_ALL] = {0, "all", 0, "",
+                 "approve every reference of the suite, or of the names given, but\n"
+                 "those that are up to date and have no candidate"},
+    [OPT_FROM] = {0, "from", 1, "DIR", "candidates (build/golden-candidate)"},
+    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
+    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
+    [OPT_NEW] = {0, "new", 0, "", "approve also where nothing is stored"},
+    [OPT_ACCEPT] = {0, "accept-difference", 1, "WHY",
+                    "approve also what is DIFFERENT; WHY goes into the manifest"},
+    [OPT_ALPHA] = {0, "alpha", 1, "A", "chance of any wrong verdict in this run (1e-3)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+struct settings {
+    const char *suite_dir, *names[MAX_NAMES];
+    int num_names;
+    struct approve_options opt; /* alpha: of the run */
+    bool all, help;
+};
+
+static void print_usage(void)
+{
+    puts(
+        "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
+        "       assay golden status [options]          what is stored, and what is wrong with it\n"
+        "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE] ...\n");
+    cli_print_options(stdout, options);
+}
+
+static bool parse(int argc, char **argv, struct settings *s, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true;
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        const char *v = c.value[0];
+        if (i == CLI_POSITIONAL) {
+            if (s->num_names == MAX_NAMES)
+                return err_set(e, "more than %d names", MAX_NAMES);
+            s->names[s->num_names++] = v;
+            continue;
+        }
+        switch ((enum option)i) {
+        case OPT_ALL: s->all = true; break;
+        case OPT_FROM: s->opt.from_dir = v; break;
+        case OPT_GOLDEN: s->opt.golden_dir = v; break;
+        case OPT_SUITE: s->suite_dir = v; break;
+        case OPT_NEW: s->opt.accept_new = true; break;
+        case OPT_ACCEPT:
+            s->opt.why = v;
+            ok = v[strspn(v, " \t\n")] != '\0' || err_set(e, "--accept-difference needs a reason");
+            break;
+        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &s->opt.alpha, e); break;
+        case OPT_HELP: s->help = true; break;
+        }
+    }
+    return ok;
+}
+
+/* A reference of the suite that an engine renders, counted over scenes and engines; NULL past the last. */
+static const struct suite_reference *rendered_reference(const struct suite *suite, int i,
+                                                        const struct suite_scene **scene)
+{
+    for (int s = 0; s < suite->num_scenes; s++) {
+        *scene = &suite->scene[s];
+        for (int k = 0; k < (*scene)->num_references; k++)
+            if (strcmp((*scene)->references_of, (*scene)->name) == 0 &&
+                strcmp((*scene)->reference[k].engine, "truth") != 0 && i-- == 0)
+                return &(*scene)->reference[k];
+    }
+    return NULL;
+}
+
+/* "SCENE" or "SCENE/ENGINE". */
+static bool is_named(const char *name, const struct suite_scene *scene,
+                     const struct suite_reference *ref)
+{
+    size_t n = strlen(scene->name);
+    return strncmp(name, scene->name, n) == 0 &&
+           (name[n] == '\0' || (name[n] == '/' && strcmp(name + n + 1, ref->engine) == 0));
+}
+
+static bool is_selected(const struct settings *s, const struct suite_scene *scene,
+                        const struct suite_reference *ref)
+{
+    for (int i = 0; i < s->num_names; i++)
+        if (is_named(s->names[i], scene, ref))
+            return true;
+    return s->num_names == 0;
+}
+
+/* Every name has to be that of a reference. */
+static bool check_names(const struct settings *s, const struct suite *suite, struct err *e)
+{
+    if (!s->all && s->num_names == 0)
+        return err_set(e, "approve takes --all or names of references (see --help)");
+    for (int n = 0; n < s->num_names; n++) {
+        const struct suite_scene *scene;
+        const struct suite_reference *ref;
+        bool found = false;
+        for (int i = 0; !found && (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
+            found = is_named(s->names[n], scene, ref);
+        if (!found)
+            return err_set(e, "%s: the suite in %s has no such reference", s->names[n],
+                           s->suite_dir);
+    }
+    return true;
+}
+
+static bool has_candidate(const struct settings *s, const struct suite_scene *scene,
+                          const struct suite_reference *ref)
+{
+    struct golden g;
+    golden_inspect(s->opt.from_dir, scene, ref, &g);
+    bool there = g.state != GOLDEN_MISSING;
+    golden_free(&g);
+    return there;
+}
+
+static bool is_current(const struct settings *s, const struct suite_scene *scene,
+                       const struct suite_reference *ref)
+{
+    struct golden g;
+    golden_inspect(s->opt.golden_dir, scene, ref, &g);
+    bool current = g.state == GOLDEN_CURRENT;
+    golden_free(&g);
+    return current;
+}
+
+/* What the suite no longer has is not for approval. */
+static bool count_orphans(const char *dir, const struct suite *suite, bool print, size_t *num,
+                          const char **first, json_t **names, struct err *e)
+{
+    if (!golden_orphans(dir, suite, names, e))
+        return false;
+    const char *name;
+    json_t *value;
+    *num = json_object_size(*names);
+    *first = *num > 0 ? json_object_iter_key(json_object_iter(*names)) : "";
+    json_object_foreach(*names, name, value)
+    {
+        if (print)
+            printf("%-8s %s/%s: not in the suite\n", "orphan", dir, name);
+    }
+    return true;
+}
+
+static int status(const struct settings *s, const struct suite *suite, struct err *e)
+{
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+    size_t bad = 0, orphans;
+    int total = 0;
+    for (; (ref = rendered_reference(suite, total, &scene)) != NULL; total++) {
+        struct golden g;
+        golden_inspect(s->opt.golden_dir, scene, ref, &g);
+        bool current = g.state == GOLDEN_CURRENT;
+        printf("%-8s %s/%s%s%s\n", golden_state_name(g.state), scene->name, ref->engine,
+               current ? "" : ": ", current ? "" : g.why.msg);
+        bad += !current;
+        golden_free(&g);
+    }
+    json_t *names;
+    const char *first;
+    if (!count_orphans(s->opt.golden_dir, suite, true, &orphans, &first, &names, e))
+        return EXIT_NOT_JUDGED;
+    json_decref(names);
+    if (bad + orphans == 0)
+        return EXIT_EQUIVALENT;
+    err_set(e, "%zu of %d stored references are not current, %zu have no place in the suite", bad,
+            total, orphans);
+    return EXIT_NOT_JUDGED;
+}
+
+/* The command that would accept what was refused as DIFFERENT. */
+static void print_command(const struct settings *s, const struct suite_scene *scene,
+                          const struct suite_reference *ref)
+{
+    printf("  assay golden approve --from %s --golden %s --accept-difference \"...\" %s/%s\n",
+           s->opt.from_dir, s->opt.golden_dir, scene->name, ref->engine);
+}
+
+/* All that are selected, whatever becomes of the others; the line for exit code 3 is that of the first
+ * that could not be judged. */
+static int approve_all(const struct settings *s, const struct suite *suite, struct err *e)
+{
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+    int count[APPROVE_IMPOSSIBLE + 1] = {0}, selected = 0;
+    struct approve_options opt = s->opt;
+    if (!check_names(s, suite, e))
+        return EXIT_NOT_JUDGED;
+    for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
+        selected += is_selected(s, scene, ref);
+    opt.alpha = s->opt.alpha / (selected > 0 ? selected : 1);
+    for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
+        /* Under --all a reference that is up to date needs no candidate. */
+        if (!is_selected(s, scene, ref) ||
+            (s->all && !has_candidate(s, scene, ref) && is_current(s, scene, ref)))
+            continue;
+        struct err why = {0};
+        enum approval done = approve(&opt, scene, ref, stdout, &why);
+        if (done == APPROVE_IMPOSSIBLE)
+            printf("  refused: %s\n", why.msg);
+        if (done == APPROVE_DIFFERENT)
+            print_command(s, scene, ref);
+        if (done == APPROVE_IMPOSSIBLE && count[done] == 0)
+            *e = why;
+        count[done]++;
+    }
+    json_t *names = NULL;
+    const char *first = "";
+    size_t orphans = 0;
+    struct err why = {0};
+    if (s->num_names == 0 &&
+        !count_orphans(s->opt.from_dir, suite, true, &orphans, &first, &names, &why) &&
+        count[APPROVE_IMPOSSIBLE]++ == 0)
+        *e = why;
+    printf(
+        "%d approved, %d unchanged, %d refused as DIFFERENT, %d as INCONCLUSIVE, %d impossible\n",
+        count[APPROVE_ACCEPTED], count[APPROVE_UNCHANGED], count[APPROVE_DIFFERENT],
+        count[APPROVE_INCONCLUSIVE], count[APPROVE_IMPOSSIBLE] + (int)orphans);
+    if (orphans > 0 && count[APPROVE_IMPOSSIBLE]++ == 0)
+        err_set(e, "%s/%s: not in the suite", s->opt.from_dir, first);
+    json_decref(names);
+    return count[APPROVE_IMPOSSIBLE] > 0     ? EXIT_NOT_JUDGED
+           : count[APPROVE_DIFFERENT] > 0    ? EXIT_DIFFERENT
+           : count[APPROVE_INCONCLUSIVE] > 0 ? EXIT_INCONCLUSIVE
+                                             : EXIT_EQUIVALENT;
+}
+
+int verb_golden(int argc, char **argv, struct err *e)
+{
+    struct settings s = {
+        .suite_dir = "reference/scenes",
+        .opt = {.from_dir = "build/golden-candidate", .golden_dir = "golden", .alpha = 1e-3}};
+    const char *what = argc > 1 ? argv[1] : "";
+    if (strcmp(what, "render") == 0)
+        return verb_reference(argc - 1, argv + 1, e);
+    bool is_status = strcmp(what, "status") == 0, help = strcmp(what, "--help") == 0;
+    if (!is_status && !help && strcmp(what, "approve") != 0) {
+        err_set(e, "golden: '%s' is none of render, status, approve (see --help)", what);
+        return EXIT_NOT_JUDGED;
+    }
+    if (!parse(argc - 1, argv + 1, &s, e))
+        return EXIT_NOT_JUDGED;
+    if (help || s.help) {
+        print_usage();
+        return 0;
+    }
+    struct suite suite;
+    if (is_status && (s.num_names > 0 || s.all)) {
+        err_set(e, "golden status takes no names");
+        return EXIT_NOT_JUDGED;
+    }
+    if (!suite_load(s.suite_dir, &suite, e))
+        return EXIT_NOT_JUDGED;
+    int code = is_status ? status(&s, &suite, e) : approve_all(&s, &suite, e);
+    suite_free(&suite);
+    return code;
+}

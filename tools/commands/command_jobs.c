@@ -1,0 +1,220 @@
+/* plan, run-job, gather and slurm: work in jobs (plan.h). */
+#include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
+#include "tools/jobs/plan.h"
+#include "tools/results/results.h"
+#include "tools/jobs/slurm.h"
+#include "commands.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { OPT_DIR, OPT_PARTS, OPT_RANGES, OPT_BY, OPT_HELP };
+
+static const struct cli_option options[] = {
+    [OPT_DIR] = {0, "plan", 1, "DIR", "where the plan and its jobs are kept (OUTPUT.plan)"},
+    [OPT_PARTS] = {0, "parts", 1, "N",
+                   "into about how many cells a render is cut, or how many jobs\n"
+                   "references (64)"},
+    [OPT_RANGES] = {0, "ranges", 1, "R",
+                    "each cell into R sample ranges, a job each; at most one for each\n"
+                    "sample. Their sums are added up, so that the picture is that of\n"
+                    "one render to rounding, not to the bit; the same bits for the\n"
+                    "same R whatever the cells and the order; not with --adaptive and\n"
+                    "--keep-state (1)"},
+    [OPT_BY] = {0, "by", 1, "WHAT",
+                "a validation: scene, a job for each scene, whose claims share its\n"
+                "renders; claim, a job for each claim, each of which renders what it\n"
+                "needs itself (scene)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+static const struct cli_option only_help[] = {{'h', "help", 0, "", "print this"}, {0}};
+
+struct words {
+    const char *dir;
+    struct plan_wishes wish;
+    int first; /* argv[first]: the command that is planned */
+    bool help;
+};
+
+static bool parse_option(int option, const char *value, struct words *w, struct err *e)
+{
+    static const char *const by[] = {"scene", "claim", NULL};
+    int which = 0;
+    switch (option) {
+    case OPT_DIR: w->dir = value; return true;
+    case OPT_PARTS: return cli_int("--parts", value, 1, 1000000, &w->wish.parts, e);
+    case OPT_RANGES: return cli_int("--ranges", value, 1, 1000000, &w->wish.ranges, e);
+    case OPT_BY:
+        if (!cli_choice("--by", value, by, &which, e))
+            return false;
+        w->wish.by = which == 0 ? PLAN_BY_SCENE : PLAN_BY_CLAIM;
+        return true;
+    default: return w->help = true;
+    }
+}
+
+/* Options end where the command begins. */
+static bool parse(int argc, char **argv, struct words *w, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    *w = (struct words){.first = argc};
+    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        if (i == CLI_POSITIONAL) {
+            w->first = c.next - 1;
+            return true;
+        }
+        if (!parse_option(i, c.value[0], w, e))
+            return false;
+        if (w->help)
+            return true;
+    }
+    return true;
+}
+
+static void print_help(const char *verb, const char *what)
+{
+    printf("usage: assay %s [options] pathtracer|grade|validate|reference ARGUMENT...\n\n%s\n",
+           verb, what);
+    cli_print_options(stdout, options);
+}
+
+int verb_plan(int argc, char **argv, struct err *e)
+{
+    struct words w;
+    struct plan p;
+    if (!parse(argc, argv, &w, e))
+        return EXIT_NOT_JUDGED;
+    if (w.help) {
+        print_help(
+            "plan",
+            "Cuts the command into jobs, writes DIR/plan.jsonl and prints it: a line for all, "
+            "then one for each job.\nassay run-job DIR K... runs some, assay gather DIR "
+            "puts them together to what the command\nwould have left.\n");
+        return 0;
+    }
+    if (!plan_make(w.dir, argc - w.first, argv + w.first, &w.wish, &p, e))
+        return EXIT_NOT_JUDGED;
+    json_dumpf(p.head, stdout, JSON_COMPACT);
+    for (int k = 0; k < p.num; k++)
+        printf("\n%s", p.line[k]);
+    putchar('\n');
+    plan_free(&p);
+    return 0;
+}
+
+/* True with the plan read and entered; false with *code and a line, or after --help. */
+static bool open_plan(int argc, char **argv, const char *help, struct plan *p, int *code,
+                      struct err *e)
+{
+    struct cli c = {.options = only_help, .argc = argc, .argv = argv, .next = 1};
+    int i = cli_next(&c, e);
+    *code = EXIT_NOT_JUDGED;
+    if (i == 0) {
+        puts(help);
+        *code = 0;
+        return false;
+    }
+    if (i != CLI_POSITIONAL)
+        return i == CLI_ERROR ? false : err_set(e, "%s needs a plan (see --help)", argv[0]);
+    if (!plan_read(c.value[0], p, e))
+        return false;
+    if (plan_enter(p, e))
+        return true;
+    plan_free(p);
+    return false;
+}
+
+int verb_run_job(int argc, char **argv, struct err *e)
+{
+    struct plan p;
+    int code, failed = 0;
+    if (!open_plan(
+            argc, argv,
+            "usage: assay run-job PLAN K...\n\n"
+            "Runs jobs of a plan by number, from 0. What is made and whole is not made again.",
+            &p, &code, e))
+        return code;
+    for (int i = 2; i < argc && failed == 0; i++) {
+        int k;
+        failed = !cli_int("run-job", argv[i], 0, p.num - 1, &k, e);
+    }
+    if (argc < 3)
+        failed = !err_set(e, "run-job needs the number of a job (see --help)");
+    /* One that fails does not keep the others from being made. */
+    for (int i = 2; i < argc && e->msg[0] == '\0'; i++) {
+        struct err why = {""};
+        bool made;
+        int k = (int)strtol(argv[i], NULL, 10);
+        printf("job %d: begins\n", k);
+        fflush(stdout);
+        bool ok = plan_run_job(&p, k, &made, &why);
+        printf("job %d: %s\n", k, !ok ? why.msg : made ? "made" : "was there");
+        fflush(stdout);
+        failed += !ok;
+        if (!ok && i == argc - 1)
+            *e = why;
+    }
+    if (failed > 0 && e->msg[0] == '\0')
+        err_set(e, "%d of %d jobs failed, see above", failed, argc - 2);
+    plan_free(&p);
+    return failed > 0 ? EXIT_NOT_JUDGED : 0;
+}
+
+int verb_gather(int argc, char **argv, struct err *e)
+{
+    struct plan p;
+    int code;
+    if (!open_plan(
+            argc, argv,
+            "usage: assay gather PLAN\n\n"
+            "Puts the jobs of a plan together to what its command would have left, and ends with\n"
+            "its exit code.",
+            &p, &code, e))
+        return code;
+    if (argc > 2)
+        err_set(e, "gather takes one plan");
+    else
+        code = plan_gather(&p, e);
+    plan_free(&p);
+    return code;
+}
+
+int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                  struct err *e)
+{
+    static const struct plan_wishes none = {0};
+    struct plan p;
+    struct err ignored;
+    if (!plan_make(dir, argc, argv, w != NULL ? w : &none, &p, e))
+        return EXIT_NOT_JUDGED;
+    int code = EXIT_NOT_JUDGED;
+    bool ok = slurm_make(&p, e);
+    if (ok)
+        code = plan_gather(&p, e);
+    /* What has been put together needs no plan of ours; one that the user named is the user's. */
+    if (ok && dir == NULL && e->msg[0] == '\0' && !remove_tree(p.dir, &ignored))
+        fprintf(stderr, "assay: note: %s\n", ignored.msg);
+    plan_free(&p);
+    return code;
+}
+
+int verb_slurm(int argc, char **argv, struct err *e)
+{
+    struct words w;
+    if (!parse(argc, argv, &w, e))
+        return EXIT_NOT_JUDGED;
+    if (w.help) {
+        print_help("slurm",
+                   "Plans the command, runs its jobs as arrays of a Slurm cluster that sees these "
+                   "files, submits again what is\nlost, and gathers. Where sbatch reads SBATCH_... "
+                   "from the environment, that is how to choose a partition\nor a time limit. "
+                   "Begun again it goes on.\n");
+        return 0;
+    }
+    return slurm_command(w.dir, argc - w.first, argv + w.first, &w.wish, e);
+}

@@ -1,0 +1,84 @@
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "tools/golden/reference_options.h"
+#include "tools/results/results.h"
+#include "commands.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
+                     struct err *e)
+{
+    const struct reference_command *c = ctx;
+    struct reference_state state;
+    struct moments m;
+    json_t *manifest;
+    double start = now_seconds();
+    if (!reference_command_state(c, scene, ref, &state, e))
+        return false;
+    if (state.there != NULL)
+        return reference_command_keep(c, scene, ref, &state, e);
+    fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
+    if (!reference_render(scene, ref, &state.opt, &m, &manifest, e))
+        return false;
+    bool ok =
+        reference_command_write(c, scene, ref, state.key, &m, manifest, now_seconds() - start, e);
+    moments_free(&m);
+    json_decref(manifest);
+    return ok;
+}
+
+/* --pictures wants one reference. */
+struct chosen {
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+};
+
+static bool choose(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
+                   struct err *e)
+{
+    struct chosen *c = ctx;
+    if (c->ref != NULL)
+        return err_set(e, "--pictures is of one reference: give --only and --engine");
+    *c = (struct chosen){scene, ref};
+    return true;
+}
+
+static bool make_pictures(const struct reference_command *c, struct err *e)
+{
+    struct chosen one = {NULL, NULL};
+    return reference_command_each(c, choose, &one, e) && make_dirs(c->out, e) &&
+           reference_render_part(one.scene, one.ref, &c->opt, c->first, c->last, c->out, e);
+}
+
+/* Also as `golden render`. */
+static int on_slurm(int argc, char **argv, struct err *e)
+{
+    char name[] = "reference";
+    char **word = calloc((size_t)argc + 1, sizeof *word);
+    if (word == NULL) {
+        err_set(e, "out of memory");
+        return EXIT_NOT_JUDGED;
+    }
+    memcpy(word, argv, (size_t)argc * sizeof *word);
+    word[0] = name;
+    int code = slurm_command(NULL, argc, word, NULL, e);
+    free(word);
+    return code;
+}
+
+int verb_reference(int argc, char **argv, struct err *e)
+{
+    struct reference_command c;
+    int code = EXIT_NOT_JUDGED;
+    bool ok = reference_command_read(argc, argv, &c, e);
+    if (ok && c.slurm && !c.help)
+        code = on_slurm(argc, argv, e);
+    else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
+                                          : reference_command_each(&c, make_one, &c, e))))
+        code = 0;
+    reference_command_free(&c);
+    return code;
+}

@@ -1,0 +1,32 @@
+/* The verbs of the assay program: each reads its own options, does its job and returns the exit
+ * code (results.h); with EXIT_NOT_JUDGED, e has the line. argv[0] is the verb. */
+#ifndef ASSAY_COMMANDS_H
+#define ASSAY_COMMANDS_H
+
+#include "renderer/base/err.h"
+
+int verb_validate(int argc, char **argv, struct err *e);
+int verb_compare(int argc, char **argv, struct err *e);
+int verb_converge(int argc, char **argv, struct err *e);
+int verb_reference(int argc, char **argv, struct err *e);
+int verb_golden(int argc, char **argv, struct err *e);
+int verb_export(int argc, char **argv, struct err *e);
+int verb_import_check(int argc, char **argv, struct err *e);
+int verb_merge(int argc, char **argv, struct err *e);
+int verb_diagnose(int argc, char **argv, struct err *e);
+int verb_watch(int argc, char **argv, struct err *e);
+int verb_grade(int argc, char **argv, struct err *e);
+int verb_reproduce(int argc, char **argv, struct err *e);
+int verb_report(int argc, char **argv, struct err *e);
+int verb_plan(int argc, char **argv, struct err *e);
+int verb_run_job(int argc, char **argv, struct err *e);
+int verb_gather(int argc, char **argv, struct err *e);
+int verb_slurm(int argc, char **argv, struct err *e);
+
+/* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
+ * jobs on the cluster, gathers. w NULL: no wishes. */
+struct plan_wishes;
+int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                  struct err *e);
+
+#endif

@@ -1,0 +1,264 @@
+#include "compare.h"
+
+#include "chi_square.h"
+#include "matched_filter.h"
+#include "error_modes.h"
+#include "input_checks.h"
+#include "variance_ratio.h"
+#include "pyramid.h"
+#include "region.h"
+#include "tools/stats/distributions.h"
+#include "verdict.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const double largest_z = 1e4;
+const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense", "directed",
+                                                    "noise"};
+
+/* Skewness is judged where a statistic's part of alpha would be divided by all its regions. */
+static void set_guards(struct judge *j, size_t regions)
+{
+    double tests[NUM_STATISTICS] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1), 6,
+                                    NUM_DIRECTIONS, 1};
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        if (j->share[s] > 0)
+            j->z_guard[s] = stats_normal_quantile(j->opt.alpha * j->share[s] / (2 * tests[s]));
+}
+
+/* The region with the smallest p so far. */
+struct worst {
+    struct cell cell;
+    struct rect rect;
+    int channel;
+    double log10_p, z;
+};
+
+/* Tests every region of one channel; worst, of the image and of all smaller ones. */
+static void scan(struct judge *j, const struct pyramid *p, int channel, struct worst worst_of[2],
+                 struct comparison *out)
+{
+    for (int l = p->num_levels - 1; l >= 0; l--) {
+        const struct pyramid_level *level = &p->level[l];
+        size_t regions = (size_t)level->nx * (size_t)level->ny, tested = 0;
+        for (size_t i = 0; i < regions; i++) {
+            struct rect r = pyramid_rect(p, l, i);
+            struct measured m = region_measure(j, &level->cell[i], r);
+            if (!region_testable(j, &m))
+                continue;
+            tested++;
+            /* An exact p only for what may be the smallest: noise-free regions and those whose
+             * normal equivalent, good to 3 %, comes near the largest. */
+            struct worst *worst = &worst_of[m.statistic];
+            double z = m.noise_free ? INFINITY : stats_z_of_t(region_excess_t(&m), m.dof);
+            if (!m.noise_free && (z <= 0 || z < 0.94 * worst->z))
+                continue;
+            double log10_p = region_log10_p(j, &m, channel);
+            if (log10_p < worst->log10_p) {
+                *worst = (struct worst){level->cell[i], r, channel, log10_p,
+                                        m.noise_free ? worst->z : fmax(z, worst->z)};
+            }
+        }
+        j->num_tests[l == p->num_levels - 1 ? STATISTIC_IMAGE : STATISTIC_PYRAMID] += tested;
+        if (l >= p->tile_level && tested < regions)
+            out->skew_limited = true;
+        if (channel == CHANNEL_LUMINANCE && 2 * tested >= regions)
+            out->finest_side = level->side;
+    }
+}
+
+/* sum over pixels of d^2 - v: without bias for the sum of squared biases. */
+static double squared_bias(const struct pyramid *p)
+{
+    double sum = 0;
+    size_t pixels = (size_t)p->width * (size_t)p->height;
+    const struct cell *cell = p->level[0].cell;
+    for (size_t i = 0; i < pixels; i++) {
+        double d = cell[i].a - cell[i].b;
+        sum += d * d - cell[i].va - cell[i].vb;
+    }
+    return sum;
+}
+
+static bool fill_images(const struct judge *j, const struct pyramid *p, struct comparison *out,
+                        struct err *e)
+{
+    if (!image_alloc(&out->z, p->width, p->height, 1, (const char *const[]){"z"}, e) ||
+        !image_alloc(&out->relative, p->width, p->height, 1, (const char *const[]){"rel"}, e))
+        return false;
+    size_t pixels = (size_t)p->width * (size_t)p->height;
+    for (size_t i = 0; i < pixels; i++) {
+        struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
+        out->z.data[i] = (float)fmin(largest_z, fmax(-largest_z, region_t(&m)));
+        out->relative.data[i] = (float)(m.d / m.unit);
+    }
+    return true;
+}
+
+/* The region's own MDB or, if it is too skewed to be tested, that of the smallest tested region
+ * around it: there the same error is diluted. */
+static double mdb_of(const struct judge *j, const struct pyramid *p, int level, size_t i)
+{
+    struct measured own = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
+    size_t x = i % (size_t)p->level[level].nx, y = i / (size_t)p->level[level].nx;
+    for (int l = level; l < p->num_levels; l++, x /= 2, y /= 2) {
+        size_t at = y * (size_t)p->level[l].nx + x;
+        struct measured m = region_measure(j, &p->level[l].cell[at], pyramid_rect(p, l, at));
+        if (region_testable(j, &m))
+            return fmin(region_mdb_none, region_mdb(j, &m, CHANNEL_LUMINANCE) * m.unit / own.unit);
+    }
+    return region_mdb_none;
+}
+
+static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct comparison *out,
+                       struct region **tiles, struct err *e)
+{
+    const struct pyramid_level *level = &p->level[p->tile_level];
+    size_t num = (size_t)level->nx * (size_t)level->ny;
+    out->tiles_x = level->nx;
+    out->tiles_y = level->ny;
+    *tiles = malloc(num * sizeof **tiles);
+    out->tile_log10_p = malloc(num * sizeof *out->tile_log10_p);
+    out->tile_t = malloc(num * sizeof *out->tile_t);
+    if (*tiles == NULL || out->tile_log10_p == NULL || out->tile_t == NULL)
+        return err_set(e, "out of memory for %zu tiles", num);
+    for (size_t i = 0; i < num; i++) {
+        struct rect r = pyramid_rect(p, p->tile_level, i);
+        struct measured m = region_measure(j, &level->cell[i], r);
+        struct region *tile = &(*tiles)[i];
+        *tile = region_fill(j, &level->cell[i], r, CHANNEL_LUMINANCE);
+        tile->mdb = mdb_of(j, p, p->tile_level, i);
+        out->mdb_tile = fmax(out->mdb_tile, tile->mdb);
+        out->tile_t[i] = tile->t;
+        out->tile_log10_p[i] = region_log10_p_equal(j, &m, CHANNEL_LUMINANCE);
+        if (i == 0 || region_reach(tile) > region_reach(&out->worst_tile))
+            out->worst_tile = *tile;
+    }
+    return true;
+}
+
+/* log10_p: the smallest. False if the statistic has no test. */
+static bool fill_statistic(const struct judge *j, int s, double log10_p, struct comparison *out)
+{
+    struct statistic *st = &out->statistic[s];
+    assert(j->num_tests[s] < 1u << 31);
+    st->share = j->share[s];
+    st->num_tests = (int)j->num_tests[s];
+    out->num_tests += st->num_tests;
+    if (st->num_tests > 0)
+        st->log10_p = fmin(0, log10_p + log10(st->num_tests));
+    return st->num_tests > 0;
+}
+
+static void fill_statistics(struct judge *j, const struct worst worst[2], const struct dense *dense,
+                            double directed, double noise, struct comparison *out)
+{
+    struct statistic *st = out->statistic;
+    for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
+        if (fill_statistic(j, s, worst[s].log10_p, out))
+            region_name(j->width, j->height, worst[s].rect, worst[s].channel, st[s].what,
+                        sizeof st[s].what);
+    if (fill_statistic(j, STATISTIC_DENSE, dense->log10_p, out))
+        snprintf(st[STATISTIC_DENSE].what, sizeof st->what,
+                 "%d regions of %d x %d pixels or more (%s)", dense->regions, dense->side,
+                 dense->side, channel_name[dense->channel]);
+    if (fill_statistic(j, STATISTIC_DIRECTED, directed, out))
+        snprintf(st[STATISTIC_DIRECTED].what, sizeof st->what, "%s", out->direction.name);
+    if (fill_statistic(j, STATISTIC_NOISE, noise, out))
+        snprintf(st[STATISTIC_NOISE].what, sizeof st->what, "variance of a path: %.3g times",
+                 out->variance.ratio);
+}
+
+/* The statistics besides those of the regions. */
+static bool test_rest(const struct moments *a, const struct moments *b, struct judge *j,
+                      double *directed, double *noise, struct comparison *out, struct err *e)
+{
+    bool testable;
+    *directed = 0;
+    if (j->share[STATISTIC_DIRECTED] > 0 && !directed_test(a, b, j, &out->direction, directed, e))
+        return false;
+    out->variance = noise_ratio(a, b, j, noise, &testable);
+    j->num_tests[STATISTIC_NOISE] = j->share[STATISTIC_NOISE] > 0 && testable;
+    return true;
+}
+
+/* How far below the level it is held to the smallest p of a statistic is; above 0: rejected. */
+static double evidence(const struct comparison *c, int s)
+{
+    return c->statistic[s].num_tests > 0 ? log10(c->statistic[s].share) - c->statistic[s].log10_p
+                                         : -INFINITY;
+}
+
+bool compare_moments(const struct moments *a, const struct moments *b,
+                     const struct compare_options *opt, struct comparison *out, struct err *e)
+{
+    *out = (struct comparison){0};
+    struct judge j;
+    struct pyramid p = {0};
+    struct region *tiles = NULL;
+    struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
+    struct cell image[NUM_CHANNELS];
+    struct dense dense = {0};
+    double squared = 0, mean = 0, directed, noise;
+    if (!hygiene_check(a, b, opt, &j, e))
+        return false;
+    struct rect whole = {0, 0, a->width, a->height};
+    for (int c = 0; c < NUM_CHANNELS; c++) {
+        pyramid_free(&p);
+        if (!pyramid_build(a, b, c, opt->tile, &p, e))
+            goto fail;
+        if (c == 0)
+            set_guards(&j, pyramid_regions(&p));
+        image[c] = p.level[p.num_levels - 1].cell[0];
+        scan(&j, &p, c, worst, out);
+        if (c < CHANNEL_LUMINANCE && j.share[STATISTIC_DENSE] > 0 &&
+            !dense_scan(&j, &p, c, &dense, e))
+            goto fail;
+        if (c < CHANNEL_LUMINANCE)
+            squared += luminance_weight[c] * squared_bias(&p);
+    }
+    if (!test_rest(a, b, &j, &directed, &noise, out, e))
+        goto fail;
+    fill_statistics(&j, worst, &dense, directed, noise, out);
+    if (!fill_images(&j, &p, out, e) || !fill_tiles(&j, &p, out, &tiles, e))
+        goto fail;
+    mean = image[CHANNEL_LUMINANCE].b;
+    out->rms_bias = sqrt(fmax(0, squared) * whole.width * whole.height) / mean;
+    for (int c = 0; c < NUM_CHANNELS; c++) {
+        struct measured m = region_measure(&j, &image[c], whole);
+        out->global[c] = region_fill(&j, &image[c], whole, c);
+        out->global[c].mdb = region_testable(&j, &m) ? region_mdb(&j, &m, c) : region_mdb_none;
+    }
+    out->mdb_global = out->global[CHANNEL_LUMINANCE].mdb;
+    const struct worst *w =
+        &worst[evidence(out, STATISTIC_PYRAMID) > evidence(out, STATISTIC_IMAGE)];
+    if (w->log10_p > 0) {
+        out->worst = out->global[CHANNEL_LUMINANCE];
+    } else {
+        struct measured m = region_measure(&j, &w->cell, w->rect);
+        out->worst = region_fill(&j, &w->cell, w->rect, w->channel);
+        out->worst.mdb = region_mdb(&j, &m, w->channel);
+    }
+    verdict_decide(out, opt, tiles);
+    free(tiles);
+    pyramid_free(&p);
+    return true;
+
+fail:
+    free(tiles);
+    pyramid_free(&p);
+    comparison_free(out);
+    return false;
+}
+
+void comparison_free(struct comparison *c)
+{
+    free(c->tile_log10_p);
+    free(c->tile_t);
+    image_free(&c->z);
+    image_free(&c->relative);
+    *c = (struct comparison){0};
+}

@@ -1,0 +1,110 @@
+/* Two moments images -> a verdict with its error rates and what it could have missed.
+ * Procedure, formulas, sources and limits: tools/README.md. */
+#ifndef ASSAY_COMPARE_H
+#define ASSAY_COMPARE_H
+
+#include "reference/suite/suite.h"
+#include "renderer/image/moments.h"
+
+struct compare_options {
+    double alpha;           /* in (0, 0.5): bounds the chance of a wrong DIFFERENT and of a wrong
+                             EQUIVALENT, each, over all regions and channels of this one claim */
+    double margin_global;   /* relative, in [0, 1); 0: any difference counts (a regression test) */
+    double margin_tile;     /* at least margin_global; both are 0 or none is */
+    int tile;               /* side of a reporting tile, pixels; divides width and height */
+    double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
+                               as different estimators differ rightly */
+};
+
+/* The claim's tests in groups, each with its own part of alpha. */
+enum {
+    STATISTIC_IMAGE,    /* the image's mean: R, G, B, luminance */
+    STATISTIC_PYRAMID,  /* every smaller region */
+    STATISTIC_DENSE,    /* many small differences together */
+    STATISTIC_DIRECTED, /* known kinds of error */
+    STATISTIC_NOISE,    /* the variance of one observation */
+    NUM_STATISTICS
+};
+
+/* DIFFERENT if any log10_p <= log10(alpha * share). */
+struct statistic {
+    double share;   /* of alpha; 0 where it does not apply. Its share then goes to the others, by
+                       options and kind of input only, never by the data */
+    int num_tests;  /* 0: nothing could be tested */
+    double log10_p; /* of its smallest p, times num_tests (Bonferroni), at most 0 */
+    char what[96];  /* which test that was: "shift by x", "16 x 16 pixels at 32,48 (red)" */
+};
+/* The known kind of error that looks most like A - B. */
+struct direction {
+    const char *name; /* "shift by x", static; NULL if none could be tested */
+    double
+        explained; /* share of the squared difference, noise removed, that lies in this direction,
+                         0..1; an estimate */
+    double amount; /* its size to first order, and its 1 - 2 alpha interval: 0 where unit is "" */
+    double lo, hi;
+    const char *unit; /* "%", "% of the mean", "in the exponent", "px", "" */
+};
+
+/* VA/VB: the variance of one path (or, where the number of paths is unknown, of one observation), RGB
+ * together, and its 1 - 2 alpha interval. lo may be 0. */
+struct variance_ratio {
+    double ratio, lo, hi;
+    bool valid; /* both sides have noise of a kind that compares, and enough of it to know */
+};
+extern const char *const statistic_name[NUM_STATISTICS]; /* "image", "pyramid", .. */
+
+/* A square region (or the image) in one channel (0..2 RGB, 3 luminance .2126 .7152 .0722). Relative
+ * quantities are in units of the larger of mean_b and 5 % of the mean luminance of the image B.
+ * Every number is finite: t is within +-1e9, log10_p at least -1e6, mdb at most 1e6. */
+struct region {
+    int x, y, width, height;
+    int channel;
+    double mean_a, mean_b; /* mean radiance of the region */
+    double difference;     /* (A-B) relative */
+    double std_error;      /* of `difference` */
+    double dof;            /* Welch-Satterthwaite; 0 if there is no noise */
+    double t;              /* difference / std_error; 0 if both are 0 */
+    double log10_p;        /* two-sided p of "no difference beyond the margin" */
+    double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference`, widened for skew */
+    bool ci_valid;         /* false: too skewed for an interval; ci_lo, ci_hi only a hint */
+    double mdb;            /* the smallest true |difference| that comes out DIFFERENT with 95 % */
+    double margin;
+};
+
+struct comparison {
+    enum verdict verdict;
+    char reason[256]; /* one sentence: what decided */
+    int num_tests;    /* of all statistics together */
+    struct statistic statistic[NUM_STATISTICS];
+    struct direction direction; /* of the smallest p of STATISTIC_DIRECTED */
+    struct variance_ratio variance;
+    struct region global[4];  /* per channel and luminance */
+    struct region worst;      /* of all regions, smallest p in units of the level it is held to */
+    struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
+    double mdb_global;        /* of luminance */
+    double mdb_tile;          /* largest over the reporting tiles, luminance */
+    double rms_bias;          /* debiased RMS error over pixels and RGB (weighted as luminance) in
+                                 units of the mean luminance of B: sqrt(max(0, ..)) */
+    double extra_factor; /* INCONCLUSIVE: about how many times the samples would decide; else 1 */
+    bool skew_limited;   /* some regions of a tile's size or larger were too skewed for their t and
+                            were judged only as part of larger ones */
+    int finest_side; /* smallest side of which at least half the luminance regions were tested */
+    int tiles_x, tiles_y; /* of reporting tiles */
+    double *tile_log10_p; /* luminance, no margin (H0: equal), tiles_x*tiles_y; for the histogram */
+    double *tile_t;
+    struct image z;        /* per pixel luminance z (difference / standard error), 1 channel "z",
+                              within +-1e4 */
+    struct image relative; /* per pixel signed relative difference of luminance, 1 channel "rel" */
+};
+
+/* Hygiene first, each a line in e and false (could not judge): sizes differ, NaN, infinity,
+ * negative radiance, negative M2, n < 3 where not exact (skewness is unknown then), an unknown
+ * unit, noise in an exact side, replicates without any variance (the seed was ignored), the same
+ * observations on both sides, a black reference, options out of range. A is the tested side, B the reference. The caller frees with
+ * comparison_free(). */
+bool compare_moments(const struct moments *a, const struct moments *b,
+                     const struct compare_options *opt, struct comparison *out, struct err *e)
+    __attribute__((warn_unused_result));
+void comparison_free(struct comparison *c);
+
+#endif

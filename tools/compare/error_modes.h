@@ -1,0 +1,71 @@
+/* What a known kind of error would add to each pixel, as a picture: the directions of matched_filter.c.
+ *
+ * A direction is computed from the two sides themselves. To keep the level of the test, nothing that is
+ * seen in pixel p may enter the direction or its weight in p: neighbours stand for it. */
+#ifndef ASSAY_ERROR_MODES_H
+#define ASSAY_ERROR_MODES_H
+
+#include "renderer/image/moments.h"
+
+enum direction_kind {
+    DIRECTION_SCALE,     /* all radiance times a factor */
+    DIRECTION_OFFSET,    /* a constant added */
+    DIRECTION_GAMMA,     /* a power of radiance */
+    DIRECTION_SHIFT_X,   /* moved to the right */
+    DIRECTION_SHIFT_Y,   /* moved down */
+    DIRECTION_FLIP_X,    /* left and right exchanged */
+    DIRECTION_FLIP_Y,    /* top and bottom exchanged */
+    DIRECTION_ROTATE,    /* both */
+    DIRECTION_TRANSPOSE, /* columns and rows exchanged; square images only */
+    DIRECTION_SWAP_RB,
+    DIRECTION_SWAP_RG,
+    DIRECTION_SWAP_GB,
+    DIRECTION_CLAMP, /* radiance above 1 cut off */
+    NUM_DIRECTIONS
+};
+
+extern const char *const direction_name[NUM_DIRECTIONS];
+
+/* All 3 per pixel. */
+struct base {
+    int width, height;
+    const struct moments *a, *b;
+    double *sd[2];     /* of the means of A and B, 0 where exact */
+    double *root[2];   /* cube roots of their third cumulants */
+    double *around[2]; /* squares of sd, mean over the 5 x 5 pixels around p without p */
+    /* 1 / variance around A and B together, which is taken to be at least 3 % of the image's mean; 0
+     * where a channel has no noise anywhere. */
+    double *weight;
+    /* A and B weighted by the inverse of `around`: its noise is uncorrelated with that of A - B if the
+     * variances near p are those of p. */
+    double *mix;
+    double *mix_around; /* mean of mix over the 3 x 3 pixels around p without p */
+    double *b_around;   /* of B */
+    double *data;       /* of all these */
+};
+
+/* At least 2 pixels. Fails only out of memory. Release with base_free(). */
+bool base_build(const struct moments *a, const struct moments *b, struct base *out, struct err *e)
+    __attribute__((warn_unused_result));
+void base_free(struct base *base);
+
+/* Whether the direction exists for this size of image. */
+bool direction_applies(const struct base *base, enum direction_kind kind);
+
+/* One direction in one pixel. */
+struct difference {
+    double d[3]; /* free of what is seen in the pixel */
+    double
+        same[3]; /* the same quantity with noise of its own, for the amount; d where has_amount is
+                       false */
+    double noise[3]; /* variance of d, where `same` is d; else 0 */
+    /* Variance of sum w D beyond that of D, because d in p is made of pixels in which d is made of p:
+     * their product's mean does not vanish where d is B alone. */
+    double coupled;
+};
+struct difference direction_at(const struct base *base, enum direction_kind kind, int x, int y);
+
+/* Whether a multiple of the direction means something: a shift by 0.3 pixels, but no flip by 0.3. */
+bool direction_has_amount(enum direction_kind kind);
+
+#endif

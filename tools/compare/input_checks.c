@@ -1,0 +1,148 @@
+#include "input_checks.h"
+
+#include "variance_ratio.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double floor_fraction = 0.05; /* of the mean luminance of B */
+
+static bool check_options(const struct compare_options *opt, int width, int height, struct err *e)
+{
+    if (!(opt->alpha > 0 && opt->alpha < 0.5))
+        return err_set(e, "alpha is %g, must lie in (0, 0.5)", opt->alpha);
+    if (!(opt->margin_global >= 0 && opt->margin_global <= opt->margin_tile &&
+          opt->margin_tile < 1))
+        return err_set(e, "margins %g (image) and %g (tile): must be 0 <= image <= tile < 1",
+                       opt->margin_global, opt->margin_tile);
+    if ((opt->margin_global == 0) != (opt->margin_tile == 0))
+        return err_set(e, "margins %g (image) and %g (tile): both or none must be 0",
+                       opt->margin_global, opt->margin_tile);
+    if (!(opt->margin_variance >= 0) || isinf(opt->margin_variance))
+        return err_set(e, "margin of the variance is %g, must be 0 or more", opt->margin_variance);
+    if (opt->tile < 1 || width % opt->tile != 0 || height % opt->tile != 0)
+        return err_set(e, "tile side %d does not divide the image's %d x %d pixels", opt->tile,
+                       width, height);
+    return true;
+}
+
+static bool check_pixel(const struct moments *m, size_t p, bool exact, struct err *e)
+{
+    int x = (int)(p % (size_t)m->width), y = (int)(p / (size_t)m->width);
+    if (!(m->n[p] >= (exact ? 1 : 3)) || isinf(m->n[p]))
+        return err_set(e, "pixel %d,%d has %g observations, at least 3 are needed", x, y, m->n[p]);
+    for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+        if (isnan(m->mean[i]) || isnan(m->m2[i]) || isnan(m->m3[i]))
+            return err_set(e, "pixel %d,%d is not a number", x, y);
+        if (isinf(m->mean[i]) || isinf(m->m2[i]) || isinf(m->m3[i]))
+            return err_set(e, "pixel %d,%d is infinite", x, y);
+        if (m->mean[i] < 0)
+            return err_set(e, "pixel %d,%d has negative radiance %g", x, y, m->mean[i]);
+        if (m->m2[i] < 0)
+            return err_set(e, "pixel %d,%d has a negative sum of squares %g", x, y, m->m2[i]);
+        if (exact && m->m2[i] != 0)
+            return err_set(e, "pixel %d,%d is called exact but has variance", x, y);
+    }
+    return true;
+}
+
+/* Its variance is the other side's too, and its n no count (moments.h). */
+static bool is_picture(const struct moments *m)
+{
+    return strcmp(m->unit, "picture") == 0;
+}
+
+/* Checks one side and gathers what it contributes to the judge. An observation's typical brightness
+ * where it matters is E[x^2]/E[x], for something seen rarely its brightness when seen. */
+static bool check_side(const struct moments *m, struct judge *j, struct err *e)
+{
+    bool exact = strcmp(m->unit, "exact") == 0, replicates = strcmp(m->unit, "replicate") == 0;
+    if (strcmp(m->unit, "stratified") == 0)
+        return err_set(e, "its samples depend on each other (--sampler sobol), so its variance is "
+                          "unknown: only replicates with seeds of their own may be compared");
+    if (!exact && !replicates && !is_picture(m) && strcmp(m->unit, "sample") != 0)
+        return err_set(e, "unknown unit '%s' of an observation", m->unit);
+    bool varies = false;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    for (size_t p = 0; p < pixels; p++) {
+        if (!check_pixel(m, p, exact, e))
+            return false;
+        if (!exact)
+            j->n_min = fmin(j->n_min, m->n[p]);
+        for (size_t c = 0; c < 3; c++) {
+            double mean = m->mean[3 * p + c], m2 = m->m2[3 * p + c];
+            varies = varies || m2 > 0;
+            if (mean > 0)
+                j->event[c] = fmax(j->event[c], mean + m2 / (m->n[p] * mean));
+        }
+    }
+    if (replicates && !varies)
+        return err_set(e, "%g replicates without any variance: was the seed ignored?", m->n[0]);
+    return true;
+}
+
+/* The same seeds on both sides: no difference could show, and none would be there to find. */
+static bool check_shared(const struct moments *a, const struct moments *b, struct err *e)
+{
+    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_picture(a))
+        return true;
+    size_t pixels = (size_t)a->width * (size_t)a->height, shared = noise_shared(a, b);
+    if (shared > 0)
+        return err_set(
+            e,
+            "A and B hold the same observations in %zu of %zu pixels: rendered with the same seed, or copied?",
+            shared, pixels);
+    return true;
+}
+
+/* Parts of alpha. What does not apply gives its part to the others, in proportion. That is a matter of
+ * options and kind of input: by the data it would be a choice among tests. */
+static void set_shares(const struct moments *a, const struct moments *b, struct judge *j)
+{
+    static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};
+    bool pixels = j->width * j->height > 1, noise_a = strcmp(a->unit, "exact") != 0;
+    bool noise_b = strcmp(b->unit, "exact") != 0, known = !is_picture(a) && !is_picture(b);
+    bool applies[NUM_STATISTICS] = {
+        [STATISTIC_IMAGE] = true,
+        [STATISTIC_PYRAMID] = pixels,
+        [STATISTIC_DENSE] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_DIRECTED] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_NOISE] = j->opt.margin_variance > 0 && known && noise_a && noise_b,
+    };
+    double sum = 0;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        sum += applies[s] ? part[s] : 0;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        j->share[s] = applies[s] ? part[s] / sum : 0;
+}
+
+bool hygiene_check(const struct moments *a, const struct moments *b,
+                   const struct compare_options *opt, struct judge *j, struct err *e)
+{
+    if (a->width != b->width || a->height != b->height)
+        return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
+                       b->height);
+    if (!check_options(opt, a->width, a->height, e))
+        return false;
+    *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
+    set_shares(a, b, j);
+    if (!check_side(a, j, e))
+        return err_prefix(e, "A");
+    if (!check_side(b, j, e))
+        return err_prefix(e, "B");
+    if (!check_shared(a, b, e))
+        return false;
+    size_t pixels = (size_t)b->width * (size_t)b->height;
+    double luminance = 0;
+    for (int c = 0; c < 3; c++) {
+        j->event[CHANNEL_LUMINANCE] += luminance_weight[c] * j->event[c];
+        for (size_t p = 0; p < pixels; p++)
+            luminance += luminance_weight[c] * b->mean[3 * p + (size_t)c];
+    }
+    if (!(luminance > 0))
+        return err_set(e, "B is black: relative differences have no unit");
+    j->mean_b = luminance / (double)pixels;
+    j->floor = floor_fraction * j->mean_b;
+    return true;
+}

@@ -1,0 +1,13 @@
+/* What must hold before anything is compared (tools/README.md, "Hygiene"). Used by compare.c and two_stage.c. */
+#ifndef ASSAY_INPUT_CHECKS_H
+#define ASSAY_INPUT_CHECKS_H
+
+#include "region.h"
+
+/* Each failure is a line in e: see compare_moments(). On success *j holds all that regions share but
+ * what the number of regions decides (z_guard, num_tests). */
+bool hygiene_check(const struct moments *a, const struct moments *b,
+                   const struct compare_options *opt, struct judge *j, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

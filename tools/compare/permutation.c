@@ -1,0 +1,296 @@
+#include "permutation.h"
+
+#include "permutation_table.h"
+#include "region.h"
+#include "tools/stats/distributions.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_LABELLINGS = 200000 };
+static const double regression_mdb = 0.05; /* as in verdict.c */
+static const double tie = 1e-9;            /* relative: the same sum in another order is the same */
+
+/* C(n, k), as a double: beyond 2^53 only its size matters. */
+static double choose(int n, int k)
+{
+    double c = 1;
+    for (int i = 1; i <= k; i++)
+        c = c * (n - k + i) / i;
+    return round(c);
+}
+
+/* Swapping all of A and B changes no |t|. */
+static double smallest_p(int num_a, int num_b, int sides)
+{
+    double all = choose(num_a + num_b, num_a);
+    if (all > MOST_LABELLINGS)
+        return 1 / (1 + (double)MOST_LABELLINGS);
+    return (sides == 2 && num_a == num_b ? 2 : 1) / all;
+}
+
+int permutation_needed(double alpha, int sides)
+{
+    for (int k = 3; k <= 64; k++)
+        if (smallest_p(k, k, sides) <= alpha)
+            return k;
+    return 0;
+}
+
+/* The largest sum of z over the rows of A, either way or in the direction of sign; *where is its region (may be NULL). */
+static double largest_sum(const struct table *t, const int *row, double *sum, size_t *where)
+{
+    memcpy(sum, t->z + (size_t)row[0] * t->num, t->num * sizeof *sum);
+    for (int i = 1; i < t->num_a; i++) {
+        const double *z = t->z + (size_t)row[i] * t->num;
+        for (size_t r = 0; r < t->num; r++)
+            sum[r] += z[r];
+    }
+    double best = 0;
+    for (size_t r = 0; r < t->num; r++) {
+        double s = t->sign != 0 ? t->sign * sum[r] : fabs(sum[r]);
+        if (r == 0 || s > best) {
+            best = s;
+            if (where != NULL)
+                *where = r;
+        }
+    }
+    return best;
+}
+
+/* Next subset of num_a of rows in lexicographic order; false after the last. */
+static bool next_subset(int *row, int num_a, int rows)
+{
+    int i = num_a - 1;
+    while (i >= 0 && row[i] == rows - num_a + i)
+        i--;
+    if (i < 0)
+        return false;
+    row[i]++;
+    for (int j = i + 1; j < num_a; j++)
+        row[j] = row[j - 1] + 1;
+    return true;
+}
+
+/* splitmix64 */
+static uint64_t next_random(uint64_t *state)
+{
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
+/* Moves a random subset of num_a to the front. The remainder's bias is below 2^-57. */
+static void random_subset(int *row, int num_a, int rows, uint64_t *state)
+{
+    for (int i = 0; i < num_a; i++) {
+        /* NOLINTNEXTLINE(clang-analyzer-core.DivideZero): rows > num_a. */
+        int j = i + (int)(next_random(state) % (uint64_t)(rows - i)), other = row[j];
+        row[j] = row[i];
+        row[i] = other;
+    }
+}
+
+static int upwards(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* t of a sum of standardised rows: difference of means s (1/na + 1/nb), within groups a sum of
+ * squares of 1 - s^2 (1/na + 1/nb). */
+static double t_of_sum(const struct table *t, double s)
+{
+    double f = 1.0 / t->num_a + 1.0 / t->num_b, within = fmax(1e-18, 1 - s * s * f);
+    return s * f / sqrt(within / (t->num_a + t->num_b - 2) * f);
+}
+
+/* Fills `largest` with the statistic of every labelling, the observed one first, and sorts it. */
+static bool run_labellings(const struct table *t, struct permutation *out, double **largest,
+                           size_t *where, double *observed, struct err *e)
+{
+    int rows = t->num_a + t->num_b;
+    double all = choose(rows, t->num_a);
+    out->is_exhaustive = all <= MOST_LABELLINGS;
+    out->num_labellings = out->is_exhaustive ? (int)all : MOST_LABELLINGS + 1;
+    int *row = malloc((size_t)rows * sizeof *row);
+    double *sum = malloc(t->num * sizeof *sum);
+    *largest = malloc((size_t)out->num_labellings * sizeof **largest);
+    bool ok = row != NULL && sum != NULL && *largest != NULL;
+    if (ok) {
+        for (int k = 0; k < rows; k++)
+            row[k] = k; /* the observed labelling */
+        (*largest)[0] = *observed = largest_sum(t, row, sum, where);
+        uint64_t state = 1;
+        for (int i = 1; i < out->num_labellings; i++) {
+            if (out->is_exhaustive)
+                ok = next_subset(row, t->num_a, rows);
+            else
+                random_subset(row, t->num_a, rows, &state);
+            assert(ok);
+            (*largest)[i] = largest_sum(t, row, sum, NULL);
+        }
+        qsort(*largest, (size_t)out->num_labellings, sizeof **largest, upwards);
+    } else {
+        err_set(e, "out of memory for %d labellings", out->num_labellings);
+    }
+    free(row);
+    free(sum);
+    return ok;
+}
+
+static bool check(const struct renders *a, const struct renders *b, struct err *e)
+{
+    if (a->width != b->width || a->height != b->height)
+        return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
+                       b->height);
+    size_t bytes = 3 * (size_t)a->width * (size_t)a->height * sizeof **a->rgb;
+    for (int i = 0; i < a->num; i++)
+        for (int j = 0; j < b->num; j++)
+            if (memcmp(a->rgb[i], b->rgb[j], bytes) == 0)
+                return err_set(e,
+                               "%s of A and %s of B are the same picture: exchangeable replicates "
+                               "need seeds of their own",
+                               a->name[i], b->name[j]);
+    return true;
+}
+
+static void describe(const struct table *t, size_t r, struct permutation *out)
+{
+    out->x = t->rect[r].x;
+    out->y = t->rect[r].y;
+    out->width = t->rect[r].width;
+    out->height = t->rect[r].height;
+    out->channel = t->channel[r];
+    double d = t->mean[0][r] - t->mean[1][r], b = fabs(t->mean[1][r]);
+    out->difference = b > 0 ? fmax(-1e6, fmin(1e6, d / b)) : copysign(1e6, d);
+}
+
+/* The difference of the image's luminance that exceeds the critical sum with about 95 %. */
+static double image_mdb(const struct table *t, double critical)
+{
+    size_t image = t->num - 1; /* coarsest of the last channel, luminance */
+    double f = 1.0 / t->num_a + 1.0 / t->num_b, dof = t->num_a + t->num_b - 2;
+    double s = (t->mean[0][image] - t->mean[1][image]) / t->spread[image] / f;
+    double se = t->spread[image] * sqrt(fmax(0, 1 - s * s * f) / dof * f);
+    return fmin(region_mdb_none,
+                (t_of_sum(t, critical) + stats_t_quantile(0.05, dof)) * se / t->mean[1][image]);
+}
+
+static void decide(const struct permutation_options *opt, int num_a, int num_b, int width,
+                   int height, struct permutation *out)
+{
+    char where[96];
+    struct rect r = {out->x, out->y, out->width, out->height};
+    region_name(width, height, r, out->channel, where, sizeof where);
+    const char *kind = out->is_exhaustive ? "all" : "random";
+    if (out->p <= opt->alpha) {
+        out->verdict = VERDICT_DIFFERENT;
+        snprintf(out->reason, sizeof out->reason,
+                 "%s: difference %+.3g %%, t = %.3g; p = %.3g by %d labellings (%s), none smaller "
+                 "than %.2g possible",
+                 where, 100 * out->difference, out->t, out->p, out->num_labellings, kind,
+                 out->smallest_p);
+        return;
+    }
+    out->verdict = VERDICT_INCONCLUSIVE;
+    int needed = permutation_needed(opt->alpha, 2);
+    if (out->smallest_p > opt->alpha && needed > 0)
+        snprintf(out->reason, sizeof out->reason,
+                 "%d and %d replicates cannot reach a p below %.2g, alpha is %.2g: %d a side are "
+                 "needed",
+                 num_a, num_b, out->smallest_p, opt->alpha, needed);
+    else if (out->smallest_p > opt->alpha)
+        snprintf(out->reason, sizeof out->reason,
+                 "no p below %.2g can be reached, alpha is %.2g: two stages (--again) of %d "
+                 "replicates a side can",
+                 out->smallest_p, opt->alpha, permutation_needed(sqrt(opt->alpha), 2));
+    else if (out->mdb > regression_mdb)
+        snprintf(out->reason, sizeof out->reason,
+                 "no difference found (p = %.3g by %d labellings), but one below %.3g %% of the "
+                 "image could have been missed",
+                 out->p, out->num_labellings, 100 * out->mdb);
+    else {
+        out->verdict = VERDICT_EQUIVALENT;
+        snprintf(out->reason, sizeof out->reason,
+                 "no difference found (p = %.3g by %d labellings, %s); %.3g %% of the image would "
+                 "have been",
+                 out->p, out->num_labellings, kind, 100 * out->mdb);
+    }
+}
+
+/* Of the labellings, how many reach what was observed; `largest` is sorted. */
+static int count_reaching(const double *largest, int num, double observed)
+{
+    int above = 0;
+    while (above < num && largest[num - 1 - above] >= observed - tie * fabs(observed))
+        above++;
+    return above;
+}
+
+bool permutation_test(const struct renders *a, const struct renders *b,
+                      const struct permutation_options *opt, struct permutation *out, struct err *e)
+{
+    *out = (struct permutation){.smallest_p = smallest_p(a->num, b->num, 2)};
+    struct table t = {0};
+    double *largest = NULL, observed = 0;
+    size_t where = 0;
+    bool ok = check(a, b, e) && table_make(a, b, opt->min_side, &t, e) &&
+              run_labellings(&t, out, &largest, &where, &observed, e);
+    size_t image = t.num - 1; /* the coarsest of the last channel */
+    for (size_t r = 0; ok && r < t.num; r++)
+        out->num_regions += t.spread[r] > 0;
+    if (ok && !(t.spread[image] > 0))
+        ok = err_set(e, "the pictures of A and B do not vary: were the seeds ignored?");
+    if (ok && !(t.mean[1][image] > 0))
+        ok = err_set(e, "B is black: relative differences have no unit");
+    if (ok) {
+        int n = out->num_labellings, most = (int)floor(opt->alpha * n);
+        out->p = (double)count_reaching(largest, n, observed) / n;
+        describe(&t, where, out);
+        out->t = t_of_sum(&t, copysign(observed, t.mean[0][where] - t.mean[1][where]));
+        out->image_difference = t.mean[0][image] / t.mean[1][image] - 1;
+        out->mdb = most > 0 && out->smallest_p <= opt->alpha ? image_mdb(&t, largest[n - most])
+                                                             : region_mdb_none;
+        decide(opt, a->num, b->num, a->width, a->height, out);
+    }
+    free(largest);
+    table_free(&t);
+    return ok;
+}
+
+bool permutation_confirm(const struct permutation *first, const struct renders *a2,
+                         const struct renders *b2, const struct permutation_options *opt,
+                         struct permutation *out, struct err *e)
+{
+    *out = (struct permutation){.smallest_p = smallest_p(a2->num, b2->num, 1), .num_regions = 1};
+    if (!check(a2, b2, e))
+        return false;
+    struct table t;
+    struct rect rect = {first->x, first->y, first->width, first->height};
+    double *largest = NULL, observed = 0;
+    bool ok = table_make_one(a2, b2, rect, first->channel, &t, e);
+    t.sign = copysign(1, first->difference);
+    ok = ok && run_labellings(&t, out, &largest, NULL, &observed, e);
+    if (ok) {
+        char where[96];
+        out->p =
+            (double)count_reaching(largest, out->num_labellings, observed) / out->num_labellings;
+        describe(&t, 0, out);
+        out->t = t_of_sum(&t, observed * t.sign);
+        region_name(a2->width, a2->height, t.rect[0], t.channel[0], where, sizeof where);
+        out->verdict = out->p <= opt->alpha ? VERDICT_DIFFERENT : VERDICT_INCONCLUSIVE;
+        snprintf(out->reason, sizeof out->reason,
+                 "%s: %+.3g %%, then %+.3g %% with fresh seeds, p = %.2g and %.2g%s, each held "
+                 "against %.2g",
+                 where, 100 * first->difference, 100 * out->difference, first->p, out->p,
+                 out->verdict == VERDICT_DIFFERENT ? "" : " (not confirmed)", opt->alpha);
+    }
+    free(largest);
+    table_free(&t);
+    return ok;
+}

@@ -1,0 +1,56 @@
+/* An exact test of "A and B come from the same law" from replicates: if they do, which pictures are
+ * called A is arbitrary, and every other way to call them is as likely [Pitman37]. Nothing is assumed
+ * of noise, its tails, or what pixels and channels share: a relabelling moves whole pictures.
+ *
+ * Statistic: the largest |t| (two samples, pooled variance) over the squares of sides min_side, 2
+ * min_side, .. up to the picture, in R, G, B and luminance [Westfall93]. A region's total sum of
+ * squares is the same for every labelling, so t grows with |sum over A of z|, z being the region's
+ * means, centred and over the root of that sum; the largest of that is what is compared.
+ *
+ * All labellings where there are at most 200 000, else that many random ones (fixed seed) besides the
+ * one observed: p = (1 + #)/(1 + N). Exact: P(p <= alpha) <= alpha. */
+#ifndef ASSAY_PERMUTATION_H
+#define ASSAY_PERMUTATION_H
+
+#include "tools/images/replicate_dir.h"
+
+#include "reference/suite/suite.h"
+
+struct permutation_options {
+    double alpha;
+    int min_side; /* pixels; 0: the smallest power of 2 that leaves at most 1024 regions a channel */
+};
+
+struct permutation {
+    enum verdict verdict; /* DIFFERENT: p <= alpha. INCONCLUSIVE: smallest_p > alpha, or mdb > 5 %.
+                             Else EQUIVALENT: no difference found, and one of 5 % would have been */
+    char reason[256];
+    double p, smallest_p; /* the second is what so many replicates can reach at best */
+    int num_labellings;   /* compared, with the one observed */
+    bool is_exhaustive;
+    int num_regions; /* over all channels; those that never vary are left out */
+    /* Where |t| is largest: */
+    int x, y, width, height, channel; /* 0..2 RGB, 3 luminance */
+    double t;
+    double difference;       /* of the means there, over that of B */
+    double image_difference; /* luminance of the image, over that of B */
+    double mdb;              /* relative, luminance of the image: found with about 95 % */
+};
+
+/* Fails with a line if sizes differ, a picture is in both, none varies, or B is black. */
+bool permutation_test(const struct renders *a, const struct renders *b,
+                      const struct permutation_options *opt, struct permutation *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* A second stage on fresh replicates: the region of `first` alone, in its direction, at opt->alpha.
+ * Everything in out but mdb (0) and min_side is of that one test. */
+bool permutation_confirm(const struct permutation *first, const struct renders *a2,
+                         const struct renders *b2, const struct permutation_options *opt,
+                         struct permutation *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Replicates a side for a smallest p, one- or two-sided, of at most alpha; 0 if random labellings
+ * cannot reach it. */
+int permutation_needed(double alpha, int sides);
+
+#endif

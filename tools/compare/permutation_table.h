@@ -1,0 +1,30 @@
+/* The regions of all pictures of two sides, made comparable: what permutation.c adds up. */
+#ifndef ASSAY_PERMUTATION_TABLE_H
+#define ASSAY_PERMUTATION_TABLE_H
+
+#include "pyramid.h"
+#include "tools/images/replicate_dir.h"
+
+/* Means of all regions in all pictures. */
+struct table {
+    int num_a, num_b;
+    size_t num;      /* regions of all channels */
+    double sign;     /* 0: of |sum|; else of sum times sign, one-sided */
+    double *z;       /* num_a + num_b rows of num: centred, sum of squares 1, or all 0 */
+    double *mean[2]; /* of A's and B's rows, before that */
+    double *spread;  /* root of the total sum of squares, before that */
+    struct rect *rect;
+    int *channel;
+};
+
+/* All squares of sides min_side, 2 min_side, .. up to the image, in R, G, B and luminance; the last
+ * is the luminance of the image. min_side 0: the smallest power of 2 that leaves at most 1024 squares
+ * a channel. Release with table_free(), also after a failure. */
+bool table_make(const struct renders *a, const struct renders *b, int min_side, struct table *t,
+                struct err *e) __attribute__((warn_unused_result));
+/* One region alone. */
+bool table_make_one(const struct renders *a, const struct renders *b, struct rect rect, int channel,
+                    struct table *t, struct err *e) __attribute__((warn_unused_result));
+void table_free(struct table *t);
+
+#endif

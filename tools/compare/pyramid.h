@@ -1,0 +1,77 @@
+/* Sums of one comparison over square regions of all sizes, in one channel: what the tests of
+ * compare.h are made of. Level sides are 1, 2, 4, .. below the reporting tile, then tile, 2 tile,
+ * 4 tile, .. until one region is the image: dyadic if the tile is a power of two. Regions at the
+ * right and lower border may be smaller. */
+#ifndef ASSAY_PYRAMID_H
+#define ASSAY_PYRAMID_H
+
+#include "renderer/image/moments.h"
+
+enum { CHANNEL_LUMINANCE = 3, NUM_CHANNELS = 4 };
+/* Relative: what two engines' float32 arithmetic may make of the same value. */
+extern const double float_tolerance;
+extern const double luminance_weight[3]; /* Rec. 709: .2126 .7152 .0722 */
+
+/* One side's mean in one pixel (or the sum of such means over a region), as an estimate. */
+struct estimate {
+    double mean;
+    double v;     /* its estimated variance, M2/(n(n-1)); 0 if exact */
+    double k3;    /* its third cumulant, M3/(n(n-1)(n-2)) */
+    double var_v; /* variance of v: the larger of 2 v^2/(n-1) (normal) and k3^2/v (Cauchy-Schwarz:
+                      the covariance of mean and variance is k3) */
+    double var_v_normal; /* variance of v if normal: 2 v^2/(n-1) */
+    double var_k3;       /* variance of k3 if normal, 6 v^3/((n-1)(n-2)) */
+    double tolerance;    /* of the mean, from rounded numbers (moments.h) */
+};
+
+/* Channel 3 is luminance, whose variance the moments do not hold: the bound for any correlation of
+ * the channels, v = (sum w_c sqrt v_c)^2, is used, and k3 = (sum w_c cbrt k3_c)^3. Both are exact
+ * if the channels are perfectly correlated. n must be >= 3 unless exact. */
+struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channel);
+
+/* From the moments of any sum of a pixel's channels. v = 0: no noise. */
+struct estimate estimate_from(double mean, double v, double k3, double n);
+
+/* Sums over the pixels of a region, or of their products with weights. */
+struct cell {
+    double a, b;   /* means of A and B */
+    double va, vb; /* their variances */
+    double k3;     /* third cumulant of A - B */
+    double var_v;  /* variance of va + vb */
+    double var_v_normal;
+    double var_k3;    /* variance of k3 */
+    double tolerance; /* of a and b together, from rounded numbers */
+    /* Of one pixel: log10 of the most that the chance can be of what is seen (all observations of A alike,
+     * all of B alike, the two different) if both follow one law; 0 where that is not seen. */
+    double log10_alike;
+};
+
+struct pyramid_level {
+    int side, nx, ny;
+    struct cell *cell; /* ny rows of nx */
+};
+
+struct pyramid {
+    int width, height;
+    int num_levels;
+    int tile_level; /* its side is the reporting tile */
+    struct pyramid_level level[40];
+    struct cell *cells; /* of all levels */
+};
+
+/* Same sizes, tile >= 1. Fails only out of memory. Release with pyramid_free(). */
+bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
+                   struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
+void pyramid_free(struct pyramid *p);
+
+void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);
+
+/* Number of regions over all levels. */
+size_t pyramid_regions(const struct pyramid *p);
+/* The pixels of region i of a level. */
+struct rect {
+    int x, y, width, height;
+};
+struct rect pyramid_rect(const struct pyramid *p, int level, size_t i);
+
+#endif

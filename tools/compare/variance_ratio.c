@@ -1,0 +1,145 @@
+#include "variance_ratio.h"
+
+#include "tools/stats/distributions.h"
+
+#include <gsl/gsl_cdf.h>
+#include <math.h>
+#include <string.h>
+
+static const double skew_limit = 0.2; /* as for regions */
+static const double skew_limit_widened = 1;
+/* The chance that two independent renders agree in all moments of a pixel in which either has noise.
+ * Two-valued laws agree most: for n = 3 observations, at even odds, 2 (3/8)^2 / (1 - 1/16) = 0.3, less for
+ * more observations. */
+static const double shared_by_chance = 1.0 / 3;
+static const double shared_level = 1e-6;
+
+/* Paths in one observation of the kind in which both sides can be counted; 0 if there is none. */
+static double paths(const struct moments *m, const struct moments *other)
+{
+    if (strcmp(m->unit, "picture") == 0)
+        return 0;
+    if (m->spp > 0 && other->spp > 0)
+        return m->spp;
+    return strcmp(m->unit, other->unit) == 0 && m->spp == other->spp ? 1 : 0;
+}
+
+/* Sums over pixels of a = variance of one observation of A, RGB together, times its paths; b likewise. */
+struct pixels {
+    double num; /* those with noise on either side */
+    double a, b, aa, ab, bb;
+    double aaa, aab, abb, bbb;
+};
+
+static double variance(const struct moments *m, size_t p)
+{
+    const double *m2 = &m->m2[3 * p];
+    return (m2[0] + m2[1] + m2[2]) / (m->n[p] - 1);
+}
+
+static struct pixels sum_pixels(const struct moments *a, const struct moments *b, double paths_a,
+                                double paths_b)
+{
+    struct pixels s = {0};
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    for (size_t p = 0; p < pixels; p++) {
+        double x = paths_a * variance(a, p), y = paths_b * variance(b, p);
+        s.num += x > 0 || y > 0;
+        s.a += x;
+        s.b += y;
+        s.aa += x * x;
+        s.ab += x * y;
+        s.bb += y * y;
+        s.aaa += x * x * x;
+        s.aab += x * x * y;
+        s.abb += x * y * y;
+        s.bbb += y * y * y;
+    }
+    return s;
+}
+
+/* sum (a - r b) over its root sum of squares: Student's t of the hypothesis that the ratio is r in
+ * expectation, each pixel's difference having its own variance, about 0 [Efron69]. */
+static double student(const struct pixels *s, double r)
+{
+    double square = s->aa - 2 * r * s->ab + r * r * s->bb, u = s->a - r * s->b;
+    if (!(square > 0))
+        return u == 0 ? 0 : copysign(INFINITY, u);
+    double left = s->num * square - u * u;
+    return left > 0 ? u * sqrt((s->num - 1) / left) : copysign(INFINITY, u);
+}
+
+/* Skewness of sum (a - r b), for the r at which the sum is 0: elsewhere its mean would count as skewness. */
+static double skewness(const struct pixels *s, double r)
+{
+    double cube = s->aaa - 3 * r * s->aab + 3 * r * r * s->abb - r * r * r * s->bbb;
+    double square = s->aa - 2 * r * s->ab + r * r * s->bb;
+    return square > 0 ? fabs(cube) / pow(square, 1.5) : 0;
+}
+
+/* Fieller's interval: all r that are not rejected. |t| <= x is u^2 <= k square, a quadratic in r. */
+static bool interval(const struct pixels *s, double x, struct variance_ratio *out)
+{
+    double k = x * x * s->num / (s->num - 1 + x * x);
+    double c2 = s->b * s->b - k * s->bb, c1 = s->a * s->b - k * s->ab;
+    double c0 = s->a * s->a - k * s->aa, root = c1 * c1 - c2 * c0;
+    if (!(c2 > 0 && root >= 0))
+        return false;
+    out->lo = fmax(0, (c1 - sqrt(root)) / c2);
+    out->hi = (c1 + sqrt(root)) / c2;
+    return true;
+}
+
+struct variance_ratio noise_ratio(const struct moments *a, const struct moments *b,
+                                  const struct judge *j, double *log10_p, bool *testable)
+{
+    struct variance_ratio out = {0};
+    double paths_a = paths(a, b), paths_b = paths(b, a);
+    *log10_p = 0;
+    *testable = false;
+    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || paths_a == 0 ||
+        paths_b == 0)
+        return out;
+    struct pixels s = sum_pixels(a, b, paths_a, paths_b);
+    if (!(s.a > 0 && s.b > 0) || s.num < 3)
+        return out;
+    out.ratio = s.a / s.b;
+    double g = skewness(&s, out.ratio), x = 0, factor = 0;
+    for (int i = 0; i < 4; i++) {
+        x = stats_t_quantile(j->opt.alpha * exp(-factor), s.num - 1);
+        factor = fmin(skew_limit_widened, g * x * x * x / 3);
+    }
+    out.valid = factor < skew_limit_widened && interval(&s, x, &out);
+    if (!out.valid)
+        out.lo = out.hi = out.ratio;
+
+    double limit = 1 + j->opt.margin_variance;
+    double r = out.ratio > limit ? limit : out.ratio < 1 / limit ? 1 / limit : out.ratio;
+    double guard = stats_t_of_z(j->z_guard[STATISTIC_NOISE], s.num - 1);
+    *testable = g * guard * guard * guard / 3 <= skew_limit;
+    double t = fmin(1e9, fabs(student(&s, r)));
+    if (*testable)
+        *log10_p = fmax(region_smallest_log10_p, stats_t_log10_p(t, s.num - 1));
+    return out;
+}
+
+static bool same_pixel(const struct moments *a, const struct moments *b, size_t p)
+{
+    size_t i = 3 * p, size = 3 * sizeof *a->mean;
+    return a->n[p] == b->n[p] && memcmp(&a->mean[i], &b->mean[i], size) == 0 &&
+           memcmp(&a->m2[i], &b->m2[i], size) == 0 && memcmp(&a->m3[i], &b->m3[i], size) == 0;
+}
+
+size_t noise_shared(const struct moments *a, const struct moments *b)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height, noisy = 0, same = 0;
+    for (size_t p = 0; p < pixels; p++)
+        if (variance(a, p) > 0 || variance(b, p) > 0) {
+            noisy++;
+            same += same_pixel(a, b, p);
+        }
+    if (same == 0)
+        return 0;
+    double p = gsl_cdf_binomial_Q((unsigned)(same - 1), shared_by_chance, (unsigned)noisy);
+    return p <= shared_level ? same : 0;
+}

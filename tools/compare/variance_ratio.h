@@ -1,0 +1,17 @@
+/* What the moments of both sides say about the noise itself (tools/README.md, "Noise"). Used by compare.c
+ * and input_checks.c only. */
+#ifndef ASSAY_VARIANCE_RATIO_H
+#define ASSAY_VARIANCE_RATIO_H
+
+#include "region.h"
+
+/* The ratio of variances, and log10 of the two-sided p of "within the factor 1 + margin_variance of 1
+ * either way"; *testable is false where there is no ratio or it is too skewed for a p. */
+struct variance_ratio noise_ratio(const struct moments *a, const struct moments *b,
+                                  const struct judge *j, double *log10_p, bool *testable);
+
+/* In how many pixels A and B hold the same observations (all moments agree bit by bit, and there is
+ * noise), or 0 if that many can agree by chance. */
+size_t noise_shared(const struct moments *a, const struct moments *b);
+
+#endif

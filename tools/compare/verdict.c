@@ -1,0 +1,177 @@
+#include "verdict.h"
+
+#include "pyramid.h"
+#include "region.h"
+#include "tools/stats/distributions.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const double regression_mdb = 0.05; /* margins 0: a pass must have been able to see this */
+static const double named_share =
+    0.5; /* of the difference that a direction must explain to be named */
+static const double largest_factor = 1e4; /* of extra_factor */
+
+static bool inside_margin(const struct region *r)
+{
+    return r->ci_valid && region_reach(r) <= r->margin;
+}
+
+static void place(const struct comparison *c, const struct region *r, char *text, size_t size)
+{
+    struct rect rect = {r->x, r->y, r->width, r->height};
+    region_name(c->z.width, c->z.height, rect, r->channel, text, size);
+}
+
+/* How many times the samples would bring this interval inside its margin: planned for equal engines
+ * and 95 % over all the intervals or, if there were enough for that, from the difference seen. */
+static double factor_needed(const struct region *r, size_t num_intervals)
+{
+    if (!r->ci_valid)
+        return 4; /* the factor on p is above e: with four times the samples, above sqrt e */
+    double half = (r->ci_hi - r->ci_lo) / 2;
+    double spare = stats_normal_quantile(0.025 / (double)num_intervals) * r->std_error;
+    double planned = pow((half + spare) / r->margin, 2);
+    if (planned > 1)
+        return planned;
+    double gap = fabs(fabs(r->difference) - r->margin);
+    return gap > 0 ? pow((half + spare) / gap, 2) : largest_factor;
+}
+
+static void judge_equivalence(struct comparison *c, const struct region *tiles)
+{
+    size_t num_tiles = (size_t)c->tiles_x * (size_t)c->tiles_y, num = num_tiles + NUM_CHANNELS;
+    const struct region *furthest = NULL;
+    double factor = 1;
+    for (size_t i = 0; i < num; i++) {
+        const struct region *r = i < NUM_CHANNELS ? &c->global[i] : &tiles[i - NUM_CHANNELS];
+        if (inside_margin(r))
+            continue;
+        factor = fmax(factor, factor_needed(r, num));
+        if (furthest == NULL || (furthest->ci_valid && !r->ci_valid) ||
+            (furthest->ci_valid == r->ci_valid &&
+             region_reach(r) / r->margin > region_reach(furthest) / furthest->margin))
+            furthest = r;
+    }
+    if (furthest == NULL) {
+        c->verdict = VERDICT_EQUIVALENT;
+        snprintf(c->reason, sizeof c->reason,
+                 "the image lies within %.3g %% and each of %zu tiles within %.3g %%",
+                 100 * c->global[CHANNEL_LUMINANCE].margin, num_tiles, 100 * tiles[0].margin);
+        return;
+    }
+    char where[96];
+    place(c, furthest, where, sizeof where);
+    c->verdict = VERDICT_INCONCLUSIVE;
+    c->extra_factor = fmin(largest_factor, factor);
+    if (!furthest->ci_valid)
+        snprintf(c->reason, sizeof c->reason,
+                 "%s: samples too skewed for an interval, more of them are needed", where);
+    else
+        snprintf(c->reason, sizeof c->reason,
+                 "%s: interval %+.3g %% to %+.3g %% is not inside the margin of %.3g %%", where,
+                 100 * furthest->ci_lo, 100 * furthest->ci_hi, 100 * furthest->margin);
+}
+
+/* Margins 0: nothing can be shown equal, so a pass is a search that found nothing and could have.
+ */
+static void judge_regression(struct comparison *c)
+{
+    if (c->mdb_global <= regression_mdb) {
+        c->verdict = VERDICT_EQUIVALENT;
+        snprintf(c->reason, sizeof c->reason,
+                 "no difference found; %.3g %% of the image or %.3g %% of a tile would have been "
+                 "with 95 %%",
+                 100 * c->mdb_global, 100 * c->mdb_tile);
+        return;
+    }
+    c->verdict = VERDICT_INCONCLUSIVE;
+    if (c->mdb_global < region_mdb_none) {
+        c->extra_factor = fmin(largest_factor, pow(c->mdb_global / regression_mdb, 2));
+        snprintf(c->reason, sizeof c->reason,
+                 "no difference found, but one below %.3g %% of the image could have been missed",
+                 100 * c->mdb_global);
+    } else {
+        c->extra_factor = 4;
+        snprintf(c->reason, sizeof c->reason,
+                 "the image: samples too skewed for a test, more of them are needed");
+    }
+}
+
+static bool rejects(const struct comparison *c, const struct compare_options *opt, int s)
+{
+    const struct statistic *st = &c->statistic[s];
+    return st->num_tests > 0 && st->log10_p <= log10(opt->alpha * st->share);
+}
+
+/* "shift by x +0.48 px [0.46, 0.50]" */
+static void name_direction(const struct direction *d, char *text, size_t size)
+{
+    if (d->unit[0] == '\0')
+        snprintf(text, size, "%s", d->name);
+    else
+        snprintf(text, size, "%s %+.3g %s [%.3g, %.3g]", d->name, d->amount, d->unit, d->lo, d->hi);
+}
+
+/* Regions say where; without one, the statistic whose p is furthest below its level. */
+static void judge_different(struct comparison *c, const struct compare_options *opt)
+{
+    char where[96], direction[128] = "";
+    size_t size = sizeof c->reason;
+    bool directed = rejects(c, opt, STATISTIC_DIRECTED);
+    int first = -1;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        if (rejects(c, opt, s) &&
+            (first < 0 || (first > STATISTIC_PYRAMID &&
+                           c->statistic[s].log10_p - log10(c->statistic[s].share) <
+                               c->statistic[first].log10_p - log10(c->statistic[first].share))))
+            first = s;
+    assert(first >= 0);
+    const struct statistic *st = &c->statistic[first];
+    c->verdict = VERDICT_DIFFERENT;
+    if (directed)
+        name_direction(&c->direction, direction, sizeof direction);
+    if (first <= STATISTIC_PYRAMID) {
+        place(c, &c->worst, where, sizeof where);
+        snprintf(c->reason, size,
+                 "%s: difference %+.3g %% (standard error %.2g %%) is beyond the margin of %.3g "
+                 "%%, p = 10^%.1f",
+                 where, 100 * c->worst.difference, 100 * c->worst.std_error, 100 * c->worst.margin,
+                 c->worst.log10_p);
+    } else if (first == STATISTIC_DENSE) {
+        snprintf(c->reason, size,
+                 "many differences, each too small to be found alone: %s are together beyond "
+                 "their margins, p = 10^%.1f",
+                 st->what, st->log10_p);
+    } else if (first == STATISTIC_DIRECTED) {
+        snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, p = 10^%.1f",
+                 direction, st->log10_p);
+    } else {
+        snprintf(c->reason, size,
+                 "the variance of a path is %.3g times that of B [%.3g, %.3g], beyond the margin "
+                 "of %.3g %%, p = 10^%.1f",
+                 c->variance.ratio, c->variance.lo, c->variance.hi, 100 * opt->margin_variance,
+                 st->log10_p);
+    }
+    size_t used = strlen(c->reason);
+    if (directed && c->direction.explained >= named_share)
+        snprintf(c->reason + used, size - used, "; looks like %s, %.0f %% of it",
+                 first == STATISTIC_DIRECTED ? "that" : direction, 100 * c->direction.explained);
+}
+
+void verdict_decide(struct comparison *c, const struct compare_options *opt,
+                    const struct region *tiles)
+{
+    bool rejected = false;
+    for (int s = 0; s < NUM_STATISTICS; s++)
+        rejected = rejected || rejects(c, opt, s);
+    c->extra_factor = 1;
+    if (rejected)
+        judge_different(c, opt);
+    else if (opt->margin_global > 0)
+        judge_equivalence(c, tiles);
+    else
+        judge_regression(c);
+}

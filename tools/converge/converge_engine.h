@@ -1,0 +1,55 @@
+/* Renders the pictures that `assay converge` judges: K replicates of one engine at one number of
+ * samples, as plain images. */
+#ifndef ASSAY_CONVERGE_ENGINE_H
+#define ASSAY_CONVERGE_ENGINE_H
+
+#include "reference/store/reference_render.h"
+#include "renderer/base/progress.h"
+
+/* pathtracer: independent samples, the only engine whose slope must be -1/2. pathtracer-sobol: our
+ * stratified sampler. cycles: stratified within a replicate. povray: a replicate is the mean of k x k
+ * pictures' pixels (its only knob for one picture; k^2 stands for samples per pixel), on a regular grid
+ * with shared directions. */
+enum converge_engine {
+    CONVERGE_PATHTRACER,
+    CONVERGE_SOBOL,
+    CONVERGE_CYCLES,
+    CONVERGE_POVRAY,
+    CONVERGE_NUM_ENGINES
+};
+extern const char *const converge_engine_names[]; /* end with NULL */
+
+enum { CONVERGE_MAX_REPLICATES = 4096, CONVERGE_MAX_RUNGS = 16 };
+
+struct converge_job {
+    const struct suite_scene *scene; /* width and height are those of the pictures to render */
+    const char *pathtracer;          /* the program */
+    const char *dir;                 /* exists; for temporary files */
+    const char *share_dir;           /* where cycles.py is */
+    uint32_t seed;
+    int threads;
+    double timeout_s; /* of one process */
+    int replicates;
+};
+
+/* Told of every picture of our own; the other engines give theirs all at once. */
+struct converge_progress {
+    struct progress *progress;
+    double before, each, total; /* work done before this rung, of one picture, in all */
+};
+
+/* Fills images (replicates x width x height x 3 floats, one replicate after the other) with pictures
+ * whose seeds are a function of (seed, engine, rung, replicate) and differ from one another. *cpu_s is
+ * the CPU time of one replicate, its share of the engine's start included. *version (NULL where the
+ * engine does not say) is a new string, free() it. Fails where an engine cannot express the scene, where
+ * its answer has no noise, and on a number of samples it cannot render. */
+bool converge_render(const struct converge_job *job, enum converge_engine engine, int rung, int spp,
+                     float *images, double *cpu_s, char **version,
+                     const struct converge_progress *progress, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* One long run of our independent sampler with a seed of its own: moments over samples. */
+bool converge_render_own(const struct converge_job *job, int spp, struct moments *out,
+                         struct err *e) __attribute__((warn_unused_result));
+
+#endif

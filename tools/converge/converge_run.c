@@ -1,0 +1,334 @@
+#include "converge_run.h"
+
+#include "reference/truth/truth.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/version.h"
+#include "tools/results/claim_result.h"
+#include "tools/stats/convergence_rate.h"
+#include "depth_ladder.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+const char *const converge_against_names[] = {"auto", "truth", "cycles", "povray", "own", NULL};
+
+/* The reference of our own has so many times the samples of the longest ladder. */
+enum { OWN_FACTOR = 64 };
+
+/* One engine's ladder on one scene. */
+struct ladder {
+    struct rung rung[CONVERGE_MAX_RUNGS];
+    struct cost cost;
+    char *version;
+    bool present;
+    struct err e;
+};
+
+struct run {
+    const struct converge_options *opt;
+    struct suite suite;
+    char dir[4200]; /* temporary */
+    double alpha;   /* of one judgement */
+};
+
+static bool is_independent(int engine)
+{
+    return engine == CONVERGE_PATHTRACER;
+}
+
+/* Ours must leave no bias whatever the sampler; other engines are measured. */
+static bool is_judged(int engine)
+{
+    return engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL;
+}
+
+static enum converge_against choose_reference(const struct suite_scene *s)
+{
+    for (enum converge_against a = AGAINST_TRUTH; a < AGAINST_OWN; a++)
+        if (suite_reference_of(s, converge_against_names[a]) != NULL)
+            return a;
+    return AGAINST_OWN;
+}
+
+/* The reference of scene s (whose references those of `from` are), and its name. */
+static bool load_reference(const struct run *r, const struct suite_scene *s,
+                           const struct suite_scene *from, const struct converge_job *job,
+                           struct converge_reference *out, char name[64], struct err *e)
+{
+    const struct converge_options *o = r->opt;
+    enum converge_against against =
+        o->against == AGAINST_AUTO ? choose_reference(from) : o->against;
+    const char *engine = converge_against_names[against];
+    struct moments m;
+    int shrink = o->shrink;
+    if (against == AGAINST_OWN) {
+        shrink = 1;
+        int spp = OWN_FACTOR * o->ladder[o->num_rungs - 1];
+        snprintf(name, 64, "pathtracer, %d samples", spp);
+        if (!converge_render_own(job, spp, &m, e))
+            return false;
+    } else {
+        const struct suite_reference *ref = suite_reference_of(from, engine);
+        if (ref == NULL)
+            return err_set(e, "%s has no reference '%s'", from->name, engine);
+        snprintf(name, 64, against == AGAINST_TRUTH ? "closed form" : "golden of %s", engine);
+        json_t *manifest = NULL;
+        bool ok = against == AGAINST_TRUTH
+                      ? truth_render(s, ref, &m, e)
+                      : golden_read(o->golden_dir, from, ref, &m, &manifest, e);
+        json_decref(manifest);
+        if (!ok)
+            return false;
+    }
+    bool ok = converge_reference_init(out, &m, shrink, e);
+    moments_free(&m);
+    return ok || err_prefix(e, "%s", s->name);
+}
+
+static void climb(const struct run *r, const struct converge_job *job, int engine,
+                  const struct converge_reference *ref, struct ladder *out)
+{
+    const struct converge_options *o = r->opt;
+    char what[128];
+    float *images = malloc((size_t)o->replicates * ref->size * sizeof *images);
+    if (images == NULL) {
+        err_set(&out->e, "out of memory for %d replicates", o->replicates);
+        return;
+    }
+    struct progress progress;
+    snprintf(what, sizeof what, "%s, %s", job->scene->name, converge_engine_names[engine]);
+    progress_start(&progress, what, NULL, o->quiet);
+    /* A picture costs its samples and a start, of which this is a guess good enough for a bar. */
+    const double start = o->ladder[o->num_rungs - 1] / 4.0;
+    double done = 0, total = 0;
+    for (int i = 0; i < o->num_rungs; i++)
+        total += (o->ladder[i] + start) * o->replicates;
+    bool ok = true;
+    for (int i = 0; ok && i < o->num_rungs; i++) {
+        double cpu_s;
+        free(out->version);
+        ok = converge_render(
+            job, (enum converge_engine)engine, i, o->ladder[i], images, &cpu_s, &out->version,
+            &(struct converge_progress){&progress, done, o->ladder[i] + start, total}, &out->e);
+        if (ok && !converge_rung(images, o->replicates, o->ladder[i], ref, &out->rung[i], &out->e))
+            ok = err_prefix(&out->e, "%s, %d samples", what, o->ladder[i]);
+        out->rung[i].cpu_s = cpu_s;
+        done += (o->ladder[i] + start) * o->replicates;
+        progress_update(&progress, done, total);
+    }
+    progress_end(&progress, total);
+    free(images);
+    out->present = ok;
+    if (ok)
+        out->cost = converge_cost(out->rung, o->num_rungs);
+}
+
+static json_t *number(double v)
+{
+    return isfinite(v) ? json_real(v) : json_null();
+}
+
+static json_t *pair(double lo, double hi)
+{
+    return isfinite(lo) && isfinite(hi) ? json_pack("[f, f]", lo, hi) : json_null();
+}
+
+/* exp of an interval of a logarithm, to a power; null where it says nothing (a factor of e^20). */
+static json_t *exp_pair(struct estimate x, double alpha, double power)
+{
+    struct interval i = estimate_interval(x, alpha);
+    return i.hi - i.lo < 20 ? pair(exp(power * i.lo), exp(power * i.hi)) : json_null();
+}
+
+static json_t *rung_json(const struct rung *g, const struct cost *c, double alpha)
+{
+    struct estimate eff = converge_log_efficiency(g, c);
+    double bias = copysign(sqrt(fabs(g->bias2.value)), g->bias2.value);
+    return json_pack("{s:f, s:f, s:o, s:f, s:o, s:f, s:f, s:o, s:o}", "spp", g->spp, "rmse",
+                     exp(0.5 * g->log_mse.value), "rmse_ci", exp_pair(g->log_mse, alpha, 0.5),
+                     "variance", exp(g->log_variance.value), "variance_ci",
+                     exp_pair(g->log_variance, alpha, 1), "bias", bias, "cpu_s", g->cpu_s,
+                     "efficiency", number(exp(eff.value)), "efficiency_ci",
+                     exp_pair(eff, alpha, 1));
+}
+
+/* The judgements of one engine, in words and as one verdict, the worst of them. */
+static json_t *verdict_json(const struct run *r, int engine, const struct ladder *l)
+{
+    const struct converge_options *o = r->opt;
+    const struct rung *top = &l->rung[o->num_rungs - 1];
+    struct estimate slope = converge_slope(l->rung, o->num_rungs);
+    struct interval si = estimate_interval(slope, r->alpha), fi = converge_floor(top, r->alpha);
+    enum verdict vs = converge_slope_verdict(slope, r->alpha, o->slope_margin);
+    enum verdict vf = converge_floor_verdict(top, o->margin, r->alpha);
+    bool judge_slope = is_independent(engine), judged = is_judged(engine);
+    bool different = vf == VERDICT_DIFFERENT || (judge_slope && vs == VERDICT_DIFFERENT);
+    bool unclear = vf == VERDICT_INCONCLUSIVE || (judge_slope && vs == VERDICT_INCONCLUSIVE);
+    enum verdict v = different ? VERDICT_DIFFERENT
+                     : unclear ? VERDICT_INCONCLUSIVE
+                               : VERDICT_EQUIVALENT;
+    char reason[512], of_slope[160] = "";
+    if (judge_slope)
+        snprintf(of_slope, sizeof of_slope,
+                 vs == VERDICT_DIFFERENT      ? "the slope is not -1/2; "
+                 : vs == VERDICT_INCONCLUSIVE ? "the slope is known to no better than +-%.3g; "
+                                              : "the slope is -1/2 within +-%.3g; ",
+                 (si.hi - si.lo) / 2);
+    snprintf(reason, sizeof reason,
+             "%sat %g samples the RMS bias is %s %.3g %%, from %.3g %% to %.3g %%", of_slope,
+             top->spp,
+             vf == VERDICT_DIFFERENT      ? "above"
+             : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
+                                          : "below",
+             100 * o->margin, 100 * fi.lo, 100 * fi.hi);
+    return json_pack("{s:f, s:o, s:s, s:o, s:s, s:s, s:b, s:s}", "slope", slope.value, "slope_ci",
+                     pair(si.lo, si.hi), "slope_verdict",
+                     judge_slope ? verdict_name(vs) : "MEASURED", "floor_ci", pair(fi.lo, fi.hi),
+                     "floor_verdict", judged ? verdict_name(vf) : "MEASURED", "verdict",
+                     judged ? verdict_name(v) : "MEASURED", "passed",
+                     !judged || v == VERDICT_EQUIVALENT, "reason", reason);
+}
+
+static json_t *engine_json(const struct run *r, int engine, const struct ladder *l)
+{
+    json_t *j = json_pack("{s:s, s:b, s:b}", "engine", converge_engine_names[engine], "independent",
+                          is_independent(engine), "judged", is_judged(engine));
+    if (j == NULL)
+        return NULL;
+    if (!l->present) {
+        json_object_set_new(j, "passed", json_false());
+        json_object_set_new(j, "error", json_string(l->e.msg));
+        return j;
+    }
+    json_t *rungs = json_array(), *verdict = verdict_json(r, engine, l);
+    for (int i = 0; i < r->opt->num_rungs; i++)
+        json_array_append_new(rungs, rung_json(&l->rung[i], &l->cost, r->alpha));
+    json_object_update(j, verdict);
+    json_decref(verdict);
+    const char *version = is_judged(engine) ? assay_version : l->version;
+    if (version != NULL)
+        json_object_set_new(j, "version", json_string(version));
+    json_object_set_new(j, "start_s", number(l->cost.start_s));
+    json_object_set_new(j, "cpu_s_per_spp", number(l->cost.per_spp.value));
+    json_object_set_new(j, "rungs", rungs);
+    return j;
+}
+
+static json_t *ratio_json(const struct run *r, int a, const struct ladder *la, int b,
+                          const struct ladder *lb)
+{
+    json_t *rungs = json_array();
+    for (int i = 0; i < r->opt->num_rungs; i++) {
+        struct estimate v = converge_log_ratio(&la->rung[i], &lb->rung[i]);
+        struct estimate ea = converge_log_efficiency(&la->rung[i], &la->cost);
+        struct estimate eb = converge_log_efficiency(&lb->rung[i], &lb->cost);
+        double var = ea.se * ea.se + eb.se * eb.se;
+        struct estimate eff = {ea.value - eb.value, sqrt(var), fmin(ea.dof, eb.dof)};
+        json_array_append_new(
+            rungs, json_pack("{s:f, s:f, s:o, s:o, s:o}", "spp", la->rung[i].spp, "variance",
+                             exp(v.value), "variance_ci", exp_pair(v, r->alpha, 1), "efficiency",
+                             number(exp(eff.value)), "efficiency_ci", exp_pair(eff, r->alpha, 1)));
+    }
+    return json_pack("{s:s, s:s, s:o}", "a", converge_engine_names[a], "b",
+                     converge_engine_names[b], "rungs", rungs);
+}
+
+static bool run_scene(const struct run *r, const struct suite_scene *scene, json_t *convergence,
+                      struct err *e)
+{
+    const struct converge_options *o = r->opt;
+    const struct suite_scene *from = suite_find(&r->suite, scene->references_of);
+    if (scene->width % o->shrink != 0 || scene->height % o->shrink != 0)
+        return err_set(e, "%s: %d x %d pixels cannot be made %d times smaller", scene->name,
+                       scene->width, scene->height, o->shrink);
+    struct suite_scene small = *scene;
+    small.width /= o->shrink;
+    small.height /= o->shrink;
+    const struct converge_job job = {.scene = &small,
+                                     .pathtracer = o->pathtracer,
+                                     .dir = r->dir,
+                                     .share_dir = o->share_dir,
+                                     .seed = o->seed,
+                                     .threads = o->threads,
+                                     .timeout_s = o->timeout_s,
+                                     .replicates = o->replicates};
+    struct converge_reference ref;
+    char name[64];
+    if (!load_reference(r, scene, from, &job, &ref, name, e))
+        return false;
+    json_t *depths = NULL;
+    struct err why;
+    if (o->depth_spp > 0 &&
+        !depths_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
+        depths = json_pack("{s:s}", "error", why.msg);
+    struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
+    json_t *engines = json_array(), *ratios = json_array();
+    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
+        if (o->engine[k]) {
+            climb(r, &job, k, &ref, &ladder[k]);
+            json_array_append_new(engines, engine_json(r, k, &ladder[k]));
+        }
+    for (int a = 0; a < CONVERGE_NUM_ENGINES; a++)
+        for (int b = a + 1; b < CONVERGE_NUM_ENGINES; b++)
+            if (ladder[a].present && ladder[b].present)
+                json_array_append_new(ratios, ratio_json(r, a, &ladder[a], b, &ladder[b]));
+    json_t *j =
+        json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:f, s:f, s:f, s:f, s:o, s:o}", "scene",
+                  scene->name, "title", scene->title, "width", small.width, "height", small.height,
+                  "depth", scene->depth, "replicates", o->replicates, "reference", name,
+                  "reference_noise", sqrt(ref.noise), "alpha", r->alpha, "margin", o->margin,
+                  "slope_margin", o->slope_margin, "engines", engines, "ratios", ratios);
+    if (depths != NULL)
+        json_object_set_new(j, "depths", depths);
+    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
+        free(ladder[k].version);
+    converge_reference_free(&ref);
+    return (j != NULL && json_array_append_new(convergence, j) == 0) ||
+           err_set(e, "out of memory for the results");
+}
+
+/* Bonferroni over all that is judged in this run. */
+static double alpha_of_one(const struct converge_options *o)
+{
+    int num = 0;
+    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
+        if (o->engine[k])
+            num += (is_judged(k) ? 1 : 0) + (is_independent(k) ? 1 : 0);
+    return o->alpha / (o->num_scenes * (num > 0 ? num : 1));
+}
+
+bool converge_run(const struct converge_options *opt, int argc, char **argv, json_t **results,
+                  struct err *e)
+{
+    struct run r = {.opt = opt, .alpha = alpha_of_one(opt)};
+    double start = now_seconds();
+    if (!suite_load(opt->suite_dir, &r.suite, e))
+        return false;
+    json_t *root = results_new(argc, argv, opt->alpha, e), *convergence = json_array();
+    bool ok = root != NULL;
+    for (int i = 0; ok && i < opt->num_scenes; i++)
+        if (suite_find(&r.suite, opt->scene[i]) == NULL)
+            ok = err_set(e, "no scene '%s' in %s", opt->scene[i], opt->suite_dir);
+    if (ok && (ok = make_dirs(opt->out_dir, e))) {
+        snprintf(r.dir, sizeof r.dir, "%.4096s/converge-XXXXXX", opt->out_dir);
+        if (mkdtemp(r.dir) == NULL)
+            ok = err_set(e, "%s: cannot make a directory in it: %s", opt->out_dir, strerror(errno));
+        for (int i = 0; ok && i < opt->num_scenes; i++)
+            ok = run_scene(&r, suite_find(&r.suite, opt->scene[i]), convergence, e);
+        rmdir(r.dir); /* unless a failed engine has left something to look at */
+    }
+    if (ok) {
+        json_object_set(root, "convergence", convergence);
+        json_object_set_new(root, "seed", json_integer(opt->seed));
+        json_object_set_new(root, "seconds", json_real(now_seconds() - start));
+        *results = json_incref(root);
+    }
+    json_decref(convergence);
+    json_decref(root);
+    suite_free(&r.suite);
+    return ok;
+}

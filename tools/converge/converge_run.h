@@ -1,0 +1,41 @@
+/* `assay converge`: the ladders of all engines on some scenes, judged, as a results object. */
+#ifndef ASSAY_CONVERGE_RUN_H
+#define ASSAY_CONVERGE_RUN_H
+
+#include "converge_engine.h"
+
+enum { CONVERGE_MAX_SCENES = 64 };
+
+/* What the squared error is measured against. AUTO: the closed form if the scene has one, else the
+ * golden of Cycles, else that of POV-Ray, else a run of our own. The last one is blind to whatever our
+ * renderer does wrong at every number of samples. */
+enum converge_against { AGAINST_AUTO, AGAINST_TRUTH, AGAINST_CYCLES, AGAINST_POVRAY, AGAINST_OWN };
+extern const char *const converge_against_names[]; /* end with NULL */
+
+struct converge_options {
+    const char *suite_dir, *golden_dir, *share_dir, *out_dir, *pathtracer;
+    const char *scene[CONVERGE_MAX_SCENES];
+    int num_scenes;
+    bool engine[CONVERGE_NUM_ENGINES];
+    int ladder[CONVERGE_MAX_RUNGS]; /* ascending */
+    int num_rungs;                  /* at least 3 */
+    int replicates;                 /* at least 4 */
+    int depth_spp;                  /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
+    int shrink;                     /* pictures are so many times smaller on both sides */
+    enum converge_against against;
+    uint32_t seed;
+    double alpha;        /* of all judgements of the run together */
+    double margin;       /* largest RMS bias that counts as none, relative */
+    double slope_margin; /* a slope's interval that is wider than +- this decides nothing */
+    int threads;
+    double timeout_s;
+    bool quiet;
+};
+
+/* Fills *results (results.h; a new reference): no claims, but "convergence" (convergence_results.h). Writes no
+ * file that stays. An engine that cannot be judged is in the results with its error; false only if
+ * nothing could be judged at all. */
+bool converge_run(const struct converge_options *opt, int argc, char **argv, json_t **results,
+                  struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,87 @@
+#include "depth_ladder.h"
+
+#include "reference/truth/truth.h"
+#include "tools/html/plot_colour.h"
+
+#include <math.h>
+
+static double mean_of(const struct moments *m, double *se)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    double sum = 0, variance = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        double sd[3];
+        for (int c = 0; c < 3; c++)
+            sd[c] = sqrt(fmax(0, moments_var_of_mean(m, i, c)));
+        sum += luminance(&m->mean[3 * i]);
+        variance += luminance(sd) * luminance(sd);
+    }
+    *se = sqrt(variance) / (double)pixels;
+    return sum / (double)pixels;
+}
+
+static bool measure_one(const struct converge_job *job, const struct suite_reference *truth,
+                        int spp, int depth, json_t *rungs, struct err *e)
+{
+    struct suite_scene scene = *job->scene;
+    struct converge_job at = *job;
+    struct moments m;
+    struct err none = {""};
+    double se, ignored;
+    scene.depth = depth;
+    at.scene = &scene;
+    if (!converge_render_own(&at, spp, &m, e))
+        return false;
+    double mean = mean_of(&m, &se);
+    moments_free(&m);
+    json_t *rung = json_pack("{s:i, s:f, s:f}", "depth", depth, "mean", mean, "se", se);
+    if (truth != NULL && truth_render(&scene, truth, &m, &none)) {
+        json_object_set_new(rung, "truth", json_real(mean_of(&m, &ignored)));
+        moments_free(&m);
+    }
+    if (err_is_of_memory(&none)) {
+        json_decref(rung);
+        return err_set(e, "%s", none.msg);
+    }
+    return json_array_append_new(rungs, rung) == 0 || err_set(e, "out of memory for the results");
+}
+
+bool depths_measure(const struct converge_job *job, const struct suite_reference *truth, int spp,
+                    json_t **out, struct err *e)
+{
+    json_t *rungs = json_array();
+    int last = job->scene->depth;
+    bool ok = rungs != NULL || err_set(e, "out of memory for the results");
+    for (int depth = 0; ok && depth <= last;) {
+        ok = measure_one(job, truth, spp, depth, rungs, e);
+        int next = depth < 8 ? depth + 1 : depth + depth / 2;
+        depth = next < last || depth == last ? next : last;
+    }
+    if (!ok) {
+        json_decref(rungs);
+        return false;
+    }
+    *out = json_pack("{s:i, s:o}", "samples", spp, "rungs", rungs);
+    return *out != NULL || err_set(e, "out of memory for the results");
+}
+
+bool depths_check(const json_t *depths, const char *where, struct err *e)
+{
+    const json_t *rungs = json_object_get(depths, "rungs");
+    if (json_is_string(json_object_get(depths, "error")))
+        return true;
+    if (!json_is_integer(json_object_get(depths, "samples")) || json_array_size(rungs) == 0)
+        return err_set(e, "%s: 'depths' has no whole 'samples' or no 'rungs'", where);
+    for (size_t i = 0; i < json_array_size(rungs); i++) {
+        const json_t *g = json_array_get(rungs, i), *depth = json_object_get(g, "depth"),
+                     *before = json_object_get(json_array_get(rungs, i - 1), "depth");
+        if (!json_is_integer(depth) || json_integer_value(depth) < 0 ||
+            (i > 0 && json_integer_value(depth) <= json_integer_value(before)))
+            return err_set(e, "%s: 'depths': 'depth' does not ascend in whole numbers", where);
+        const json_t *se = json_object_get(g, "se"), *truth = json_object_get(g, "truth");
+        if (!json_is_number(json_object_get(g, "mean")) || !json_is_number(se) ||
+            json_number_value(se) < 0 || (truth != NULL && !json_is_number(truth)))
+            return err_set(e, "%s: 'depths': 'mean', 'se' or 'truth' is not a number", where);
+    }
+    return true;
+}

@@ -1,0 +1,25 @@
+/* The depth ladder of `assay converge`: the picture's mean radiance if paths end after so many bounces. */
+#ifndef ASSAY_DEPTH_LADDER_H
+#define ASSAY_DEPTH_LADDER_H
+
+#include "converge_engine.h"
+
+#include <stdio.h>
+
+/* "depths" of an element of "convergence" (convergence_results.h), in *out (a new reference):
+ *   {"samples": 64, "rungs": [{"depth": 0, "mean": .12, "se": .0004, "truth": .1201}, ...]}
+ * Our independent sampler at depths 0 to 8 and then half as many again each time, up to the scene's own. mean: luminance,
+ * mean over the picture; se: its standard error for channels that err together (an upper bound). truth: of the closed
+ * form, where `truth` (may be NULL) holds at that depth. All pictures have the same seed, so that steps are less noisy
+ * than the values. Fails where a picture cannot be rendered. */
+bool depths_measure(const struct converge_job *job, const struct suite_reference *truth, int spp,
+                    json_t **out, struct err *e) __attribute__((warn_unused_result));
+
+/* Checks that, or {"error": "one line"} of a ladder that could not be rendered; the line begins with `where`. */
+bool depths_check(const json_t *depths, const char *where, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* <figure> of it, or its error; nothing without any (NULL). */
+void report_depths(FILE *f, const json_t *depths);
+
+#endif

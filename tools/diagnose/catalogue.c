@@ -1,0 +1,458 @@
+#include "catalogue.h"
+
+#include "reference/base/json_file.h"
+#include "renderer/image/image.h"
+#include "renderer/base/sha256.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_PATH = 4600, MAX_PATCH = 8192 };
+
+static const char *const suffix[3] = {"R", "G", "B"};
+
+/* Rounds to `bits` of mantissa, so that files are small; 0 stays 0. */
+static float rounded(double x, int bits)
+{
+    int exponent;
+    double m = frexp(x, &exponent);
+    return (float)ldexp(round(ldexp(m, bits)), exponent - bits);
+}
+
+void catalogue_free(struct catalogue *c)
+{
+    for (int v = 0; v < c->num_views; v++) {
+        for (int b = 0; c->view[v].effect != NULL && b < c->num_bugs; b++)
+            free(c->view[v].effect[b]);
+        free(c->view[v].effect);
+    }
+    free(c->view);
+    free(c->bug);
+    *c = (struct catalogue){0};
+}
+
+const struct view *catalogue_view(const struct catalogue *c, const char *name)
+{
+    for (int v = 0; v < c->num_views; v++)
+        if (strcmp(c->view[v].name, name) == 0)
+            return &c->view[v];
+    return NULL;
+}
+
+int catalogue_bug(const struct catalogue *c, const char *name)
+{
+    for (int b = 0; b < c->num_bugs; b++)
+        if (strcmp(c->bug[b].name, name) == 0)
+            return b;
+    return -1;
+}
+
+bool view_scene(const struct view *v, const struct suite *suite, const struct suite_scene **scene,
+                const struct suite_variant **variant, struct err *e)
+{
+    *scene = suite_find(suite, v->scene);
+    *variant = NULL;
+    if (*scene == NULL)
+        return err_set(e, "the suite has no scene '%s' of the catalogue", v->scene);
+    if (strcmp((*scene)->sha256, v->scene_sha256) != 0)
+        return err_set(e, "%s has changed since the catalogue of bugs was made: make catalogue",
+                       v->scene);
+    for (int i = 0; i < (*scene)->num_variants; i++)
+        if (strcmp((*scene)->variant[i].name, v->variant) == 0)
+            *variant = &(*scene)->variant[i];
+    if (v->variant[0] != '\0' && *variant == NULL)
+        return err_set(e, "%s: the suite has no '%s' of the catalogue", v->scene, v->variant);
+    return true;
+}
+
+/* ---- patches */
+
+static bool header_line(const char *line, const char *key, char *out, size_t size)
+{
+    size_t n = strlen(key);
+    if (strncmp(line, key, n) != 0)
+        return false;
+    line += n;
+    line += strspn(line, " ");
+    size_t length = strcspn(line, "\n");
+    snprintf(out, size, "%.*s", (int)length, line);
+    return length > 0 && length < size;
+}
+
+/* Not the lines around a change nor their numbers, nor where the file stands. */
+static bool is_of_the_bug(const char *line, bool in_code)
+{
+    return !in_code || !(line[0] == ' ' || line[0] == '\n' || strncmp(line, "@@", 2) == 0 ||
+                         strncmp(line, "--- ", 4) == 0 || strncmp(line, "+++ ", 4) == 0);
+}
+
+bool bug_of_patch(const char *path, struct bug *out, struct err *e)
+{
+    char line[1024], text[MAX_PATCH] = "";
+    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
+    *out = (struct bug){0};
+    size_t length = strcspn(name, ".");
+    if (length >= sizeof out->name)
+        return err_set(e, "%s: the name is too long", path);
+    snprintf(out->name, sizeof out->name, "%.*s", (int)length, name);
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return err_set(e, "%s: %s", path, strerror(errno));
+    bool what = false, where = false, in_code = false;
+    size_t used = 0;
+    while (fgets(line, sizeof line, f) != NULL) {
+        in_code = in_code || strncmp(line, "---", 3) == 0;
+        what = what || (!in_code && header_line(line, "Bug:", out->what, sizeof out->what));
+        where = where || (!in_code && header_line(line, "Where:", out->where, sizeof out->where));
+        if (!is_of_the_bug(line, in_code))
+            continue;
+        used += strlen(line);
+        if (used < sizeof text)
+            strcat(text, line);
+    }
+    fclose(f);
+    if (!what || !where)
+        return err_set(e, "%s: no line '%s'", path, what ? "Where:" : "Bug:");
+    if (used >= sizeof text)
+        return err_set(e, "%s: more than %d characters", path, MAX_PATCH - 1);
+    sha256_text(text, out->patch_sha256);
+    return true;
+}
+
+bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct err *e)
+{
+    static const char end[] = ".patch";
+    DIR *d = opendir(patch_dir);
+    if (d == NULL)
+        return err_set(e, "%s: %s", patch_dir, strerror(errno));
+    bool ok = true;
+    int patches = 0;
+    for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
+        size_t n = strlen(entry->d_name);
+        char path[MAX_PATH];
+        struct bug bug;
+        if (n < sizeof end || strcmp(entry->d_name + n - (sizeof end - 1), end) != 0)
+            continue;
+        snprintf(path, sizeof path, "%s/%s", patch_dir, entry->d_name);
+        ok = bug_of_patch(path, &bug, e);
+        int b = ok ? catalogue_bug(c, bug.name) : 0;
+        if (ok && b < 0)
+            ok = err_set(e, "%s: not in the catalogue of bugs: make catalogue", path);
+        else if (ok && strcmp(bug.patch_sha256, c->bug[b].patch_sha256) != 0)
+            ok = err_set(e, "%s: has changed since the catalogue of bugs was made: make catalogue",
+                         path);
+        patches++;
+    }
+    closedir(d);
+    return ok && (patches == c->num_bugs ||
+                  err_set(e, "the catalogue has %d bugs, %s has %d: make catalogue", c->num_bugs,
+                          patch_dir, patches));
+}
+
+/* ---- writing */
+
+static json_t *facts_json(const double *fact, const double *sd)
+{
+    json_t *list = json_array();
+    for (int f = 0; f < NUM_FACTS; f++)
+        json_array_append_new(list,
+                              isnan(fact[f]) ? json_null() : json_pack("[ff]", fact[f], sd[f]));
+    return list;
+}
+
+static void set_name(char *name, const char *stem, int c)
+{
+    snprintf(name, 32, "%s.%s", stem, suffix[c]);
+}
+
+/* Adds three channels at *next. */
+static void put(struct image *im, int *next, const char *stem, const double *x, const float *xf,
+                int bits)
+{
+    for (int c = 0; c < 3; c++, (*next)++) {
+        set_name(im->names[*next], stem, c);
+        for (int i = 0; i < im->width * im->height; i++) {
+            double value = x != NULL ? x[3 * i + c] : (double)xf[3 * i + c];
+            im->data[i * im->channels + *next] = rounded(value, bits);
+        }
+    }
+}
+
+static bool write_picture(const char *path, const struct view *v, int num_bugs, struct err *e)
+{
+    int channels = 10, next = 0;
+    for (int b = 0; b < num_bugs; b++)
+        channels += v->effect[b] != NULL && v->effect[b]->pixels ? 6 : 0;
+    const char **names = calloc((size_t)channels, sizeof *names);
+    for (int i = 0; names != NULL && i < channels; i++)
+        names[i] = "";
+    struct image im;
+    bool ok = names != NULL || err_set(e, "out of memory");
+    ok = ok && image_alloc(&im, v->correct.columns, v->correct.rows, channels, names, e);
+    free(names);
+    if (!ok)
+        return false;
+    put(&im, &next, "c", v->correct.mean, NULL, 24);
+    put(&im, &next, "cv", v->correct.var, NULL, 12);
+    put(&im, &next, "ck", v->correct.k3, NULL, 12);
+    snprintf(im.names[next], 32, "cs");
+    for (int i = 0; i < im.width * im.height; i++)
+        im.data[i * channels + next] = rounded(v->correct.spread[i], 12);
+    next++;
+    for (int b = 0; b < num_bugs; b++)
+        if (v->effect[b] != NULL && v->effect[b]->pixels) {
+            char stem[16];
+            snprintf(stem, sizeof stem, "%d", b);
+            put(&im, &next, stem, NULL, v->effect[b]->mean, 11);
+            snprintf(stem, sizeof stem, "%dv", b);
+            put(&im, &next, stem, NULL, v->effect[b]->var, 5);
+        }
+    ok = image_write_exr(path, &im, e);
+    image_free(&im);
+    return ok;
+}
+
+static json_t *options_json(const struct view *v)
+{
+    json_t *list = json_array();
+    for (int i = 0; v->option[i][0] != '\0'; i++)
+        json_array_append_new(list, json_string(v->option[i]));
+    return list;
+}
+
+static json_t *view_json(const struct view *v, const struct catalogue *c, const char *picture,
+                         const char *sha256)
+{
+    json_t *bugs = json_object();
+    for (int b = 0; b < c->num_bugs; b++)
+        if (v->effect[b] != NULL)
+            json_object_set_new(bugs, c->bug[b].name,
+                                json_pack("{sb,so}", "pixels", v->effect[b]->pixels, "facts",
+                                          facts_json(v->effect[b]->fact, v->effect[b]->fact_sd)));
+    return json_pack("{ss,ss,ss,so,ss,si,si,si,si,sb,sI,ss,ss,sf,so,so}", "name", v->name, "scene",
+                     v->scene, "variant", v->variant, "options", options_json(v), "scene_sha256",
+                     v->scene_sha256, "width", v->width, "height", v->height, "spp", v->spp,
+                     "renders", v->renders, "fixed_spp", v->fixed_spp, "seed", (json_int_t)v->seed,
+                     "picture", picture, "picture_sha256", sha256, "n", v->correct.n, "correct",
+                     facts_json(v->correct.fact, v->correct.fact_sd), "bugs", bugs);
+}
+
+bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
+{
+    char path[MAX_PATH], picture[140], sha256[65];
+    json_t *bugs = json_object(), *views = json_array();
+    bool ok = true;
+    for (int b = 0; b < c->num_bugs; b++)
+        json_object_set_new(bugs, c->bug[b].name,
+                            json_pack("{ss,ss,ss}", "bug", c->bug[b].what, "where", c->bug[b].where,
+                                      "patch_sha256", c->bug[b].patch_sha256));
+    for (int v = 0; ok && v < c->num_views; v++) {
+        snprintf(picture, sizeof picture, "%s.exr", c->view[v].name);
+        snprintf(path, sizeof path, "%s/%s", dir, picture);
+        ok = write_picture(path, &c->view[v], c->num_bugs, e) && sha256_file(path, sha256, e);
+        if (ok)
+            json_array_append_new(views, view_json(&c->view[v], c, picture, sha256));
+    }
+    json_t *root = json_pack("{si,so,so}", "side", SIGHT_SIDE, "bugs", bugs, "views", views);
+    snprintf(path, sizeof path, "%s/manifest.json", dir);
+    ok = ok && (root != NULL || err_set(e, "out of memory")) && json_write(path, root, e);
+    json_decref(root);
+    return ok;
+}
+
+/* ---- reading */
+
+static bool get_facts(const json_t *list, double *fact, double *sd)
+{
+    if (json_array_size(list) != NUM_FACTS)
+        return false;
+    for (size_t f = 0; f < NUM_FACTS; f++) {
+        const json_t *pair = json_array_get(list, f);
+        fact[f] = sd[f] = NAN;
+        if (json_is_null(pair))
+            continue;
+        if (json_array_size(pair) != 2)
+            return false;
+        fact[f] = json_number_value(json_array_get(pair, 0));
+        sd[f] = json_number_value(json_array_get(pair, 1));
+    }
+    return true;
+}
+
+static bool copy_text(char *to, size_t size, const json_t *object, const char *name)
+{
+    const char *text = json_string_value(json_object_get(object, name));
+    return text != NULL && snprintf(to, size, "%s", text) < (int)size;
+}
+
+static bool get_channels(const struct image *im, const char *stem, double *out, float *outf)
+{
+    for (int c = 0; c < 3; c++) {
+        char name[32];
+        set_name(name, stem, c);
+        int at = image_channel(im, name);
+        if (at < 0)
+            return false;
+        for (int i = 0; i < im->width * im->height; i++) {
+            float value = im->data[i * im->channels + at];
+            if (!isfinite(value))
+                return false;
+            if (out != NULL)
+                out[3 * i + c] = (double)value;
+            else
+                outf[3 * i + c] = value;
+        }
+    }
+    return true;
+}
+
+static bool get_effects(struct view *v, const struct catalogue *c, const json_t *bugs,
+                        const struct image *im, const char *path, struct err *e)
+{
+    const char *name;
+    json_t *value;
+    json_object_foreach((json_t *)bugs, name, value)
+    {
+        int b = catalogue_bug(c, name);
+        struct effect *effect = calloc(1, sizeof *effect);
+        if (b < 0 || effect == NULL) {
+            free(effect);
+            return b < 0 ? err_set(e, "%s: bug '%s' is not in its list", path, name)
+                         : err_set(e, "%s: out of memory", path);
+        }
+        v->effect[b] = effect;
+        effect->pixels = json_is_true(json_object_get(value, "pixels"));
+        char mean[16], var[16];
+        snprintf(mean, sizeof mean, "%d", b);
+        snprintf(var, sizeof var, "%dv", b);
+        if (!get_facts(json_object_get(value, "facts"), effect->fact, effect->fact_sd) ||
+            (effect->pixels && (!get_channels(im, mean, NULL, effect->mean) ||
+                                !get_channels(im, var, NULL, effect->var))))
+            return err_set(e, "%s: the effect of '%s' on %s is incomplete", path, name, v->name);
+    }
+    return true;
+}
+
+static bool get_picture(const char *dir, struct view *v, const struct catalogue *c,
+                        const json_t *json, struct err *e)
+{
+    char path[MAX_PATH], picture[140], stored[65], sha256[65];
+    struct image im;
+    if (!copy_text(picture, sizeof picture, json, "picture") ||
+        !copy_text(stored, sizeof stored, json, "picture_sha256") || strchr(picture, '/') != NULL)
+        return err_set(e, "%s/manifest.json: no picture of '%s'", dir, v->name);
+    snprintf(path, sizeof path, "%s/%s", dir, picture);
+    if (!sha256_file(path, sha256, e))
+        return false;
+    if (strcmp(sha256, stored) != 0)
+        return err_set(e, "%s: is not the file that the manifest describes", path);
+    if (!image_read_exr(path, &im, NULL, e))
+        return false;
+    int cs = image_channel(&im, "cs");
+    struct sight *s = &v->correct;
+    s->columns = im.width;
+    s->rows = im.height;
+    bool ok = im.width <= SIGHT_SIDE && im.height <= SIGHT_SIDE && cs >= 0 &&
+              im.width * v->height == im.height * v->width &&
+              get_channels(&im, "c", s->mean, NULL) && get_channels(&im, "cv", s->var, NULL) &&
+              get_channels(&im, "ck", s->k3, NULL);
+    if (!ok)
+        err_set(e, "%s: channels are missing, or its size is wrong", path);
+    for (int i = 0; ok && i < im.width * im.height; i++)
+        s->spread[i] = (double)im.data[i * im.channels + cs];
+    s->cell = v->width / im.width;
+    ok = ok && get_effects(v, c, json_object_get(json, "bugs"), &im, path, e);
+    image_free(&im);
+    return ok;
+}
+
+static bool get_options(struct view *v, const json_t *list)
+{
+    enum { MOST = sizeof v->option / sizeof v->option[0] - 1 };
+    if (!json_is_array(list) || json_array_size(list) > MOST)
+        return false;
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const char *text = json_string_value(json_array_get(list, i));
+        if (text == NULL ||
+            snprintf(v->option[i], sizeof v->option[i], "%s", text) >= (int)sizeof v->option[i])
+            return false;
+        v->options[i] = v->option[i];
+    }
+    return true;
+}
+
+static bool get_view(const char *dir, struct view *v, const struct catalogue *c, const json_t *json,
+                     struct err *e)
+{
+    json_int_t seed;
+    int fixed;
+    bool ok = copy_text(v->name, sizeof v->name, json, "name") &&
+              copy_text(v->scene, sizeof v->scene, json, "scene") &&
+              copy_text(v->variant, sizeof v->variant, json, "variant") &&
+              copy_text(v->scene_sha256, sizeof v->scene_sha256, json, "scene_sha256") &&
+              get_options(v, json_object_get(json, "options")) &&
+              json_unpack((json_t *)json, "{si,si,si,si,sb,sI,sF}", "width", &v->width, "height",
+                          &v->height, "spp", &v->spp, "renders", &v->renders, "fixed_spp", &fixed,
+                          "seed", &seed, "n", &v->correct.n) == 0 &&
+              v->width > 0 && v->height > 0 && v->spp > 2 && v->renders > 0 && v->correct.n >= 3 &&
+              get_facts(json_object_get(json, "correct"), v->correct.fact, v->correct.fact_sd);
+    if (!ok)
+        return err_set(e, "%s/manifest.json: a view is incomplete", dir);
+    v->fixed_spp = fixed != 0;
+    v->seed = (uint64_t)seed;
+    return get_picture(dir, v, c, json, e);
+}
+
+static bool fill(const char *dir, struct catalogue *c, const json_t *root, struct err *e)
+{
+    const json_t *bugs = json_object_get(root, "bugs"), *views = json_object_get(root, "views");
+    size_t num_bugs = json_object_size(bugs), num_views = json_array_size(views);
+    if (json_integer_value(json_object_get(root, "side")) != SIGHT_SIDE || num_bugs == 0 ||
+        num_views == 0)
+        return err_set(e, "%s/manifest.json: no catalogue of bugs with %d cells across", dir,
+                       SIGHT_SIDE);
+    c->bug = calloc(num_bugs, sizeof *c->bug);
+    c->view = calloc(num_views, sizeof *c->view);
+    if (c->bug == NULL || c->view == NULL)
+        return err_set(e, "out of memory");
+    const char *name;
+    json_t *value;
+    json_object_foreach((json_t *)bugs, name, value)
+    {
+        struct bug *b = &c->bug[c->num_bugs++];
+        if (snprintf(b->name, sizeof b->name, "%s", name) >= (int)sizeof b->name ||
+            !copy_text(b->what, sizeof b->what, value, "bug") ||
+            !copy_text(b->where, sizeof b->where, value, "where") ||
+            !copy_text(b->patch_sha256, sizeof b->patch_sha256, value, "patch_sha256"))
+            return err_set(e, "%s/manifest.json: bug '%s' is incomplete", dir, name);
+    }
+    for (size_t i = 0; i < num_views; i++) {
+        struct view *v = &c->view[c->num_views++];
+        v->effect = calloc(num_bugs, sizeof(struct effect *));
+        if (v->effect == NULL)
+            return err_set(e, "out of memory");
+        if (!get_view(dir, v, c, json_array_get(views, i), e))
+            return false;
+    }
+    return true;
+}
+
+bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
+{
+    char path[MAX_PATH];
+    json_error_t why;
+    *out = (struct catalogue){0};
+    snprintf(path, sizeof path, "%s/manifest.json", dir);
+    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
+    if (root == NULL)
+        return err_set(e, "%s:%d: %s", path, why.line, why.text);
+    bool ok = fill(dir, out, root, e);
+    json_decref(root);
+    if (!ok)
+        catalogue_free(out);
+    return ok;
+}

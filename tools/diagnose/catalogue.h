@@ -1,0 +1,88 @@
+/* The catalogue of known bugs: how each changes the pictures of a few scenes. golden/diagnose/ holds
+ *
+ *   manifest.json
+ *     { "side": 16,                                   cells across (signature.h)
+ *       "bugs": { "NAME": {"bug": "one line", "where": "part, function", "patch_sha256": hex} },
+ *       "views": [ { "name": "13_square_patch-hemisphere", "scene": , "variant": , "scene_sha256": ,
+ *                    "options": ["-a", "32", "0.05"],
+ *                    "width": , "height": , "spp": , "renders": , "fixed_spp": , "seed": ,
+ *                    "picture": "NAME.exr", "picture_sha256": , "n": ,
+ *                    "correct": [[value, sd] or null for each fact],
+ *                    "bugs": { "NAME": {"pixels": true, "facts": [...]} } } ] }
+ *   NAME.exr   per cell: "c.R ..." mean of the correct renderer, "cv.R ..." its variance, "ck.R ..." its third
+ *              cumulant, "cs" its spread; "K.R ..." of bug number K (in the order of "bugs") the effect,
+ *              bug minus correct, and "Kv.R ..." the variance of that. Effects are rounded to 11 bits, their
+ *              variances to 5.
+ *
+ * A bug that is not in a view's "bugs" changes nothing there; one without "pixels" no cell's mean. Written by
+ * tests/mutants/make_catalogue.c, which also says how; read by everybody else. */
+#ifndef ASSAY_CATALOGUE_H
+#define ASSAY_CATALOGUE_H
+
+#include "reference/suite/suite.h"
+#include "signature.h"
+
+struct bug {
+    char name[64];         /* of tests/mutants/NAME.patch */
+    char what[256];        /* its line "Bug:" */
+    char where[160];       /* its line "Where:", the place in the assignment */
+    char patch_sha256[65]; /* of what it says, removes and adds, without the lines around */
+};
+
+struct effect {
+    bool pixels; /* false: mean and var are all 0 */
+    float mean[SIGHT_VALUES], var[SIGHT_VALUES];
+    double fact[NUM_FACTS], fact_sd[NUM_FACTS];
+};
+
+/* One way to look at a renderer: a scene of the suite, as it is or by a variant. */
+struct view {
+    char name[128];              /* "13_square_patch-hemisphere" */
+    char scene[64], variant[64]; /* variant: "" or "pathtracer-hemisphere" */
+    char option[5][16];          /* with these options besides; none: what the suite renders */
+    const char *options[6];      /* the same, NULL at the end */
+    char scene_sha256[65];
+    int width,
+        height;     /* of the renders that it was made of; their ratio is that of every picture */
+    int spp;        /* of one render of a diagnosis */
+    int renders;    /* with seeds of their own; 4 or more: also stated_error.h is asked */
+    bool fixed_spp; /* the mean depends on the number of samples asked for (adaptive) */
+    uint64_t seed;
+    struct sight correct;
+    struct effect **effect; /* per bug; NULL: no difference at all */
+};
+
+struct catalogue {
+    struct bug *bug; /* sorted by name */
+    int num_bugs;
+    struct view *view;
+    int num_views;
+};
+
+/* Fails, with a line, on a missing or damaged file. */
+bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
+    __attribute__((warn_unused_result));
+/* manifest.json last, so that a catalogue is whole or not there. */
+bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
+    __attribute__((warn_unused_result));
+void catalogue_free(struct catalogue *c);
+
+/* The scene and the variant (NULL: none) of a view. Fails if the suite has no such, or if the scene is not
+ * the one that the catalogue was made with. */
+bool view_scene(const struct view *v, const struct suite *suite, const struct suite_scene **scene,
+                const struct suite_variant **variant, struct err *e)
+    __attribute__((warn_unused_result));
+const struct view *catalogue_view(const struct catalogue *c, const char *name);
+/* Its number, -1 if there is none. */
+int catalogue_bug(const struct catalogue *c, const char *name);
+
+/* The header lines and the hash of a patch; the bug's name is the file's. Fails if a line is missing. */
+bool bug_of_patch(const char *path, struct bug *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Holds the catalogue against a directory of patches: fails, naming the first, if one has no entry, has
+ * changed since, or is gone. */
+bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,146 @@
+#include "diagnose_gather.h"
+
+#include "diagnose_render.h"
+#include "tools/results/results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MAX_PATH = 8192 };
+
+/* What only a comparison with the correct renderer's noise tells. */
+static void finish(struct clue *clue)
+{
+    sight_set_spread(&clue->seen, &clue->view->correct);
+}
+
+bool gather_program(const struct gather_options *opt, const char *program, struct clue *clue,
+                    int *num, struct err *e)
+{
+    const struct catalogue *c = opt->catalogue;
+    for (int i = 0; i < c->num_views; i++) {
+        const struct view *v = &c->view[i];
+        /* A seed of its own for each view: the same one would make their noise alike. */
+        struct diagnose_job job = {.program = program,
+                                   .options = v->options[0] != NULL ? v->options : NULL,
+                                   .columns = v->correct.columns,
+                                   .width = v->width,
+                                   .height = v->height,
+                                   .spp = v->spp,
+                                   .renders = v->renders,
+                                   .seed = opt->seed * 1000 + (uint64_t)i,
+                                   .threads = opt->threads,
+                                   .timeout_s = opt->timeout_s,
+                                   .work_dir = opt->work_dir};
+        clue[i] = (struct clue){.view = v};
+        if (!view_scene(v, opt->suite, &job.scene, &job.variant, e) ||
+            !diagnose_render(&job, opt->alpha / (2 * c->num_views), &clue[i].seen,
+                             &clue[i].is_consistent, e))
+            return false;
+        finish(&clue[i]);
+    }
+    *num = c->num_views;
+    return true;
+}
+
+/* asked: 0 where a picture does not say, and it matters only for adaptive sampling. */
+static bool read_picture(const struct view *v, const char *path, int asked, struct clue *clue,
+                         struct err *e)
+{
+    struct moments m;
+    *clue = (struct clue){.view = v, .is_consistent = true};
+    if (!moments_read(path, &m, NULL, e))
+        return false;
+    bool ok = sight_of(&m, v->correct.columns, v->fixed_spp ? asked : 0, &clue->seen, e) ||
+              err_prefix(e, "%s", path);
+    moments_free(&m);
+    if (ok && clue->seen.rows != v->correct.rows)
+        ok = err_set(e, "%s: width by height is not %d by %d", path, v->width, v->height);
+    if (ok)
+        finish(clue);
+    return ok;
+}
+
+bool gather_picture(const struct gather_options *opt, const char *view, const char *path,
+                    struct clue *clue, struct err *e)
+{
+    const struct view *v = catalogue_view(opt->catalogue, view);
+    const struct suite_scene *scene;
+    const struct suite_variant *variant;
+    if (v == NULL)
+        return err_set(e, "--scene: the catalogue of bugs has no '%s' (see --help)", view);
+    return view_scene(v, opt->suite, &scene, &variant, e) && read_picture(v, path, v->spp, clue, e);
+}
+
+/* The path of the picture that claims of this scene and engine were judged by. */
+static bool find_picture(const json_t *results, const char *json_path, const struct view *v,
+                         char *path)
+{
+    const char *engine = v->variant[0] != '\0' ? v->variant : "pathtracer";
+    size_t i;
+    const json_t *claim;
+    json_array_foreach(json_object_get(results, "claims"), i, claim)
+    {
+        const char *file = member_text(json_object_get(claim, "files"), "a");
+        if (file == NULL || v->options[0] != NULL ||
+            strcmp(member_text(claim, "scene"), v->scene) != 0 ||
+            strcmp(member_text(claim, "a"), engine) != 0)
+            continue;
+        const char *slash = strrchr(json_path, '/');
+        int stem = file[0] == '/' || slash == NULL ? 0 : (int)(slash - json_path) + 1;
+        return snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
+    }
+    return false;
+}
+
+static void add_consistency(const json_t *results, struct clue *clue)
+{
+    size_t i;
+    const json_t *c;
+    json_array_foreach(json_object_get(results, "consistency"), i, c)
+    {
+        if (strcmp(member_text(c, "scene"), clue->view->scene) != 0 ||
+            member_text(c, "error") != NULL || clue->view->renders < 4)
+            continue;
+        const json_t *ci = json_object_get(c, "pixels_ci");
+        sight_set_consistency(&clue->seen, member_number(c, "pixels"),
+                              json_number_value(json_array_get(ci, 0)),
+                              json_number_value(json_array_get(ci, 1)), member_number(c, "image"),
+                              (int)member_number(c, "renders"), member_number(c, "alpha"));
+        clue->is_consistent =
+            strcmp(member_text(c, "verdict"), verdict_name(VERDICT_DIFFERENT)) != 0;
+    }
+}
+
+bool gather_results(const struct gather_options *opt, const char *path, struct clue *clue, int *num,
+                    json_t *skipped, struct err *e)
+{
+    const struct catalogue *c = opt->catalogue;
+    json_t *results;
+    if (!results_read(path, &results, e))
+        return false;
+    *num = 0;
+    bool ok = true;
+    for (int i = 0; ok && i < c->num_views; i++) {
+        const struct view *v = &c->view[i];
+        const struct suite_scene *scene;
+        const struct suite_variant *variant;
+        struct err why = {""};
+        char picture[MAX_PATH];
+        ok = view_scene(v, opt->suite, &scene, &variant, e);
+        if (!ok)
+            break;
+        bool there = find_picture(results, path, v, picture) || err_set(&why, "no picture");
+        if (there && read_picture(v, picture, v->spp, &clue[*num], &why)) {
+            add_consistency(results, &clue[*num]);
+            ++*num;
+        } else {
+            json_array_append_new(skipped,
+                                  json_pack("{ss,ss}", "view", v->name, "reason", why.msg));
+        }
+    }
+    json_decref(results);
+    return ok && (*num > 0 ||
+                  err_set(e, "%s: none of the scenes that the catalogue of bugs knows", path));
+}

@@ -1,0 +1,84 @@
+#include "diagnose_render.h"
+
+#include "reference/replicates/engine_driver.h"
+#include "tools/validate/run_pathtracer.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_PATH = 4400, FEWEST_CONSISTENT = 4 };
+
+/* How far R may lie from 1: ours is independent, so all that counts is alpha. */
+static const double consistency_margin = 0.02;
+
+static bool render_one(const struct diagnose_job *job, int k, struct moments *out, struct err *e)
+{
+    char picture[MAX_PATH], log[MAX_PATH];
+    struct suite_scene scene = *job->scene;
+    scene.width = job->width;
+    scene.height = job->height;
+    snprintf(picture, sizeof picture, "%s/diagnose.exr", job->work_dir);
+    snprintf(log, sizeof log, "%s/diagnose.log", job->work_dir);
+    const struct ours_job ours = {.program = job->program,
+                                  .scene = &scene,
+                                  .spp = job->spp,
+                                  .seed = replicate_seed((uint32_t)job->seed, k),
+                                  .options = job->options != NULL   ? job->options
+                                             : job->variant != NULL ? job->variant->options
+                                                                    : NULL,
+                                  .threads = job->threads,
+                                  .timeout_s = job->timeout_s,
+                                  .picture = picture,
+                                  .log = log};
+    double cpu_s;
+    bool ok = ours_render(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
+    unlink(picture);
+    unlink(log);
+    return ok;
+}
+
+/* A black picture has no noise to judge; that it is black is for others to find. */
+static bool has_noise(const struct sight *s)
+{
+    double sum = 0;
+    for (int i = 0; i < s->columns * s->rows; i++)
+        sum += s->spread[i];
+    return sum > 0;
+}
+
+static bool judge(const struct moments *m, const struct diagnose_job *job, double alpha,
+                  struct sight *s, bool *consistent, struct err *e)
+{
+    struct consistency c;
+    if (!consistency_judge(m, job->renders, consistency_margin, alpha, &c, e))
+        return false;
+    sight_set_consistency(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders, alpha);
+    *consistent = c.verdict != VERDICT_DIFFERENT;
+    return true;
+}
+
+bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight *out,
+                     bool *consistent, struct err *e)
+{
+    size_t num = (size_t)job->renders;
+    struct moments *m = calloc(num, sizeof *m);
+    struct sight *s = calloc(num, sizeof *s);
+    bool ok = (m != NULL && s != NULL) || err_set(e, "out of memory"), judged = true;
+    int done = 0;
+    for (; ok && done < job->renders; done += ok)
+        ok = render_one(job, done, &m[done], e) &&
+             sight_of(&m[done], job->columns, job->spp, &s[done], e);
+    if (ok)
+        *out = sight_average(s, job->renders);
+    if (ok && job->renders >= FEWEST_CONSISTENT && has_noise(out))
+        ok = judge(m, job, alpha, out, &judged, e);
+    if (consistent != NULL)
+        *consistent = judged;
+    for (int k = 0; k < done; k++)
+        moments_free(&m[k]);
+    free(m);
+    free(s);
+    return ok;
+}

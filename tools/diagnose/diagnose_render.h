@@ -1,0 +1,25 @@
+/* Renders what a diagnosis looks at: a view of the catalogue, by any program with our command line. */
+#ifndef ASSAY_DIAGNOSE_RENDER_H
+#define ASSAY_DIAGNOSE_RENDER_H
+
+#include "catalogue.h"
+
+struct diagnose_job {
+    const char *program;
+    const struct suite_scene *scene;
+    const struct suite_variant *variant; /* NULL: none */
+    const char *const *options;          /* instead of the variant's, NULL at the end; NULL: none */
+    int columns;                         /* of cells (signature.h) */
+    int width, height, spp;
+    int renders;   /* averaged; with 4 or more FACT_PIXELS and FACT_IMAGE are set */
+    uint64_t seed; /* of the first; the others follow from it */
+    int threads;
+    double timeout_s;
+    const char *work_dir; /* for pictures, which are removed; exists */
+};
+
+/* consistent (may be NULL): false if a claim of consistency (stated_error.h) comes out DIFFERENT at `alpha`. */
+bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight *out,
+                     bool *consistent, struct err *e) __attribute__((warn_unused_result));
+
+#endif

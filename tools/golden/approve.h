@@ -1,0 +1,36 @@
+/* Accepting a newly rendered reference in place of the stored one, or refusing it: what changes is
+ * measured and printed first. */
+#ifndef ASSAY_APPROVE_H
+#define ASSAY_APPROVE_H
+
+#include "reference/store/reference_render.h"
+
+#include <stdio.h>
+
+struct approve_options {
+    const char *from_dir, *golden_dir; /* both as reference_render.h says */
+    double alpha;                      /* of one comparison */
+    bool accept_new;                   /* where nothing is stored */
+    const char *why;                   /* accept a difference for this reason; NULL: refuse it */
+};
+
+enum approval {
+    APPROVE_ACCEPTED,     /* stored */
+    APPROVE_UNCHANGED,    /* nothing to do */
+    APPROVE_DIFFERENT,    /* refused: DIFFERENT, and no reason given */
+    APPROVE_INCONCLUSIVE, /* refused, whatever the options */
+    APPROVE_IMPOSSIBLE /* refused: no candidate, a damaged one, or nothing to compare with; e says */
+};
+
+/* One reference. Prints to `out` the verdict (compare_moments() of candidate against stored, margins of
+ * the suite), effect with interval and MDB, provenance of both, and what was done.
+ *
+ * What is accepted goes into golden_dir as golden_write() does it; its manifest entry carries
+ * "changes", oldest first, one for each approval: {"date", "verdict": "NEW", "IDENTICAL",
+ * "EQUIVALENT", "DIFFERENT" or "NOT COMPARABLE" (of another size), and where they apply "why",
+ * "difference", "ci", "mdb_global", "mdb_tile", "alpha", "was": {version, seed, scene_sha256,
+ * exr_sha256, date}}. */
+enum approval approve(const struct approve_options *opt, const struct suite_scene *scene,
+                      const struct suite_reference *ref, FILE *out, struct err *e);
+
+#endif

@@ -1,0 +1,202 @@
+#include "export_job.h"
+
+#include "reference/cycles/export_cycles.h"
+#include "reference/mitsuba/export_mitsuba.h"
+#include "reference/pbrt/export_pbrt.h"
+#include "reference/povray/export_povray.h"
+#include "renderer/base/cli.h"
+#include "renderer/collada/collada.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/sha256.h"
+#include "renderer/base/shell_quote.h"
+#include "renderer/base/version.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum option {
+    OPT_OUT,
+    OPT_ENGINE,
+    OPT_RESOLUTION,
+    OPT_BOUNCES,
+    OPT_ENVIRONMENT,
+    OPT_LENS,
+    OPT_FOCUS,
+    OPT_HELP
+};
+
+static const struct cli_option options[] = {
+    [OPT_OUT] = {'o', "out", 1, "FILE",
+                 "required; .json: for cycles.py, .pov: for POV-Ray,\n"
+                 ".xml: for Mitsuba 3, with meshes beside it, .pbrt: for pbrt-v4"},
+    [OPT_ENGINE] = {0, "engine", 1, "NAME",
+                    "cycles, povray, mitsuba or pbrt (by the ending of --out)"},
+    [OPT_RESOLUTION] = {'r', "resolution", 2, "W H", "pixels (480 360)"},
+    [OPT_BOUNCES] = {'m', "max-bounces", 1, "N", "as pathtracer counts them (5)"},
+    [OPT_ENVIRONMENT] = {'e', "environment", 1, "FILE", "as pathtracer's"},
+    [OPT_LENS] = {'b', "lens-radius", 1, "R", "as pathtracer's; 0: pinhole (0)"},
+    [OPT_FOCUS] = {'d', "focal-distance", 1, "D", "as pathtracer's (4.7)"},
+    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0}};
+
+static const char *const engine_names[] = {"cycles", "povray", "mitsuba", "pbrt", NULL};
+static const char *const endings[] = {".json", ".pov", ".xml", ".pbrt", NULL};
+
+static void engine_of_ending(struct exporting *s)
+{
+    const char *dot = s->out != NULL ? strrchr(s->out, '.') : NULL;
+    for (int i = 0; s->engine == EXPORTING_UNKNOWN && dot != NULL && endings[i] != NULL; i++)
+        if (strcmp(dot, endings[i]) == 0)
+            s->engine = i;
+}
+
+bool exporting_parse(int argc, char **argv, struct exporting *s, struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    bool ok = true;
+    *s = (struct exporting){.engine = EXPORTING_UNKNOWN,
+                            .width = 480,
+                            .height = 360,
+                            .depth = 5,
+                            .focal_distance = 4.7};
+    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        const char *v = c.value[0];
+        if (i == CLI_POSITIONAL) {
+            if (s->scene != NULL)
+                return err_set(e, "export takes one scene, '%s' is one more", v);
+            s->scene = v;
+            continue;
+        }
+        switch ((enum option)i) {
+        case OPT_OUT: s->out = v; break;
+        case OPT_ENGINE: ok = cli_choice("--engine", v, engine_names, &s->engine, e); break;
+        case OPT_RESOLUTION:
+            ok = cli_int("--resolution", v, 1, 65535, &s->width, e) &&
+                 cli_int("--resolution", c.value[1], 1, 65535, &s->height, e);
+            break;
+        case OPT_BOUNCES: ok = cli_int("--max-bounces", v, 0, 10000, &s->depth, e); break;
+        case OPT_ENVIRONMENT: s->environment = v; break;
+        case OPT_LENS: ok = cli_double("--lens-radius", v, 0, 1e6, &s->lens_radius, e); break;
+        case OPT_FOCUS:
+            ok = cli_double("--focal-distance", v, 1e-6, 1e9, &s->focal_distance, e);
+            break;
+        case OPT_HELP:
+            puts("usage: assay export [options] -o OUT SCENE.dae\n");
+            cli_print_options(stdout, options);
+            s->help = true;
+            return true;
+        }
+    }
+    engine_of_ending(s);
+    return ok;
+}
+
+enum { NUMBER = 32 };
+
+/* As few digits as are needed to read the same number back. */
+static const char *shortest(double x, char text[NUMBER])
+{
+    enum { MOST_DIGITS = 17 };
+    for (int digits = 1; digits <= MOST_DIGITS; digits++) {
+        snprintf(text, NUMBER, "%.*g", digits, x);
+        if (strtod(text, NULL) == x)
+            break;
+    }
+    return text;
+}
+
+char *exporting_command(const struct exporting *s, const char *name)
+{
+    char width[NUMBER], height[NUMBER], depth[NUMBER], lens[NUMBER], focus[NUMBER];
+    const char *word[24] = {"assay", "export", "--engine", engine_names[s->engine],
+                            "-r",    width,    height,     "-m",
+                            depth,   "-b",     lens,       "-d",
+                            focus};
+    int n = 13;
+    snprintf(width, sizeof width, "%d", s->width);
+    snprintf(height, sizeof height, "%d", s->height);
+    snprintf(depth, sizeof depth, "%d", s->depth);
+    shortest(s->lens_radius, lens);
+    shortest(s->focal_distance, focus);
+    if (s->environment != NULL) {
+        word[n++] = "-e";
+        word[n++] = s->environment;
+    }
+    if (name != NULL) {
+        word[n++] = "-o";
+        word[n++] = name;
+    }
+    if (s->scene[0] == '-')
+        word[n++] = "--";
+    word[n] = s->scene;
+    char *text = shell_join(NULL, word), *ascii = text != NULL ? shell_ascii(text) : NULL;
+    free(text);
+    return ascii;
+}
+
+static bool write_text(const struct exporting *s, const struct export_origin *origin,
+                       const struct scene *scene, const struct camera *camera, struct err *e)
+{
+    struct out_file out;
+    struct povray_variant plain = povray_variant_plain();
+    bool povray = s->engine == EXPORTING_POVRAY;
+    if (!out_open(&out, s->out, e))
+        return false;
+    export_origin_write(out.f, povray ? COMMENT_POVRAY : COMMENT_PBRT, origin, false);
+    if (povray ? !export_povray(scene, camera, s->depth, &plain, out.f, e)
+               : !export_pbrt(scene, camera, s->depth, out.f, e)) {
+        out_abandon(&out);
+        return false;
+    }
+    return out_commit(&out, e);
+}
+
+static bool write_scene(const struct exporting *s, const struct export_origin *origin,
+                        const struct scene *scene, const struct camera *camera, struct err *e)
+{
+    if (s->engine == EXPORTING_CYCLES)
+        return export_cycles(scene, camera, s->depth, origin, s->out, e);
+    if (s->engine == EXPORTING_MITSUBA)
+        return export_mitsuba(scene, camera, s->depth, origin, s->out, e);
+    return write_text(s, origin, scene, camera, e);
+}
+
+static bool with_origin(const struct exporting *s, const struct scene *scene,
+                        const struct camera *camera, struct err *e)
+{
+    char hash[65], environment[65];
+    if (!sha256_file(s->scene, hash, e) ||
+        (s->environment != NULL && !sha256_file(s->environment, environment, e)))
+        return false;
+    char *command = exporting_command(s, NULL), *named = exporting_command(s, base_of(s->out));
+    const struct export_origin origin = {.version = s->version != NULL ? s->version : assay_version,
+                                         .command = s->command != NULL ? s->command : command,
+                                         .named = s->command != NULL ? s->command : named,
+                                         .scene = hash,
+                                         .environment =
+                                             s->environment != NULL ? environment : NULL};
+    bool ok = ((command != NULL && named != NULL) || err_set(e, "out of memory")) &&
+              write_scene(s, &origin, scene, camera, e);
+    free(command);
+    free(named);
+    return ok;
+}
+
+bool exporting_run(const struct exporting *s, struct err *e)
+{
+    struct scene scene = {0};
+    struct camera camera;
+    bool ok = make_parent_dirs(s->out, e) && collada_load(s->scene, DIALECT_AUTO, &scene, e) &&
+              (s->environment == NULL || scene_read_environment(&scene, s->environment, e));
+    if (ok && !camera_init(&camera, &scene, s->width, s->height, e))
+        ok = err_prefix(e, "%s", s->scene);
+    if (ok) {
+        camera.lens_radius = (float)s->lens_radius;
+        camera.focal_distance = (float)s->focal_distance;
+        ok = with_origin(s, &scene, &camera, e);
+    }
+    scene_free(&scene);
+    return ok;
+}

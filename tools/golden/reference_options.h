@@ -1,0 +1,51 @@
+/* The command `assay reference`: its words, what they ask for, and what becomes of one reference; for the verb and for who
+ * plans it as jobs (job_reference.c). */
+#ifndef ASSAY_REFERENCE_OPTIONS_H
+#define ASSAY_REFERENCE_OPTIONS_H
+
+#include "reference/store/reference_render.h"
+
+enum { REFERENCE_MOST_SCENES = 64 };
+
+struct reference_command {
+    const char *only[REFERENCE_MOST_SCENES], *engine, *out, *golden, *suite_dir, *work;
+    int num_only;
+    struct reference_options opt;
+    int first, last; /* --pictures; last 0: all */
+    bool fresh, has_seed, slurm, help;
+    struct suite suite;
+};
+
+/* Reads the words and the suite, and makes the directory for temporary files. help: it was printed, and no more was
+ * done. The caller calls reference_command_free(), also after a failure. */
+bool reference_command_read(int argc, char **argv, struct reference_command *c, struct err *e)
+    __attribute__((warn_unused_result));
+void reference_command_free(struct reference_command *c);
+
+/* Calls one() for each reference that is asked for, in the order of the suite, as long as it returns true. Fails if there is
+ * none. */
+bool reference_command_each(const struct reference_command *c,
+                            bool (*one)(void *ctx, const struct suite_scene *scene,
+                                        const struct suite_reference *ref, struct err *e),
+                            void *ctx, struct err *e) __attribute__((warn_unused_result));
+
+/* How one of them would be made, and where it is up to date already. */
+struct reference_state {
+    struct reference_options opt; /* with its seed */
+    char key[65];                 /* reference_key() */
+    const char *there;            /* --golden or --out; NULL: to be rendered */
+};
+bool reference_command_state(const struct reference_command *c, const struct suite_scene *scene,
+                             const struct suite_reference *ref, struct reference_state *out,
+                             struct err *e) __attribute__((warn_unused_result));
+/* Says that it is up to date; a candidate that is older than what is stored is removed. */
+bool reference_command_keep(const struct reference_command *c, const struct suite_scene *scene,
+                            const struct suite_reference *ref, const struct reference_state *state,
+                            struct err *e) __attribute__((warn_unused_result));
+/* Writes it to --out with the key in its manifest, and says so. */
+bool reference_command_write(const struct reference_command *c, const struct suite_scene *scene,
+                             const struct suite_reference *ref, const char *key,
+                             const struct moments *m, json_t *manifest, double seconds,
+                             struct err *e) __attribute__((warn_unused_result));
+
+#endif

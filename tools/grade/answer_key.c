@@ -1,0 +1,229 @@
+#include "grade_checks.h"
+
+#include "reference/base/process.h"
+#include "reference/store/reference_render.h"
+#include "reference/truth/truth.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/sha256.h"
+#include "renderer/base/version.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_ARGS = 96, TEXT = 8192, MAX_PATH = 8192 };
+
+/* Far from the seeds that submissions get. */
+static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
+
+/* Our command for a picture: that of the assignment, which our renderer understands, in the directory in which
+ * "scene" is staged. */
+static bool command_of(const struct rubric *r, const struct rubric_picture *p, const char *words,
+                       const struct answer_options *opt, const char *out, char *text,
+                       const char **argv, struct err *e)
+{
+    struct rubric ours = {0};
+    struct rubric_picture picture = *p;
+    snprintf(
+        ours.command, sizeof ours.command,
+        "{program} -q -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} --seed {seed} {options} %s -f {out} {scene}",
+        words);
+    snprintf(ours.output, sizeof ours.output, "%s", out);
+    if (p->reference_options[0] != '\0')
+        snprintf(picture.options, sizeof picture.options, "%s",
+                 strcmp(p->reference_options, "none") == 0 ? "" : p->reference_options);
+    picture.spp = p->reference_spp;
+    return submission_command(&ours, &picture, opt->pathtracer, answer_seed, opt->threads, text,
+                              TEXT, argv, MAX_ARGS) ||
+           err_set(e, "%s:%d: the command of '%s' is too long", r->path, p->line, p->name);
+}
+
+/* All that decides our render: the words of its command and the files of the scene. */
+static bool key_of(const char *const *argv, const char *scene_file, const char *environment,
+                   char key[65], struct err *e)
+{
+    char text[TEXT + 512], hash[65], other[65] = "";
+    size_t n = 0;
+    if (!sha256_file(scene_file, hash, e) ||
+        (environment != NULL && !sha256_file(environment, other, e)))
+        return false;
+    n += (size_t)snprintf(text, sizeof text, "%s %s %s", assay_version, hash, other);
+    for (const char *const *a = argv + 1; *a != NULL && n < sizeof text; a++)
+        if (strcmp(a[-1], "-t") != 0)
+            n += (size_t)snprintf(text + n, sizeof text - n, " %s", *a);
+    sha256_text(text, key);
+    return true;
+}
+
+static void scene_files(const struct rubric *r, const struct rubric_picture *p, char *scene,
+                        char *environment)
+{
+    environment[0] = '\0';
+    if (p->suite != NULL) {
+        snprintf(scene, MAX_PATH, "%s", p->suite->dae);
+        snprintf(environment, MAX_PATH, "%s", p->suite->environment);
+    } else {
+        snprintf(scene, MAX_PATH, "%s/%s", r->dir, p->scene);
+    }
+    if (p->environment[0] != '\0')
+        snprintf(environment, MAX_PATH, "%s/%s", r->dir, p->environment);
+}
+
+/* words: besides those of the picture; "" none. */
+static bool render_ours(const struct rubric *r, const struct rubric_picture *p, const char *words,
+                        const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    char text[TEXT], key[65], path[MAX_PATH], scene[MAX_PATH], environment[MAX_PATH], log[MAX_PATH];
+    const char *argv[MAX_ARGS];
+    if (!command_of(r, p, words, opt, "out.exr", text, argv, e))
+        return false;
+    scene_files(r, p, scene, environment);
+    if (!key_of(argv, scene, environment[0] != '\0' ? environment : NULL, key, e))
+        return false;
+    snprintf(path, sizeof path, "%s/%s.exr", opt->cache, key);
+    if (access(path, R_OK) == 0 && moments_read(path, out, NULL, e))
+        return true;
+    char made[MAX_PATH];
+    snprintf(made, sizeof made, "%s/new.exr", opt->cache);
+    snprintf(log, sizeof log, "%s/%s.log", opt->cache, p->name);
+    if (!command_of(r, p, words, opt, "new.exr", text, argv, e))
+        return false;
+    const struct process process = {
+        .argv = argv, .cwd = opt->cache, .log = log, .timeout_s = opt->timeout_s};
+    if (!process_run(&process, NULL, e))
+        return err_prefix(e, "reference of '%s'", p->name);
+    if (rename(made, path) != 0)
+        return err_set(e, "%s: cannot rename", made);
+    unlink(log);
+    return moments_read(path, out, NULL, e);
+}
+
+static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
+                         const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    static const char *const engines[] = {"", "truth", "cycles", "povray"};
+    if (p->reference == REFERENCE_OURS)
+        return render_ours(r, p, "", opt, out, e);
+    struct suite_scene scene = *p->suite;
+    const struct suite_reference *ref = suite_reference_of(&scene, engines[p->reference]);
+    json_t *manifest = NULL;
+    if (p->reference != REFERENCE_TRUTH) {
+        bool ok = golden_read(opt->golden_dir, &scene, ref, out, &manifest, e);
+        json_decref(manifest);
+        return ok;
+    }
+    scene.width = p->width;
+    scene.height = p->height;
+    scene.depth = p->bounces;
+    return truth_render(&scene, ref, out, e) || err_prefix(e, "%s:%d", r->path, p->line);
+}
+
+/* How samples vary, from a render of ours. */
+static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
+                     const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    enum { NOISE_SPP = 256 };
+    struct rubric_picture ours = *p;
+    if (p->reference != REFERENCE_OURS)
+        ours.reference_spp = NOISE_SPP;
+    return render_ours(r, &ours, "", opt, out, e);
+}
+
+bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
+                   const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    struct rubric_picture ours = r->picture[picture];
+    char all[sizeof ours.reference_options + sizeof r->set->words + 64];
+    /* By the reference's estimator: its noise decides how many samples adaptive sampling takes. */
+    bool has =
+        as_asked && ours.reference == REFERENCE_OURS && strcmp(ours.reference_options, "none") != 0;
+    snprintf(all, sizeof all, "%s %s", has ? ours.reference_options : "", words);
+    ours.reference_spp = spp;
+    if (as_asked)
+        ours.reference_options[0] = '\0';
+    return render_ours(r, &ours, all, opt, out, e);
+}
+
+/* How many samples each pixel takes, where a check wants to know. */
+static bool as_asked(const struct rubric *r, int picture, const char *words,
+                     const struct answer_options *opt, struct moments *out, struct err *e)
+{
+    bool needed = false;
+    for (int i = 0; i < r->num_checks; i++)
+        needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
+    return !needed || answer_render(r, picture, true, words, r->picture[picture].spp, opt, out, e);
+}
+
+/* Does our renderer make another picture with these words? Told by one sample a pixel, of the same seed. */
+static bool words_matter(const struct rubric *r, const struct rubric_picture *p, const char *words,
+                         const struct answer_options *opt, bool *matter, struct err *e)
+{
+    struct rubric_picture quick = *p;
+    struct moments with = {0}, without = {0};
+    quick.reference_spp = 1;
+    bool ok = render_ours(r, &quick, words, opt, &with, e) &&
+              render_ours(r, &quick, "", opt, &without, e);
+    *matter = ok && memcmp(with.mean, without.mean,
+                           3 * (size_t)with.width * (size_t)with.height * sizeof *with.mean) != 0;
+    moments_free(&with);
+    moments_free(&without);
+    return ok;
+}
+
+static bool read_accepted(const struct rubric *r, const struct rubric_picture *p, const char *file,
+                          struct moments *out, struct err *e)
+{
+    char path[MAX_PATH];
+    snprintf(path, sizeof path, "%s/%s", r->dir, file);
+    return moments_read(path, out, NULL, e) &&
+           ((out->width == p->width && out->height == p->height) ||
+            err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path, out->width, out->height,
+                    p->name, p->width, p->height));
+}
+
+/* What picture i looks like with the deviations of a set; left empty where they change nothing. */
+static bool deviating(const struct rubric *r, const struct rubric_set *set, int i,
+                      const struct answer_options *opt, struct answer *out, struct err *e)
+{
+    const struct rubric_picture *p = &r->picture[i];
+    bool matter = false;
+    for (int a = 0; a < p->num_accepted; a++)
+        if (strcmp(p->accept[a].name, set->name) == 0)
+            return read_accepted(r, p, p->accept[a].how, &out->m, e);
+    if (set->words[0] == '\0' || p->reference != REFERENCE_OURS)
+        return true;
+    return words_matter(r, p, set->words, opt, &matter, e) &&
+           (!matter || (render_ours(r, p, set->words, opt, &out->m, e) &&
+                        as_asked(r, i, set->words, opt, &out->as_asked, e)));
+}
+
+bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
+                  struct err *e)
+{
+    char path[MAX_PATH];
+    *out = (struct answers){0};
+    snprintf(path, sizeof path, "%s/scene", opt->cache);
+    bool ok = submission_stage(r, path, e);
+    for (int i = 0; ok && i < r->num_pictures; i++) {
+        const struct rubric_picture *p = &r->picture[i];
+        struct answer *a = &out->of[0][i];
+        ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
+        ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, "", opt, &a->as_asked, e);
+        for (int k = 1; ok && k < r->num_sets; k++)
+            ok = deviating(r, &r->set[k], i, opt, &out->of[k][i], e);
+    }
+    if (!ok)
+        answers_free(out);
+    return ok;
+}
+
+void answers_free(struct answers *a)
+{
+    for (int k = 0; k < RUBRIC_SETS; k++)
+        for (int i = 0; i < RUBRIC_PICTURES; i++) {
+            moments_free(&a->of[k][i].m);
+            moments_free(&a->of[k][i].noise);
+            moments_free(&a->of[k][i].as_asked);
+        }
+}

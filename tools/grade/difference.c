@@ -1,0 +1,259 @@
+#include "difference.h"
+
+#include "rubric.h"
+#include "tools/stats/distributions.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.25;
+/* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
+static const double unknown_dof = 30;
+static const double least_used = 0.25; /* of a tile, of the picture */
+enum { FEWEST = 60 };                  /* second differences */
+
+double interval_distance(const struct interval *i)
+{
+    return fmax(0, fmax(i->lo, -i->hi));
+}
+
+double interval_half(const struct interval *i)
+{
+    return (i->hi - i->lo) / 2;
+}
+
+/* A pair of pictures being compared. */
+struct pair {
+    const struct student *a, *b;
+    const unsigned char *use;
+};
+
+/* Sums for the slope of r^2 - c on m: kappa = xy/xx, and of squared residuals once kappa is known. */
+struct slope {
+    double num, xx, xy, residual;
+};
+
+static bool all_used(const struct pair *p, int x, int y)
+{
+    int width = p->a->width;
+    if (x < 1 || y < 1 || x >= width - 1 || y >= p->a->height - 1)
+        return false;
+    for (int k = 0; k < 9; k++)
+        if (!p->use[(size_t)(y - 1 + k / 3) * (size_t)width + (size_t)(x - 1 + k % 3)])
+            return false;
+    return true;
+}
+
+/* At each place that has noise: r^2 = kappa m + c, weight 1/(m + c)^2. */
+static void add_place(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+{
+    static const double kernel[3] = {1, -2, 1};
+    double r = 0, m = 0, rounding = 0;
+    for (int k = 0; k < 9; k++) {
+        size_t i =
+            3 * ((size_t)(y - 1 + k / 3) * (size_t)p->a->width + (size_t)(x - 1 + k % 3)) + c;
+        double w = kernel[k / 3] * kernel[k % 3] / 6;
+        r += w * (p->a->mean[i] - p->b->mean[i]);
+        m += w * w * (p->a->variance[i] + p->b->variance[i]);
+        rounding += w * w * (p->a->rounding[i] + p->b->rounding[i]);
+    }
+    /* Where rounding is the larger, r^2 says nothing of noise: a flat area is rounded alike everywhere. */
+    if (m <= rounding)
+        return;
+    double weight = 1 / ((m + rounding) * (m + rounding));
+    s->num++;
+    s->xx += weight * m * m;
+    s->xy += weight * m * (r * r - rounding);
+    s->residual += pow(weight * m * (r * r - rounding - kappa * m), 2);
+}
+
+static struct slope sum_places(const struct pair *p, struct rect r, double kappa)
+{
+    struct slope s = {0};
+    for (int y = r.y; y < r.y + r.height; y++)
+        for (int x = r.x; x < r.x + r.width; x++)
+            for (size_t c = 0; c < 3 && all_used(p, x, y); c++)
+                add_place(p, x, y, c, kappa, &s);
+    return s;
+}
+
+struct noise {
+    double kappa;
+    double dof; /* of kappa as a variance */
+    bool known;
+};
+
+static struct noise noise_in(const struct pair *p, struct rect r)
+{
+    struct slope s = sum_places(p, r, 0);
+    if (s.num < FEWEST)
+        return (struct noise){.kappa = 1, .dof = unknown_dof};
+    struct noise n = {.kappa = s.xy / s.xx, .known = s.xy > 0};
+    n.kappa = fmax(least_kappa, n.kappa);
+    s = sum_places(p, r, n.kappa);
+    double variance = overlap * channels_alike * s.residual / (s.xx * s.xx);
+    n.dof = fmax(3, stats_dof(n.kappa, variance));
+    return n;
+}
+
+/* Sums over a region, one channel. */
+struct sums {
+    double d, b, v, k3, tolerance, used;
+};
+
+static double weighted(const double *x, int channel)
+{
+    return channel < CHANNEL_LUMINANCE ? x[channel]
+                                       : luminance_weight[0] * x[0] + luminance_weight[1] * x[1] +
+                                             luminance_weight[2] * x[2];
+}
+
+/* For any correlation of the channels (pyramid.h). */
+static double weighted_root(const double *x, int channel, double power)
+{
+    double sum = 0;
+    if (channel < CHANNEL_LUMINANCE)
+        return x[channel];
+    for (int c = 0; c < 3; c++)
+        sum += luminance_weight[c] * copysign(pow(fabs(x[c]), 1 / power), x[c]);
+    return copysign(pow(fabs(sum), power), sum);
+}
+
+static void add_pixel(const struct pair *p, size_t i, int channel, double kappa, struct sums *s)
+{
+    double v[3], k3[3], tolerance[3];
+    for (size_t c = 0; c < 3; c++) {
+        size_t k = 3 * i + c;
+        v[c] =
+            kappa * (p->a->variance[k] + p->b->variance[k]) + p->a->rounding[k] + p->b->rounding[k];
+        k3[c] = kappa * sqrt(kappa) * (p->a->k3[k] - p->b->k3[k]);
+        tolerance[c] = p->a->tolerance[k] + p->b->tolerance[k];
+    }
+    s->used++;
+    s->b += weighted(p->b->mean + 3 * i, channel);
+    s->d += weighted(p->a->mean + 3 * i, channel) - weighted(p->b->mean + 3 * i, channel);
+    s->v += weighted_root(v, channel, 2);
+    s->k3 += weighted_root(k3, channel, 3);
+    s->tolerance += weighted(tolerance, channel);
+}
+
+static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, double kappa)
+{
+    struct sums s = {0};
+    for (int y = r.y; y < r.y + r.height; y++)
+        for (int x = r.x; x < r.x + r.width; x++) {
+            size_t i = (size_t)y * (size_t)p->a->width + (size_t)x;
+            if (p->use[i])
+                add_pixel(p, i, channel, kappa, &s);
+        }
+    return s;
+}
+
+/* False: too skewed. `alpha` two-sided; divided by what skewness may do to the tail of a sum whose variance is known
+ * from elsewhere, exp(g x^3/6) (Cramer), at most e. */
+static bool interval_from(const struct sums *s, double unit, double dof, double alpha,
+                          struct interval *out)
+{
+    double factor = 0, x = 0, sd = sqrt(s->v);
+    for (int i = 0; i < 4 && sd > 0; i++) {
+        x = stats_t_quantile(alpha / 2 * exp(-factor), dof);
+        factor = fmin(1, fabs(s->k3) / (s->v * sd) * x * x * x / 6);
+    }
+    double half = x * sd + s->tolerance;
+    *out = (struct interval){s->d / unit, (s->d - half) / unit, (s->d + half) / unit, sd / unit};
+    return factor < 1;
+}
+
+static struct rect around(const struct student *s, struct rect r)
+{
+    int x0 = r.x - RUBRIC_TILE, y0 = r.y - RUBRIC_TILE, x1 = r.x + 2 * RUBRIC_TILE,
+        y1 = r.y + 2 * RUBRIC_TILE;
+    x0 = x0 < 0 ? 0 : x0;
+    y0 = y0 < 0 ? 0 : y0;
+    x1 = x1 > s->width ? s->width : x1;
+    y1 = y1 > s->height ? s->height : y1;
+    return (struct rect){x0, y0, x1 - x0, y1 - y0};
+}
+
+static void measure_tile(const struct pair *p, struct rect r, const struct noise *whole,
+                         double floor, double alpha, double *furthest, double *relative,
+                         struct agreement *out)
+{
+    struct noise noise = noise_in(p, around(p->a, r));
+    if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
+        noise = *whole;
+    struct sums s = sum_pixels(p, r, CHANNEL_LUMINANCE, noise.kappa);
+    struct interval interval;
+    *relative = NAN;
+    if (s.used < least_used * r.width * r.height ||
+        !interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &interval))
+        return;
+    *relative = interval.value;
+    out->tiles++;
+    /* Among tiles that agree: the one that is least sure to. */
+    double distance =
+        interval_distance(&interval) + 1e-9 * fmax(fabs(interval.lo), fabs(interval.hi));
+    if (distance <= *furthest)
+        return;
+    *furthest = distance;
+    out->tile = interval;
+    out->tile_x = r.x;
+    out->tile_y = r.y;
+}
+
+bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
+                       double alpha, struct agreement *out, struct err *e)
+{
+    const struct pair p = {a, b, use};
+    const struct rect whole = {0, 0, a->width, a->height};
+    int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
+    double pixels = (double)a->width * a->height, furthest = -1;
+    *out = (struct agreement){0};
+    struct noise noise = noise_in(&p, whole);
+    struct sums luminance = sum_pixels(&p, whole, CHANNEL_LUMINANCE, noise.kappa);
+    out->compared = luminance.used / pixels;
+    out->kappa = noise.kappa;
+    if (out->compared < least_used)
+        return err_set(e, "only %.0f %% of the pixels can be compared, the others are saturated",
+                       100 * out->compared);
+    if (!(luminance.b > 0))
+        return err_set(e, "there is no light to compare with");
+    double floor = floor_fraction * luminance.b / luminance.used;
+    alpha /= NUM_CHANNELS + columns * rows;
+    for (int c = 0; c < NUM_CHANNELS; c++) {
+        struct sums s = sum_pixels(&p, whole, c, noise.kappa);
+        if (!interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &out->image[c]))
+            return err_set(e, "rare bright pixels keep it from being judged");
+    }
+    out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);
+    if (out->relative == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < columns * rows; i++) {
+        struct rect r = {i % columns * RUBRIC_TILE, i / columns * RUBRIC_TILE, RUBRIC_TILE,
+                         RUBRIC_TILE};
+        measure_tile(&p, r, &noise, floor, alpha, &furthest, &out->relative[i], out);
+    }
+    return true;
+}
+
+void agreement_free(struct agreement *a)
+{
+    free(a->relative);
+    *a = (struct agreement){0};
+}
+
+bool agreement_noise(const struct student *p, const struct student *reference_p,
+                     const struct student *q, const struct student *reference_q,
+                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
+{
+    const struct rect whole = {0, 0, p->width, p->height};
+    const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};
+    struct noise na = noise_in(&a, whole), nb = noise_in(&b, whole);
+    if (!na.known || !nb.known)
+        return err_set(e, "there is no noise in one of the pictures");
+    /* Var ln v = 2/dof. */
+    double sd = sqrt(2 / na.dof + 2 / nb.dof), value = log(na.kappa / nb.kappa);
+    double half = stats_normal_quantile(alpha / 2) * sd;
+    *out = (struct interval){value, value - half, value + half, sd};
+    return true;
+}

@@ -1,0 +1,56 @@
+/* By how much two pictures differ, as intervals: what points are a function of. */
+#ifndef ASSAY_DIFFERENCE_H
+#define ASSAY_DIFFERENCE_H
+
+#include "tools/compare/pyramid.h"
+#include "submitted_image.h"
+
+/* A quantity that should be 0 and the interval that holds its true value with 1 - alpha. */
+struct interval {
+    double value, lo, hi, sd;
+};
+
+/* How far the interval is from 0 (0 if it holds 0); half its width. */
+double interval_distance(const struct interval *i);
+double interval_half(const struct interval *i);
+
+struct agreement {
+    struct interval
+        image[NUM_CHANNELS]; /* relative difference of the means of R, G, B, luminance */
+    struct interval tile;    /* of the tile furthest from agreeing, luminance */
+    int tile_x, tile_y;      /* pixels */
+    int tiles;               /* that could be judged */
+    double compared;         /* share of the pixels */
+    double kappa;            /* noise variance over that of our renderer */
+    double *relative;        /* per tile, difference in luminance; NAN where not judged */
+};
+
+/* A against B over the pixels with use[p] != 0; means elsewhere are not looked at.
+ *
+ * Noise. Neither file states any. What is known is the variance that a render of as many samples by our own
+ * renderer has in each pixel (struct student: variance), and that neighbouring pixels of A - B differ by noise alone
+ * where the pictures agree: r = second differences, as in noise_estimate.h, with E[r^2] = kappa m + c, m from those
+ * variances, c from rounding. kappa, the noise of this program over ours, is their weighted least squares slope,
+ * one for the picture, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
+ * from the residuals, times 4 for r that overlap (noise_estimate.h) and 3 for channels that one lamp makes alike, gives
+ * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide.
+ * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
+ * a tile (tools/README.md, "EQUIVALENT").
+ *
+ * Differences are relative to B's mean in the same place, but to no less than a quarter of the picture's luminance.
+ * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
+ * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
+ * frees with agreement_free(). */
+bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
+                       double alpha, struct agreement *out, struct err *e)
+    __attribute__((warn_unused_result));
+void agreement_free(struct agreement *a);
+
+/* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
+ * that of ours does. Fails where there is no noise in one of them. */
+bool agreement_noise(const struct student *p, const struct student *reference_p,
+                     const struct student *q, const struct student *reference_q,
+                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,429 @@
+#include "grade_checks.h"
+
+#include "rate_image.h"
+#include "tools/stats/distributions.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+double score_share(const struct margin *m, const struct interval *i)
+{
+    double distance = interval_distance(i), half = interval_half(i);
+    double near = fmin(1, fmax(0, (m->none - distance) / (m->none - m->full)));
+    double quiet = fmin(1, fmax(0, 2 - half / m->none));
+    return fmin(near, quiet);
+}
+
+static double beyond(double distance, double sd)
+{
+    return sd > 0 ? 0.5 * erfc(distance / (sd * sqrt(2))) : distance >= 0 ? 0 : 1;
+}
+
+double score_chance(const struct margin *m, const struct interval *i)
+{
+    double share = score_share(m, i), half = interval_half(i), v = fabs(i->value);
+    if (share == 1)
+        return fmin(1, beyond(m->full + half - v, i->sd) + beyond(m->full + half + v, i->sd));
+    if (share == 0 && half < 2 * m->none)
+        return beyond(v - half - m->none, i->sd);
+    return share == 0 ? 0 : 1;
+}
+
+/* One check being made. */
+struct work {
+    const struct rubric *r;
+    const struct rubric_check *check;
+    const struct answers *answers;
+    int set;
+    struct handed_in *h;
+    double alpha;
+};
+
+static const struct rubric_picture *picture(const struct work *w, int k)
+{
+    return &w->r->picture[w->check->picture[k]];
+}
+
+static const struct student *student(const struct work *w, int k)
+{
+    return &w->h->picture[w->check->picture[k]];
+}
+
+/* NULL: the rubric gives none. */
+static const struct moments *reference(const struct work *w, int k)
+{
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m,
+                         *plain = &w->answers->of[0][w->check->picture[k]].m;
+    return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
+}
+
+static const struct moments *expected_noise(const struct work *w, int k)
+{
+    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m;
+    return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
+}
+
+static bool is_masked(const struct work *w, const struct student *s, size_t p)
+{
+    return rubric_masks(w->r, s->width, s->height, p);
+}
+
+static unsigned char *usable(const struct work *w, struct err *e)
+{
+    size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
+    unsigned char *use = malloc(pixels);
+    bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
+    for (size_t p = 0; ok && p < pixels; p++)
+        use[p] = !is_masked(w, student(w, 0), p);
+    for (int k = 0; ok && k < w->check->num_pictures; k++)
+        ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
+    if (ok)
+        return use;
+    free(use);
+    return NULL;
+}
+
+/* The noise of the reference itself, in a picture that should have noise of its own: a copy. A share of values
+ * that lie in their code's bin around the reference, where only chance would put so many of them. */
+static bool is_copy(const struct student *s, const struct moments *m, double spp,
+                    const unsigned char *use)
+{
+    double same = 0, expected = 0, num = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        double sd = student_expected_sd(m, i, spp), bin = s->tolerance[i] + 1e-6 * m->mean[i];
+        if (!use[i / 3] || s->clipped[i] || !(sd > 0))
+            continue;
+        num++;
+        same += fabs(s->mean[i] - m->mean[i]) <= bin * 1.01;
+        expected += erf(bin / (sd * sqrt(2)));
+    }
+    return num >= 100 && same > 0.98 * num && expected < 0.6 * num;
+}
+
+static void tell(const struct agreement *a, char *text, size_t size)
+{
+    const struct interval *worst = &a->image[0];
+    static const char *const names[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
+    int channel = 0;
+    for (int c = 0; c < NUM_CHANNELS; c++)
+        if (interval_distance(&a->image[c]) >= interval_distance(worst)) {
+            worst = &a->image[c];
+            channel = c;
+        }
+    int n = snprintf(text, size, "mean of the picture (%s) %+.2f %% (%+.2f to %+.2f)",
+                     names[channel], 100 * worst->value, 100 * worst->lo, 100 * worst->hi);
+    if (a->tiles > 0 && n > 0 && (size_t)n < size)
+        snprintf(text + n, size - (size_t)n, "; furthest tile at %d,%d: %+.1f %% (%+.1f to %+.1f)",
+                 a->tile_x, a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
+}
+
+static void score_agreement(const struct rubric_check *c, struct result *out)
+{
+    out->share = 1;
+    out->chance = 0;
+    out->consistent = true;
+    for (int k = 0; k <= NUM_CHANNELS; k++) {
+        const struct interval *i =
+            k < NUM_CHANNELS ? &out->agreement.image[k] : &out->agreement.tile;
+        const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
+        if (k == NUM_CHANNELS && out->agreement.tiles == 0)
+            continue;
+        double share = score_share(m, i), chance = score_chance(m, i);
+        out->consistent = out->consistent && interval_distance(i) == 0;
+        if (share < out->share)
+            out->chance = chance;
+        else if (share == 1 && out->share == 1)
+            out->chance = fmin(1, out->chance + chance);
+        out->share = fmin(out->share, share);
+    }
+    tell(&out->agreement, out->seen, sizeof out->seen);
+}
+
+/* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
+static bool compare(const struct work *w, const struct student *a, const struct student *b,
+                    const unsigned char *use, struct result *out, struct err *e)
+{
+    struct err why;
+    if (agreement_measure(a, b, use, w->alpha, &out->agreement, &why))
+        score_agreement(w->check, out);
+    else if (err_is_of_memory(&why))
+        return err_set(e, "%s", why.msg);
+    else
+        snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
+    return true;
+}
+
+static bool check_equal(const struct work *w, struct result *out, struct err *e)
+{
+    const struct rubric_picture *p = picture(w, 0);
+    const struct moments *plain = &w->answers->of[0][w->check->picture[0]].m;
+    unsigned char *use = usable(w, e);
+    struct student b;
+    snprintf(
+        out->expected, sizeof out->expected,
+        "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
+        100 * w->check->image.full, 100 * w->check->tile.full);
+    if (use == NULL || !student_from(reference(w, 0), student(w, 0), &b, e)) {
+        free(use);
+        return false;
+    }
+    const bool ok = compare(w, student(w, 0), &b, use, out, e);
+    student_free(&b);
+    if (!ok) {
+        free(use);
+        return false;
+    }
+    if (is_copy(student(w, 0), reference(w, 0), p->spp, use) ||
+        is_copy(student(w, 0), plain, p->spp, use)) {
+        out->share = out->chance = 0;
+        snprintf(
+            out->seen, sizeof out->seen,
+            "this is the reference itself, with its noise; a render of %d samples has noise of its own",
+            p->spp);
+        snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
+    }
+    free(use);
+    return true;
+}
+
+/* A copy of q, moved by the difference of two references, with their noise. */
+static bool moved(const struct student *q, const struct moments *to, const struct moments *from,
+                  struct student *out, struct err *e)
+{
+    struct student a, b;
+    if (!student_from(to, q, &a, e))
+        return false;
+    bool ok = student_from(from, q, &b, e);
+    if (ok && !(ok = student_copy(q, out, e)))
+        student_free(&b);
+    for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
+        out->mean[i] += a.mean[i] - b.mean[i];
+        out->variance[i] += a.variance[i] + b.variance[i];
+    }
+    if (ok)
+        student_free(&b);
+    student_free(&a);
+    return ok;
+}
+
+static bool check_agree(const struct work *w, struct result *out, struct err *e)
+{
+    const struct moments *m = reference(w, 0), *n = reference(w, 1);
+    bool deviates = w->set > 0 && m != NULL && n != NULL;
+    snprintf(out->expected, sizeof out->expected,
+             "%s and %s %s, within %.3g %% (any 8 x 8 pixels: %.3g %%)", picture(w, 0)->name,
+             picture(w, 1)->name,
+             deviates ? "differ as in our renders with the same deviation" : "have the same mean",
+             100 * w->check->image.full, 100 * w->check->tile.full);
+    if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
+        snprintf(out->seen, sizeof out->seen,
+                 "the two files are the same: the option that tells them apart has no effect");
+        return true;
+    }
+    unsigned char *use = usable(w, e);
+    struct student b = {0};
+    bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
+    ok = ok && compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out, e);
+    student_free(&b);
+    free(use);
+    return ok;
+}
+
+static bool check_sum(const struct work *w, struct result *out, struct err *e)
+{
+    struct student sum;
+    unsigned char *use = usable(w, e);
+    bool ok = use != NULL && student_from(NULL, student(w, 0), &sum, e);
+    snprintf(out->expected, sizeof out->expected,
+             "%s is the sum of the other %d pictures, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
+             picture(w, 0)->name, w->check->num_pictures - 1, 100 * w->check->image.full,
+             100 * w->check->tile.full);
+    for (int k = 1; ok && k < w->check->num_pictures; k++)
+        student_add(&sum, student(w, k));
+    if (ok)
+        student_unclipped(&sum, use);
+    if (ok) {
+        ok = compare(w, student(w, 0), &sum, use, out, e);
+        student_free(&sum);
+    }
+    free(use);
+    return ok;
+}
+
+/* Deterministic shares of pixels. */
+static void score_pixels(const struct work *w, double wrong, double num, struct result *out)
+{
+    double v = num > 0 ? wrong / num : 1;
+    const struct interval i = {v, v, v, 0};
+    out->share = score_share(&w->check->share, &i);
+    out->chance = 0;
+}
+
+/* One wrong pixel: the share of its tile's, and which tile has most. */
+static void map_wrong(struct agreement *map, int columns, int x, int y)
+{
+    double *here = &map->relative[y / RUBRIC_TILE * columns + x / RUBRIC_TILE];
+    *here += 1.0 / (RUBRIC_TILE * RUBRIC_TILE);
+    if (map->tiles > 0 &&
+        *here <= map->relative[map->tile_y / RUBRIC_TILE * columns + map->tile_x / RUBRIC_TILE])
+        return;
+    map->tiles = 1;
+    map->tile_x = x / RUBRIC_TILE * RUBRIC_TILE;
+    map->tile_y = y / RUBRIC_TILE * RUBRIC_TILE;
+}
+
+/* A picture without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
+ * the reference's own samples, and the rounding to codes. */
+static bool check_exact(const struct work *w, struct result *out, struct err *e)
+{
+    static const double allowed_sd = 6;
+    const struct student *s = student(w, 0);
+    const struct moments *m = reference(w, 0);
+    double wrong = 0, num = 0;
+    int first = -1, columns = s->width / RUBRIC_TILE;
+    struct agreement *map = &out->agreement;
+    map->relative =
+        calloc((size_t)columns * (size_t)(s->height / RUBRIC_TILE), sizeof *map->relative);
+    if (map->relative == NULL)
+        return err_set(e, "out of memory");
+    for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
+        bool off = false, lit = false;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+            double sd = hypot(student_expected_sd(m, i, picture(w, 0)->spp),
+                              student_expected_sd(m, i, m->n[p] * fmax(1, m->spp)));
+            lit |= m->mean[i] > 0;
+            off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
+                   allowed_sd * sd + 2 * s->tolerance[i] + 1e-3;
+        }
+        lit &= !is_masked(w, s, p);
+        num += lit;
+        wrong += lit && off;
+        if (lit && off) {
+            first = first < 0 ? (int)p : first;
+            map_wrong(map, columns, (int)(p % (size_t)s->width), (int)(p / (size_t)s->width));
+        }
+    }
+    score_pixels(w, wrong, num, out);
+    snprintf(out->expected, sizeof out->expected,
+             "all pixels of objects as in the reference, at most %.3g %% of them not",
+             100 * w->check->share.full);
+    int n = snprintf(out->seen, sizeof out->seen, "%.0f of %.0f pixels differ (%.2f %%)", wrong,
+                     num, 100 * wrong / fmax(1, num));
+    if (first >= 0)
+        snprintf(out->seen + n, sizeof out->seen - (size_t)n,
+                 ", the first at %d,%d from the top left", first % s->width, first / s->width);
+    return true;
+}
+
+static bool check_noise(const struct work *w, struct result *out, struct err *e)
+{
+    const struct student *p = student(w, 0), *q = student(w, 1);
+    snprintf(out->expected, sizeof out->expected,
+             "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
+             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
+    if (strcmp(p->sha256, q->sha256) == 0) {
+        snprintf(out->seen, sizeof out->seen,
+                 "the two files are the same, though one has more samples");
+        return true;
+    }
+    unsigned char *use = usable(w, e);
+    struct student rp, rq;
+    struct interval i;
+    struct err why;
+    bool ok = use != NULL && student_from(reference(w, 0), p, &rp, e);
+    if (ok && !student_from(reference(w, 1), q, &rq, e)) {
+        student_free(&rp);
+        ok = false;
+    }
+    if (!ok) {
+        free(use);
+        return false;
+    }
+    if (agreement_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+        snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
+                 exp(i.lo), exp(i.hi));
+        out->share = score_share(&w->check->log_ratio, &i);
+        out->chance = score_chance(&w->check->log_ratio, &i);
+    } else {
+        snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
+    }
+    student_free(&rp);
+    student_free(&rq);
+    free(use);
+    return true;
+}
+
+static bool check_rates(const struct work *w, struct result *out, struct err *e)
+{
+    const struct rubric_check *c = w->check;
+    const struct made *made = &w->h->made[c->picture[0]];
+    const struct moments *own = &w->answers->of[w->set][c->picture[0]].as_asked,
+                         *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
+    struct rates rates;
+    struct err why;
+    snprintf(
+        out->expected, sizeof out->expected,
+        "every pixel of the rate picture stands for a multiple of %d samples, and on average for as many as in our render, within %.3g %%",
+        c->batch, 100 * c->count.full);
+    if (made->rates[0] == '\0') {
+        snprintf(out->seen, sizeof out->seen, "there is no rate picture");
+        return true;
+    }
+    if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height, picture(w, 0)->spp,
+                    c->batch, ours->n, &rates, &why)) {
+        if (err_is_of_memory(&why))
+            return err_set(e, "%s", why.msg);
+        snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
+        return true;
+    }
+    double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
+    const struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    score_pixels(w, rates.odd, rates.pixels, out);
+    double share = score_share(&c->count, &count);
+    out->chance = share < 1 || out->share == 1 ? score_chance(&c->count, &count) : 0;
+    out->share = fmin(out->share, share);
+    snprintf(
+        out->seen, sizeof out->seen,
+        "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",
+        rates.odd, rates.pixels, c->batch, rates.early, rates.mean, 100 * count.value,
+        100 * count.lo, 100 * count.hi);
+    return true;
+}
+
+/* The noise that a picture should have. */
+static void expect_noise(const struct work *w)
+{
+    for (int k = 0; k < w->check->num_pictures; k++)
+        student_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
+                       picture(w, k)->spp);
+}
+
+bool grading_check(const struct rubric *r, const struct rubric_check *check,
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e)
+{
+    static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
+                                                struct err *) = {
+        [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
+        [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
+    const struct work w = {r, check, a, set, h, alpha};
+    *out = (struct result){.judged = true, .picture = check->picture[0]};
+    for (int k = 0; k < check->num_pictures; k++) {
+        int i = check->picture[k];
+        if (h->picture[i].mean != NULL)
+            continue;
+        snprintf(out->expected, sizeof out->expected, "picture '%s'", r->picture[i].name);
+        snprintf(out->seen, sizeof out->seen, "%s", h->why[i]);
+        out->judged = h->made[i].end != SANDBOX_LOST;
+        return true;
+    }
+    expect_noise(&w);
+    return kinds[check->kind](&w, out, e);
+}
+
+void result_free(struct result *r)
+{
+    agreement_free(&r->agreement);
+}

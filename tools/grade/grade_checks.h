@@ -1,0 +1,83 @@
+/* From pictures to points: the checks of a rubric on one submission. */
+#ifndef ASSAY_GRADE_CHECKS_H
+#define ASSAY_GRADE_CHECKS_H
+
+#include "difference.h"
+#include "submission.h"
+
+/* What the pictures of a rubric should be; made once for all submissions. */
+struct answer {
+    struct moments m; /* of the reference; width 0: none */
+    struct moments
+        noise; /* of a render by ours: how its samples vary; m itself where that is ours */
+    struct moments
+        as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
+};
+/* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
+struct answers {
+    struct answer of[RUBRIC_SETS][RUBRIC_PICTURES];
+};
+
+struct answer_options {
+    const char *golden_dir, *pathtracer;
+    const char *cache; /* directory for our own renders, kept while their key is the same */
+    int threads;
+    double timeout_s;
+};
+bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
+                  struct err *e) __attribute__((warn_unused_result));
+void answers_free(struct answers *a);
+
+/* One picture by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
+ * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
+bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
+                   const struct answer_options *opt, struct moments *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
+ * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
+ * half its width is judged too: 1 up to margin.none, 0 from twice that; the smaller of the two counts. */
+double score_share(const struct margin *m, const struct interval *i);
+
+/* The chance that a fresh run of the same program, with the estimate as its truth, gets another share; 1 where the
+ * share lies between 0 and 1. For a program that is within margin.full the chance of less than all is at most alpha
+ * by the interval itself, whatever its noise. */
+double score_chance(const struct margin *m, const struct interval *i);
+
+struct result {
+    double share;  /* 0 .. 1 of the points */
+    double chance; /* score_chance() of what decided */
+    bool
+        judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
+    bool consistent; /* of equal, agree and sum: no interval misses 0 */
+    char expected[256], seen[400];
+    char accepted[160]; /* the deviations by which it has more points than without, or "" */
+    char flag[256];     /* for staff only */
+    int picture;        /* that shows it best: index in the rubric */
+    /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
+     * are wrong, and where most are. */
+    struct agreement agreement;
+};
+
+/* One student's pictures, read. */
+struct handed_in {
+    struct made made[RUBRIC_PICTURES];
+    struct student picture[RUBRIC_PICTURES]; /* mean NULL: not there, or not readable */
+    char why[RUBRIC_PICTURES][400];          /* why not */
+};
+
+/* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
+ * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
+bool grading_check(const struct rubric *r, const struct rubric_check *check,
+                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   struct result *out, struct err *e) __attribute__((warn_unused_result));
+
+/* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
+ * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
+ * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
+ * is nothing to free. */
+bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
+                 struct result *out, int *set, struct err *e) __attribute__((warn_unused_result));
+void result_free(struct result *r);
+
+#endif

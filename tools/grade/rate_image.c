@@ -1,0 +1,63 @@
+#include "rate_image.h"
+
+#include "renderer/pathtracer/output.h"
+#include "tools/images/image_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* A step of one batch moves one of the colours by 510 batch/most codes. */
+enum { MOST_BATCHES = 64, ALLOWED = 2 };
+
+static double distance(const float *px, const uint8_t code[3])
+{
+    double d = 0;
+    for (int c = 0; c < 3; c++)
+        d = fmax(d, fabs(255 * (double)px[c] - code[c]));
+    return d;
+}
+
+bool rates_read(const char *path, int width, int height, int most, int batch,
+                const double *expected, struct rates *out, struct err *e)
+{
+    struct picture pic;
+    struct image_info info;
+    double ours = 0, squares = 0;
+    *out = (struct rates){0};
+    if (most / batch > MOST_BATCHES)
+        return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
+    if (!image_inspect(path, &info, e))
+        return false;
+    if (info.width != width || info.height != height)
+        return err_set(e, "it is %d x %d pixels, not %d x %d", info.width, info.height, width,
+                       height);
+    if (!picture_read_inspected(path, &info, &pic, e))
+        return false;
+    for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
+        int nearest = 0;
+        double least = INFINITY;
+        for (int n = batch; n <= most + batch - 1; n += batch) {
+            uint8_t code[3];
+            int count = n < most ? n : most;
+            rate_colour((double)count / most, code);
+            double d = distance(pic.rgb + 3 * p, code);
+            if (d < least) {
+                least = d;
+                nearest = count;
+            }
+        }
+        out->pixels++;
+        out->odd += least > ALLOWED;
+        out->early += nearest < most;
+        out->mean += nearest;
+        ours += expected[p];
+        squares += pow(nearest - expected[p], 2);
+    }
+    out->more = out->mean / ours - 1;
+    double difference = (out->mean - ours) / out->pixels;
+    out->sd = sqrt(fmax(0, squares / out->pixels - difference * difference) / out->pixels) *
+              out->pixels / ours;
+    out->mean /= out->pixels;
+    picture_free(&pic);
+    return true;
+}

@@ -1,0 +1,20 @@
+/* The assignment's picture of sampling rates: blue (none) through green (half) to red (all samples), 8 bits. */
+#ifndef ASSAY_RATE_IMAGE_H
+#define ASSAY_RATE_IMAGE_H
+
+#include "renderer/base/err.h"
+
+struct rates {
+    double pixels, odd; /* odd: of a colour that no multiple of the batch has, to 2 codes */
+    double early;       /* that did not take all samples */
+    double mean;        /* samples a pixel */
+    double more, sd;    /* mean over that of `expected`, less 1, and its standard deviation */
+};
+
+/* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
+ * counts varies from pixel to pixel by noise alone). Fails on what is no picture of that size, and where batches are too small against `most` to tell apart. */
+bool rates_read(const char *path, int width, int height, int most, int batch,
+                const double *expected, struct rates *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

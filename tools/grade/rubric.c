@@ -1,0 +1,435 @@
+#include "rubric_internal.h"
+
+#include "tools/images/tone_curve.h"
+#include "renderer/base/cli.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_FILE = 1 << 20, MAX_LINE = 2048 };
+
+const char *const check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
+                                                      "exact", "noise", "rates"};
+
+/* A line being read: its words are taken one by one. */
+struct statement {
+    struct rubric *r;
+    struct rubric_mistakes *m;
+    int line;
+    char *rest;                     /* what has not been taken, without spaces around */
+    struct rubric_picture *picture; /* the block that the line stands in; at most one is not NULL */
+    struct rubric_check *check;
+};
+
+void mistake(struct rubric_mistakes *m, int line, const char *format, ...)
+{
+    if (m->num < (int)(sizeof m->at / sizeof *m->at)) {
+        va_list ap;
+        va_start(ap, format);
+        m->at[m->num].line = line;
+        vsnprintf(m->at[m->num].text, sizeof m->at->text, format, ap);
+        va_end(ap);
+        err_hide_controls(m->at[m->num].text);
+    }
+    m->num++;
+}
+
+static char *take_word(struct statement *s)
+{
+    char *word = s->rest;
+    size_t n = strcspn(word, " \t");
+    s->rest = word + n + strspn(word + n, " \t");
+    if (word[n] != '\0')
+        word[n] = '\0';
+    return word;
+}
+
+static void take_text(struct statement *s, const char *what, char *out, size_t size)
+{
+    if (s->rest[0] == '\0')
+        mistake(s->m, s->line, "'%s' needs a text", what);
+    else if (out[0] != '\0')
+        mistake(s->m, s->line, "a second '%s'", what);
+    else if (strlen(s->rest) >= size)
+        mistake(s->m, s->line, "'%s' is longer than %zu characters", what, size - 1);
+    else
+        snprintf(out, size, "%s", s->rest);
+    s->rest += strlen(s->rest);
+}
+
+/* A name of letters, digits, _ and -. */
+static bool take_name(struct statement *s, const char *what, char *out, size_t size)
+{
+    char *word = take_word(s);
+    if (word[0] == '\0') {
+        mistake(s->m, s->line, "'%s' needs a name", what);
+        return false;
+    }
+    if (word[strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")] !=
+            '\0' ||
+        word[0] == '-' || strlen(word) >= size) {
+        mistake(s->m, s->line, "'%s' is no name: letters, digits, _ and -, at most %zu", word,
+                size - 1);
+        return false;
+    }
+    snprintf(out, size, "%s", word);
+    return true;
+}
+
+static bool take_number(struct statement *s, const char *what, double lo, double hi, double *out)
+{
+    struct err e;
+    char *word = take_word(s);
+    if (word[0] == '\0')
+        mistake(s->m, s->line, "'%s' needs a number", what);
+    else if (cli_double(what, word, lo, hi, out, &e))
+        return true;
+    else
+        mistake(s->m, s->line, "%.150s", e.msg);
+    return false;
+}
+
+static void take_int(struct statement *s, const char *what, int lo, int hi, int *out)
+{
+    struct err e;
+    char *word = take_word(s);
+    if (word[0] == '\0')
+        mistake(s->m, s->line, "'%s' needs a whole number", what);
+    else if (!cli_int(what, word, lo, hi, out, &e))
+        mistake(s->m, s->line, "%.150s", e.msg);
+}
+
+static void take_margin(struct statement *s, const char *what, struct margin *out)
+{
+    struct margin m = {.given = true};
+    if (!take_number(s, what, 0, 100, &m.full) || !take_number(s, what, 0, 100, &m.none))
+        return;
+    if (m.full >= m.none)
+        mistake(s->m, s->line,
+                "'%s': full points up to %g and none from %g: the first must be less", what, m.full,
+                m.none);
+    *out = m;
+}
+
+static void read_limit(struct statement *s)
+{
+    struct sandbox_limits *l = &s->r->limit;
+    char *what = take_word(s);
+    double v = 1;
+    if (strcmp(what, "wall") == 0)
+        take_number(s, "limit wall", 1, 1e5, &l->wall_s);
+    else if (strcmp(what, "cpu") == 0)
+        take_number(s, "limit cpu", 1, 1e5, &l->cpu_s);
+    else if (strcmp(what, "build") == 0)
+        take_number(s, "limit build", 1, 1e5, &s->r->build_s);
+    else if (strcmp(what, "processes") == 0)
+        take_int(s, "limit processes", 1, 4096, &l->processes);
+    else if (strcmp(what, "memory") == 0) {
+        if (take_number(s, "limit memory", 16, 1 << 20, &v))
+            l->memory = (size_t)(v * (1 << 20));
+    } else if (strcmp(what, "disk") == 0) {
+        if (take_number(s, "limit disk", 1, 1 << 20, &v)) {
+            l->disk = (size_t)(v * (1 << 20));
+            l->file = l->disk < l->file ? l->disk : l->file;
+        }
+    } else
+        mistake(s->m, s->line, "'limit %s' is none of wall, cpu, build, memory, disk, processes",
+                what);
+}
+
+static void read_mask(struct statement *s)
+{
+    if (s->r->mask[2] > 0)
+        mistake(s->m, s->line, "a second 'mask'");
+    for (int i = 0; i < 4; i++)
+        take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
+}
+
+static void read_picture(struct statement *s)
+{
+    struct rubric *r = s->r;
+    s->check = NULL;
+    s->picture = NULL;
+    if (r->num_pictures == RUBRIC_PICTURES) {
+        mistake(s->m, s->line, "more than %d pictures", RUBRIC_PICTURES);
+        return;
+    }
+    struct rubric_picture *p = &r->picture[r->num_pictures];
+    *p = (struct rubric_picture){.line = s->line, .lights = 1, .bounces = -1};
+    s->picture = p;
+    if (!take_name(s, "picture", p->name, sizeof p->name))
+        return;
+    for (int i = 0; i < r->num_pictures; i++)
+        if (strcmp(r->picture[i].name, p->name) == 0)
+            mistake(s->m, s->line, "picture '%s' is already in line %d", p->name,
+                    r->picture[i].line);
+    r->num_pictures++;
+}
+
+static void read_part(struct statement *s)
+{
+    struct rubric *r = s->r;
+    s->check = NULL;
+    s->picture = NULL;
+    if (r->num_parts == RUBRIC_PARTS) {
+        mistake(s->m, s->line, "more than %d parts", RUBRIC_PARTS);
+        return;
+    }
+    struct rubric_part *p = &r->part[r->num_parts++];
+    *p = (struct rubric_part){.line = s->line};
+    take_name(s, "part", p->number, sizeof p->number);
+    take_text(s, "part NUMBER", p->title, sizeof p->title);
+}
+
+static void read_check(struct statement *s)
+{
+    struct rubric *r = s->r;
+    s->check = NULL;
+    s->picture = NULL;
+    if (r->num_checks == RUBRIC_CHECKS) {
+        mistake(s->m, s->line, "more than %d checks", RUBRIC_CHECKS);
+        return;
+    }
+    struct rubric_check *c = &r->check[r->num_checks++];
+    *c = (struct rubric_check){.line = s->line, .part = r->num_parts - 1};
+    s->check = c;
+    if (r->num_parts == 0)
+        mistake(s->m, s->line, "a check before the first 'part'");
+    if (!take_name(s, "check", c->name, sizeof c->name) ||
+        !take_number(s, "points", 0, 1e4, &c->points))
+        return;
+    for (int i = 0; i < r->num_checks - 1; i++)
+        if (strcmp(r->check[i].name, c->name) == 0)
+            mistake(s->m, s->line, "check '%s' is already in line %d", c->name, r->check[i].line);
+    char *kind = take_word(s);
+    int k = 0;
+    while (k < NUM_CHECK_KINDS && strcmp(kind, check_kind_name[k]) != 0)
+        k++;
+    c->kind = (enum check_kind)k;
+    if (k == NUM_CHECK_KINDS)
+        mistake(s->m, s->line, "'%s' is no kind of check: equal, agree, sum, exact, noise or rates",
+                kind);
+    while (s->rest[0] != '\0') {
+        char *name = take_word(s);
+        int i = 0;
+        while (i < r->num_pictures && strcmp(r->picture[i].name, name) != 0)
+            i++;
+        if (i == r->num_pictures)
+            mistake(s->m, s->line, "no picture '%s' above", name);
+        else if (c->num_pictures == CHECK_PICTURES)
+            mistake(s->m, s->line, "more than %d pictures", CHECK_PICTURES);
+        else {
+            c->picture[c->num_pictures++] = i;
+            r->picture[i].used = true;
+        }
+    }
+}
+
+static void read_reference(struct statement *s, struct rubric_picture *p)
+{
+    static const char *const kinds[] = {"none", "truth", "cycles", "povray", "ours"};
+    char *kind = take_word(s);
+    if (p->reference != REFERENCE_NONE)
+        mistake(s->m, s->line, "a second 'reference'");
+    for (int k = REFERENCE_TRUTH; k <= REFERENCE_OURS; k++)
+        if (strcmp(kind, kinds[k]) == 0)
+            p->reference = (enum rubric_reference)k;
+    if (p->reference == REFERENCE_NONE)
+        mistake(s->m, s->line, "reference '%s' is none of truth, cycles, povray, ours", kind);
+    if (p->reference == REFERENCE_OURS) {
+        take_int(s, "reference ours", 1, 1 << 20, &p->reference_spp);
+        if (s->rest[0] != '\0')
+            take_text(s, "reference ours SPP", p->reference_options, sizeof p->reference_options);
+    }
+}
+
+static void read_accept(struct statement *s, struct accepted *list, int most, int *num)
+{
+    if (*num == most) {
+        mistake(s->m, s->line, "more than %d accepted deviations", most);
+        return;
+    }
+    struct accepted *a = &list[*num];
+    *a = (struct accepted){.line = s->line};
+    if (!take_name(s, "accept", a->name, sizeof a->name))
+        return;
+    take_text(s, "accept NAME", a->how, sizeof a->how);
+    for (int i = 0; i < *num; i++)
+        if (strcmp(list[i].name, a->name) == 0)
+            mistake(s->m, s->line, "'%s' is already accepted in line %d", a->name, list[i].line);
+    ++*num;
+}
+
+/* False: no statement of a picture. */
+static bool read_in_picture(struct statement *s, const char *word)
+{
+    struct rubric_picture *p = s->picture;
+    if (strcmp(word, "scene") == 0)
+        take_text(s, word, p->scene, sizeof p->scene);
+    else if (strcmp(word, "size") == 0) {
+        take_int(s, word, 16, 4096, &p->width);
+        take_int(s, word, 16, 4096, &p->height);
+    } else if (strcmp(word, "spp") == 0)
+        take_int(s, word, 1, 1 << 20, &p->spp);
+    else if (strcmp(word, "lights") == 0)
+        take_int(s, word, 1, 1 << 20, &p->lights);
+    else if (strcmp(word, "bounces") == 0)
+        take_int(s, word, 0, 1000, &p->bounces);
+    else if (strcmp(word, "options") == 0)
+        take_text(s, word, p->options, sizeof p->options);
+    else if (strcmp(word, "environment") == 0)
+        take_text(s, word, p->environment, sizeof p->environment);
+    else if (strcmp(word, "reference") == 0)
+        read_reference(s, p);
+    else if (strcmp(word, "accept") == 0)
+        read_accept(s, p->accept, RUBRIC_SETS, &p->num_accepted);
+    else
+        return false;
+    return true;
+}
+
+static bool read_in_check(struct statement *s, const char *word)
+{
+    struct rubric_check *c = s->check;
+    if (strcmp(word, "image") == 0)
+        take_margin(s, word, &c->image);
+    else if (strcmp(word, "tile") == 0)
+        take_margin(s, word, &c->tile);
+    else if (strcmp(word, "count") == 0)
+        take_margin(s, word, &c->count);
+    else if (strcmp(word, "share") == 0)
+        take_margin(s, word, &c->share);
+    else if (strcmp(word, "ratio") == 0) {
+        take_margin(s, word, &c->log_ratio);
+    } else if (strcmp(word, "batch") == 0)
+        take_int(s, word, 1, 1 << 20, &c->batch);
+    else if (strcmp(word, "title") == 0)
+        take_text(s, word, c->title, sizeof c->title);
+    else if (strcmp(word, "hint") == 0)
+        take_text(s, word, c->hint, sizeof c->hint);
+    else if (strcmp(word, "where") == 0)
+        take_text(s, word, c->where, sizeof c->where);
+    else if (strcmp(word, "visibility") == 0)
+        take_text(s, word, c->visibility, sizeof c->visibility);
+    else
+        return false;
+    return true;
+}
+
+static void read_statement(struct statement *s)
+{
+    struct rubric *r = s->r;
+    char *word = take_word(s);
+    if (strcmp(word, "rubric") == 0)
+        take_text(s, word, r->title, sizeof r->title);
+    else if (strcmp(word, "curve") == 0)
+        take_text(s, word, r->curve, sizeof r->curve);
+    else if (strcmp(word, "command") == 0)
+        take_text(s, word, r->command, sizeof r->command);
+    else if (strcmp(word, "diagnose") == 0)
+        take_text(s, word, r->diagnose, sizeof r->diagnose);
+    else if (strcmp(word, "bugs") == 0) {
+        if (r->bugs[0] != '\0')
+            mistake(s->m, s->line, "a second 'bugs'");
+        take_name(s, word, r->bugs, sizeof r->bugs);
+    } else if (strcmp(word, "output") == 0)
+        take_text(s, word, r->output, sizeof r->output);
+    else if (strcmp(word, "program") == 0)
+        take_text(s, word, r->program, sizeof r->program);
+    else if (strcmp(word, "build") == 0)
+        take_text(s, word, r->build, sizeof r->build);
+    else if (strcmp(word, "total") == 0)
+        take_number(s, word, 0, 1e6, &r->total);
+    else if (strcmp(word, "limit") == 0)
+        read_limit(s);
+    else if (strcmp(word, "mask") == 0)
+        read_mask(s);
+    else if (strcmp(word, "accept") == 0 && s->picture == NULL && s->check == NULL)
+        read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
+    else if (strcmp(word, "picture") == 0)
+        read_picture(s);
+    else if (strcmp(word, "part") == 0)
+        read_part(s);
+    else if (strcmp(word, "check") == 0)
+        read_check(s);
+    else if (!(s->picture != NULL && read_in_picture(s, word)) &&
+             !(s->check != NULL && read_in_check(s, word))) {
+        mistake(s->m, s->line, "'%s' is no statement %s", word,
+                s->picture != NULL ? "of a picture"
+                : s->check != NULL ? "of a check"
+                                   : "here");
+        return;
+    }
+    if (s->rest[0] != '\0')
+        mistake(s->m, s->line, "'%.100s' is too much for '%s'", s->rest, word);
+}
+
+static int by_line(const void *a, const void *b)
+{
+    const int *x = a, *y = b; /* the first member */
+    return (*x > *y) - (*x < *y);
+}
+
+bool rubric_read(const char *path, const struct suite *suite, struct rubric *out,
+                 struct rubric_mistakes *m, struct err *e)
+{
+    char line[MAX_LINE];
+    *out = (struct rubric){.limit = sandbox_default, .build_s = 600};
+    *m = (struct rubric_mistakes){0};
+    const char *slash = strrchr(path, '/');
+    snprintf(out->path, sizeof out->path, "%s", path);
+    snprintf(out->dir, sizeof out->dir, "%.*s", slash != NULL ? (int)(slash - path) : 1,
+             slash != NULL ? path : ".");
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    struct statement s = {.r = out, .m = m};
+    size_t read = 0;
+    while (fgets(line, sizeof line, f) != NULL && read <= MAX_FILE) {
+        size_t n = strlen(line);
+        read += n;
+        s.line++;
+        if (n == sizeof line - 1 && line[n - 1] != '\n') {
+            mistake(m, s.line, "longer than %d characters", MAX_LINE - 2);
+            for (int c; (c = getc(f)) != EOF && c != '\n';)
+                read++;
+        }
+        for (char *c = strchr(line, '#'); c != NULL; c = strchr(c + 1, '#'))
+            if (c == line || c[-1] == ' ' || c[-1] == '\t') {
+                *c = '\0';
+                n = (size_t)(c - line);
+                break;
+            }
+        while (n > 0 && strchr(" \t\r\n", line[n - 1]) != NULL)
+            line[--n] = '\0';
+        s.rest = line + strspn(line, " \t");
+        if (s.rest[0] != '\0')
+            read_statement(&s);
+    }
+    bool failed = ferror(f) != 0;
+    fclose(f);
+    if (failed || read > MAX_FILE)
+        return err_set(e, "%s: %s", path, failed ? "cannot read" : "more than 1 MiB");
+    rubric_check_whole(out, suite, m);
+    int kept = (int)(sizeof m->at / sizeof *m->at);
+    qsort(m->at, (size_t)(m->num < kept ? m->num : kept), sizeof *m->at, by_line);
+    return true;
+}
+
+double rubric_points(const struct rubric *r)
+{
+    double sum = 0;
+    for (int i = 0; i < r->num_checks; i++)
+        sum += r->check[i].points;
+    return sum;
+}
+
+bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel)
+{
+    const int *m = r->mask;
+    int x = (int)(pixel % (size_t)width), y = height - 1 - (int)(pixel / (size_t)width);
+    return x >= m[0] && x < m[0] + m[2] && y >= m[1] && y < m[1] + m[3];
+}

@@ -1,0 +1,172 @@
+/* A rubric: what a course asks of a submission, what it is worth, and what is said where it is not met. A file of
+ * lines, one statement each, because staff edit it by hand, and because every mistake can be told with its line,
+ * which a JSON tree has lost. `#` at the
+ * beginning or after a space starts a comment; indentation is free. Lists stand in the order of the file.
+ *
+ *   rubric TITLE                        first statement
+ *   curve cgl | srgb | linear | gamma=G of the PNG files that programs write (tone_curve.h); default cgl
+ *   command WORDS                       how a program is run. {program} {scene} {out} {width} {height} {spp} {lights}
+ *                                       {bounces} {threads} {seed} {options} are replaced; {options} may be several words.
+ *                                       In a scene with an environment or a lens, {options} has -e, -b and -d too
+ *   output NAME                         the file that {out} names: its ending is the kind of picture (out.png)
+ *   program NAME                        the program inside a submitted directory (pathtracer)
+ *   build WORDS                         run first in a submitted source tree; without it trees are as they are
+ *   diagnose WORDS                      a command as above that writes our moments (.exr) to {out}, from plain COLLADA:
+ *                                       programs that lose points are then diagnosed, and the bug is named
+ *   bugs DIR                            a directory beside the rubric (rubric_bugs.h): what known bugs do to its
+ *                                       pictures. Submissions of any kind that lose points are then told the bug
+ *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
+ *   total POINTS                        what all checks have to add up to
+ *   mask X Y W H                        pixels that no check looks at, of every picture, from the bottom left as in the
+ *                                       assignment's -p: a watermark of a library that students were given
+ *   accept NAME WORDS                   a deviation that is not the student's fault: our renderer shows it with WORDS
+ *                                       besides its other options. A program is graded against our own references,
+ *                                       and against those of each deviation and of all of them together in every
+ *                                       choice; the best counts, for the whole program, and staff are told
+ *
+ *   picture NAME                        one run of the program, or NAME.png (.exr, .pfm, .hdr) of a directory
+ *     scene SCENE                       of the suite, or FILE.dae beside the rubric
+ *     size W H, spp N, lights N (1), bounces N, options WORDS
+ *     reference truth | cycles | povray | ours SPP [WORDS]
+ *                                       a closed form or a golden of the suite's scene (golden: of its size and
+ *                                       bounces), or our own render with as many samples and WORDS instead of
+ *                                       `options` (or "none"); not needed where no check asks for it
+ *     accept NAME FILE.exr              the same by a picture of it (our moments) beside the rubric, where our renderer
+ *                                       cannot make it; pictures of one NAME belong together
+ *     environment FILE.exr              beside the rubric; {options} then has -e too
+ *   part NUMBER TITLE
+ *   check NAME POINTS KIND PICTURES     of the part above it:
+ *                                         equal P             the picture has the mean of its reference
+ *                                         agree P Q           two pictures have the same mean
+ *                                         sum P Q R ...       P is the sum of the others
+ *                                         exact P             codes of the reference away from edges
+ *                                         noise P Q           variance of P over that of Q is `ratio`
+ *                                         rates P             the rate picture shows whole batches only
+ *     image D0 D1, tile D0 D1           relative difference: full points inside +-D0, none outside +-D1 (equal,
+ *                                       agree, sum; tiles are SIDE = 8 pixels)
+ *     share D0 D1                       of pixels that are wrong (exact, rates)
+ *     ratio D0 D1                       on the natural logarithm (noise)
+ *     batch N                           samples (rates)
+ *     count D0 D1                       relative difference of the mean number of samples from ours (rates)
+ *     title TEXT, hint TEXT, where TEXT (the place in the assignment)
+ *     visibility hidden | after_due_date | after_published | visible (default) */
+#ifndef ASSAY_RUBRIC_H
+#define ASSAY_RUBRIC_H
+
+#include "reference/suite/suite.h"
+#include "tools/base/sandbox.h"
+
+enum {
+    RUBRIC_PARTS = 24,
+    RUBRIC_PICTURES = 96,
+    RUBRIC_CHECKS = 128,
+    CHECK_PICTURES = 8,
+    RUBRIC_ACCEPTED = 3,                      /* by words */
+    RUBRIC_SETS = (1 << RUBRIC_ACCEPTED) + 4, /* choices of them, and those by pictures */
+    RUBRIC_TILE = 8
+};
+
+enum check_kind {
+    CHECK_EQUAL,
+    CHECK_AGREE,
+    CHECK_SUM,
+    CHECK_EXACT,
+    CHECK_NOISE,
+    CHECK_RATES,
+    NUM_CHECK_KINDS
+};
+extern const char *const check_kind_name[NUM_CHECK_KINDS];
+
+enum rubric_reference {
+    REFERENCE_NONE,
+    REFERENCE_TRUTH,
+    REFERENCE_CYCLES,
+    REFERENCE_POVRAY,
+    REFERENCE_OURS
+};
+
+struct accepted {
+    int line;
+    char name[48], how[256]; /* words, or a file */
+};
+
+/* What a program may do wrong for which it is not to blame, all at once. The first set is empty. */
+struct rubric_set {
+    char name[160];  /* "light_pdf, turned_lamp" */
+    char words[800]; /* "" of those by pictures */
+};
+
+struct rubric_picture {
+    int line;
+    char name[48];
+    char scene[256];                 /* as written: of the suite, or ending in .dae */
+    const struct suite_scene *suite; /* NULL: a file beside the rubric */
+    int width, height, spp, lights, bounces;
+    char options[256], environment[256];
+    enum rubric_reference reference;
+    int reference_spp;
+    char reference_options[256]; /* "" : those of the student */
+    struct accepted accept[RUBRIC_SETS];
+    int num_accepted;
+    bool used;
+};
+
+/* Full points up to `full`, none from `none` on, linear between. */
+struct margin {
+    double full, none;
+    bool given;
+};
+
+struct rubric_check {
+    int line, part;
+    char name[48];
+    double points;
+    enum check_kind kind;
+    int picture[CHECK_PICTURES], num_pictures; /* indices */
+    struct margin image, tile, share, log_ratio, count;
+    int batch;
+    char title[160], hint[512], where[160], visibility[24];
+};
+
+struct rubric_part {
+    int line;
+    char number[16], title[128];
+};
+
+struct rubric {
+    char path[4096], dir[4096]; /* of the file; of what lies beside it */
+    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], build[512],
+        bugs[128];
+    struct sandbox_limits limit;
+    double build_s, total;
+    int mask[4]; /* x y width height, from the bottom left; width 0: none */
+    struct accepted accept[RUBRIC_ACCEPTED];
+    int num_accepted;
+    struct rubric_set set[RUBRIC_SETS];
+    int num_sets;
+    struct rubric_part part[RUBRIC_PARTS];
+    struct rubric_picture picture[RUBRIC_PICTURES];
+    struct rubric_check check[RUBRIC_CHECKS];
+    int num_parts, num_pictures, num_checks;
+};
+
+struct rubric_mistakes {
+    int num; /* of them the first 64 are kept */
+    struct {
+        int line;
+        char text[200];
+    } at[64];
+};
+
+/* Reads the file and looks for mistakes, all of them; *m is sorted by line. Scenes named are looked up in the
+ * suite, which has to outlive the rubric. Fails only if the file cannot be read or is longer than 1 MiB; a
+ * rubric with mistakes is not to be used. *out is large: not for the stack. */
+bool rubric_read(const char *path, const struct suite *suite, struct rubric *out,
+                 struct rubric_mistakes *m, struct err *e) __attribute__((warn_unused_result));
+
+double rubric_points(const struct rubric *r);
+
+/* Is pixel number `pixel`, by rows from the top, one that no check looks at? */
+bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel);
+
+#endif

@@ -1,0 +1,53 @@
+/* Known bugs on a rubric's own pictures: a catalogue (catalogue.h) beside the rubric, made by tests/studies/grading/make_rubric_bugs.c. By it
+ * a submission of any kind, 8-bit pictures alone too, is told which bug its pictures look like; nothing more is rendered.
+ *
+ * A view is a picture, alone or with a set of accepted deviations that changes it: "box", "box@light_pdf". Cells are those of
+ * signature.h. What they hold is what an 8-bit picture of the rubric's curve and of as many samples as are asked for shows on
+ * average: E[min(X, clip)] of each pixel, X normal with the mean and the variance of a render of ours, clip the radiance of
+ * the brightest code. Decoded codes are the middle of their bin; half a bin, by which a flat cell may be off, is added to the standard
+ * deviation of a student's cell, so rounding and clipping are part of every likelihood. The variance of an effect also holds the
+ * noise that the bug adds to one picture. Pictures of adaptive sampling have FACT_SAMPLES, by the rate picture. */
+#ifndef ASSAY_RUBRIC_BUGS_H
+#define ASSAY_RUBRIC_BUGS_H
+
+#include "tools/diagnose/diagnose.h"
+#include "grade_checks.h"
+
+#include <jansson.h>
+
+struct rubric_bugs {
+    struct catalogue catalogue;
+    int view[RUBRIC_SETS][RUBRIC_PICTURES]; /* -1: none */
+};
+
+/* Whether the picture is one of those looked at: with a reference of ours, and of a check that is about what it shows (equal,
+ * exact, rates, sum). */
+bool rubric_bugs_sees(const struct rubric *r, int picture);
+/* Is the number of its samples a fact (a check of rates)? */
+bool rubric_bugs_counts(const struct rubric *r, int picture);
+/* The first set of deviations whose reference is, bit by bit, that of `set`. */
+int rubric_bugs_set(const struct answers *a, int set, int picture);
+/* Name of a view and a hash of all that decides its correct picture. */
+bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128], char key[65],
+                     struct err *e) __attribute__((warn_unused_result));
+
+/* Cells of a render of ours as above: mean, variance of the mean, n = samples in a cell (of counting pictures: as if
+ * all had been taken), FACT_SAMPLES of counting pictures. Fails on a size that is not of whole cells. */
+bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments *m,
+                       struct sight *out, struct err *e) __attribute__((warn_unused_result));
+
+/* Reads r->bugs. Fails if a view is missing or has been made of another picture. The caller closes it. */
+bool rubric_bugs_open(const struct rubric *r, const struct answers *a, struct rubric_bugs *out,
+                      struct err *e) __attribute__((warn_unused_result));
+void rubric_bugs_close(struct rubric_bugs *b);
+
+/* What these pictures look like, graded with the deviations of `set`; where no bug explains them with those, with any
+ * other set. found->finding is FINDING_CORRECT where nothing was seen; *with: the set by which it was found. A right program
+ * is told a bug with a probability of at most alpha for each set, as far as its pictures are independent (not if all
+ * have one seed). */
+bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
+                          const struct answers *a, const struct handed_in *h, int set, double alpha,
+                          struct diagnosis *found, int *with, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

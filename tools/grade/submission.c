@@ -1,0 +1,349 @@
+#include "submission.h"
+
+#include "reference/base/process.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/sha256.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { MAX_PATH = 4400, MAX_ARGS = 96, TEXT = 8192 };
+
+const char *const submission_kind_name[] = {"images", "program", "source"};
+static const char *const endings[] = {".png", ".exr", ".pfm", ".hdr"};
+enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
+
+static const char *last_part(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+/* Copies a file of ours; everybody may read it. */
+static bool copy_file(const char *from, const char *to, struct err *e)
+{
+    char buffer[1 << 16];
+    FILE *in = fopen(from, "rb"), *out = in != NULL ? fopen(to, "wb") : NULL;
+    bool ok = in != NULL && out != NULL;
+    for (size_t n; ok && (n = fread(buffer, 1, sizeof buffer, in)) > 0;)
+        ok = fwrite(buffer, 1, n, out) == n;
+    ok = ok && ferror(in) == 0;
+    if (in != NULL)
+        fclose(in);
+    if (out != NULL && fclose(out) != 0)
+        ok = false;
+    return (ok && chmod(to, 0644) == 0) ||
+           err_set(e, "cannot copy %s to %s: %s", from, to, strerror(errno));
+}
+
+static bool stage_file(const char *from, const char *dir, struct err *e)
+{
+    char to[2 * MAX_PATH];
+    snprintf(to, sizeof to, "%.4000s/%.4000s", dir, last_part(from));
+    return copy_file(from, to, e);
+}
+
+bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
+{
+    char path[8192];
+    if (!make_dirs(dir, e))
+        return false;
+    chmod(dir, 0755);
+    for (int i = 0; i < r->num_pictures; i++) {
+        const struct rubric_picture *p = &r->picture[i];
+        snprintf(path, sizeof path, "%s/%s", r->dir, p->scene);
+        if (!stage_file(p->suite != NULL ? p->suite->dae : path, dir, e))
+            return false;
+        if (p->suite != NULL && p->suite->environment[0] != '\0' &&
+            !stage_file(p->suite->environment, dir, e))
+            return false;
+        snprintf(path, sizeof path, "%s/%s", r->dir, p->environment);
+        if (p->environment[0] != '\0' && !stage_file(path, dir, e))
+            return false;
+    }
+    return true;
+}
+
+/* Words are appended to text; the command's own are split at spaces. */
+struct words {
+    char *text;
+    size_t used, size;
+    const char **argv;
+    int num, most;
+    bool overflow;
+};
+
+static void add_word(struct words *w, const char *word, size_t length)
+{
+    if (w->num >= w->most - 1 || w->used + length + 1 > w->size) {
+        w->overflow = true;
+        return;
+    }
+    w->argv[w->num++] = w->text + w->used;
+    memcpy(w->text + w->used, word, length);
+    w->text[w->used + length] = '\0';
+    w->used += length + 1;
+}
+
+static void add_words(struct words *w, const char *words)
+{
+    for (const char *at = words + strspn(words, " "); *at != '\0'; at += strspn(at, " ")) {
+        size_t n = strcspn(at, " ");
+        add_word(w, at, n);
+        at += n;
+    }
+}
+
+/* What belongs to a scene besides its file. */
+static void add_scene_options(struct words *w, const struct rubric_picture *p)
+{
+    char text[600];
+    const struct suite_scene *s = p->suite;
+    if (p->environment[0] != '\0' || (s != NULL && s->environment[0] != '\0')) {
+        snprintf(text, sizeof text, "-e scene/%.500s",
+                 p->environment[0] != '\0' ? p->environment : last_part(s->environment));
+        add_words(w, text);
+    }
+    if (s != NULL && s->lens_radius > 0) {
+        snprintf(text, sizeof text, "-b %.9g -d %.9g", s->lens_radius, s->focal_distance);
+        add_words(w, text);
+    }
+}
+
+bool submission_command(const struct rubric *r, const struct rubric_picture *p, const char *program,
+                        uint64_t seed, int threads, char *text, size_t size, const char **argv,
+                        int most)
+{
+    struct words w = {.text = text, .size = size, .argv = argv, .most = most};
+    char scene[300], number[7][24];
+    snprintf(scene, sizeof scene, "scene/%.280s",
+             p->suite != NULL ? last_part(p->suite->dae) : p->scene);
+    snprintf(number[0], sizeof *number, "%d", p->width);
+    snprintf(number[1], sizeof *number, "%d", p->height);
+    snprintf(number[2], sizeof *number, "%d", p->spp);
+    snprintf(number[3], sizeof *number, "%d", p->lights);
+    snprintf(number[4], sizeof *number, "%d", p->bounces);
+    snprintf(number[5], sizeof *number, "%d", threads);
+    snprintf(number[6], sizeof *number, "%llu", (unsigned long long)seed);
+    const struct {
+        const char *name, *value;
+    } tokens[] = {{"{program}", program},  {"{scene}", scene},       {"{out}", r->output},
+                  {"{width}", number[0]},  {"{height}", number[1]},  {"{spp}", number[2]},
+                  {"{lights}", number[3]}, {"{bounces}", number[4]}, {"{threads}", number[5]},
+                  {"{seed}", number[6]}};
+    for (const char *at = r->command + strspn(r->command, " \t"); *at != '\0';
+         at += strspn(at, " \t")) {
+        size_t n = strcspn(at, " \t");
+        char word[1200];
+        size_t used = 0;
+        if (n == strlen("{options}") && strncmp(at, "{options}", n) == 0) {
+            add_words(&w, p->options);
+            add_scene_options(&w, p);
+            at += n;
+            continue;
+        }
+        for (const char *c = at; c < at + n;) {
+            size_t t = 0, count = sizeof tokens / sizeof *tokens;
+            while (t < count && strncmp(c, tokens[t].name, strlen(tokens[t].name)) != 0)
+                t++;
+            const char *value = t < count ? tokens[t].value : c;
+            size_t length = t < count ? strlen(value) : 1;
+            if (used + length >= sizeof word)
+                return false;
+            /* NOLINTNEXTLINE(bugprone-not-null-terminated-result): into a longer text. */
+            memcpy(word + used, value, length);
+            used += length;
+            c += t < count ? strlen(tokens[t].name) : 1;
+        }
+        add_word(&w, word, used);
+        at += n;
+    }
+    if (w.num < most)
+        argv[w.num] = NULL;
+    return !w.overflow && w.num > 0;
+}
+
+/* The file of a picture in a directory of images, looked for by ending; not through a link. */
+static bool find_image(const struct submission *s, const char *name, const char *ending, char *path,
+                       size_t size)
+{
+    struct stat st;
+    for (int i = 0; i < NUM_ENDINGS; i++) {
+        if (ending != NULL && strcmp(ending, endings[i]) != 0)
+            continue;
+        snprintf(path, size, "%s/%s%s", s->path, name, endings[i]);
+        if (lstat(path, &st) == 0 && S_ISREG(st.st_mode))
+            return true;
+    }
+    path[0] = '\0';
+    return false;
+}
+
+static enum submission_kind kind_of(const struct rubric *r, const struct submission *s,
+                                    bool is_directory)
+{
+    char path[MAX_PATH];
+    if (!is_directory)
+        return SUBMISSION_PROGRAM;
+    for (int i = 0; i < r->num_pictures; i++)
+        if (find_image(s, r->picture[i].name, NULL, path, sizeof path))
+            return SUBMISSION_IMAGES;
+    return r->build[0] != '\0' ? SUBMISSION_SOURCE : SUBMISSION_PROGRAM;
+}
+
+bool submission_build(const struct rubric *r, const struct sandbox *box, const char *work,
+                      const char *log, struct submission *s, struct err *e)
+{
+    if (s->kind != SUBMISSION_SOURCE || s->why[0] != '\0')
+        return true;
+    char out[MAX_PATH], built[2 * MAX_PATH];
+    const char *const argv[] = {"sh", "-c", r->build, NULL};
+    struct sandbox_job job = {.argv = argv,
+                              .tree = s->tree,
+                              .keep_tree = true,
+                              .out = out,
+                              .log = log,
+                              .limit = r->limit};
+    struct sandbox_result result;
+    snprintf(out, sizeof out, "%s/build", work);
+    job.limit.wall_s = job.limit.cpu_s = r->build_s;
+    if (!sandbox_run(box, &job, &result, e))
+        return false;
+    snprintf(built, sizeof built, "%s/tree.tar", out);
+    if (result.end != SANDBOX_OK)
+        snprintf(s->why, sizeof s->why, "building it failed: %s", result.why);
+    else if (access(built, R_OK) != 0)
+        snprintf(s->why, sizeof s->why, "what building made is larger than %zu MiB",
+                 r->limit.disk >> 20);
+    else if (rename(built, s->tree) != 0 || chmod(s->tree, 0644) != 0)
+        return err_set(e, "%s: %s", s->tree, strerror(errno));
+    return remove_tree(out, e);
+}
+
+bool submission_open(const struct rubric *r, const char *path, const char *work,
+                     struct submission *out, struct err *e)
+{
+    struct stat st;
+    struct err why;
+    *out = (struct submission){0};
+    snprintf(out->path, sizeof out->path, "%s", path);
+    for (size_t n = strlen(out->path); n > 1 && out->path[n - 1] == '/';)
+        out->path[--n] = '\0';
+    snprintf(out->id, sizeof out->id, "%.127s", last_part(out->path));
+    if (stat(out->path, &st) != 0)
+        return err_set(e, "%s: %s", path, strerror(errno));
+    if (!make_dirs(work, e))
+        return false;
+    chmod(work, 0755);
+    out->kind = kind_of(r, out, S_ISDIR(st.st_mode));
+    if ((size_t)snprintf(out->tree, sizeof out->tree, "%s/tree.tar", work) >= sizeof out->tree)
+        return err_set(e, "%s: path too long", work);
+    snprintf(out->program, sizeof out->program, "./%.150s",
+             S_ISDIR(st.st_mode) ? r->program : out->id);
+    if (!sandbox_pack(out->path, out->tree, r->limit.disk, &why)) {
+        snprintf(out->why, sizeof out->why, "%.590s", why.msg);
+        return true;
+    }
+    return sha256_file(out->tree, out->sha256, e);
+}
+
+static bool move_file(const char *from_dir, const char *name, const char *to, bool *moved,
+                      struct err *e)
+{
+    char from[2 * MAX_PATH];
+    snprintf(from, sizeof from, "%s/%s", from_dir, name);
+    *moved = access(from, R_OK) == 0;
+    return !*moved || copy_file(from, to, e);
+}
+
+static bool run_program(const struct rubric *r, const struct sandbox *box,
+                        const struct submission *sub, const struct rubric_picture *p,
+                        const char *stage, const char *work, const char *out_dir, uint64_t seed,
+                        int threads, struct made *made, struct err *e)
+{
+    char text[TEXT], out[MAX_PATH], log[MAX_PATH], rates[80];
+    const char *argv[MAX_ARGS];
+    const char *dot = strrchr(r->output, '.');
+    if (!submission_command(r, p, sub->program, seed, threads, text, sizeof text, argv, MAX_ARGS))
+        return err_set(e, "%s: the command of picture '%s' is too long", r->path, p->name);
+    snprintf(rates, sizeof rates, "%.*s_rate.png", (int)(dot - r->output), r->output);
+    snprintf(out, sizeof out, "%s/%s", work, p->name);
+    snprintf(log, sizeof log, "%s/%s.log", out_dir, p->name);
+    const char *const keep[] = {r->output, rates, NULL};
+    const struct sandbox_job job = {.argv = argv,
+                                    .tree = sub->tree,
+                                    .scene = stage,
+                                    .keep = keep,
+                                    .out = out,
+                                    .log = log,
+                                    .limit = r->limit};
+    struct sandbox_result result;
+    if (!sandbox_run(box, &job, &result, e))
+        return false;
+    made->end = result.end;
+    made->cpu_s = result.cpu_s;
+    made->wall_s = result.wall_s;
+    bool there = false, has_rates = false;
+    snprintf(made->path, sizeof made->path, "%s/%s%s", out_dir, p->name, dot);
+    snprintf(made->rates, sizeof made->rates, "%s/%s_rate.png", out_dir, p->name);
+    bool ok = move_file(out, r->output, made->path, &there, e) &&
+              move_file(out, rates, made->rates, &has_rates, e) && remove_tree(out, e);
+    if (result.end != SANDBOX_OK)
+        snprintf(made->why, sizeof made->why, "the program: %s", result.why);
+    else if (!there)
+        snprintf(made->why, sizeof made->why, "the program ended well but wrote no %s", r->output);
+    if (made->why[0] != '\0')
+        made->path[0] = '\0';
+    if (!has_rates)
+        made->rates[0] = '\0';
+    return ok;
+}
+
+/* Copies a picture of a directory to where those of programs are; `to` "" and the reason where there is none. */
+static bool take_image(const struct rubric *r, const struct submission *s, const char *name,
+                       const char *ending, const char *out_dir, char *to, char *why, size_t size,
+                       struct err *e)
+{
+    char from[MAX_PATH];
+    struct stat st;
+    to[0] = '\0';
+    if (!find_image(s, name, ending, from, sizeof from)) {
+        snprintf(why, size, "there is no %s.png, .exr, .pfm or .hdr", name);
+        return true;
+    }
+    if (stat(from, &st) != 0 || (size_t)st.st_size > r->limit.file) {
+        snprintf(why, size, "%s is larger than %zu MiB", last_part(from), r->limit.file >> 20);
+        return true;
+    }
+    snprintf(to, MAX_PATH, "%.4000s/%.300s", out_dir, last_part(from));
+    return copy_file(from, to, e);
+}
+
+static bool take_rates(const struct rubric *r, const struct submission *s, const char *name,
+                       const char *out_dir, char *to, struct err *e)
+{
+    char rates[80], why[400];
+    snprintf(rates, sizeof rates, "%s_rate", name);
+    return take_image(r, s, rates, ".png", out_dir, to, why, sizeof why, e);
+}
+
+bool submission_picture(const struct rubric *r, const struct sandbox *s,
+                        const struct submission *sub, int picture, const char *stage,
+                        const char *work, const char *out_dir, uint64_t seed, int threads,
+                        struct made *made, struct err *e)
+{
+    const struct rubric_picture *p = &r->picture[picture];
+    *made = (struct made){.end = SANDBOX_OK};
+    if (sub->why[0] != '\0') {
+        snprintf(made->why, sizeof made->why, "%.590s", sub->why);
+        return true;
+    }
+    if (sub->kind != SUBMISSION_IMAGES)
+        return run_program(r, s, sub, p, stage, work, out_dir, seed, threads, made, e);
+    return take_image(r, sub, p->name, NULL, out_dir, made->path, made->why, sizeof made->why, e) &&
+           take_rates(r, sub, p->name, out_dir, made->rates, e);
+}

@@ -1,0 +1,267 @@
+#include "submitted_image.h"
+
+#include "renderer/base/sha256.h"
+#include "tools/images/tone_curve.h"
+#include "tools/images/image_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double clip_sd = 5; /* of the clipping point, where nothing is compared */
+
+static bool check_header(const char *path, int width, int height, struct image_info *info,
+                         struct err *e)
+{
+    struct err why;
+    if (!image_inspect(path, info, &why)) {
+        const char *what = strstr(why.msg, ": "); /* without our path */
+        return err_set(e, "the picture: %.300s", what != NULL ? what + 2 : "cannot be read");
+    }
+    if (info->width != width || info->height != height)
+        return err_set(e, "the picture is %d x %d pixels, not %d x %d", info->width, info->height,
+                       width, height);
+    return info->channels <= 64 || err_set(e, "the picture has %d channels", info->channels);
+}
+
+static bool allocate(struct student *s, struct err *e)
+{
+    size_t n = 3 * (size_t)s->width * (size_t)s->height;
+    s->mean = calloc(n, sizeof *s->mean);
+    s->tolerance = calloc(n, sizeof *s->tolerance);
+    s->rounding = calloc(n, sizeof *s->rounding);
+    s->variance = calloc(n, sizeof *s->variance);
+    s->k3 = calloc(n, sizeof *s->k3);
+    s->clipped = calloc(n, 1);
+    return (s->variance != NULL && s->k3 != NULL && s->mean != NULL && s->tolerance != NULL &&
+            s->rounding != NULL && s->clipped != NULL) ||
+           err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
+}
+
+static void set_code(struct student *s, size_t i, const struct curve *curve, int k, int steps)
+{
+    double lo, hi;
+    curve_bin(curve, k, steps, &lo, &hi);
+    s->clipped[i] = k == steps;
+    s->mean[i] = k == steps ? s->clip : (lo + hi) / 2;
+    s->tolerance[i] = k == steps ? 0 : (hi - lo) / 2;
+    s->rounding[i] = k == steps ? 0 : (hi - lo) * (hi - lo) / 12;
+}
+
+/* Half floats are rounded, RGBE may be cut off. */
+static double float_step(const struct picture *pic, float v, const float *px)
+{
+    if (pic->info.type == IMAGE_HALF)
+        return fmax(ldexp(fabs((double)v), -10), 0x1p-24);
+    double brightest = fmaxf(px[0], fmaxf(px[1], px[2]));
+    int exponent;
+    frexp(brightest, &exponent);
+    return strcmp(pic->info.format, "hdr") == 0 && brightest > 0 ? 2 * ldexp(1, exponent - 8) : 0;
+}
+
+static bool fill(struct student *s, const struct picture *pic, const struct curve *curve,
+                 struct err *e)
+{
+    size_t n = 3 * (size_t)s->width * (size_t)s->height;
+    int steps = pic->info.type == IMAGE_INT8 ? 255 : pic->info.type == IMAGE_INT16 ? 65535 : 0;
+    double lo, hi;
+    s->clip = INFINITY;
+    if (steps > 0) {
+        curve_bin(curve, steps, steps, &lo, &hi);
+        s->clip = lo;
+    }
+    for (size_t i = 0; i < n; i++) {
+        float v = pic->rgb[i];
+        if (!(v >= 0))
+            return err_set(e, "the picture has negative numbers");
+        if (steps > 0) {
+            set_code(s, i, curve, (int)lround((double)v * steps), steps);
+            continue;
+        }
+        double step = float_step(pic, v, pic->rgb + i / 3 * 3);
+        s->mean[i] = (double)v;
+        s->tolerance[i] = step / 2;
+        s->rounding[i] = step * step / 12;
+    }
+    return true;
+}
+
+bool student_read(const char *path, const char *curve, int width, int height, struct student *out,
+                  struct err *e)
+{
+    struct picture pic;
+    struct image_info info;
+    struct curve c;
+    *out = (struct student){.width = width, .height = height};
+    if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
+        !picture_read_inspected(path, &info, &pic, e))
+        return false;
+    bool ok = allocate(out, e) && fill(out, &pic, &c, e) && sha256_file(path, out->sha256, e);
+    picture_free(&pic);
+    if (!ok)
+        student_free(out);
+    return ok;
+}
+
+void student_free(struct student *s)
+{
+    free(s->mean);
+    free(s->tolerance);
+    free(s->rounding);
+    free(s->variance);
+    free(s->k3);
+    free(s->clipped);
+    *s = (struct student){0};
+}
+
+void student_expect(struct student *s, const struct moments *m, double spp)
+{
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++)
+            for (size_t c = 0; c < 3; c++) {
+                double v = 0, k3 = 0, num = 0;
+                for (int k = 0; k < 9; k++) {
+                    int u = x - 1 + k % 3, w = y - 1 + k / 3;
+                    if (u < 0 || w < 0 || u >= s->width || w >= s->height)
+                        continue;
+                    size_t p = (size_t)w * (size_t)s->width + (size_t)u;
+                    double n = m->n[p], paths = fmax(1, m->spp) / spp;
+                    if (m->mean[3 * p + c] >= s->clip)
+                        continue;
+                    v += n > 1 ? m->m2[3 * p + c] / (n - 1) * paths : 0;
+                    k3 += n > 2 ? n * m->m3[3 * p + c] / ((n - 1) * (n - 2)) * paths * paths : 0;
+                    num++;
+                }
+                size_t i = 3 * ((size_t)y * (size_t)s->width + (size_t)x) + c;
+                bool varies = m->mean[i] < s->clip;
+                s->variance[i] = varies ? v / num : 0;
+                s->k3[i] = varies ? k3 / num : 0;
+            }
+}
+
+bool student_from(const struct moments *m, const struct student *like, struct student *out,
+                  struct err *e)
+{
+    *out = (struct student){.width = like->width, .height = like->height, .clip = like->clip};
+    if (!allocate(out, e)) {
+        student_free(out);
+        return false;
+    }
+    for (size_t i = 0; m != NULL && i < 3 * (size_t)m->width * (size_t)m->height; i++) {
+        double n = m->n[i / 3];
+        out->mean[i] = fmin(m->mean[i], like->clip);
+        if (m->mean[i] >= like->clip)
+            continue;
+        out->variance[i] = n > 1 ? m->m2[i] / (n * (n - 1)) : 0;
+        out->k3[i] = n > 2 ? m->m3[i] / (n * (n - 1) * (n - 2)) : 0;
+    }
+    return true;
+}
+
+bool student_copy(const struct student *s, struct student *out, struct err *e)
+{
+    if (!student_from(NULL, s, out, e))
+        return false;
+    memcpy(out->sha256, s->sha256, sizeof out->sha256);
+    student_add(out, s);
+    memcpy(out->k3, s->k3, 3 * (size_t)s->width * (size_t)s->height * sizeof *s->k3);
+    return true;
+}
+
+void student_add(struct student *dst, const struct student *src)
+{
+    for (size_t i = 0; i < 3 * (size_t)dst->width * (size_t)dst->height; i++) {
+        dst->mean[i] += src->mean[i];
+        dst->tolerance[i] += src->tolerance[i];
+        dst->rounding[i] += src->rounding[i];
+        dst->variance[i] += src->variance[i];
+        dst->k3[i] += src->k3[i];
+        dst->clipped[i] |= src->clipped[i];
+    }
+}
+
+double student_expected_sd(const struct moments *reference, size_t i, double spp)
+{
+    double n = reference->n[i / 3], paths = fmax(1, reference->spp);
+    return n > 1 ? sqrt(reference->m2[i] / (n - 1) * paths / spp) : 0;
+}
+
+/* Clears use[p] where mark[] is `kind` or more in p or beside it, but not where p itself is `spared`. */
+static void clear_around(const struct student *s, const unsigned char *mark, unsigned char kind,
+                         unsigned char spared, unsigned char *use)
+{
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++) {
+            size_t p = (size_t)y * (size_t)s->width + (size_t)x;
+            bool beside = false;
+            for (int k = 0; k < 9; k++) {
+                int u = x - 1 + k % 3, v = y - 1 + k / 3;
+                if (u >= 0 && v >= 0 && u < s->width && v < s->height)
+                    beside |= mark[(size_t)v * (size_t)s->width + (size_t)u] >= kind;
+            }
+            if (beside && mark[p] != spared)
+                use[p] = 0;
+        }
+}
+
+/* A few pixels at the rim of a lamp, or of a caustic, can hold most of a picture's noise and all of its skewness. */
+static void drop_loudest(const struct student *s, const struct moments *m, double spp, double *v,
+                         unsigned char *use)
+{
+    static const double loudest = 20; /* times the mean variance */
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    double num = 0, total = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        double sum = 0;
+        for (size_t i = 3 * p; i < 3 * p + 3; i++)
+            sum += m->mean[i] < s->clip ? pow(student_expected_sd(m, i, spp), 2) : 0;
+        v[p] = sum;
+        if (use[p] && sum > 0) {
+            total += sum;
+            num++;
+        }
+    }
+    for (size_t p = 0; p < pixels; p++)
+        if (num > 0 && v[p] > loudest * total / num)
+            use[p] = 0;
+}
+
+enum mark { MARK_NONE, MARK_CLIPPED, MARK_UNKNOWN };
+
+bool student_comparable(const struct student *s, const struct moments *m, double spp,
+                        unsigned char *use, struct err *e)
+{
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    unsigned char *mark = calloc(pixels, 1);
+    double *v = calloc(pixels, sizeof *v);
+    if (mark == NULL || v == NULL) {
+        free(mark);
+        free(v);
+        return err_set(e, "out of memory for %zu pixels", pixels);
+    }
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        double far = m->mean[i] - s->clip;
+        if (fabs(far) < clip_sd * student_expected_sd(m, i, spp) + s->tolerance[i])
+            mark[i / 3] = MARK_UNKNOWN;
+        else if (far > 0 && mark[i / 3] == MARK_NONE)
+            mark[i / 3] = MARK_CLIPPED;
+    }
+    clear_around(s, mark, MARK_CLIPPED, MARK_CLIPPED, use);
+    drop_loudest(s, m, spp, v, use);
+    free(mark);
+    free(v);
+    return true;
+}
+
+void student_unclipped(const struct student *s, unsigned char *use)
+{
+    for (int y = 0; y < s->height; y++)
+        for (int x = 0; x < s->width; x++)
+            for (int k = 0; k < 9; k++) {
+                int u = x - 1 + k % 3, v = y - 1 + k / 3;
+                const unsigned char *c =
+                    s->clipped + 3 * ((size_t)v * (size_t)s->width + (size_t)u);
+                if (u >= 0 && v >= 0 && u < s->width && v < s->height && (c[0] || c[1] || c[2]))
+                    use[(size_t)y * (size_t)s->width + (size_t)x] = 0;
+            }
+}

@@ -1,0 +1,295 @@
+/* The class, for staff: who has what, how points are spread, which bugs are common, whose programs are slow, and what
+ * looks alike. */
+#include "student_page.h"
+
+#include "tools/html/html.h"
+#include "tools/results/results.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BARS = 20, SLOWEST = 5 };
+
+static void histogram(FILE *f, const json_t *grades)
+{
+    double count[BARS] = {0}, most = 1;
+    size_t i;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        double share = member_number(g, "points") / fmax(1e-9, member_number(g, "of"));
+        int bar = (int)(share * BARS);
+        count[bar < BARS ? bar : BARS - 1]++;
+    }
+    for (int b = 0; b < BARS; b++)
+        most = fmax(most, count[b]);
+    fputs("<h2>Points</h2><svg width=\"420\" viewBox=\"0 0 420 120\" role=\"img\">", f);
+    for (int b = 0; b < BARS; b++)
+        fprintf(
+            f,
+            "<rect x=\"%d\" y=\"%g\" width=\"18\" height=\"%g\" fill=\"#468\"><title>%d to %d %%: %g</title></rect>",
+            10 + 20 * b, 100 - 90 * count[b] / most, 90 * count[b] / most, 100 * b / BARS,
+            100 * (b + 1) / BARS, count[b]);
+    fputs(
+        "<text x=\"10\" y=\"115\" font-size=\"10\">0 %</text><text x=\"385\" y=\"115\" font-size=\"10\">100 %</text></svg>\n",
+        f);
+}
+
+/* A path of one part for an href. */
+static void link_to(FILE *f, const char *id)
+{
+    fputs("<a href=\"", f);
+    for (const char *c = id; *c != '\0'; c++)
+        if (strchr("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-", *c) != NULL)
+            fputc(*c, f);
+        else
+            fprintf(f, "%%%02X", (unsigned)(unsigned char)*c);
+    fputs("/index.html\">", f);
+    html_text(f, id);
+    fputs("</a>", f);
+}
+
+static void table(FILE *f, const json_t *grades)
+{
+    const json_t *parts = NULL;
+    size_t i, k;
+    json_t *g, *p, *c;
+    json_array_foreach(grades, i, g)
+    {
+        if (json_array_size(json_object_get(g, "parts")) > 0)
+            parts = json_object_get(g, "parts");
+    }
+    fputs("<h2>Submissions</h2><table><tr><th>submission</th><th class=\"n\">points</th>", f);
+    json_array_foreach(parts, k, p)
+    {
+        fputs("<th class=\"n\">", f);
+        html_text(f, grade_text(p, "number"));
+        fputs("</th>", f);
+    }
+    fputs("<th>bug</th><th>for you to look at</th></tr>\n", f);
+    json_array_foreach(grades, i, g)
+    {
+        fputs("<tr><td>", f);
+        link_to(f, grade_text(g, "id"));
+        fprintf(f, "</td><td class=\"n\">%.2f</td>", member_number(g, "points"));
+        json_array_foreach(json_object_get(g, "parts"), k, p)
+        {
+            fprintf(f, "<td class=\"n\">%.2f</td>", member_number(p, "points"));
+        }
+        if (json_array_size(json_object_get(g, "parts")) == 0)
+            fprintf(f, "<td colspan=\"%zu\"></td>", json_array_size(parts));
+        fputs("<td>", f);
+        json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, p)
+        {
+            fputs(k > 0 ? " or " : "", f);
+            html_text(f, grade_text(p, "name"));
+        }
+        /* Of other deviations than those it was graded with: staff may want to know. */
+        const char *with = grade_text(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, grade_text(g, "accepted")) != 0) {
+            fputs(" on top of ", f);
+            html_text(f, with);
+        }
+        fputs("</td><td>", f);
+        html_text(f, grade_text(g, "trouble"));
+        html_text(f, grade_text(g, "wrong"));
+        if (grade_text(g, "accepted")[0] != '\0') {
+            fputs("accepted: ", f);
+            html_text(f, grade_text(g, "accepted"));
+            fputs("; ", f);
+        }
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            bool judged = json_is_true(json_object_get(c, "judged"));
+            if (grade_text(c, "flag")[0] == '\0' && judged)
+                continue;
+            html_text(f, grade_text(c, "name"));
+            fputs(": ", f);
+            html_text(f, grade_text(c, "flag"));
+            fputs(judged ? "; " : " not judged; ", f);
+        }
+        fputs("</td></tr>\n", f);
+    }
+    fputs("</table>\n", f);
+}
+
+/* A text and how often it was met. */
+struct tally {
+    const char *text, *with;
+    double num;
+};
+
+static int by_num(const void *a, const void *b)
+{
+    const struct tally *x = a, *y = b;
+    return (x->num < y->num) - (x->num > y->num);
+}
+
+static size_t count_one(struct tally *t, size_t num, const char *text)
+{
+    for (size_t i = 0; i < num; i++)
+        if (strcmp(t[i].text, text) == 0) {
+            t[i].num++;
+            return num;
+        }
+    t[num] = (struct tally){.text = text, .num = 1};
+    return num + 1;
+}
+
+static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
+{
+    size_t i, num = 0;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        const json_t *first =
+            json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
+        if (first != NULL)
+            num = count_one(t, num, grade_text(first, "bug"));
+    }
+    if (num == 0)
+        return;
+    qsort(t, num, sizeof *t, by_num);
+    fputs("<h2>Most common bugs</h2><table>\n", f);
+    for (i = 0; i < num && i < 10; i++) {
+        fprintf(f, "<tr><td class=\"n\">%g</td><td>", t[i].num);
+        html_text(f, t[i].text);
+        fputs("</td></tr>\n", f);
+    }
+    fputs("</table>\n", f);
+}
+
+static void slowest(FILE *f, const json_t *grades, struct tally *t)
+{
+    size_t i, num = 0;
+    json_t *g;
+    json_array_foreach(grades, i, g) t[num++] =
+        (struct tally){.text = grade_text(g, "id"), .num = member_number(g, "cpu_s")};
+    qsort(t, num, sizeof *t, by_num);
+    fputs("<h2>Slowest</h2><table>\n", f);
+    for (i = 0; i < num && i < SLOWEST; i++) {
+        fprintf(f, "<tr><td class=\"n\">%.1f s</td><td>", t[i].num);
+        html_text(f, t[i].text);
+        fputs("</td></tr>\n", f);
+    }
+    fputs("</table>\n", f);
+}
+
+/* Submissions that share a picture bit by bit. A program without a seed of its own always makes the same one, and two
+ * that follow the text to the letter may make the same: no proof of anything. */
+static void look_alikes(FILE *f, const json_t *grades)
+{
+    size_t i, k, m;
+    json_t *g, *h, *p;
+    bool any = false;
+    json_array_foreach(grades, i, g)
+    {
+        for (k = i + 1; k < json_array_size(grades); k++) {
+            size_t same = 0, num = 0;
+            h = json_array_get(grades, k);
+            json_array_foreach(json_object_get(g, "pictures"), m, p)
+            {
+                const char *a = grade_text(p, "sha256"),
+                           *b = grade_text(json_array_get(json_object_get(h, "pictures"), m),
+                                           "sha256");
+                num += a[0] != '\0';
+                same += a[0] != '\0' && strcmp(a, b) == 0;
+            }
+            if (num < 2 || same < num)
+                continue;
+            if (!any)
+                fputs(
+                    "<h2>All pictures the same, bit by bit</h2><p>No proof of anything: programs with a fixed seed that do the same "
+                    "make the same.</p><ul>\n",
+                    f);
+            any = true;
+            fputs("<li>", f);
+            html_text(f, grade_text(g, "id"));
+            fputs(" and ", f);
+            html_text(f, grade_text(h, "id"));
+            fputs("</li>\n", f);
+        }
+    }
+    if (any)
+        fputs("</ul>\n", f);
+}
+
+/* Adds to `group` all that are like i, and what they are like; group[k]: 0 not yet seen, else a number from 1 on. */
+static void join_group(const json_t *grades, size_t i, int number, int *group)
+{
+    size_t k, m;
+    json_t *like, *other;
+    group[i] = number;
+    json_array_foreach(json_object_get(json_array_get(grades, i), "alike"), k, like)
+    {
+        json_array_foreach(grades, m, other)
+        {
+            if (group[m] == 0 && strcmp(grade_text(other, "id"), grade_text(like, "id")) == 0)
+                join_group(grades, m, number, group);
+        }
+    }
+}
+
+static void list_group(FILE *f, const json_t *grades, int number, const int *group)
+{
+    size_t i, members = 0;
+    json_t *g;
+    fputs("<li>", f);
+    json_array_foreach(grades, i, g)
+    {
+        if (group[i] != number)
+            continue;
+        fputs(members++ > 0 ? ", " : "", f);
+        link_to(f, grade_text(g, "id"));
+    }
+    fputs("</li>\n", f);
+}
+
+/* same_noise.h */
+static void same_noise(FILE *f, const json_t *grades, int *group)
+{
+    int number = 0;
+    size_t i;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        if (group[i] > 0 || json_array_size(json_object_get(g, "alike")) == 0)
+            continue;
+        if (number == 0)
+            fputs(
+                "<h2>The same noise</h2><p>Pictures that cost no points and whose errors go together more than those of programs "
+                "that draw numbers of their own: one false alarm in a thousand classes. No proof of anything: the same fixed seed in "
+                "what all were given does it too. Each line is a chain of likenesses.</p><ul>\n",
+                f);
+        join_group(grades, i, ++number, group);
+        list_group(f, grades, number, group);
+    }
+    fputs(number > 0 ? "</ul>\n" : "", f);
+}
+
+bool grade_overview(FILE *f, const json_t *grades, struct err *e)
+{
+    struct tally *t = calloc(json_array_size(grades) + 1, sizeof *t);
+    int *group = calloc(json_array_size(grades) + 1, sizeof *group);
+    if (t == NULL || group == NULL) {
+        free(t);
+        free(group);
+        return err_set(e, "out of memory for the page of the class");
+    }
+    fputs(grade_page_head, f);
+    fputs("<meta name=\"generator\" content=\"" GRADE_CLASS_ORIGIN
+          "\">\n<title>Grades</title>\n<h1>",
+          f);
+    html_text(f, grade_text(json_array_get(grades, 0), "rubric"));
+    fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
+    histogram(f, grades);
+    common_bugs(f, grades, t);
+    slowest(f, grades, t);
+    look_alikes(f, grades);
+    same_noise(f, grades, group);
+    table(f, grades);
+    free(t);
+    free(group);
+    return true;
+}

@@ -1,0 +1,367 @@
+#include "grade_batch.h"
+
+#include "reference/base/json_file.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/sha256.h"
+#include "renderer/base/shell_quote.h"
+#include "renderer/base/version.h"
+
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_PATH = 4400 };
+
+/* Seeds of pictures differ, or their noise would be the same. */
+static uint64_t picture_seed(uint64_t seed, int picture)
+{
+    return (seed * 1000003u + (uint64_t)picture) % 1000000007u;
+}
+
+static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
+                   struct err *e)
+{
+    char rubric[65], bugs[65] = "", path[MAX_PATH], text[1024];
+    snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
+    if (!sha256_file(job->rubric->path, rubric, e) ||
+        (job->bugs != NULL && !sha256_file(path, bugs, e)))
+        return false;
+    snprintf(text, sizeof text, "%s %s %s %s %llu %.17g %d", assay_version, rubric, bugs, s->sha256,
+             (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
+    sha256_text(text, key);
+    return true;
+}
+
+/* Pictures are made one after the other, so that a student's time does not depend on how many others there are. */
+static bool make_pictures(const struct grade_job *job, const struct submission *s, const char *work,
+                          const char *out, struct handed_in *h, struct err *e)
+{
+    const struct rubric *r = job->rubric;
+    for (int i = 0; i < r->num_pictures; i++) {
+        const struct rubric_picture *p = &r->picture[i];
+        struct err why = {""};
+        if (!submission_picture(r, job->sandbox, s, i, job->stage, work, out,
+                                picture_seed(job->seed, i), job->threads, &h->made[i], e))
+            return false;
+        if (h->made[i].path[0] == '\0')
+            err_set(&why, "%s", h->made[i].why);
+        else if (student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
+            why.msg[0] = '\0';
+        else if (err_is_of_memory(&why)) /* which is our trouble */
+            return err_set(e, "%s: %s", p->name, why.msg);
+        snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
+    }
+    return true;
+}
+
+/* JSON has no NaN. */
+static json_t *number(double v)
+{
+    return isfinite(v) ? json_real(v) : json_null();
+}
+
+static json_t *relative_of(const struct agreement *a, const struct rubric_picture *p)
+{
+    if (a->relative == NULL)
+        return json_null();
+    json_t *array = json_array();
+    for (int i = 0; i < p->width / RUBRIC_TILE * (p->height / RUBRIC_TILE); i++)
+        json_array_append_new(array, number(a->relative[i]));
+    return array;
+}
+
+/* What points are a function of, with the margins. */
+static json_t *intervals_of(const struct agreement *a, const struct rubric_check *c)
+{
+    static const char *const names[] = {"red", "green", "blue", "luminance", "furthest tile"};
+    json_t *array = json_array();
+    if (c->kind != CHECK_EQUAL && c->kind != CHECK_AGREE && c->kind != CHECK_SUM)
+        return array;
+    for (int k = 0; k <= NUM_CHANNELS && a->relative != NULL; k++) {
+        const struct interval *i = k < NUM_CHANNELS ? &a->image[k] : &a->tile;
+        const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
+        if (k < NUM_CHANNELS || a->tiles > 0)
+            json_array_append_new(array, json_pack("{ss, sf, sf, sf, sf, sf}", "what", names[k],
+                                                   "value", i->value, "lo", i->lo, "hi", i->hi,
+                                                   "full", m->full, "none", m->none));
+    }
+    return array;
+}
+
+static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
+                          const struct result *result)
+{
+    return json_pack(
+        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}", "kind",
+        check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
+        c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
+        "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
+        result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
+        result->accepted, "flag", result->flag, "picture", r->picture[result->picture].name, "tile",
+        result->agreement.tiles > 0
+            ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
+            : json_null(),
+        "relative", relative_of(&result->agreement, &r->picture[result->picture]), "intervals",
+        intervals_of(&result->agreement, c));
+}
+
+static json_t *picture_json(const struct rubric_picture *p, const struct made *made,
+                            const struct student *s, const char *why)
+{
+    const char *slash = strrchr(made->path, '/');
+    return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, ss?}", "name", p->name, "file",
+                     made->path[0] == '\0' ? NULL
+                     : slash != NULL       ? slash + 1
+                                           : made->path,
+                     "why", why, "end", sandbox_end_name[made->end], "cpu_s", made->cpu_s, "wall_s",
+                     made->wall_s, "width", p->width, "height", p->height, "sha256",
+                     s->mean != NULL ? s->sha256 : NULL);
+}
+
+static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t *grade, int *set,
+                       struct err *e)
+{
+    const struct rubric *r = job->rubric;
+    json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
+    double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
+    struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
+    bool ok = (result != NULL || err_set(e, "out of memory")) &&
+              grading_all(r, job->answers, h, job->alpha, result, set, e);
+    for (int i = 0; ok && i < r->num_checks; i++) {
+        json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
+        part[r->check[i].part] += r->check[i].points * result[i].share;
+        of[r->check[i].part] += r->check[i].points;
+        points += r->check[i].points * result[i].share;
+        chance = fmin(1, chance + result[i].chance);
+        result_free(&result[i]);
+    }
+    free(result);
+    for (int i = 0; i < r->num_parts; i++)
+        json_array_append_new(parts,
+                              json_pack("{ss, ss, sf, sf}", "number", r->part[i].number, "title",
+                                        r->part[i].title, "points", part[i], "of", of[i]));
+    for (int i = 0; i < r->num_pictures; i++) {
+        json_array_append_new(pictures,
+                              picture_json(&r->picture[i], &h->made[i], &h->picture[i], h->why[i]));
+        cpu_s += h->made[i].cpu_s;
+    }
+    json_object_set_new(grade, "points", json_real(points));
+    json_object_set_new(grade, "of", json_real(rubric_points(r)));
+    json_object_set_new(grade, "chance", json_real(chance));
+    json_object_set_new(grade, "cpu_s", json_real(cpu_s));
+    json_object_set_new(grade, "accepted", json_string(r->set[*set].name));
+    json_object_set_new(grade, "parts", parts);
+    json_object_set_new(grade, "checks", checks);
+    json_object_set_new(grade, "pictures", pictures);
+    return ok;
+}
+
+/* A picture that is not of the student's making looks like no bug. */
+static bool is_flagged(const json_t *grade)
+{
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        if (json_string_length(json_object_get(c, "flag")) > 0)
+            return true;
+    }
+    return false;
+}
+
+/* By the pictures that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
+static json_t *name_bug(const struct grade_job *job, const struct submission *s,
+                        const struct handed_in *h, int set, const char *work)
+{
+    json_t *by_pictures =
+        job->bugs != NULL
+            ? diagnosis_by_pictures(job->bugs, job->rubric, job->answers, h, set, job->alpha)
+            : json_null();
+    if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
+        json_array_size(json_object_get(by_pictures, "named")) == 1)
+        return by_pictures;
+    json_t *by_views =
+        diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed, job->threads, job->alpha);
+    size_t views = json_array_size(json_object_get(by_views, "named")),
+           pictures = json_array_size(json_object_get(by_pictures, "named"));
+    bool better = json_is_null(by_pictures) || (views > 0 && (pictures == 0 || views < pictures));
+    json_decref(better ? by_pictures : by_views);
+    return better ? by_views : by_pictures;
+}
+
+static bool grade_made(const struct grade_job *job, const struct submission *s, const char *work,
+                       const char *out, json_t *grade, struct err *e)
+{
+    struct handed_in *h = calloc(1, sizeof *h);
+    int set = 0;
+    bool ok = h != NULL || err_set(e, "out of memory");
+    ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
+    bool lost =
+        ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
+    json_object_set_new(grade, "diagnosis",
+                        lost && !is_flagged(grade) ? name_bug(job, s, h, set, work) : json_null());
+    for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
+        student_free(&h->picture[i]);
+    free(h);
+    return ok;
+}
+
+static bool is_done(const char *path, const char *key, json_t **grade)
+{
+    *grade = json_load_file(path, 0, NULL);
+    const char *old = json_string_value(json_object_get(*grade, "key"));
+    if (old != NULL && strcmp(old, key) == 0)
+        return true;
+    json_decref(*grade);
+    *grade = NULL;
+    return false;
+}
+
+/* NULL where there is none to say. */
+static json_t *command_of(const struct grade_job *job, const char *path)
+{
+    int num = 0;
+    while (job->word != NULL && job->word[num] != NULL)
+        num++;
+    const char **word = num > 0 ? calloc((size_t)num + 2, sizeof *word) : NULL;
+    if (word == NULL)
+        return NULL;
+    memcpy(word, job->word, (size_t)num * sizeof *word);
+    word[num] = path;
+    char *text = shell_join("assay", word);
+    json_t *command = text != NULL ? json_string(text) : NULL;
+    free(text);
+    free(word);
+    return command;
+}
+
+static bool grade_one(const struct grade_job *job, const char *path, const char *work,
+                      json_t **grade, struct err *e)
+{
+    struct submission s;
+    char out[MAX_PATH], file[MAX_PATH + 32], log[MAX_PATH + 32], key[65];
+    if (!submission_open(job->rubric, path, work, &s, e) || !key_of(job, &s, key, e))
+        return false;
+    snprintf(out, sizeof out, "%.4000s/%s", job->out, s.id);
+    snprintf(file, sizeof file, "%s/grade.json", out);
+    snprintf(log, sizeof log, "%s/build.log", out);
+    if (!job->again && is_done(file, key, grade))
+        return true;
+    if (!remove_tree(out, e) || !make_dirs(out, e) ||
+        !submission_build(job->rubric, job->sandbox, work, log, &s, e))
+        return false;
+    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
+                       s.id, "kind", submission_kind_name[s.kind], "command", command_of(job, path),
+                       "version", assay_version, "key", key, "rubric", job->rubric->title,
+                       "sandbox", !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha",
+                       job->alpha, "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
+    if (*grade != NULL && grade_made(job, &s, work, out, *grade, e) && json_write(file, *grade, e))
+        return true;
+    json_decref(*grade);
+    *grade = NULL;
+    return e->msg[0] != '\0' ? false : err_set(e, "%s: out of memory", path);
+}
+
+/* What the workers share. */
+struct batch {
+    const struct grade_job *job;
+    pthread_mutex_t lock;
+    int next, done;
+    json_t **grade;
+};
+
+static json_t *trouble_json(const struct grade_job *job, const char *path, const char *why)
+{
+    const char *slash = strrchr(path, '/');
+    return json_pack("{si, ss, sf, sf, sf, ss, sn, s[], s[], s[]}", "assay_grade", 1, "id",
+                     slash != NULL ? slash + 1 : path, "points", 0.0, "of",
+                     rubric_points(job->rubric), "cpu_s", 0.0, "trouble", why, "wrong", "parts",
+                     "checks", "pictures");
+}
+
+static void *work(void *ctx)
+{
+    struct batch *b = ctx;
+    const struct grade_job *job = b->job;
+    for (;;) {
+        char dir[sizeof job->sandbox->dir.path + 24];
+        struct err e = {""}, ignored;
+        pthread_mutex_lock(&b->lock);
+        int i = b->next++;
+        pthread_mutex_unlock(&b->lock);
+        if (i >= job->num)
+            return NULL;
+        snprintf(dir, sizeof dir, "%s/work-%d", job->sandbox->dir.path, i);
+        if (!grade_one(job, job->path[i], dir, &b->grade[i], &e))
+            b->grade[i] = trouble_json(job, job->path[i], e.msg);
+        bool removed = remove_tree(dir, &ignored);
+        (void)removed; /* goes with the sandbox's directory */
+        pthread_mutex_lock(&b->lock);
+        b->done++;
+        if (job->done != NULL)
+            job->done(job->ctx, b->done, job->path[i], b->grade[i]);
+        pthread_mutex_unlock(&b->lock);
+    }
+}
+
+static const char *id_of(const char *path, size_t *length)
+{
+    *length = strlen(path);
+    while (*length > 1 && path[*length - 1] == '/')
+        --*length;
+    const char *at = path + *length;
+    while (at > path && at[-1] != '/')
+        at--;
+    *length -= (size_t)(at - path);
+    return at;
+}
+
+static bool check_ids(const struct grade_job *job, struct err *e)
+{
+    for (int i = 0; i < job->num; i++) {
+        size_t n, m;
+        const char *id = id_of(job->path[i], &n);
+        json_t *text = json_stringn(id, n); /* NULL: no UTF-8 */
+        json_decref(text);
+        if (n == 0 || n > 120 || id[0] == '.' || text == NULL)
+            return err_set(e, "%s: '%.*s' is no name for a submission", job->path[i], (int)n, id);
+        for (int k = 0; k < i; k++) {
+            const char *other = id_of(job->path[k], &m);
+            if (n == m && memcmp(id, other, n) == 0)
+                return err_set(e, "%s and %s would both be '%.*s'", job->path[k], job->path[i],
+                               (int)n, id);
+        }
+    }
+    return true;
+}
+
+bool grade_all(const struct grade_job *job, json_t **grades, struct err *e)
+{
+    enum { MOST_JOBS = 64 };
+    pthread_t thread[MOST_JOBS];
+    struct batch b = {.job = job, .lock = PTHREAD_MUTEX_INITIALIZER};
+    int started = 0, jobs = job->jobs < MOST_JOBS ? job->jobs : MOST_JOBS;
+    if (!check_ids(job, e) || !make_dirs(job->out, e))
+        return false;
+    b.grade = calloc((size_t)job->num, sizeof(json_t *));
+    *grades = json_array();
+    if (b.grade == NULL || *grades == NULL) {
+        free(b.grade);
+        return err_set(e, "out of memory");
+    }
+    json_object_seed(0); /* before threads make objects */
+    while (started < jobs && pthread_create(&thread[started], NULL, work, &b) == 0)
+        started++;
+    if (started == 0)
+        work(&b);
+    for (int k = 0; k < started; k++)
+        pthread_join(thread[k], NULL);
+    for (int i = 0; i < job->num; i++)
+        json_array_append_new(*grades, b.grade[i]);
+    free(b.grade);
+    return true;
+}

@@ -1,0 +1,66 @@
+/* `assay grade`: many submissions by one rubric, each into a directory of its own, whatever they do. */
+#ifndef ASSAY_GRADE_BATCH_H
+#define ASSAY_GRADE_BATCH_H
+
+#include "grade_diagnose.h"
+#include "tools/grade/grade_checks.h"
+
+#include <jansson.h>
+
+struct grade_job {
+    const struct rubric *rubric;
+    const struct answers *answers;
+    const struct sandbox *sandbox;
+    const char *stage;       /* submission_stage() */
+    const char *out;         /* OUT/ID/grade.json and what else there is of it */
+    const char *const *path; /* of the submissions */
+    const char *const *word; /* grade_words(), for "command" of a grade; NULL: not said */
+    int num, jobs, threads;
+    double alpha;                            /* of one check */
+    const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the pictures */
+    const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
+    uint64_t seed;
+    bool again; /* also those that have been graded already */
+    void (*done)(void *ctx, int num, const char *id,
+                 const json_t *grade); /* one at a time; may be NULL */
+    void *ctx;
+};
+
+/* grade.json:
+ *   { "assay_grade": 1, "id": , "kind": "program", "command": | null (grades this one again), "version": , "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
+ *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
+ *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
+ *     "chance": of any check's points being others in another run, at most (the sum of theirs),
+ *     "cpu_s": , "accepted": "light_pdf" (deviations that are not the student's fault, with which it was graded) | "",
+ *     "parts": [{"number": , "title": , "points": , "of": }],
+ *     "checks": [{"kind": "equal", "part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,
+ *                 "expected": , "seen": , "hint": , "where": , "visibility": , "accepted": , "flag": , "picture": ,
+ *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null (exact: the share of
+ *                 its pixels that are wrong),
+ *                 "intervals": [{"what": "red", "value": , "lo": , "hi": , "full": , "none": }] (equal, agree, sum)}],
+ *     "pictures": [{"name": , "file": "NAME.png" | null, "why": , "end": "ok", "cpu_s": , "wall_s": ,
+ *                   "width": , "height": , "sha256": | null}] }
+ *   "diagnosis": null | grade_diagnose.h
+ * Texts of programs are in it: whoever shows them has to escape them. */
+
+/* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
+ * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
+ * the order of path. */
+bool grade_all(const struct grade_job *job, json_t **grades, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* What is made of the grades, by itself and without the submissions: of the class, OUT/grades.csv, junit.xml, grades.tap and
+ * index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, and index.html. The pages need no
+ * other file to be read. Each of the lists ends with NULL. */
+extern const char *const grade_class_files[], *const grade_files[];
+
+/* All of these, and OUT/grades.json, the array. */
+bool grade_write(const char *out, const json_t *grades, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* One of these, into the file `to`, by rename. grades: the array, of a class; one grade, of a submission, whose pictures are in
+ * out/ID. The same bytes of the same grades. */
+bool grade_write_file(const char *out, const json_t *grades, const char *name, const char *to,
+                      struct err *e) __attribute__((warn_unused_result));
+
+#endif

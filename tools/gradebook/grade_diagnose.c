@@ -1,0 +1,142 @@
+#include "grade_diagnose.h"
+
+#include "renderer/base/fs.h"
+#include "tools/diagnose/diagnose_gather.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void join(const char *const *words, char *out, size_t size)
+{
+    size_t n = 0;
+    out[0] = '\0';
+    for (; words != NULL && *words != NULL && n < size; words++)
+        n += (size_t)snprintf(out + n, size - n, "%s ", *words);
+}
+
+static bool add_view(const struct view *v, const struct suite *suite, struct rubric *r,
+                     struct err *e)
+{
+    const struct suite_scene *scene;
+    const struct suite_variant *variant;
+    if (r->num_pictures == RUBRIC_PICTURES)
+        return err_set(e, "more than %d views to diagnose by", RUBRIC_PICTURES);
+    if (!view_scene(v, suite, &scene, &variant, e))
+        return false;
+    struct rubric_picture *p = &r->picture[r->num_pictures++];
+    *p = (struct rubric_picture){.suite = scene,
+                                 .width = v->width,
+                                 .height = v->height,
+                                 .spp = v->spp,
+                                 .lights = 1,
+                                 .bounces = scene->depth};
+    snprintf(p->name, sizeof p->name, "view%d", r->num_pictures);
+    snprintf(p->scene, sizeof p->scene, "%s", scene->name);
+    join(v->options[0] != NULL ? v->options
+         : variant != NULL     ? variant->options
+                               : NULL,
+         p->options, sizeof p->options);
+    return true;
+}
+
+bool diagnosis_open(const struct rubric *r, const char *catalogue_dir, const struct suite *suite,
+                    const char *stage, struct grade_diagnosis *out, struct err *e)
+{
+    *out = (struct grade_diagnosis){.suite = suite, .rubric = calloc(1, sizeof *out->rubric)};
+    snprintf(out->stage, sizeof out->stage, "%s", stage);
+    bool ok = (out->rubric != NULL || err_set(e, "out of memory")) &&
+              catalogue_read(catalogue_dir, &out->catalogue, e);
+    if (ok) {
+        out->rubric->limit = r->limit;
+        snprintf(out->rubric->path, sizeof out->rubric->path, "%s", r->path);
+        snprintf(out->rubric->dir, sizeof out->rubric->dir, "%s", r->dir);
+        snprintf(out->rubric->command, sizeof out->rubric->command, "%s", r->diagnose);
+        snprintf(out->rubric->output, sizeof out->rubric->output, "diagnose.exr");
+    }
+    for (int i = 0; ok && i < out->catalogue.num_views; i++)
+        ok = add_view(&out->catalogue.view[i], suite, out->rubric, e);
+    ok = ok && submission_stage(out->rubric, stage, e);
+    if (!ok)
+        diagnosis_close(out);
+    return ok;
+}
+
+void diagnosis_close(struct grade_diagnosis *d)
+{
+    catalogue_free(&d->catalogue);
+    free(d->rubric);
+    *d = (struct grade_diagnosis){0};
+}
+
+/* One view rendered by the submission; the picture goes away again. */
+static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
+                 const struct submission *s, int view, const char *work, uint64_t seed, int threads,
+                 double alpha, struct clue *clue, struct err *e)
+{
+    char out[4400];
+    struct made made;
+    const struct gather_options opt = {
+        .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
+    snprintf(out, sizeof out, "%s/diagnose", work);
+    if (!make_dirs(out, e) || !submission_picture(d->rubric, box, s, view, d->stage, work, out,
+                                                  seed * 1000u + (uint64_t)view, threads, &made, e))
+        return false;
+    bool ok = made.why[0] == '\0'
+                  ? gather_picture(&opt, d->catalogue.view[view].name, made.path, clue, e)
+                  : err_set(e, "%.500s", made.why);
+    struct err ignored;
+    return remove_tree(out, ok ? e : &ignored) && ok;
+}
+
+static json_t *finding_json(const struct catalogue *c, const struct diagnosis *found)
+{
+    static const char *const names[] = {
+        [FINDING_CORRECT] = "correct", [FINDING_BUG] = "bug", [FINDING_UNKNOWN] = "unknown"};
+    json_t *named = json_array();
+    for (int i = 0; i < found->num_named; i++) {
+        const struct bug *b = &c->bug[found->candidate[i].bug];
+        json_array_append_new(
+            named, json_pack("{ss, ss, ss}", "name", b->name, "bug", b->what, "where", b->where));
+    }
+    return json_pack("{ss, ss, so}", "finding", names[found->finding], "gate", found->gate, "named",
+                     named);
+}
+
+json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
+                              const struct answers *a, const struct handed_in *h, int set,
+                              double alpha)
+{
+    struct diagnosis found;
+    struct err e;
+    int with, pictures = 0;
+    for (int i = 0; i < r->num_pictures; i++)
+        pictures += b->view[0][i] >= 0 && h->picture[i].mean != NULL;
+    if (pictures == 0)
+        return json_null();
+    if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, &found, &with, &e))
+        return json_pack("{ss}", "error", e.msg);
+    if (found.finding == FINDING_CORRECT)
+        found.finding = FINDING_UNKNOWN;
+    json_t *json = finding_json(&b->catalogue, &found);
+    json_object_set_new(json, "with", json_string(r->set[with].name));
+    return json;
+}
+
+json_t *diagnosis_of(const struct grade_diagnosis *d, const struct sandbox *box,
+                     const struct submission *s, const char *work, uint64_t seed, int threads,
+                     double alpha)
+{
+    const struct catalogue *c = &d->catalogue;
+    const struct diagnose_options opt = {.alpha = alpha};
+    struct clue *clue = calloc((size_t)c->num_views, sizeof *clue);
+    struct diagnosis found;
+    struct err e = {""};
+    bool ok = clue != NULL || err_set(&e, "out of memory");
+    for (int i = 0; ok && i < c->num_views; i++)
+        ok = look(d, box, s, i, work, seed, threads, alpha, &clue[i], &e) ||
+             err_prefix(&e, "%s", c->view[i].name);
+    ok = ok && diagnose(c, clue, c->num_views, &opt, &found, &e);
+    free(clue);
+    return ok ? finding_json(c, &found) : json_pack("{ss}", "error", e.msg);
+}

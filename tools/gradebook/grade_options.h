@@ -1,0 +1,34 @@
+/* The command line of `assay grade`. */
+#ifndef ASSAY_GRADE_OPTIONS_H
+#define ASSAY_GRADE_OPTIONS_H
+
+#include "renderer/base/err.h"
+
+#include <stdint.h>
+
+struct grade_settings {
+    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references;
+    const char **submission; /* num of them, words of the command */
+    int num, jobs, threads;
+    uint64_t seed;
+    double alpha;
+    bool only_check, prepare, again, unsafe, quiet, slurm, help;
+};
+
+/* Where the paths are kept that the options do not give. */
+struct grade_paths {
+    char pathtracer[4096], suite[4096], golden[4096], catalogue[4096];
+};
+
+/* submission: NULL out of memory, else room for argc + 1, which the caller frees. */
+struct grade_settings grade_defaults(int argc, struct grade_paths *at);
+/* On top of the defaults. */
+bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
+    __attribute__((warn_unused_result));
+/* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go and how many at a
+ * time: a NULL-terminated array of num words, to free(). NULL out of memory. */
+char **grade_words(int argc, char **argv, const struct grade_settings *s, int *num)
+    __attribute__((warn_unused_result));
+void grade_print_help(void);
+
+#endif

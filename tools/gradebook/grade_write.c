@@ -1,0 +1,307 @@
+#include "grade_batch.h"
+
+#include "reference/base/json_file.h"
+#include "renderer/base/fs.h"
+#include "student_page.h"
+#include "tools/html/html.h"
+#include "tools/results/results.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MAX_PATH = 4400 };
+
+/* To a hundredth of a point: more would be noise. */
+static double rounded(double points)
+{
+    return round(100 * points) / 100;
+}
+
+static bool is_judged(const json_t *check)
+{
+    return json_is_true(json_object_get(check, "judged"));
+}
+
+static bool is_full(const json_t *check)
+{
+    return member_number(check, "share") >= 1;
+}
+
+/* What a student reads of a check. */
+static void describe(const json_t *c, char *out, size_t size)
+{
+    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.", grade_text(c, "expected"),
+                                grade_text(c, "seen"));
+    if (grade_text(c, "accepted")[0] != '\0' && n < size)
+        n += (size_t)snprintf(
+            out + n, size - n,
+            "\nExplained by what the starter code does (%s): no points lost for that.",
+            grade_text(c, "accepted"));
+    if (!is_full(c) && grade_text(c, "hint")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", grade_text(c, "hint"));
+    if (!is_full(c) && grade_text(c, "where")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", grade_text(c, "where"));
+    if (!is_judged(c) && n < size)
+        snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
+}
+
+/* What is said of the submission as a whole, the bug's name with its place above all. */
+static void describe_whole(const json_t *grade, char *out, size_t size)
+{
+    const json_t *diagnosis = json_object_get(grade, "diagnosis");
+    size_t n = (size_t)snprintf(out, size, "%s%s", grade_text(grade, "trouble"),
+                                grade_text(grade, "wrong")),
+           i;
+    json_t *b;
+    if (strcmp(grade_text(diagnosis, "finding"), "unknown") == 0 && n < size)
+        n += (size_t)snprintf(
+            out + n, size - n,
+            "Different from the right pictures in a way that no known bug explains.");
+    json_array_foreach(json_object_get(diagnosis, "named"), i, b)
+    {
+        if (n < size)
+            n += (size_t)snprintf(out + n, size - n, "%s%s (%s)",
+                                  i == 0 ? "This looks like: " : "\nor: ", grade_text(b, "bug"),
+                                  grade_text(b, "where"));
+    }
+}
+
+/* Fields as documented at gradescope-autograders.readthedocs.io, "specs": points and texts of every check, no
+ * score of the whole, which Gradescope adds up. */
+static json_t *gradescope(const json_t *grade)
+{
+    json_t *tests = json_array(), *root = json_object();
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        char output[4096], name[400], number[32];
+        describe(c, output, sizeof output);
+        snprintf(name, sizeof name, "Part %s: %s", grade_text(c, "part"), grade_text(c, "title"));
+        snprintf(number, sizeof number, "%s.%zu", grade_text(c, "part"), i + 1);
+        json_array_append_new(tests,
+                              json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
+                                        rounded(member_number(c, "points")), "max_score",
+                                        member_number(c, "of"), "name", name, "number", number,
+                                        "output", output, "visibility", grade_text(c, "visibility"),
+                                        "status", is_full(c) ? "passed" : "failed"));
+    }
+    char whole[2048];
+    describe_whole(grade, whole, sizeof whole);
+    json_object_set_new(root, "output", json_string(whole));
+    json_object_set_new(root, "output_format", json_string("text"));
+    json_object_set_new(root, "test_output_format", json_string("text"));
+    json_object_set_new(root, "visibility", json_string("visible"));
+    json_object_set_new(root, "stdout_visibility", json_string("hidden"));
+    json_object_set_new(root, "extra_data", json_pack("{ss}", "assay", GRADE_ORIGIN));
+    if (json_array_size(tests) > 0) {
+        json_object_set_new(root, "tests", tests);
+    } else {
+        json_decref(tests);
+        json_object_set_new(root, "score", json_real(0));
+    }
+    return root;
+}
+
+/* RFC 4180; a leading = + - @ would be a formula to a spreadsheet. */
+static void csv_text(FILE *f, const char *text)
+{
+    fputc('"', f);
+    if (text[0] != '\0' && strchr("=+-@\t", text[0]) != NULL)
+        fputc('\'', f);
+    for (; *text != '\0'; text++) {
+        if (*text == '"')
+            fputc('"', f);
+        fputc(*text == '\n' || *text == '\r' ? ' ' : *text, f);
+    }
+    fputc('"', f);
+}
+
+static void write_csv(FILE *f, const json_t *grades)
+{
+    const json_t *first = NULL;
+    size_t i, k;
+    json_t *g, *c;
+    json_array_foreach(grades, i, g)
+    {
+        if (first == NULL && json_array_size(json_object_get(g, "checks")) > 0)
+            first = g;
+    }
+    fputs("id,points,of,remarks", f);
+    json_array_foreach(json_object_get(first, "checks"), k, c)
+    {
+        fputc(',', f);
+        csv_text(f, grade_text(c, "name"));
+    }
+    fputs("\r\n", f);
+    json_array_foreach(grades, i, g)
+    {
+        csv_text(f, grade_text(g, "id"));
+        fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
+        csv_text(f, grade_text(g, "trouble")[0] != '\0' ? grade_text(g, "trouble")
+                                                        : grade_text(g, "wrong"));
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            fprintf(f, ",%.2f", member_number(c, "points"));
+        }
+        fputs("\r\n", f);
+    }
+}
+
+/* One point a line: `#` would begin a directive. */
+static void tap_text(FILE *f, const char *text)
+{
+    for (; *text != '\0'; text++)
+        fputc(*text == '#' || *text == '\n' ? ' ' : *text, f);
+}
+
+static void write_tap(FILE *f, const json_t *grades)
+{
+    size_t i, k, num = 0;
+    json_t *g, *c;
+    json_array_foreach(grades, i, g)
+    {
+        size_t checks = json_array_size(json_object_get(g, "checks"));
+        num += checks > 0 ? checks : 1;
+    }
+    fprintf(f, "TAP version 13\n# " GRADE_CLASS_ORIGIN "\n1..%zu\n", num);
+    num = 0;
+    json_array_foreach(grades, i, g)
+    {
+        if (json_array_size(json_object_get(g, "checks")) == 0) {
+            fprintf(f, "not ok %zu - ", ++num);
+            tap_text(f, grade_text(g, "id"));
+            fputs(": ", f);
+            tap_text(f, grade_text(g, "trouble"));
+            fputc('\n', f);
+        }
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
+            tap_text(f, grade_text(g, "id"));
+            fprintf(f, " %s (%.2f of %g): ", grade_text(c, "name"), member_number(c, "points"),
+                    member_number(c, "of"));
+            tap_text(f, grade_text(c, "seen"));
+            fputc('\n', f);
+        }
+    }
+}
+
+static void xml_pair(FILE *f, const char *name, const char *value)
+{
+    fprintf(f, " %s=\"", name);
+    html_text(f, value);
+    fputc('"', f);
+}
+
+static void write_junit(FILE *f, const json_t *grades)
+{
+    size_t i, k;
+    json_t *g, *c;
+    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- " GRADE_CLASS_ORIGIN
+          " -->\n<testsuites>\n",
+          f);
+    json_array_foreach(grades, i, g)
+    {
+        size_t failures = 0, errors = grade_text(g, "trouble")[0] != '\0',
+               checks = json_array_size(json_object_get(g, "checks"));
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            failures += is_judged(c) && !is_full(c);
+            errors += !is_judged(c);
+        }
+        fputs("<testsuite", f);
+        xml_pair(f, "name", grade_text(g, "id"));
+        fprintf(f, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" time=\"%.2f\">\n",
+                checks + (checks == 0), failures, errors, member_number(g, "cpu_s"));
+        if (checks == 0) {
+            fputs("<testcase name=\"submission\"><error", f);
+            xml_pair(f, "message", grade_text(g, "trouble"));
+            fputs("/></testcase>\n", f);
+        }
+        json_array_foreach(json_object_get(g, "checks"), k, c)
+        {
+            char output[4096];
+            describe(c, output, sizeof output);
+            fputs("<testcase", f);
+            xml_pair(f, "classname", grade_text(c, "part"));
+            xml_pair(f, "name", grade_text(c, "name"));
+            fputc('>', f);
+            if (!is_full(c)) {
+                fputs(is_judged(c) ? "<failure" : "<error", f);
+                xml_pair(f, "message", grade_text(c, "seen"));
+                fputc('>', f);
+                html_text(f, output);
+                fputs(is_judged(c) ? "</failure>" : "</error>", f);
+            }
+            fputs("</testcase>\n", f);
+        }
+        fputs("</testsuite>\n", f);
+    }
+    fputs("</testsuites>\n", f);
+}
+
+static bool write_json(const char *path, json_t *root, struct err *e)
+{
+    bool ok = (root != NULL || err_set(e, "out of memory")) && json_write(path, root, e);
+    json_decref(root);
+    return ok;
+}
+
+/* Of a class. */
+static bool write_text(const json_t *grades, const char *name, FILE *f, struct err *e)
+{
+    if (strcmp(name, "grades.csv") == 0)
+        write_csv(f, grades);
+    else if (strcmp(name, "junit.xml") == 0)
+        write_junit(f, grades);
+    else if (strcmp(name, "grades.tap") == 0)
+        write_tap(f, grades);
+    else {
+        assert(strcmp(name, "index.html") == 0);
+        return grade_overview(f, grades, e);
+    }
+    return true;
+}
+
+const char *const grade_class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
+                                         NULL};
+const char *const grade_files[] = {"results.json", "index.html", NULL};
+
+bool grade_write_file(const char *dir, const json_t *grades, const char *name, const char *to,
+                      struct err *e)
+{
+    struct out_file o;
+    if (strcmp(name, "results.json") == 0)
+        return write_json(to, gradescope(grades), e);
+    if (!make_parent_dirs(to, e) || !out_open(&o, to, e))
+        return false;
+    if (json_is_array(grades) ? write_text(grades, name, o.f, e) : grade_page(o.f, dir, grades, e))
+        return out_commit(&o, e);
+    out_abandon(&o);
+    return false;
+}
+
+bool grade_write(const char *out, const json_t *grades, struct err *e)
+{
+    char path[MAX_PATH];
+    size_t i;
+    json_t *g;
+    bool ok = true;
+    json_array_foreach(grades, i, g)
+    {
+        for (int k = 0; ok && grade_files[k] != NULL; k++) {
+            snprintf(path, sizeof path, "%.4000s/%s/%s", out, grade_text(g, "id"), grade_files[k]);
+            ok = grade_write_file(out, g, grade_files[k], path, e);
+        }
+    }
+    snprintf(path, sizeof path, "%.4000s/grades.json", out);
+    ok = ok && json_write(path, grades, e);
+    for (int k = 0; ok && grade_class_files[k] != NULL; k++) {
+        snprintf(path, sizeof path, "%.4000s/%s", out, grade_class_files[k]);
+        ok = grade_write_file(out, grades, grade_class_files[k], path, e);
+    }
+    return ok;
+}

@@ -1,0 +1,194 @@
+#include "same_noise.h"
+
+#include "tools/results/results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double least_kappa = 0.25, clip_sd = 5;
+enum { GREEN = 1, DETAILS = 3 };
+
+void alike_noise_free(struct alike_noise *n)
+{
+    free(n->detail);
+    free(n->shared);
+    *n = (struct alike_noise){0};
+}
+
+/* Is there noise in all four pixels that rounding and clipping leave as it is? */
+static bool is_usable(const struct student *s, const struct moments *m, const size_t pixel[4],
+                      double spp)
+{
+    for (int k = 0; k < 4; k++) {
+        size_t i = 3 * pixel[k] + GREEN;
+        double sd = student_expected_sd(m, i, spp);
+        if (!(sd > 0) || sd < 2 * s->tolerance[i] || s->clipped[i] ||
+            m->mean[i] + clip_sd * sd > s->clip)
+            return false;
+    }
+    return true;
+}
+
+bool alike_noise_of(const struct student *s, const struct moments *m, double spp,
+                    struct alike_noise *out, struct err *e)
+{
+    int columns = s->width / 2, rows = s->height / 2;
+    double found = 0, expected = 0;
+    size_t blocks = (size_t)columns * (size_t)rows;
+    *out = (struct alike_noise){.blocks = columns * rows,
+                                .detail = calloc(blocks, DETAILS * sizeof(float)),
+                                .shared = calloc(blocks, sizeof(float))};
+    if (out->detail == NULL || out->shared == NULL) {
+        alike_noise_free(out);
+        return err_set(e, "out of memory");
+    }
+    for (int b = 0; b < out->blocks; b++) {
+        size_t first = (size_t)(b / columns * 2) * (size_t)s->width + (size_t)(b % columns * 2);
+        const size_t pixel[4] = {first, first + 1, first + (size_t)s->width,
+                                 first + (size_t)s->width + 1};
+        double d[4], ours = 0, reference = 0;
+        for (int k = 0; k < 4; k++) {
+            size_t i = 3 * pixel[k] + GREEN;
+            double n = m->n[pixel[k]];
+            d[k] = s->mean[i] - m->mean[i];
+            ours += pow(student_expected_sd(m, i, spp), 2) / 4;
+            reference += n > 1 ? m->m2[i] / (n * (n - 1)) / 4 : 0;
+        }
+        float *detail = out->detail + DETAILS * b;
+        if (!is_usable(s, m, pixel, spp)) {
+            detail[0] = NAN;
+            continue;
+        }
+        detail[0] = (float)((d[0] - d[1] + d[2] - d[3]) / 2);
+        detail[1] = (float)((d[0] + d[1] - d[2] - d[3]) / 2);
+        detail[2] = (float)((d[0] - d[1] - d[2] + d[3]) / 2);
+        out->shared[b] = (float)(DETAILS * reference);
+        for (int k = 0; k < DETAILS; k++)
+            found += (double)detail[k] * (double)detail[k];
+        expected += DETAILS * (ours + reference);
+    }
+    if (found < least_kappa * expected)
+        out->blocks = 0;
+    return true;
+}
+
+double alike_t(const struct alike_noise *a, const struct alike_noise *b)
+{
+    double sum = 0, squares = 0;
+    int used = 0;
+    for (int i = 0; i < a->blocks && i < b->blocks; i++) {
+        const float *x = a->detail + DETAILS * i, *y = b->detail + DETAILS * i;
+        if (isnan(x[0]) || isnan(y[0]))
+            continue;
+        double p = -(double)a->shared[i];
+        for (int k = 0; k < DETAILS; k++)
+            p += (double)x[k] * (double)y[k];
+        sum += p;
+        squares += p * p;
+        used++;
+    }
+    return used >= ALIKE_FEWEST && squares > 0 ? sum / sqrt(squares) : NAN;
+}
+
+double alike_bound(double tests, double alpha)
+{
+    return sqrt(2 * log(fmax(1, tests) / alpha));
+}
+
+static const char *text_of(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text != NULL ? text : "";
+}
+
+static int set_of(const struct rubric *r, const json_t *grade)
+{
+    int k = r->num_sets - 1;
+    while (k > 0 && strcmp(r->set[k].name, text_of(grade, "accepted")) != 0)
+        k--;
+    return k;
+}
+
+/* Is it the picture of an `equal` check, and did it cost no points? */
+static bool is_right(const json_t *grade, const char *picture)
+{
+    size_t i;
+    json_t *c;
+    bool asked = false;
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        if (strcmp(text_of(c, "kind"), "equal") != 0 || strcmp(text_of(c, "picture"), picture) != 0)
+            continue;
+        asked = true;
+        if (member_number(c, "share") < 1)
+            return false;
+    }
+    return asked;
+}
+
+/* Pictures that cannot be read any more are left out; for want of memory none is. */
+static bool read_noise(const char *out, const struct rubric *r, const struct answers *a, int i,
+                       const json_t *grade, struct alike_noise *noise, struct err *e)
+{
+    const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
+    const struct rubric_picture *p = &r->picture[i];
+    const struct moments *own = &a->of[set_of(r, grade)][i].m, *plain = &a->of[0][i].m;
+    struct student s;
+    struct err why;
+    char path[4600];
+    snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, text_of(grade, "id"),
+             text_of(made, "file"));
+    if (!is_right(grade, p->name) || text_of(made, "file")[0] == '\0')
+        return true;
+    if (!student_read(path, r->curve, p->width, p->height, &s, &why))
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    bool ok = alike_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
+    student_free(&s);
+    return ok;
+}
+
+static void add_like(json_t *grade, const json_t *other, const char *picture, double t,
+                     double bound)
+{
+    json_t *list = json_object_get(grade, "alike");
+    if (list == NULL) {
+        list = json_array();
+        json_object_set_new(grade, "alike", list);
+    }
+    size_t last = json_array_size(list);
+    const char *id = text_of(other, "id");
+    for (size_t i = 0; i < last; i++)
+        if (strcmp(text_of(json_array_get(list, i), "id"), id) == 0)
+            return; /* by an earlier picture */
+    json_array_append_new(
+        list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", picture, "t", t, "bound", bound));
+}
+
+bool grade_alike(const char *out, const struct rubric *r, const struct answers *a, json_t *grades,
+                 struct err *e)
+{
+    size_t num = json_array_size(grades);
+    struct alike_noise *noise = calloc(num + 1, sizeof *noise);
+    double bound = alike_bound((double)num * ((double)num - 1) / 2 * r->num_pictures, ALIKE_ALPHA);
+    bool ok = noise != NULL || err_set(e, "out of memory");
+    for (int i = 0; ok && i < r->num_pictures; i++) {
+        for (size_t k = 0; ok && k < num; k++)
+            ok = a->of[0][i].m.width == 0 ||
+                 read_noise(out, r, a, i, json_array_get(grades, k), &noise[k], e);
+        for (size_t k = 0; ok && k < num; k++)
+            for (size_t j = 0; noise[k].blocks > 0 && j < k; j++) {
+                double t = alike_t(&noise[k], &noise[j]); /* NAN: not told */
+                json_t *x = json_array_get(grades, k), *y = json_array_get(grades, j);
+                if (t > bound) {
+                    add_like(x, y, r->picture[i].name, t, bound);
+                    add_like(y, x, r->picture[i].name, t, bound);
+                }
+            }
+        for (size_t k = 0; noise != NULL && k < num; k++)
+            alike_noise_free(&noise[k]);
+    }
+    free(noise);
+    return ok;
+}

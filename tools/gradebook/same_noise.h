@@ -1,0 +1,45 @@
+/* Submissions that have the same noise: for staff to look at, never worth points. Programs that draw numbers of their own
+ * err independently of each other, also where both are right or share an idea; a copy, or a picture rendered by somebody
+ * else's program, errs as its original does, retouched or not. So does a program with the same fixed seed that
+ * follows the same text to the letter.
+ *
+ * A picture less its reference in blocks of 2 x 2 pixels, green: the three differences that are orthogonal to the mean (Haar
+ * details), in which what differs smoothly hardly shows. P = sum over the three of A times B, less what both have of the
+ * reference's noise. If A and B are independent E[P] = 0, blocks are independent, and the law of P is symmetric as that of a
+ * difference of like pixels is; then T = sum P / sqrt(sum P^2) exceeds x with a probability of at most exp(-x^2/2)
+ * [Efron69]. Two renders of one noise have T of about 0.6 times the root of the number of blocks. */
+#ifndef ASSAY_SAME_NOISE_H
+#define ASSAY_SAME_NOISE_H
+
+#include "tools/grade/grade_checks.h"
+
+#include <jansson.h>
+
+enum { ALIKE_FEWEST = 150 }; /* blocks that two pictures have to have in common */
+
+struct alike_noise {
+    int blocks;
+    float *detail; /* 3 per block; NAN: not used */
+    float *shared; /* per block: what the reference's noise adds to P */
+};
+
+/* Of a picture of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
+ * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the picture has less
+ * than a quarter of the noise of ours, no block is. False: out of memory. The caller frees. */
+bool alike_noise_of(const struct student *s, const struct moments *m, double spp,
+                    struct alike_noise *out, struct err *e) __attribute__((warn_unused_result));
+void alike_noise_free(struct alike_noise *n);
+
+/* T, NAN where fewer than ALIKE_FEWEST blocks are used in both. */
+double alike_t(const struct alike_noise *a, const struct alike_noise *b);
+/* What T has to exceed for a chance of alpha over `tests` of them. */
+double alike_bound(double tests, double alpha);
+
+/* Compares every pair of a class by the pictures in out/ID that cost neither of them points in an `equal` check (a bug that both
+ * have would not be noise), at most ALPHA false alarms in a class on average. Each grade that has a like gets
+ * "alike": [{"id": , "picture": , "t": , "bound": }]. */
+#define ALIKE_ALPHA 1e-3
+bool grade_alike(const char *out, const struct rubric *r, const struct answers *a, json_t *grades,
+                 struct err *e) __attribute__((warn_unused_result));
+
+#endif

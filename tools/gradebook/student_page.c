@@ -1,0 +1,241 @@
+/* A student's page: what was asked, what was seen, where. One file, no script, nothing from elsewhere. Checks that
+ * are not visible now are left out: the page may be handed to the student. The reference is not shown, only how the
+ * student's picture differs from it. */
+#include "student_page.h"
+
+#include "renderer/base/fs.h"
+#include "renderer/image/tone.h"
+#include "tools/images/image_file.h"
+#include "tools/html/html.h"
+#include "tools/results/results.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_PATH = 4400 };
+
+const char grade_page_head[] =
+    "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
+    "body{font:16px/1.45 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\n"
+    "table{border-collapse:collapse}td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top}\n"
+    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}section{border-top:1px solid #ccc;margin-top:1.2rem}\n"
+    "img{image-rendering:pixelated;background:#000}figure{display:inline-block;margin:.5rem 1rem .5rem 0}\n"
+    "figcaption{font-size:.85rem;color:#555}.lost{color:#a11}.full{color:#171}.where{color:#555}h2{margin-bottom:.2rem}\n"
+    "</style>\n";
+
+const char *grade_text(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text != NULL ? text : "";
+}
+
+static void paragraph(FILE *f, const char *label, const char *text, const char *class)
+{
+    if (text[0] == '\0')
+        return;
+    fprintf(f, "<p class=\"%s\"><b>%s</b> ", class, label);
+    html_text(f, text);
+    fputs("</p>\n", f);
+}
+
+/* Codes as they are, floats by sRGB. */
+static uint8_t *codes(const struct picture *pic)
+{
+    size_t n = 3 * (size_t)pic->width * (size_t)pic->height;
+    uint8_t *rgb8 = malloc(n);
+    bool coded = pic->info.type == IMAGE_INT8 || pic->info.type == IMAGE_INT16;
+    for (size_t i = 0; rgb8 != NULL && i < n; i++)
+        rgb8[i] = coded ? (uint8_t)lround(255 * (double)pic->rgb[i])
+                        : tone_map(TONE_SRGB, (double)pic->rgb[i]);
+    return rgb8;
+}
+
+static bool write_png(FILE *f, int width, int height, const uint8_t *rgb8, struct err *e)
+{
+    uint8_t *bytes;
+    size_t size;
+    if (!image_encode_png(width, height, rgb8, &bytes, &size, e))
+        return false;
+    fputs("data:image/png;base64,", f);
+    html_base64(f, bytes, size);
+    free(bytes);
+    return true;
+}
+
+/* The tile with its neighbours, enlarged: three by three of them, fewer at the rim. Moves rows of rgb8 to its front. */
+static bool show_crop(FILE *f, const struct picture *pic, uint8_t *rgb8, const json_t *tile,
+                      struct err *e)
+{
+    if (json_array_size(tile) != 2)
+        return true;
+    int x = (int)json_number_value(json_array_get(tile, 0)) - GRADE_TILE,
+        y = (int)json_number_value(json_array_get(tile, 1)) - GRADE_TILE;
+    int right = x + 3 * GRADE_TILE < pic->width ? x + 3 * GRADE_TILE : pic->width,
+        bottom = y + 3 * GRADE_TILE < pic->height ? y + 3 * GRADE_TILE : pic->height;
+    x = x > 0 ? x : 0;
+    y = y > 0 ? y : 0;
+    int width = right - x, height = bottom - y;
+    if (width <= 0 || height <= 0)
+        return true;
+    for (int row = 0; row < height; row++)
+        memmove(rgb8 + 3 * (size_t)(row * width),
+                rgb8 + 3 * ((size_t)(y + row) * (size_t)pic->width + (size_t)x), 3 * (size_t)width);
+    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", 12 * width);
+    bool ok = write_png(f, width, height, rgb8, e);
+    fprintf(f,
+            "\"><figcaption>of it, pixels %d,%d to %d,%d, around what differs "
+            "most</figcaption></figure>\n",
+            x, y, right - 1, bottom - 1);
+    return ok;
+}
+
+static bool show_picture(FILE *f, const char *path, const char *name, const json_t *tile,
+                         struct err *e)
+{
+    struct picture pic;
+    struct err why;
+    if (!picture_read(path, &pic, &why)) /* what is wrong with it has been said */
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    uint8_t *rgb8 = codes(&pic);
+    bool ok = rgb8 != NULL || err_set(e, "out of memory");
+    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", GRADE_SHOWN);
+    ok = ok && write_png(f, pic.width, pic.height, rgb8, e);
+    fputs("\"><figcaption>", f);
+    html_text(f, name);
+    fputs(", yours</figcaption></figure>\n", f);
+    ok = ok && show_crop(f, &pic, rgb8, tile, e);
+    free(rgb8);
+    picture_free(&pic);
+    return ok;
+}
+
+/* The chance that another run gets other points, of a check or of all of them. */
+static void show_chance(FILE *f, double chance, bool moves, const char *here)
+{
+    fputs("<p class=\"where\">", f);
+    if (moves)
+        fputs("Between none and all, points move a little with the noise of each run.", f);
+    else if (chance >= 1e-4)
+        fprintf(f, "Another run of the same program gets other points%s with a chance of %.2g %%.",
+                here, 100 * chance);
+    else
+        fprintf(f, "Another run of the same program gets the same points%s, but for 1 in 10 000.",
+                here);
+    fputs("</p>\n", f);
+}
+
+static const json_t *picture_of(const json_t *grade, const char *name)
+{
+    size_t i;
+    json_t *p;
+    json_array_foreach(json_object_get(grade, "pictures"), i, p)
+    {
+        if (strcmp(grade_text(p, "name"), name) == 0)
+            return p;
+    }
+    return NULL;
+}
+
+static bool show_check(FILE *f, const char *dir, const json_t *grade, const json_t *c,
+                       struct err *e)
+{
+    bool full = member_number(c, "share") >= 1;
+    fputs("<section><h3>", f);
+    html_text(f, grade_text(c, "title"));
+    fprintf(f, " <span class=\"%s\">%.2f of %g</span></h3>\n", full ? "full" : "lost",
+            member_number(c, "points"), member_number(c, "of"));
+    paragraph(f, "Expected:", grade_text(c, "expected"), "");
+    paragraph(f, "Seen:", grade_text(c, "seen"), "");
+    paragraph(f,
+              "Explained by what you were given, no points lost for it:", grade_text(c, "accepted"),
+              "");
+    double share = member_number(c, "share");
+    show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
+    const json_t *p = picture_of(grade, grade_text(c, "picture"));
+    bool ok = true;
+    if (!full) {
+        paragraph(f, "Hint:", grade_text(c, "hint"), "");
+        paragraph(f, "Where:", grade_text(c, "where"), "where");
+        if (json_is_string(json_object_get(p, "sha256"))) {
+            char path[MAX_PATH];
+            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir, grade_text(grade, "id"),
+                     grade_text(p, "file"));
+            ok = show_picture(f, path, grade_text(p, "name"), json_object_get(c, "tile"), e);
+            grade_show_difference(f, c, member_number(p, "width"), member_number(p, "height"));
+            grade_show_intervals(f, c);
+        }
+    }
+    fputs("</section>\n", f);
+    return ok;
+}
+
+/* The named bug, or that there is no name. */
+static void show_bug(FILE *f, const json_t *diagnosis)
+{
+    const json_t *named = json_object_get(diagnosis, "named");
+    size_t i;
+    json_t *b;
+    const char *finding = grade_text(diagnosis, "finding");
+    if (strcmp(finding, "unknown") == 0)
+        fputs(
+            "<p>The pictures differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
+            f);
+    if (json_array_size(named) == 0)
+        return;
+    fprintf(f, "<p>This looks like %s:</p><ul>\n",
+            json_array_size(named) > 1 ? "one of these bugs" : "a known bug");
+    json_array_foreach(named, i, b)
+    {
+        fputs("<li>", f);
+        html_text(f, grade_text(b, "bug"));
+        fputs(" <span class=\"where\">(", f);
+        html_text(f, grade_text(b, "where"));
+        fputs(")</span></li>\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
+{
+    size_t i;
+    json_t *p, *c;
+    bool ok = true, left_out = false;
+    fputs(grade_page_head, f);
+    fputs("<meta name=\"generator\" content=\"" GRADE_ORIGIN "\">\n<title>", f);
+    html_text(f, grade_text(grade, "id"));
+    fputs("</title>\n<h1>", f);
+    html_text(f, grade_text(grade, "id"));
+    fprintf(f, ": %.2f of %g points</h1>\n<p>", member_number(grade, "points"),
+            member_number(grade, "of"));
+    html_text(f, grade_text(grade, "rubric"));
+    fputs("</p>\n", f);
+    if (grade_text(grade, "trouble")[0] == '\0' && strcmp(grade_text(grade, "kind"), "images") != 0)
+        show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
+    paragraph(f, "Could not be graded:", grade_text(grade, "trouble"), "lost");
+    paragraph(f, "All of it:", grade_text(grade, "wrong"), "lost");
+    show_bug(f, json_object_get(grade, "diagnosis"));
+    fputs("<table>\n", f);
+    json_array_foreach(json_object_get(grade, "parts"), i, p)
+    {
+        fputs("<tr><td>", f);
+        html_text(f, grade_text(p, "number"));
+        fputs("</td><td>", f);
+        html_text(f, grade_text(p, "title"));
+        fprintf(f, "</td><td class=\"n\">%.2f</td><td>of %g</td></tr>\n",
+                member_number(p, "points"), member_number(p, "of"));
+    }
+    fputs("</table>\n", f);
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        if (strcmp(grade_text(c, "visibility"), "visible") == 0)
+            ok = ok && show_check(f, dir, grade, c, e);
+        else
+            left_out = true;
+    }
+    if (left_out)
+        fputs("<p>Some checks are not shown yet.</p>\n", f);
+    return ok;
+}

@@ -1,0 +1,65 @@
+#include "csv_link.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <string.h>
+
+struct csv csv_open(FILE *f, const char *name, const char *header)
+{
+    fprintf(f,
+            "<a class=\"csv\" download=\"%s\" aria-label=\"%s\" "
+            "href=\"data:text/csv;charset=utf-8,%s%%0D%%0A",
+            name, name, header);
+    return (struct csv){.f = f};
+}
+
+static void separate(struct csv *c)
+{
+    if (c->in_line)
+        fputc(',', c->f);
+    c->in_line = true;
+}
+
+void csv_text(struct csv *c, const char *s)
+{
+    separate(c);
+    fputs("%22", c->f);
+    if (s != NULL && *s != '\0' && strchr("=+-@\t\r", *s) != NULL)
+        fputs("%27", c->f);
+    for (; s != NULL && *s != '\0'; s++) {
+        unsigned char byte = (unsigned char)*s;
+        if (byte == '"')
+            fputs("%22%22", c->f);
+        else if (isalnum(byte) || strchr("._-", byte) != NULL)
+            fputc(byte, c->f);
+        else
+            fprintf(c->f, "%%%02X", byte);
+    }
+    fputs("%22", c->f);
+}
+
+void csv_number(struct csv *c, double v)
+{
+    separate(c);
+    if (isfinite(v))
+        fprintf(c->f, "%.6g", v);
+}
+
+void csv_interval(struct csv *c, const json_t *object, const char *name)
+{
+    const json_t *ends = json_object_get(object, name);
+    for (size_t n = 0; n < 2; n++)
+        csv_number(c,
+                   json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n)) : NAN);
+}
+
+void csv_line(struct csv *c)
+{
+    fputs("%0D%0A", c->f);
+    c->in_line = false;
+}
+
+void csv_close(struct csv *c)
+{
+    fputs("\">CSV</a>", c->f);
+}

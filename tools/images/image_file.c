@@ -1,0 +1,109 @@
+#include "image_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool check_file(const char *path, const struct image_info *info, struct err *e)
+{
+    bool integer = info->type == IMAGE_INT8 || info->type == IMAGE_INT16;
+    bool is_float = info->type == IMAGE_HALF || info->type == IMAGE_FLOAT;
+    bool known = (strcmp(info->format, "png") == 0 && integer) ||
+                 ((strcmp(info->format, "openexr") == 0 || strcmp(info->format, "hdr") == 0 ||
+                   strcmp(info->format, "pnm") == 0) &&
+                  is_float);
+    if (!known)
+        return err_set(e,
+                       "%s: a picture to compare is an EXR, HDR or PFM of floats or a PNG of 8 or "
+                       "16 bits, this is %s",
+                       path, info->format);
+    if (info->parts > 1)
+        return err_set(e, "%s: has %d pictures in one file, which of them?", path, info->parts);
+    if (info->orientation != 1)
+        return err_set(e, "%s: is stored rotated or mirrored (orientation %d)", path,
+                       info->orientation);
+    if (info->is_cropped)
+        return err_set(e,
+                       "%s: stores another rectangle than the picture (data and display windows "
+                       "differ)",
+                       path);
+    return true;
+}
+
+static bool channels_of(const char *path, const struct image *im, int at[3], int *alpha,
+                        struct err *e)
+{
+    static const char *const rgb[3] = {"R", "G", "B"};
+    int y = image_channel(im, "Y");
+    *alpha = image_channel(im, "A");
+    bool has_all = true;
+    for (int c = 0; c < 3; c++) {
+        at[c] = image_channel(im, rgb[c]);
+        has_all = has_all && at[c] >= 0;
+    }
+    if (has_all)
+        return true;
+    bool grey = y >= 0 && im->channels == 1 + (*alpha >= 0);
+    for (int c = 0; c < 3; c++)
+        at[c] = y;
+    return grey ||
+           err_set(e, "%s: has no channels R, G, B, nor is it grey; its first is '%s' of %d", path,
+                   im->names[0], im->channels);
+}
+
+bool picture_from_image(const char *path, const struct image *im, const struct image_info *info,
+                        struct picture *out, struct err *e)
+{
+    int at[3], alpha;
+    *out = (struct picture){.width = im->width, .height = im->height, .info = *info};
+    if (!check_file(path, info, e) || !channels_of(path, im, at, &alpha, e))
+        return false;
+    out->num_other = im->channels - (at[0] == at[1] ? 1 : 3) - (alpha >= 0);
+    size_t pixels = (size_t)im->width * (size_t)im->height;
+    out->rgb = malloc(3 * pixels * sizeof *out->rgb);
+    if (out->rgb == NULL)
+        return err_set(e, "%s: out of memory for %zu pixels", path, pixels);
+    for (size_t p = 0; p < pixels; p++) {
+        const float *px = im->data + (size_t)im->channels * p;
+        size_t x = p % (size_t)im->width, y = p / (size_t)im->width;
+        bool ok = true;
+        if (alpha >= 0 && px[alpha] != 1)
+            ok = err_set(e, "%s: pixel %zu,%zu is not opaque (alpha %g)", path, x, y,
+                         (double)px[alpha]);
+        for (size_t c = 0; ok && c < 3; c++) {
+            float v = px[at[c]];
+            if (!isfinite(v))
+                ok = err_set(e, "%s: pixel %zu,%zu is %s", path, x, y,
+                             isnan(v) ? "not a number" : "infinite");
+            out->rgb[3 * p + c] = v;
+        }
+        if (!ok) {
+            picture_free(out);
+            return false;
+        }
+    }
+    return true;
+}
+
+bool picture_read(const char *path, struct picture *out, struct err *e)
+{
+    struct image_info info;
+    return image_inspect(path, &info, e) && picture_read_inspected(path, &info, out, e);
+}
+
+bool picture_read_inspected(const char *path, const struct image_info *info, struct picture *out,
+                            struct err *e)
+{
+    struct image im = {0};
+    if (!check_file(path, info, e) || !image_read(path, &im, NULL, e))
+        return false;
+    bool ok = picture_from_image(path, &im, info, out, e);
+    image_free(&im);
+    return ok;
+}
+
+void picture_free(struct picture *p)
+{
+    free(p->rgb);
+    *p = (struct picture){0};
+}

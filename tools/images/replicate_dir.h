@@ -1,0 +1,24 @@
+/* A directory of pictures of one scene by one engine, each with a seed of its own. */
+#ifndef ASSAY_REPLICATE_DIR_H
+#define ASSAY_REPLICATE_DIR_H
+
+#include "renderer/image/moments.h"
+
+struct renders {
+    int num, width, height;
+    float **rgb; /* num pictures: 3 floats a pixel */
+    char **name; /* their file names, sorted */
+};
+
+/* Reads every file of the directory (but hidden ones) in the order of their names. Fails with a line
+ * unless all are pictures of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
+ * same ("the seed was ignored"). The caller frees with renders_free(). */
+bool renders_read(const char *dir, struct renders *out, struct err *e)
+    __attribute__((warn_unused_result));
+void renders_free(struct renders *r);
+
+/* Their moments, unit "replicate", spp 0 (not known). */
+bool renders_moments(const struct renders *r, struct moments *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,41 @@
+#include "tone_curve.h"
+
+#include "renderer/base/cli.h"
+
+#include <math.h>
+#include <string.h>
+
+bool curve_parse(const char *text, struct curve *out, struct err *e)
+{
+    *out = (struct curve){.kind = CURVE_LINEAR, .gamma = 1};
+    if (strcmp(text, "linear") == 0)
+        return true;
+    if (strcmp(text, "srgb") == 0)
+        out->kind = CURVE_SRGB;
+    else if (strcmp(text, "cgl") == 0)
+        out->kind = CURVE_CGL;
+    else if (strncmp(text, "gamma=", 6) == 0)
+        out->kind = CURVE_GAMMA;
+    else
+        return err_set(e, "--curve: '%s' is none of: srgb, linear, gamma=G, cgl", text);
+    return out->kind != CURVE_GAMMA ||
+           cli_double("--curve gamma", text + 6, 0.2, 5, &out->gamma, e);
+}
+
+double curve_decode(const struct curve *c, double code)
+{
+    switch (c->kind) {
+    case CURVE_LINEAR: return code;
+    case CURVE_SRGB: return code <= 0.04045 ? code / 12.92 : pow((code + 0.055) / 1.055, 2.4);
+    case CURVE_GAMMA: return pow(code, c->gamma);
+    case CURVE_CGL: return pow(code, 2.2) / sqrt(2);
+    }
+    return NAN;
+}
+
+void curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi)
+{
+    double below = c->kind == CURVE_CGL ? 0 : 0.5, above = 1 - below;
+    *lo = curve_decode(c, fmax(0, (k - below) / steps));
+    *hi = curve_decode(c, fmin(1, (k + above) / steps));
+}

@@ -1,0 +1,247 @@
+#include "input_internal.h"
+
+#include "tools/compare/region.h"
+#include "tools/images/replicate_dir.h"
+#include "tools/stats/noise_estimate.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static const double most_censored = 0.05;     /* of the picture, for EQUIVALENT */
+static const double most_censored_tile = 0.5; /* of a reporting tile */
+
+void notes_add(struct notes *notes, const char *format, ...)
+{
+    int most = (int)(sizeof notes->line / sizeof notes->line[0]);
+    if (notes->num == most)
+        return;
+    char *line = notes->line[notes->num];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line, sizeof notes->line[0], format, args);
+    va_end(args);
+    for (int i = 0; i < notes->num; i++)
+        if (strcmp(notes->line[i], line) == 0)
+            return;
+    notes->num++;
+}
+
+static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
+{
+    struct renders r;
+    if (!renders_read(path, &r, e))
+        return false;
+    out->kind = INPUT_REPLICATES;
+    bool ok = renders_moments(&r, &out->m, e);
+    notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own", path,
+              r.num);
+    renders_free(&r);
+    return ok;
+}
+
+static bool is_moments(const struct image *im)
+{
+    return image_channel(im, "M2.R") >= 0;
+}
+
+/* Ours are told by their header, and OpenImageIO stays where it is. Fails only out of memory: then that could not be had either. */
+static bool look_for_moments(const char *path, bool *says, struct err *e)
+{
+    struct image head;
+    struct err why;
+    *says = false;
+    if (!image_read_exr_head(path, &head, &why))
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    *says = is_moments(&head);
+    image_free(&head);
+    return true;
+}
+
+static bool read_moments(const char *path, char side, const struct input_options *opt,
+                         struct input *out, struct err *e)
+{
+    out->kind = INPUT_MOMENTS;
+    if (!moments_read(path, &out->m, NULL, e))
+        return false;
+    if (strcmp(out->m.unit, "picture") == 0)
+        return err_set(e, "%s: is one side of a comparison; its variance belongs to both", path);
+    return !(opt->spp > 0) ||
+           err_set(e, "%s: --spp-%c: a moments image says itself how many samples it has", path,
+                   side);
+}
+
+static bool read_file(const char *path, char side, const struct input_options *opt,
+                      struct input *out, struct notes *notes, struct err *e)
+{
+    struct image_info info;
+    struct image im;
+    bool mitsuba = false, ours;
+    if (!look_for_moments(path, &ours, e))
+        return false;
+    if (ours)
+        return read_moments(path, side, opt, out, e);
+    if (!image_inspect(path, &info, e))
+        return false;
+    if (strcmp(info.format, "openexr") != 0)
+        return input_picture(path, side, opt, out, notes, e);
+    if (!image_read(path, &im, NULL, e))
+        return false;
+    bool ok = is_moments(&im) ? read_moments(path, side, opt, out, e)
+                              : input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
+    bool done = !ok || is_moments(&im) || mitsuba;
+    image_free(&im);
+    return done ? ok : input_picture(path, side, opt, out, notes, e);
+}
+
+bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,
+                struct notes *notes, struct err *e)
+{
+    *out = (struct input){0};
+    struct stat st;
+    bool directory = stat(path, &st) == 0 && S_ISDIR(st.st_mode), ok;
+    if (directory && opt->spp > 0)
+        ok = err_set(e, "%s: --spp-%c means nothing for a directory of replicates", path, side);
+    else if (directory)
+        ok = read_directory(path, out, notes, e);
+    else
+        ok = read_file(path, side, opt, out, notes, e);
+    if (!ok)
+        input_free(out);
+    return ok;
+}
+
+void input_free(struct input *in)
+{
+    moments_free(&in->m);
+    free(in->censored);
+    free(in->rounding);
+    *in = (struct input){0};
+}
+
+/* Both sides get the union, and in it the same number without noise. */
+static bool censor(struct input *a, struct input *b, struct notes *notes, struct err *e)
+{
+    if (a->censored == NULL && b->censored == NULL)
+        return true;
+    size_t pixels = (size_t)a->m.width * (size_t)a->m.height, num = 0;
+    for (int i = 0; i < 2; i++) {
+        struct input *in = i ? b : a;
+        if (in->censored == NULL)
+            in->censored = calloc(pixels, 1);
+        if (in->censored == NULL)
+            return err_set(e, "out of memory for %zu pixels", pixels);
+    }
+    for (size_t p = 0; p < pixels; p++) {
+        bool out = a->censored[p] || b->censored[p];
+        a->censored[p] = b->censored[p] = out;
+        num += out;
+        for (size_t i = 3 * p; out && i < 3 * p + 3; i++) {
+            a->m.mean[i] = b->m.mean[i] = 0;
+            a->m.m2[i] = b->m.m2[i] = a->m.m3[i] = b->m.m3[i] = 0;
+            if (a->m.tolerance != NULL)
+                a->m.tolerance[i] = 0;
+            if (b->m.tolerance != NULL)
+                b->m.tolerance[i] = 0;
+        }
+    }
+    a->num_censored = b->num_censored = num;
+    if (num == pixels)
+        return err_set(e, "every pixel is saturated in one of the pictures");
+    notes_add(notes,
+              "saturated: %zu of %zu pixels (%.2g %%) have the darkest or brightest code in a "
+              "picture; they are in no sum and nothing is said of them. Regions around them are "
+              "measured by what is left",
+              num, pixels, 100 * (double)num / (double)pixels);
+    return true;
+}
+
+static bool pair_pictures(struct input *a, struct input *b, struct notes *notes, struct err *e)
+{
+    struct spatial s;
+    if (a->kind != INPUT_PICTURE || b->kind != INPUT_PICTURE)
+        notes_add(notes, "the variance that %c has is not used: the other side has none",
+                  a->kind == INPUT_PICTURE ? 'B' : 'A');
+    if (!spatial_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
+        return false;
+    a->is_guessed = b->is_guessed = true;
+    notes_add(notes,
+              "approximate: without moments, the noise is taken from second differences of A - B "
+              "in blocks of 8 x 8 pixels (1/6 degree of freedom a pixel); an error as fine as a "
+              "pixel or two counts as noise and is missed");
+    notes_add(notes,
+              "neighbouring pixels share noise: means of 4 x 4 have %.2f, %.2f, %.2f times the "
+              "variance (R, G, B) of independent pixels; this is allowed for, noise shared more "
+              "widely (a denoiser's) is not",
+              s.factor[0], s.factor[1], s.factor[2]);
+    notes_add(notes,
+              "skewness of A - B in one pixel: %+.2f, %+.2f, %+.2f (+-%.2f, %.2f, %.2f); unequal "
+              "sample counts or fireflies keep small regions, or all, from being tested",
+              s.skewness[0], s.skewness[1], s.skewness[2], s.skew_error[0], s.skew_error[1],
+              s.skew_error[2]);
+    return true;
+}
+
+bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
+{
+    if (a->m.width != b->m.width || a->m.height != b->m.height)
+        return err_set(e, "A is %d x %d pixels, B is %d x %d", a->m.width, a->m.height, b->m.width,
+                       b->m.height);
+    if (a->is_xyz || b->is_xyz) {
+        input_to_xyz(a);
+        input_to_xyz(b);
+        notes_add(notes,
+                  "compared as CIE X, Y, Z, in which one side has its variance: red, green "
+                  "and blue stand for X, Y and Z, luminance for .2126 X + .7152 Y + .0722 Z");
+    }
+    if (!censor(a, b, notes, e))
+        return false;
+    if (a->kind == INPUT_PICTURE || b->kind == INPUT_PICTURE)
+        return pair_pictures(a, b, notes, e);
+    /* The unknown skewness must add to the other side's in A - B, not cancel it. */
+    if (a->kind == INPUT_VARIANCE)
+        input_bound_skewness(&a->m, b->kind == INPUT_VARIANCE ? 1 : -1);
+    if (b->kind == INPUT_VARIANCE)
+        input_bound_skewness(&b->m, -1);
+    return true;
+}
+
+void input_limit(const struct input *a, int tile, struct comparison *c)
+{
+    if (a->censored == NULL)
+        return;
+    double pixels = (double)a->m.width * a->m.height, share = (double)a->num_censored / pixels;
+    double worst = 0;
+    int worst_x = 0, worst_y = 0;
+    for (int y = 0; y < a->m.height; y += tile)
+        for (int x = 0; x < a->m.width; x += tile) {
+            double num = 0;
+            for (int i = 0; i < tile; i++)
+                for (int j = 0; j < tile; j++)
+                    num += a->censored[(size_t)(y + i) * (size_t)a->m.width + (size_t)(x + j)] != 0;
+            if (num / ((double)tile * tile) > worst) {
+                worst = num / ((double)tile * tile);
+                worst_x = x;
+                worst_y = y;
+            }
+        }
+    if (worst > most_censored_tile)
+        c->mdb_tile = region_mdb_none;
+    if (c->verdict != VERDICT_EQUIVALENT || (share <= most_censored && worst <= most_censored_tile))
+        return;
+    c->verdict = VERDICT_INCONCLUSIVE;
+    c->extra_factor = 1;
+    if (share > most_censored)
+        snprintf(c->reason, sizeof c->reason,
+                 "no difference found, but %.3g %% of the pixels are saturated, more than the %.3g "
+                 "%% that a verdict of EQUIVALENT allows",
+                 100 * share, 100 * most_censored);
+    else
+        snprintf(c->reason, sizeof c->reason,
+                 "no difference found, but %.3g %% of the tile at %d,%d is saturated: nothing is "
+                 "known of it",
+                 100 * worst, worst_x, worst_y);
+}

@@ -1,0 +1,57 @@
+/* What `assay compare` takes for a side, turned into moments (tools/README.md, "Inputs"):
+ *   a moments EXR; a directory of replicates; the output of Mitsuba 3's moment integrator, or its
+ *   reference with a variance image beside it; a plain picture: EXR, HDR, PFM of floats; a PNG of
+ *   known tone curve.
+ * What has been assumed on the way is told in notes, which belong beside every verdict. */
+#ifndef ASSAY_INPUT_H
+#define ASSAY_INPUT_H
+
+#include "tools/compare/compare.h"
+
+struct notes {
+    int num;
+    char line[16][320];
+};
+/* One more note; the same text twice is one note. */
+void notes_add(struct notes *notes, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+enum input_kind {
+    INPUT_MOMENTS,    /* all there */
+    INPUT_REPLICATES, /* all there, from a directory */
+    INPUT_VARIANCE,   /* mean and variance, no skewness */
+    INPUT_PICTURE     /* the mean alone */
+};
+
+struct input_options {
+    const char *curve; /* of integer pictures (tone_curve.h); NULL: not known */
+    double spp;        /* samples per pixel of a side whose file does not say; 0: not known */
+};
+
+struct input {
+    enum input_kind kind;
+    struct moments m;        /* of INPUT_VARIANCE M3 is 0, of INPUT_PICTURE n, M2, M3 are 0, until
+                                input_pair() */
+    bool is_xyz;             /* CIE X, Y, Z instead of R, G, B */
+    unsigned char *censored; /* 1 per pixel: not 0 where nothing is known, or NULL */
+    double *rounding;        /* 3 per pixel: variance that rounding to a code has added, or NULL */
+    size_t num_censored;
+    bool is_guessed; /* by input_pair(): n, unit and spp stand for nothing that was observed */
+};
+
+/* Reads one side; `side` is 'a' or 'b', for messages. The caller frees with input_free(). */
+bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,
+                struct notes *notes, struct err *e) __attribute__((warn_unused_result));
+void input_free(struct input *in);
+
+/* Makes both fit for compare_moments(): the same colour space, censored pixels out of both (0, exact,
+ * whatever they were), skewness bounded where it is not known, and variance from the pictures
+ * themselves if one of them has none. */
+bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* After compare_moments() on a pair: EQUIVALENT becomes INCONCLUSIVE, with the reason, if more than
+ * 5 % of the picture or half of a reporting tile is censored; in the latter case nothing is detectable
+ * in that tile, and mdb_tile says so. */
+void input_limit(const struct input *a, int tile, struct comparison *c);
+
+#endif

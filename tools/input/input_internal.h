@@ -1,0 +1,23 @@
+/* The kinds of input.h, one function each. `out` is zeroed before. */
+#ifndef ASSAY_INPUT_INTERNAL_H
+#define ASSAY_INPUT_INTERNAL_H
+
+#include "reference/base/image_oiio.h"
+#include "input.h"
+
+/* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is such a one at all; false and no error if
+ * not. `im` is the file. */
+bool input_mitsuba(const char *path, char side, const struct image *im,
+                   const struct image_info *info, const struct input_options *opt,
+                   struct input *out, bool *is_it, struct notes *notes, struct err *e)
+    __attribute__((warn_unused_result));
+/* R, G, B to X, Y, Z: means, and bounds of the rest for any correlation of the channels. */
+void input_to_xyz(struct input *in);
+/* Skewness of a log-normal law of the same mean and variance, as M3, times sign. */
+void input_bound_skewness(struct moments *m, double sign);
+
+/* Pictures without moments (plain_image.c). */
+bool input_picture(const char *path, char side, const struct input_options *opt, struct input *out,
+                   struct notes *notes, struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,157 @@
+/* A grading batch as jobs: one for each submission. */
+#define _GNU_SOURCE
+#include "reference/base/process.h"
+#include "renderer/base/fs.h"
+#include "tools/gradebook/grade_options.h"
+#include "job_kinds.h"
+#include "tools/results/results.h"
+#include "tools/grade/rubric.h"
+#include "tools/commands/commands.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* The references are made here and now: all jobs need the same. */
+static bool prepare(const char *references, char *const *words, int num, struct err *e)
+{
+    enum { MOST = 64 };
+    const char *argv[MOST + 5] = {"grade", "-q", "--prepare", "--references", references};
+    if (num > MOST - 1)
+        return err_set(e, "too many options for a plan");
+    memcpy(argv + 5, words, (size_t)num * sizeof *words);
+    return verb_grade(5 + num, (char **)argv, e) == 0;
+}
+
+static bool beside_rubric(struct plan *p, const struct rubric *r, const char *name, struct err *e)
+{
+    char path[PLAN_PATH + 256];
+    snprintf(path, sizeof path, "%s/%s", r->dir, name);
+    return name[0] == '\0' || plan_input(p, path, e);
+}
+
+/* The rubric and what it names. */
+static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct err *e)
+{
+    struct suite suite = {0};
+    struct rubric *r = calloc(1, sizeof *r);
+    struct rubric_mistakes m;
+    bool ok = (r != NULL || err_set(e, "out of memory")) && suite_load(s->suite, &suite, e) &&
+              rubric_read(s->rubric, &suite, r, &m, e);
+    if (ok && m.num > 0)
+        ok = err_set(e, "%s:%d: %s", s->rubric, m.at[0].line, m.at[0].text);
+    for (int i = 0; ok && i < r->num_pictures; i++) {
+        const struct rubric_picture *picture = &r->picture[i];
+        if (picture->suite == NULL)
+            ok = beside_rubric(p, r, picture->scene, e) &&
+                 beside_rubric(p, r, picture->environment, e);
+        else
+            ok = plan_input(p, picture->suite->dae, e) &&
+                 (picture->suite->environment[0] == '\0' ||
+                  plan_input(p, picture->suite->environment, e));
+    }
+    ok = ok && beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
+         (r->diagnose[0] == '\0' || plan_input(p, s->catalogue, e));
+    suite_free(&suite);
+    free(r);
+    return ok;
+}
+
+static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, struct plan *p,
+                      struct err *e)
+{
+    char assay[4096], references[PLAN_PATH + 16];
+    int num = 0;
+    char **words = grade_words(argc, argv, s, &num);
+    bool ok = words != NULL || err_set(e, "out of memory");
+    beside_program(assay, sizeof assay, "assay");
+    ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
+    snprintf(references, sizeof references, "%s/references", p->dir);
+    const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
+    ok = ok && prepare(references, words + 1, num - 1, e) &&
+         plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+         plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
+         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
+         plan_input(p, s->pathtracer, e) && rubric_inputs(p, s, e);
+    plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
+    for (int k = 0; ok && k < s->num; k++)
+        ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
+    free(words);
+    return ok;
+}
+
+bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
+{
+    struct grade_paths at;
+    struct grade_settings s = grade_defaults(argc, &at);
+    (void)w; /* a job for each submission */
+    bool ok = s.submission != NULL || err_set(e, "out of memory");
+    ok = ok && grade_parse(argc, argv, &s, e);
+    if (ok && (s.help || s.only_check || s.prepare || s.again))
+        ok = err_set(e, "--help, --check-rubric, --prepare and --again cannot be planned");
+    ok = ok && plan_jobs(&s, argc, argv, p, e);
+    free(s.submission);
+    return ok;
+}
+
+/* The last part of a path, as grading names what is handed in. */
+static void id_of(const char *path, char id[128])
+{
+    size_t n = strlen(path);
+    while (n > 1 && path[n - 1] == '/')
+        n--;
+    const char *at = path + n;
+    while (at > path && at[-1] != '/')
+        at--;
+    snprintf(id, 128, "%.*s", (int)(path + n - at < 127 ? path + n - at : 127), at);
+}
+
+/* OUT/ID as the job left it, by rename. What a node had trouble with left nothing, and the batch tries it again. */
+static bool place(const struct plan *p, int k, const char *out, const char *submission,
+                  struct err *e)
+{
+    char from[PLAN_PATH + 512], to[PLAN_PATH + 512], temp[PLAN_PATH + 512], id[128],
+        artefact[PLAN_PATH + 256];
+    id_of(submission, id);
+    plan_artefact(p, k, NULL, artefact);
+    snprintf(from, sizeof from, "%s/%s", artefact, id);
+    snprintf(to, sizeof to, "%.4000s/%s", out, id);
+    snprintf(temp, sizeof temp, "%.4000s/.%s.tmp%ld", out, id, (long)getpid());
+    if (!plan_verify(p, k, e))
+        return false;
+    if (access(from, F_OK) != 0)
+        return true;
+    const char *const copy[] = {"cp", "-a", "--", from, temp, NULL};
+    const struct process process = {.argv = copy};
+    return remove_tree(temp, e) && process_run(&process, NULL, e) && remove_tree(to, e) &&
+           (rename(temp, to) == 0 || err_set(e, "%s: cannot appear: %s", to, strerror(errno)));
+}
+
+/* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
+int grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
+{
+    struct grade_paths at;
+    struct grade_settings s = grade_defaults(argc, &at);
+    char references[PLAN_PATH + 16];
+    int num = 0;
+    const char **words = calloc((size_t)argc + 4, sizeof *words);
+    bool ok = (s.submission != NULL && words != NULL) || err_set(e, "out of memory");
+    ok = ok && grade_parse(argc, argv, &s, e) && make_dirs(s.out, e);
+    for (int k = 0; ok && k < p->num; k++)
+        ok = place(p, k, s.out, s.submission[k], e);
+    if (ok) {
+        snprintf(references, sizeof references, "%s/references", p->dir);
+        words[num++] = "grade";
+        words[num++] = "--references";
+        words[num++] = references;
+        for (int i = 1; i < argc; i++)
+            if (strcmp(argv[i], "--slurm") != 0)
+                words[num++] = argv[i];
+    }
+    int code = ok ? verb_grade(num, (char **)words, e) : EXIT_NOT_JUDGED;
+    free(s.submission);
+    free(words);
+    return code;
+}

@@ -1,0 +1,53 @@
+/* What can be planned (plan.h), and what a kind has to say for it. */
+#ifndef ASSAY_JOB_KINDS_H
+#define ASSAY_JOB_KINDS_H
+
+#include "renderer/base/cli_rewrite.h"
+#include "plan.h"
+
+#include <stdint.h>
+
+/* A plan in the making. Texts are copied; what is no UTF-8 makes it fail at the end. */
+
+/* First of all: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
+bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
+    __attribute__((warn_unused_result));
+/* Words of all jobs, from the program on, which is an input. user: from the user's command, where "{job}" and "{out}" are
+ * refused. */
+bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)
+    __attribute__((warn_unused_result));
+/* Those of the user's command that the table does not leave out. */
+bool plan_user_words(struct plan *p, const struct option_words *leave_out, int num, char **word,
+                     struct err *e) __attribute__((warn_unused_result));
+/* An exit code besides 0. */
+void plan_may_end(struct plan *p, int code);
+/* A file or directory that all jobs read. */
+bool plan_input(struct plan *p, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+/* What "cycles" or "povray" is besides its scene: the program, cycles.py and its modules in share_dir. *sha256 (may be
+ * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
+bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
+                        const char **sha256, struct err *e) __attribute__((warn_unused_result));
+/* What a validation with --live runs: Blender, and POV-Ray where it is in PATH, since not every scene needs that. */
+bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+    __attribute__((warn_unused_result));
+/* The next job; input: what it alone reads, NULL at the end. After all of the above. */
+bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
+              struct err *e) __attribute__((warn_unused_result));
+
+/* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
+bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
+/* Without naming the pictures on stdout. */
+bool render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
+    __attribute__((warn_unused_result));
+int render_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
+int grade_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                   struct err *e);
+int validate_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                    struct err *e);
+int reference_gather(const struct plan *p, int argc, char **argv, struct err *e);
+
+#endif

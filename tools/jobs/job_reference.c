@@ -1,0 +1,272 @@
+/* References as jobs: each renders some pictures of one of them (replicate_images.h), a replicate of Cycles say; what is there and up
+ * to date has none. The plan's head also has
+ *   "references": [{"scene": , "engine": , "seed": , "key": reference_key(), "binary_sha256": of the engine,
+ *                   "job": of its first pictures, "jobs": how many}] */
+#include "reference/base/process.h"
+#include "renderer/base/cli_rewrite.h"
+#include "renderer/base/fs.h"
+#include "job_kinds.h"
+#include "tools/golden/reference_options.h"
+#include "tools/results/results.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What every job says itself, or what is settled when it is planned. */
+static const struct option_words not_of_a_job[] = {{"--only", 1},
+                                                   {"--engine", 1},
+                                                   {"-o", 1},
+                                                   {"--out", 1},
+                                                   {"--golden", 1},
+                                                   {"--fresh", 0},
+                                                   {"--seed", 1},
+                                                   {"-t", 1},
+                                                   {"--threads", 1},
+                                                   {"--slurm", 0},
+                                                   {0}};
+
+static bool add_words(struct plan *p, int argc, char **argv, int threads, struct err *e)
+{
+    char assay[4096], t[16];
+    beside_program(assay, sizeof assay, "assay");
+    snprintf(t, sizeof t, "%d", threads);
+    const char *const first[] = {assay, "reference", "-t", t, "--out", "{out}", "{job}"};
+    return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+           plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
+}
+
+bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
+                        const char **sha256, struct err *e)
+{
+    static const char *const scripts[] = {"cycles", "cycles_blender", "cycles_geometry",
+                                          "cycles_light", "cycles_material"};
+    bool cycles = strcmp(engine, "cycles") == 0, ok = true;
+    const char *name = cycles ? "blender" : engine;
+    char path[PLAN_PATH + 64];
+    for (size_t i = 0; ok && cycles && i < sizeof scripts / sizeof *scripts; i++) {
+        snprintf(path, sizeof path, "%.4000s/cycles/%s.py", share_dir, scripts[i]);
+        ok = plan_input(p, path, e);
+    }
+    if (ok && !process_find(name, path, sizeof path))
+        return err_set(e, "%s: no such program in PATH", name);
+    ok = ok && plan_input(p, path, e);
+    if (ok && sha256 != NULL)
+        *sha256 = json_string_value(json_object_get(json_object_get(p->head, "inputs"), path));
+    return ok;
+}
+
+bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+{
+    char path[PLAN_PATH + 64];
+    snprintf(path, sizeof path, "%.4000s/import_check/blender_import.py", share_dir);
+    return plan_input(p, path, e) && plan_engine_inputs(p, "cycles", share_dir, NULL, e) &&
+           (!process_find("povray", path, sizeof path) ||
+            plan_engine_inputs(p, "povray", share_dir, NULL, e));
+}
+
+/* A reference that has to be rendered. */
+struct wanted {
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+    struct reference_state state;
+    int pictures;
+};
+
+struct planning {
+    const struct reference_command *c;
+    struct wanted *wanted;
+    int num, pictures; /* of all */
+};
+
+static bool look_at_one(void *ctx, const struct suite_scene *scene,
+                        const struct suite_reference *ref, struct err *e)
+{
+    struct planning *g = ctx;
+    struct wanted w = {.scene = scene, .ref = ref};
+    if (!reference_command_state(g->c, scene, ref, &w.state, e))
+        return false;
+    if (w.state.there != NULL)
+        return true;
+    struct wanted *more = realloc(g->wanted, ((size_t)g->num + 1) * sizeof *more);
+    if (more == NULL)
+        return err_set(e, "out of memory");
+    g->wanted = more;
+    if (!reference_count(scene, ref, &w.state.opt, &w.pictures, e))
+        return false;
+    g->wanted[g->num++] = w;
+    g->pictures += w.pictures;
+    return true;
+}
+
+/* Its share of all jobs, one at least and at most one for each picture. */
+static int jobs_of(const struct wanted *w, int parts, int pictures)
+{
+    long long share = ((long long)parts * w->pictures + pictures / 2) / pictures;
+    return share < 1 ? 1 : share > w->pictures ? w->pictures : (int)share;
+}
+
+static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const char *binary,
+                     struct err *e)
+{
+    char json[4096 + 8], seed[16], range[32];
+    const struct suite_scene *s = w->scene;
+    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    snprintf(seed, sizeof seed, "%u", (unsigned)w->state.opt.seed);
+    const char *const word[] = {"--only", s->name, "--engine",   w->ref->engine,
+                                "--seed", seed,    "--pictures", range};
+    const char *const input[] = {s->dae, json, s->environment[0] != '\0' ? s->environment : NULL,
+                                 NULL};
+    json_t *entry = json_pack("{ss, ss, sI, ss, ss, si, si}", "scene", s->name, "engine",
+                              w->ref->engine, "seed", (json_int_t)w->state.opt.seed, "key",
+                              w->state.key, "binary_sha256", binary, "job", p->num, "jobs", jobs);
+    bool ok = json_array_append_new(json_object_get(p->head, "references"), entry) == 0 ||
+              err_set(e, "%s: cannot be written into a plan", s->name);
+    for (int i = 0; ok && i < jobs; i++) {
+        snprintf(range, sizeof range, "%d:%d", (int)((long long)w->pictures * i / jobs),
+                 (int)((long long)w->pictures * (i + 1) / jobs));
+        ok = plan_job(p, word, sizeof word / sizeof *word, input, e);
+    }
+    return ok;
+}
+
+/* Inputs come before the first job. */
+static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, struct plan *p,
+                      struct err *e)
+{
+    static const char *const engines[] = {"cycles", "povray"};
+    const struct reference_command *c = g->c;
+    const char *binary[2] = {NULL, NULL};
+    int threads = has_word(argc, argv, "-t", "--threads") ? c->opt.threads : 1;
+    if (c->last > 0)
+        return err_set(e, "--pictures: these are a job already");
+    bool ok = plan_begin(p, c->out, "part.json", threads, e) &&
+              reference_command_each(c, look_at_one, g, e) && add_words(p, argc, argv, threads, e);
+    for (int k = 0; ok && k < 2; k++)
+        for (int i = 0; ok && binary[k] == NULL && i < g->num; i++)
+            if (strcmp(g->wanted[i].ref->engine, engines[k]) == 0)
+                ok = plan_engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
+    json_object_set_new(p->head, "references", json_array());
+    for (int i = 0; ok && i < g->num; i++) {
+        const struct wanted *w = &g->wanted[i];
+        ok = plan_one(p, w, jobs_of(w, parts, g->pictures),
+                      binary[strcmp(w->ref->engine, engines[1]) == 0], e);
+    }
+    return ok;
+}
+
+bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                    struct err *e)
+{
+    struct reference_command c;
+    struct planning g = {.c = &c};
+    bool ok = reference_command_read(argc, argv, &c, e);
+    if (ok)
+        ok = c.help ? err_set(e, "--help cannot be planned")
+                    : plan_jobs(&g, argc, argv, w->parts > 0 ? w->parts : PLAN_PARTS, p, e);
+    free(g.wanted);
+    reference_command_free(&c);
+    return ok;
+}
+
+struct gathering {
+    const struct plan *p;
+    const struct reference_command *c;
+    size_t used;
+};
+
+static const json_t *entry_of(const struct plan *p, const struct suite_scene *scene,
+                              const struct suite_reference *ref)
+{
+    size_t i;
+    json_t *entry;
+    json_array_foreach(json_object_get(p->head, "references"), i, entry)
+    {
+        if (strcmp(member_text(entry, "scene"), scene->name) == 0 &&
+            strcmp(member_text(entry, "engine"), ref->engine) == 0)
+            return entry;
+    }
+    return NULL;
+}
+
+/* The artefacts of jobs first .. first+num-1, whole: an array of paths, then the paths; to free(). */
+static const char **artefacts(const struct plan *p, int first, int num, struct err *e)
+{
+    enum { ROOM = PLAN_PATH + 256 };
+    if (first < 0 || num < 1 || num > p->num - first) {
+        err_set(e, "%s/plan.jsonl: no such jobs of a reference", p->dir);
+        return NULL;
+    }
+    const char **dir = malloc((size_t)num * (sizeof *dir + ROOM));
+    if (dir == NULL) {
+        err_set(e, "out of memory");
+        return NULL;
+    }
+    char *at = (char *)(dir + num);
+    for (int i = 0; i < num; i++, at += ROOM) {
+        if (!plan_verify(p, first + i, e)) {
+            free(dir);
+            return NULL;
+        }
+        plan_artefact(p, first + i, NULL, at);
+        dir[i] = at;
+    }
+    return dir;
+}
+
+static bool gather_one(const struct gathering *g, const json_t *entry,
+                       const struct suite_scene *scene, const struct suite_reference *ref,
+                       struct err *e)
+{
+    struct reference_options opt = g->c->opt;
+    struct moments m;
+    json_t *manifest;
+    int num = (int)member_number(entry, "jobs");
+    opt.seed = (uint32_t)member_number(entry, "seed");
+    const char **dir = artefacts(g->p, (int)member_number(entry, "job"), num, e);
+    if (dir == NULL)
+        return false;
+    bool ok = reference_fold_parts(scene, ref, &opt, dir, num, &m, &manifest, e);
+    free(dir);
+    if (!ok)
+        return false;
+    if (strcmp(member_text(manifest, "binary_sha256"), member_text(entry, "binary_sha256")) != 0)
+        ok = err_set(e, "%s, %s: rendered by another program than was planned with", scene->name,
+                     ref->engine);
+    ok = ok && reference_command_write(g->c, scene, ref, member_text(entry, "key"), &m, manifest,
+                                       member_number(manifest, "wall_s"), e);
+    moments_free(&m);
+    json_decref(manifest);
+    return ok;
+}
+
+static bool settle_one(void *ctx, const struct suite_scene *scene,
+                       const struct suite_reference *ref, struct err *e)
+{
+    struct gathering *g = ctx;
+    struct reference_state state;
+    const json_t *entry = entry_of(g->p, scene, ref);
+    if (entry != NULL) {
+        g->used++;
+        return gather_one(g, entry, scene, ref, e);
+    }
+    if (!reference_command_state(g->c, scene, ref, &state, e))
+        return false;
+    return state.there != NULL
+               ? reference_command_keep(g->c, scene, ref, &state, e)
+               : err_set(e, "%s, %s: was up to date when this was planned, and is not now",
+                         scene->name, ref->engine);
+}
+
+/* With --fresh nothing was up to date when it was planned. */
+int reference_gather(const struct plan *p, int argc, char **argv, struct err *e)
+{
+    struct reference_command c;
+    struct gathering g = {.p = p, .c = &c};
+    bool ok =
+        reference_command_read(argc, argv, &c, e) && reference_command_each(&c, settle_one, &g, e);
+    if (ok && g.used != json_array_size(json_object_get(p->head, "references")))
+        ok = err_set(e, "%s: has references that the suite no longer has", p->dir);
+    reference_command_free(&c);
+    return ok ? 0 : EXIT_NOT_JUDGED;
+}

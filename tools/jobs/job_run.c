@@ -1,0 +1,188 @@
+#define _GNU_SOURCE
+#include "reference/base/json_file.h"
+#include "reference/base/process.h"
+#include "renderer/base/fs.h"
+#include "plan.h"
+#include "tools/base/hash_tree.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define RECEIPT "job.json"
+enum { ROOM = PLAN_PATH + 256 };
+
+static json_t *job_of(const struct plan *p, int k)
+{
+    return json_loads(p->line[k], 0, NULL);
+}
+
+/* "" where the line is no job. */
+static void key_of(const json_t *job, char key[65])
+{
+    const char *text = json_string_value(json_object_get(job, "key"));
+    key[0] = '\0';
+    if (text != NULL && strlen(text) == 64 && strspn(text, "0123456789abcdef") == 64)
+        strcpy(key, text);
+}
+
+void plan_artefact(const struct plan *p, int k, const char *name, char path[ROOM])
+{
+    char key[65];
+    json_t *job = job_of(p, k);
+    key_of(job, key);
+    json_decref(job);
+    snprintf(path, ROOM, "%s/jobs/%s%s%s", p->dir, key, name != NULL ? "/" : "",
+             name != NULL ? name : "");
+}
+
+bool plan_is_made(const struct plan *p, int k)
+{
+    char path[ROOM];
+    plan_artefact(p, k, RECEIPT, path);
+    return access(path, R_OK) == 0;
+}
+
+bool plan_verify(const struct plan *p, int k, struct err *e)
+{
+    char path[ROOM], hex[65];
+    plan_artefact(p, k, RECEIPT, path);
+    json_t *receipt = json_load_file(path, 0, NULL);
+    const char *sha256 = json_string_value(json_object_get(receipt, "sha256"));
+    bool ok = sha256 != NULL || err_set(e, "job %d: %s is not there", k, path);
+    plan_artefact(p, k, NULL, path);
+    ok = ok && tree_hash(path, RECEIPT, hex, e);
+    if (ok && strcmp(hex, sha256) != 0)
+        ok = err_set(e, "job %d: %s is not what the job wrote", k, path);
+    json_decref(receipt);
+    return ok;
+}
+
+static bool check_inputs(json_t *inputs, struct err *e)
+{
+    const char *path;
+    json_t *planned;
+    char hex[65];
+    json_object_foreach(inputs, path, planned)
+    {
+        if (!tree_hash(path, NULL, hex, e))
+            return err_prefix(e, "an input");
+        if (json_string_value(planned) == NULL || strcmp(hex, json_string_value(planned)) != 0)
+            return err_set(e,
+                           "%s is not what was planned with (SHA-256 %.12s... then, %.12s... now)",
+                           path, json_is_string(planned) ? json_string_value(planned) : "?", hex);
+    }
+    return true;
+}
+
+/* "{job}" and "{out}" filled in; one block of words and a text for each that begins with "{out}". */
+static char **command_of(const struct plan *p, const json_t *job, const char *out)
+{
+    json_t *run = json_object_get(p->head, "run"), *own = json_object_get(job, "words"),
+           *all = json_array(), *v;
+    size_t i;
+    int num, failed = 0;
+    json_array_foreach(run, i, v)
+    {
+        const char *word = json_string_value(v);
+        char path[2 * ROOM];
+        if (strcmp(word, "{job}") == 0) {
+            failed |= json_array_extend(all, own);
+        } else if (strncmp(word, "{out}", 5) == 0) {
+            snprintf(path, sizeof path, "%s%s", out, word + 5);
+            failed |= json_array_append_new(all, json_string(path));
+        } else {
+            failed |= json_array_append(all, v);
+        }
+    }
+    char **words = failed == 0 ? plan_words(all, &num) : NULL;
+    json_decref(all);
+    return words;
+}
+
+static bool may_end(const struct plan *p, int code)
+{
+    size_t i;
+    json_t *v;
+    json_array_foreach(json_object_get(p->head, "ends"), i, v)
+    {
+        if (json_integer_value(v) == code)
+            return true;
+    }
+    return false;
+}
+
+/* Runs the program, whose artefact grows in `out`, and writes the receipt into it. */
+static bool make(const struct plan *p, int k, const json_t *job, const char *key, const char *out,
+                 struct err *e)
+{
+    char log[2 * ROOM], path[2 * ROOM], hex[65], host[256] = "";
+    struct process_usage usage = {.exit_status = -1};
+    struct err why = {""};
+    char **words = command_of(p, job, out);
+    if (words == NULL)
+        return err_set(e, "out of memory");
+    snprintf(log, sizeof log, "%s/log", out);
+    const struct process process = {.argv = (const char *const *)words, .log = log};
+    bool ok = process_run(&process, &usage, &why) || may_end(p, usage.exit_status);
+    free(words);
+    snprintf(path, sizeof path, "%s/%s", out, plan_text(p, "product"));
+    if (!ok || access(path, R_OK) != 0)
+        return err_set(e, "job %d: %s", k, why.msg[0] != '\0' ? why.msg : "it left no artefact");
+    gethostname(host, sizeof host - 1);
+    if (!tree_hash(out, RECEIPT, hex, e))
+        return false;
+    json_t *receipt =
+        json_pack("{ss, ss, ss, si, sf, sf}", "key", key, "sha256", hex, "host", host, "exit",
+                  usage.exit_status, "cpu_s", usage.cpu_s, "wall_s", usage.wall_s);
+    snprintf(path, sizeof path, "%s/" RECEIPT, out);
+    ok = json_write(path, receipt, e);
+    json_decref(receipt);
+    return ok;
+}
+
+/* Two that made the same job have made the same: the second goes. */
+static bool put_in_place(const struct plan *p, int k, const char *from, struct err *e)
+{
+    char to[ROOM];
+    plan_artefact(p, k, NULL, to);
+    if (rename(from, to) == 0)
+        return true;
+    int why = errno;
+    if ((why == EEXIST || why == ENOTEMPTY) && plan_is_made(p, k))
+        return remove_tree(from, e);
+    return err_set(e, "%s: cannot appear: %s", to, strerror(why));
+}
+
+bool plan_run_job(const struct plan *p, int k, bool *made, struct err *e)
+{
+    char path[ROOM], out[ROOM + 300], key[65], host[256] = "";
+    struct err why = {""};
+    json_t *job = job_of(p, k);
+    key_of(job, key);
+    *made = false;
+    if (key[0] == '\0' || !plan_are_texts(json_object_get(job, "words"))) {
+        json_decref(job);
+        return err_set(e, "%s/plan.jsonl: line %d is no job", p->dir, k + 2);
+    }
+    plan_artefact(p, k, NULL, path);
+    if (plan_is_made(p, k) && plan_verify(p, k, &why)) {
+        json_decref(job);
+        return true;
+    }
+    gethostname(host, sizeof host - 1);
+    snprintf(out, sizeof out, "%s.tmp-%s-%ld", path, host, (long)getpid());
+    bool ok = check_inputs(json_object_get(p->head, "inputs"), e) &&
+              check_inputs(json_object_get(job, "inputs"), e) && remove_tree(out, e) &&
+              make_dirs(out, e) && make(p, k, job, key, out, e);
+    if (ok && why.msg[0] != '\0') /* there is one, but it is not whole */
+        ok = remove_tree(path, e);
+    ok = ok && put_in_place(p, k, out, e);
+    if (!ok)
+        (void)!remove_tree(out, &why);
+    json_decref(job);
+    *made = ok;
+    return ok;
+}

@@ -1,0 +1,175 @@
+/* A validation as jobs: one for each scene, whose claims share their renders, or one for each claim, which renders what it needs. */
+#include "reference/base/process.h"
+#include "renderer/base/cli_rewrite.h"
+#include "renderer/base/fs.h"
+#include "job_kinds.h"
+#include "tools/results/results.h"
+#include "tools/validate/validate_command.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* What every job says itself. */
+static const struct option_words not_of_a_job[] = {{"--only", 1},
+                                                   {"--out", 1},
+                                                   {"--reference-seed", 1},
+                                                   {"-t", 1},
+                                                   {"--threads", 1},
+                                                   {"--of-claims", 1},
+                                                   {"--page-every", 1},
+                                                   {"--slurm", 0},
+                                                   {"-q", 0},
+                                                   {"--quiet", 0},
+                                                   {0}};
+
+static bool add_words(struct plan *p, int argc, char **argv, const struct validate_options *o,
+                      const char *threads, int claims, struct err *e)
+{
+    char assay[4096], n[16], seed[16];
+    beside_program(assay, sizeof assay, "assay");
+    snprintf(n, sizeof n, "%d", claims);
+    snprintf(seed, sizeof seed, "%u", (unsigned)o->reference_seed);
+    const char *const first[] = {
+        assay,   "validate", "-q",    "--of-claims",      n,   "-t", threads,
+        "--out", "{out}",    "{job}", "--reference-seed", seed};
+    return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
+           plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
+}
+
+/* What a plan is made of. */
+struct planning {
+    struct plan *p;
+    const struct validate_options *opt;
+    int argc, cpus;
+    char **argv;
+};
+
+/* The words of all jobs with the first, when the number of claims is known. */
+static bool plan_part(void *ctx, const struct validate_part *part, struct err *e)
+{
+    struct planning *g = ctx;
+    const struct suite_scene *s = part->scene;
+    char json[4096 + 8], from[4096 + 80], golden[4096 + 80], threads[16];
+    const char *input[6], **next = input;
+    snprintf(threads, sizeof threads, "%d", g->cpus);
+    if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, part->num_claims, e))
+        return false;
+    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    snprintf(from, sizeof from, "%s/%s.json", g->opt->suite_dir, s->references_of);
+    snprintf(golden, sizeof golden, "%s/%s", g->opt->golden_dir, s->references_of);
+    *next++ = s->dae;
+    *next++ = json;
+    if (strcmp(s->name, s->references_of) != 0)
+        *next++ = from;
+    if (s->environment[0] != '\0')
+        *next++ = s->environment;
+    if (!g->opt->live && access(golden, F_OK) == 0)
+        *next++ = golden;
+    *next = NULL;
+    const char **word = calloc(2 * (size_t)part->num_only, sizeof *word);
+    if (word == NULL)
+        return err_set(e, "out of memory");
+    for (int i = 0; i < part->num_only; i++) {
+        word[2 * i] = "--only";
+        word[2 * i + 1] = part->only[i];
+    }
+    bool ok = plan_job(g->p, word, 2 * part->num_only, input, e);
+    free(word);
+    return ok;
+}
+
+static bool plan_jobs(struct validate_command *c, int argc, char **argv, bool by_claim,
+                      struct plan *p, struct err *e)
+{
+    const struct validate_options *o = &c->opt;
+    struct planning g = {.p = p, .opt = o, .argc = argc, .argv = argv};
+    g.cpus = has_word(argc, argv, "-t", "--threads") ? o->threads : 1;
+    if (o->budget_s > 0 || o->until_different || o->of_claims > 0)
+        return err_set(e, "%s cannot be cut into jobs: what is looked at next depends on the rest",
+                       o->budget_s > 0      ? "--budget"
+                       : o->until_different ? "--until-different"
+                                            : "--of-claims");
+    for (int code = EXIT_DIFFERENT; code <= EXIT_NOT_JUDGED; code++)
+        plan_may_end(p, code);
+    return plan_begin(p, o->out_dir, "results.json", g.cpus, e) &&
+           plan_input(p, o->pathtracer, e) && (!o->live || plan_live_inputs(p, o->share_dir, e)) &&
+           (o->engine == NULL || plan_input(p, o->engine->file, e)) &&
+           validate_parts(o, by_claim, plan_part, &g, e);
+}
+
+bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                   struct err *e)
+{
+    struct validate_command c;
+    if (!validate_command_read(argc, argv, &c, e))
+        return false;
+    bool ok = c.help ? err_set(e, "--help cannot be planned")
+                     : plan_jobs(&c, argc, argv, w->by == PLAN_BY_CLAIM, p, e);
+    engine_free(&c.engine);
+    return ok;
+}
+
+/* What is said of a scene once, though each job of its claims has said it. */
+static void add_new(json_t *all, json_t *more)
+{
+    const json_t *last = json_array_get(all, json_array_size(all) - 1);
+    const char *scene = json_string_value(json_object_get(last, "scene"));
+    size_t i;
+    json_t *entry;
+    json_array_foreach(more, i, entry)
+    {
+        const char *of = json_string_value(json_object_get(entry, "scene"));
+        if (scene == NULL || of == NULL || strcmp(scene, of) != 0)
+            json_array_append(all, entry);
+    }
+}
+
+/* The lists of a job's results behind those of the jobs before. */
+static bool add_results(const struct plan *p, int k, const char *out, json_t *results,
+                        struct err *e)
+{
+    static const char *const lists[] = {"claims", "not_expressible", "loader", "consistency"};
+    char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
+    json_t *part;
+    plan_artefact(p, k, "results.json", path);
+    if (!plan_verify(p, k, e) || !results_read(path, &part, e))
+        return false;
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
+        json_t *more = json_object_get(part, lists[i]), *all = json_object_get(results, lists[i]);
+        if (more != NULL && all == NULL)
+            json_object_set(results, lists[i], more);
+        else if (more != NULL && strcmp(lists[i], "claims") != 0)
+            add_new(all, more);
+        else if (more != NULL)
+            json_array_extend(all, more);
+    }
+    if (json_object_get(results, "reference_seed") != NULL) /* chosen when it was planned */
+        json_object_set(results, "reference_seed", json_object_get(part, "reference_seed"));
+    double seconds = member_number(results, "seconds") + member_number(part, "seconds");
+    json_object_set_new(results, "seconds", json_real(seconds));
+    json_decref(part);
+    plan_artefact(p, k, "data", path);
+    snprintf(to, sizeof to, "%.4000s", out);
+    const char *const copy[] = {"cp", "-a", "--", path, to, NULL};
+    const struct process process = {.argv = copy};
+    return access(path, F_OK) != 0 || process_run(&process, NULL, e);
+}
+
+int validate_gather(const struct plan *p, int argc, char **argv, struct err *e)
+{
+    struct validate_command c;
+    json_t *results = NULL;
+    int code = EXIT_NOT_JUDGED;
+    if (!validate_command_read(argc, argv, &c, e))
+        return EXIT_NOT_JUDGED;
+    bool ok = make_dirs(c.opt.out_dir, e) && validate_start(&c.opt, argc, argv, &results, e);
+    for (int k = 0; ok && k < p->num; k++)
+        ok = add_results(p, k, c.opt.out_dir, results, e);
+    if (ok)
+        code = validate_command_finish(&c, results, e);
+    json_decref(results);
+    engine_free(&c.engine);
+    return code;
+}

@@ -1,0 +1,315 @@
+#include "slurm.h"
+
+#include "reference/base/process.h"
+#include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "renderer/base/sha256.h"
+#include "renderer/base/shell_quote.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum {
+    MOST_TASKS = 1000, /* of an array: one less than MaxArraySize where nobody has set it */
+    MOST_TRIES = 3,
+    LOOKS_BEFORE_LOST =
+        2, /* out of the queue and without artefact: files may take a moment to be seen */
+    ROOM = PLAN_PATH + 64
+};
+static const double patience_s = 60; /* with a controller that does not answer */
+
+struct job {
+    bool made, queued;
+    int tries, round, task; /* the last that it is of; round 0: none */
+    int looks;              /* since it left the queue without artefact */
+};
+
+struct cluster {
+    const struct plan *plan;
+    char name[32]; /* of our arrays: "assay-HASH OF THE PLAN-", then the round */
+    struct job *job;
+    int rounds, made, running, queued;
+    char said[160];
+    sigset_t signals;
+};
+
+static void round_path(const struct cluster *c, int round, char path[ROOM])
+{
+    snprintf(path, ROOM, "%s/%s%d", c->plan->dir, c->name, round);
+}
+
+/* Runs one of Slurm's programs; what it prints is in DIR/log/NAME. */
+static bool ask(const struct cluster *c, const char *const *argv, char log[ROOM], struct err *e)
+{
+    snprintf(log, ROOM, "%s/log/%s", c->plan->dir, argv[0]);
+    const struct process p = {.argv = argv, .log = log, .timeout_s = patience_s};
+    return process_run(&p, NULL, e);
+}
+
+/* Which jobs a round is of, a line for each task. */
+static bool read_round(struct cluster *c, int round)
+{
+    char path[ROOM], *line = NULL;
+    size_t room = 0;
+    round_path(c, round, path);
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return false;
+    for (int task = 1; getline(&line, &room, f) > 0; task++)
+        for (char *at = line, *end;; at = end) {
+            long k = strtol(at, &end, 10);
+            if (end == at)
+                break;
+            if (k >= 0 && k < c->plan->num) {
+                c->job[k].round = round;
+                c->job[k].task = task;
+            }
+        }
+    free(line);
+    fclose(f);
+    return true;
+}
+
+/* Marks the jobs of tasks that Slurm still knows. */
+static bool look_at_queue(struct cluster *c, struct err *e)
+{
+    char log[ROOM], user[32], *line = NULL;
+    size_t room = 0, each = MOST_TASKS + 1, n = strlen(c->name);
+    snprintf(user, sizeof user, "%lu", (unsigned long)getuid());
+    const char *const argv[] = {"squeue", "-h", "-r", "-u", user, "-o", "%j %K %T", NULL};
+    if (!ask(c, argv, log, e))
+        return false;
+    bool *seen = calloc((size_t)c->rounds + 1, each * sizeof *seen);
+    FILE *f = fopen(log, "r");
+    if (f == NULL || seen == NULL) {
+        free(seen);
+        if (f != NULL)
+            fclose(f);
+        return err_set(e, "%s: %s", log, f == NULL ? strerror(errno) : "out of memory");
+    }
+    c->running = c->queued = 0;
+    while (getline(&line, &room, f) > 0) {
+        char state[32];
+        int round, task;
+        if (strncmp(line, c->name, n) != 0 ||
+            sscanf(line + n, "%d %d %31s", &round, &task, state) != 3 || round < 1 ||
+            round > c->rounds || task < 1 || task > MOST_TASKS)
+            continue;
+        seen[(size_t)round * each + (size_t)task] = true;
+        c->running += strcmp(state, "RUNNING") == 0;
+        c->queued++;
+    }
+    for (int k = 0; k < c->plan->num; k++)
+        c->job[k].queued = seen[(size_t)c->job[k].round * each + (size_t)c->job[k].task];
+    free(seen);
+    free(line);
+    fclose(f);
+    return true;
+}
+
+/* Listing a directory makes a network's file system ask anew what is in it. */
+static void look_at_artefacts(struct cluster *c)
+{
+    char path[ROOM];
+    snprintf(path, sizeof path, "%s/jobs", c->plan->dir);
+    DIR *d = opendir(path);
+    while (d != NULL && readdir(d) != NULL)
+        continue;
+    if (d != NULL)
+        closedir(d);
+    c->made = 0;
+    for (int k = 0; k < c->plan->num; k++) {
+        struct job *j = &c->job[k];
+        j->made = j->made || plan_is_made(c->plan, k);
+        j->looks = j->made || j->queued ? 0 : j->looks + 1;
+        c->made += j->made;
+    }
+}
+
+static bool is_lost(const struct job *j)
+{
+    return !j->made && !j->queued && (j->round == 0 || j->looks >= LOOKS_BEFORE_LOST);
+}
+
+/* The last line that a job's task printed. */
+static void last_words(const struct cluster *c, const struct job *j, char text[256])
+{
+    char path[ROOM], *line = NULL;
+    size_t room = 0;
+    snprintf(path, sizeof path, "%s/log/%s%d-%d.txt", c->plan->dir, c->name, j->round, j->task);
+    FILE *f = fopen(path, "r");
+    strcpy(text, "it printed nothing");
+    while (f != NULL && getline(&line, &room, f) > 0) {
+        line[strcspn(line, "\n")] = '\0';
+        snprintf(text, 256, "%.255s", line);
+    }
+    free(line);
+    if (f != NULL)
+        fclose(f);
+}
+
+/* The jobs that are lost, a line of numbers for each task. Neighbours, which often cost alike, go to
+ * different tasks. */
+static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
+{
+    char path[ROOM];
+    struct out_file out;
+    int *job = calloc((size_t)lost, sizeof *job), num = 0;
+    if (job == NULL)
+        return err_set(e, "out of memory");
+    round_path(c, c->rounds, path);
+    if (!out_open(&out, path, e)) {
+        free(job);
+        return false;
+    }
+    for (int k = 0; k < c->plan->num; k++)
+        if (is_lost(&c->job[k]))
+            job[num++] = k;
+    for (int task = 0; task < tasks; task++)
+        for (int i = task; i < lost; i += tasks) {
+            struct job *j = &c->job[job[i]];
+            fprintf(out.f, "%d%c", job[i], i + tasks < lost ? ' ' : '\n');
+            *j = (struct job){
+                .queued = true, .tries = j->tries + 1, .round = c->rounds, .task = task + 1};
+        }
+    free(job);
+    return out_commit(&out, e);
+}
+
+/* The next round: an array whose tasks each run the jobs of a line. */
+static bool submit(struct cluster *c, int lost, struct err *e)
+{
+    char assay[4096], todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM];
+    int tasks = lost < MOST_TASKS ? lost : MOST_TASKS;
+    c->rounds++;
+    if (!write_round(c, lost, tasks, e))
+        return false;
+    beside_program(assay, sizeof assay, "assay");
+    round_path(c, c->rounds, todo);
+    snprintf(name, sizeof name, "--job-name=%s%d", c->name, c->rounds);
+    snprintf(array, sizeof array, "--array=1-%d", tasks);
+    snprintf(cpus, sizeof cpus, "--cpus-per-task=%d",
+             (int)json_integer_value(json_object_get(c->plan->head, "cpus")));
+    char output[ROOM + 64];
+    snprintf(output, sizeof output, "--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name,
+             c->rounds);
+    char *run = shell_join("exec", (const char *const[]){assay, "run-job", c->plan->dir, NULL});
+    char *jobs = shell_join(NULL, (const char *const[]){todo, NULL});
+    bool ok = run != NULL && jobs != NULL;
+    size_t need = ok ? (size_t)snprintf(script, sizeof script,
+                                        "%s $(sed -n ${SLURM_ARRAY_TASK_ID}p %s)", run, jobs)
+                     : 0;
+    free(run);
+    free(jobs);
+    if (!ok)
+        return err_set(e, "out of memory");
+    if (need >= sizeof script)
+        return err_set(e, "%.64s...: path too long", c->plan->dir);
+    const char *const argv[] = {
+        "sbatch", "--no-requeue", "--open-mode=append", name, array, cpus, output, "--wrap", script,
+        NULL};
+    return ask(c, argv, log, e);
+}
+
+static void cancel(const struct cluster *c)
+{
+    struct err ignored;
+    char log[ROOM], name[64];
+    for (int r = 1; r <= c->rounds; r++) {
+        snprintf(name, sizeof name, "%s%d", c->name, r);
+        const char *const argv[] = {"scancel", "-n", name, NULL};
+        (void)!ask(c, argv, log, &ignored);
+    }
+}
+
+static void tell(struct cluster *c)
+{
+    char now[160];
+    snprintf(now, sizeof now, "%d of %d jobs made, %d tasks running, %d waiting%s", c->made,
+             c->plan->num, c->running, c->queued - c->running,
+             c->rounds > 1 ? ", some submitted again" : "");
+    if (strcmp(now, c->said) != 0)
+        fprintf(stderr, "slurm: %s\n", now);
+    strcpy(c->said, now);
+}
+
+/* True if somebody wants us to stop. */
+static bool wait_a_little(const struct cluster *c)
+{
+    const struct timespec t = {1 + c->queued / 500, 0};
+    return sigtimedwait(&c->signals, NULL, &t) > 0;
+}
+
+static bool follow(struct cluster *c, struct err *e)
+{
+    double answered = now_seconds();
+    for (;;) {
+        struct err why = {""};
+        int lost = 0;
+        if (look_at_queue(c, &why)) {
+            answered = now_seconds();
+            look_at_artefacts(c);
+            for (int k = 0; k < c->plan->num; k++) {
+                const struct job *j = &c->job[k];
+                char words[256];
+                lost += is_lost(j);
+                if (!is_lost(j) || j->tries < MOST_TRIES)
+                    continue;
+                last_words(c, j, words);
+                cancel(c);
+                return err_set(e, "job %d came back %d times without its artefact: %s", k, j->tries,
+                               words);
+            }
+            tell(c);
+        } else if (now_seconds() - answered > patience_s) {
+            *e = why;
+            return err_prefix(e, "Slurm does not answer");
+        }
+        if (c->made == c->plan->num)
+            return true;
+        if (lost > 0 && !submit(c, lost, e))
+            return false;
+        if (wait_a_little(c)) {
+            cancel(c);
+            return err_set(e, "interrupted with %d of %d jobs made; the same command goes on",
+                           c->made, c->plan->num);
+        }
+    }
+}
+
+bool slurm_make(const struct plan *p, struct err *e)
+{
+    char path[ROOM], hex[65];
+    struct cluster c = {.plan = p};
+    sigset_t old;
+    snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
+    if (!sha256_file(path, hex, e))
+        return false;
+    snprintf(path, sizeof path, "%s/log", p->dir);
+    if (!make_dirs(path, e))
+        return false;
+    snprintf(path, sizeof path, "%s/jobs", p->dir);
+    if (!make_dirs(path, e))
+        return false;
+    c.job = calloc((size_t)p->num + 1, sizeof *c.job);
+    if (c.job == NULL)
+        return err_set(e, "out of memory");
+    snprintf(c.name, sizeof c.name, "assay-%.12s-", hex);
+    while (read_round(&c, c.rounds + 1))
+        c.rounds++;
+    sigemptyset(&c.signals);
+    sigaddset(&c.signals, SIGINT);
+    sigaddset(&c.signals, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &c.signals, &old);
+    bool ok = follow(&c, e);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    free(c.job);
+    return ok;
+}

@@ -1,0 +1,12 @@
+/* The two plots of `assay converge`: error against samples and against time. */
+#ifndef ASSAY_PLOT_CONVERGENCE_H
+#define ASSAY_PLOT_CONVERGENCE_H
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+/* <figure> of one element of "convergence" (convergence_results.h), both axes logarithmic; nothing without two different x. */
+void report_convergence_plot(FILE *f, const json_t *scene, bool against_time);
+
+#endif

@@ -1,0 +1,25 @@
+/* The report's drawings, as inline SVG coloured by the page's style sheet. */
+#ifndef ASSAY_PLOT_INTERVAL_H
+#define ASSAY_PLOT_INTERVAL_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+/* The interval of a claim's relative difference beside the margin: a band for the margin, a line
+ * for the interval, a dot for the estimate. What lies outside the drawing ends in an arrow head. */
+void plot_interval(FILE *f, const json_t *claim);
+
+/* What plot_p_values() drew. */
+struct p_histogram {
+    int num_tiles; /* with a p-value */
+    int bins;
+    double expected;         /* per bin, if all p-values were uniform */
+    int band_low, band_high; /* central 99 % of Binomial(num_tiles, 1/bins) */
+    int below_5_percent;     /* tiles with p < 0.05 */
+};
+
+/* Counts the claim's tile_log10_p into equal bins of p (num_tiles may be 0: then the rest is 0). */
+struct p_histogram p_histogram_of(const json_t *claim, int count[20]);
+void plot_p_values(FILE *f, const struct p_histogram *h, const int count[20]);
+
+#endif

@@ -1,0 +1,308 @@
+#include "report.h"
+
+#include "renderer/base/fs.h"
+#include "report_similarity.h"
+#include "report_stated_error.h"
+#include "report_cost.h"
+#include "report_convergence.h"
+#include "tools/html/html.h"
+#include "tools/html/page_assets.h"
+#include "report_internal.h"
+#include "tools/plots/plot_rays.h"
+#include "report_table.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Worst outcome first, the file's order within. */
+static int compare_claims(const void *a, const void *b)
+{
+    const struct claim_ref *x = a, *y = b;
+    if (x->outcome != y->outcome)
+        return x->outcome < y->outcome ? -1 : 1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
+{
+    fputs("<ul class=\"lede\">\n", f);
+    for (size_t i = 0; i < num; i++) {
+        fprintf(f, "<li><a href=\"#claim-%zu\">", claim[i].index);
+        html_text(f, member_text(claim[i].json, "scene"));
+        fputs(" against ", f);
+        report_reference(f, &claim[i]);
+        fputs("</a> ", f);
+        if (claim[i].outcome == OUTCOME_NOT_JUDGED) {
+            fputs("could not be judged: ", f);
+            html_text(f, member_text(claim[i].json, "error"));
+        } else {
+            fputs("is ", f);
+            html_text(f, member_text(claim[i].json, "verdict"));
+            fputs(", not ", f);
+            html_text(f, member_text(claim[i].json, "expected"));
+        }
+        fputs("</li>\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+/* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
+static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left)
+{
+    size_t errors = 0, wrong = 0, must_differ = 0;
+    for (size_t i = 0; i < num; i++) {
+        errors += claim[i].outcome == OUTCOME_NOT_JUDGED;
+        wrong += claim[i].outcome == OUTCOME_OPPOSITE || claim[i].outcome == OUTCOME_UNDECIDED;
+        must_differ += claim[i].outcome == OUTCOME_AS_EXPECTED &&
+                       strcmp(member_text(claim[i].json, "expected"), "DIFFERENT") == 0;
+    }
+    if (left > 0)
+        fprintf(f,
+                "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
+                " more are to be judged.</p>\n",
+                left);
+    fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
+            left > 0 ? "So far " : "");
+    const char *s = num == 1 ? "" : "s";
+    if (errors > 0 && wrong > 0)
+        fprintf(f, "%s %zu claims, %zu could not be judged and %zu did not come out as expected.",
+                left > 0 ? "of" : "Of", num, errors, wrong);
+    else if (errors > 0)
+        fprintf(f, "%zu of %zu claim%s could not be judged.", errors, num, s);
+    else if (wrong > 0)
+        fprintf(f, "%zu of %zu claim%s did not come out as expected.", wrong, num, s);
+    else if (num == 1)
+        fprintf(f, "%s claim came out as expected.", left > 0 ? "the" : "The");
+    else
+        fprintf(f, "%s %zu claims came out as expected.", left > 0 ? "all" : "All", num);
+    fputs("</h1>\n", f);
+    if (num == 1 && errors == 0) {
+        fputs("<p class=\"lede\"><b>", f);
+        html_text(f, member_text(claim->json, "verdict"));
+        fputs("</b>: ", f);
+        html_text(f, member_text(claim->json, "reason"));
+        fputs("</p>\n", f);
+    }
+    if (errors + wrong > 0)
+        write_claim_list(f, claim, errors + wrong);
+    if (must_differ == 1)
+        fputs("<p class=\"lede\">1 claim is a deliberate mistake that had to be found, and "
+              "was.</p>\n",
+              f);
+    else if (must_differ > 1)
+        fprintf(f,
+                "<p class=\"lede\">%zu claims are deliberate mistakes that had to be found, and "
+                "were.</p>\n",
+                must_differ);
+}
+
+static void write_fact(FILE *f, const char *label, const char *text)
+{
+    if (text == NULL)
+        return;
+    fprintf(f, "<div><dt>%s</dt><dd>", label);
+    html_text(f, text);
+    fputs("</dd></div>\n", f);
+}
+
+static void write_header(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
+{
+    fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
+    if (num > 0)
+        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")));
+    report_consistency_headline(f, json_object_get(root, "consistency"));
+    report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
+    fprintf(f,
+            "<p class=\"lede\">The chance that noise alone makes any claim of this page "
+            "DIFFERENT is at most %.3g (family-wise alpha), and so is the chance of any wrong "
+            "EQUIVALENT.</p>\n",
+            member_number(root, "alpha"));
+    fputs("<dl class=\"facts\">\n", f);
+    write_fact(f, "Date", member_text(root, "date"));
+    write_fact(f, "Version", member_text(root, "version"));
+    write_fact(f, "Machine", member_text(root, "machine"));
+    if (json_object_get(root, "seconds") != NULL)
+        write_fact(f, "Time", duration_text(member_number(root, "seconds")).s);
+    const char *mode = member_text(root, "mode");
+    if (mode != NULL && strcmp(mode, "golden") == 0)
+        mode = "golden: against stored references";
+    else if (mode != NULL && strcmp(mode, "live") == 0)
+        mode = "live: references rendered anew";
+    write_fact(f, "Mode", mode);
+    fputs("</dl>\n<pre tabindex=\"0\"><code>", f);
+    html_text(f, member_text(root, "command"));
+    fputs("</code></pre>\n</header>\n", f);
+}
+
+/* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
+ * keep the order in which the sorted claims first name them. */
+static size_t gather_scene(struct claim_ref *claim, size_t num)
+{
+    size_t front = 1;
+    const char *scene = member_text(claim[0].json, "scene");
+    for (size_t i = 1; i < num; i++) {
+        if (strcmp(member_text(claim[i].json, "scene"), scene) != 0)
+            continue;
+        struct claim_ref found = claim[i];
+        memmove(&claim[front + 1], &claim[front], (i - front) * sizeof *claim);
+        claim[front++] = found;
+    }
+    return front;
+}
+
+static void write_keys(FILE *f)
+{
+    fputs(
+        "<section class=\"how\">\n<h2>How to look</h2>\n<dl class=\"purpose\">\n"
+        "<div><dt>Why two right pictures differ</dt><dd>A path tracer guesses each pixel from random paths. What is left of "
+        "that is noise: grain that another seed would put elsewhere. A difference means something only where it is larger "
+        "than the noise of both pictures explains.</dd></div>\n"
+        "<div><dt>±, n and t</dt><dd>The standard error ± says how far noise moves a mean, n how often the pixel was "
+        "observed. t is a difference divided by its ±: within 2 in 95 of 100 places where nothing is wrong, beyond 4 hardly "
+        "ever.</dd></div>\n"
+        "<div><dt>p</dt><dd>How often noise alone would make a difference at least as large. Of many places some are small "
+        "by chance, so that they are counted together, and a small p may still belong to a difference far inside the "
+        "margin.</dd></div>\n"
+        "<div><dt>Tiles</dt><dd>Squares of the picture, each judged by its own mean: an error that cancels over the whole "
+        "picture shows there.</dd></div>\n</dl>\n"
+        "<p class=\"caption keys\">Each scene has its pictures "
+        "(keys <kbd>1</kbd> to <kbd>9</kbd>; <kbd>0</kbd> side by side), maps of two of them "
+        "(<kbd>d</kbd> difference, <kbd>t</kbd> difference over its noise, <kbd>e</kbd> error without "
+        "noise, <kbd>v</kbd> variance ratio, <kbd>n</kbd> samples, <kbd>p</kbd> FLIP, what the eye sees), a wipe "
+        "(<kbd>w</kbd>), tiles (<kbd>g</kbd>), exposure (<kbd>[</kbd> <kbd>]</kbd>) and zoom (<kbd>+</kbd> "
+        "<kbd>-</kbd>, <kbd>f</kbd> the whole picture, double click, Ctrl and the wheel, two "
+        "fingers); drag to pan. All frames of a scene move together. Point at a pixel, or focus a "
+        "picture and use the arrow keys, to read its values. A key goes to the scene in the middle "
+        "of the window.</p>\n<noscript><p class=\"error-line\">Pictures and maps are drawn by this "
+        "page's own script, which is switched off. Verdicts, numbers and plots are all "
+        "here.</p></noscript>\n</section>\n",
+        f);
+}
+
+/* For `assay reproduce` (reproduce_page.h). converge: NULL, or the second results.json. */
+static void write_origin(FILE *f, const json_t *root, const char *converge)
+{
+    for (int i = 0; report_origin[i] != NULL; i++) {
+        const char *text = strcmp(report_origin[i], "converge") == 0
+                               ? converge
+                               : member_text(root, report_origin[i]);
+        if (text == NULL)
+            continue;
+        fprintf(f, "<meta name=\"assay:%s\" content=\"", report_origin[i]);
+        html_text(f, text);
+        fputs("\">\n", f);
+    }
+}
+
+const char *const report_origin[] = {"command", "version", "date", "machine", "converge", NULL};
+
+/* On a page of more claims the evidence of those as expected is folded. */
+enum { FOLD_FROM = 8 };
+
+static bool write_page(struct page *p, const json_t *root, const char *converge,
+                       struct claim_ref *claim, size_t num, struct err *e)
+{
+    FILE *f = p->f;
+    p->folded = num > FOLD_FROM;
+    fprintf(f,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+            "style-src 'unsafe-inline'; script-src '%s'\">\n"
+            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+            "<meta name=\"color-scheme\" content=\"light dark\">\n",
+            script_hash(page_js).s);
+    write_origin(f, root, converge);
+    fputs("<title>Assay report, ", f);
+    html_text(f, member_text(root, "date"));
+    fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
+    write_header(f, root, claim, num);
+    if (num > 0)
+        report_table(f, claim, num);
+    if (num > 0)
+        write_keys(f);
+    for (size_t done = 0; done < num;) {
+        size_t of_scene = gather_scene(claim + done, num - done);
+        if (!report_scene(p, claim + done, of_scene, e))
+            return false;
+        done += of_scene;
+        p->num_scenes++;
+    }
+    report_alike_table(p);
+    if (!report_rays(f, json_object_get(root, "claims"), e))
+        return false;
+    report_consistency(f, json_object_get(root, "consistency"));
+    report_convergence(f, json_object_get(root, "convergence"));
+    report_cost(f, root);
+    fputs("</main>\n", f);
+    page_write_layers(p);
+    fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
+    return true;
+}
+
+/* Moves the convergence of another results.json into root. */
+static bool add_convergence(json_t *root, const char *results_path, const char *path, struct err *e)
+{
+    json_t *other;
+    if (!results_read(path, &other, e))
+        return false;
+    json_t *convergence = json_object_get(other, "convergence");
+    bool ok = true;
+    if (convergence == NULL)
+        ok = err_set(e, "%s: has no 'convergence'", path);
+    else if (json_object_get(root, "convergence") != NULL)
+        ok = err_set(e, "%s: has a 'convergence' too", results_path);
+    else
+        json_object_set(root, "convergence", convergence);
+    json_decref(other);
+    return ok;
+}
+
+bool report_write(const char *results_path, const char *out_path, struct err *e)
+{
+    return report_write_with(results_path, NULL, out_path, e);
+}
+
+bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
+                       struct err *e)
+{
+    bool ok = false;
+    struct page page = {0};
+    struct out_file out = {0};
+    json_t *root = NULL;
+    struct claim_ref *claim = NULL;
+    const char *slash = strrchr(results_path, '/');
+    size_t dir = slash != NULL ? (size_t)(slash - results_path) + 1 : 0;
+    if (dir >= sizeof page.dir)
+        return err_set(e, "%.64s...: path too long", results_path);
+    memcpy(page.dir, results_path, dir);
+
+    if (!results_read(results_path, &root, e))
+        return false;
+    if (converge_path != NULL && !add_convergence(root, results_path, converge_path, e))
+        goto done;
+    const json_t *claims = json_object_get(root, "claims");
+    size_t num = json_array_size(claims);
+    claim = calloc(num + 1, sizeof *claim);
+    if (claim == NULL) {
+        err_set(e, "out of memory for the report");
+        goto done;
+    }
+    for (size_t i = 0; i < num; i++) {
+        claim[i].json = json_array_get(claims, i);
+        claim[i].index = i;
+        claim[i].outcome = claim_outcome(claim[i].json);
+    }
+    qsort(claim, num, sizeof *claim, compare_claims);
+    if (!make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
+        goto done;
+    page.f = out.f;
+    if (write_page(&page, root, converge_path, claim, num, e))
+        ok = out_commit(&out, e);
+    else
+        out_abandon(&out);
+done:
+    page_free_layers(&page);
+    free(claim);
+    json_decref(root);
+    return ok;
+}

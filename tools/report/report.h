@@ -1,0 +1,20 @@
+/* results.json and the images beside it -> one HTML file that opens from disk without a network. */
+#ifndef ASSAY_REPORT_H
+#define ASSAY_REPORT_H
+
+#include "renderer/base/err.h"
+
+/* Reads results_path and the files it names, writes out_path (by rename, with its directories). */
+bool report_write(const char *results_path, const char *out_path, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* The same with the "convergence" of another results.json (NULL: none), after the scenes. Fails if both
+ * files have some. */
+bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
+                       struct err *e) __attribute__((warn_unused_result));
+
+/* What a page says of its origin, in elements <meta name="assay:NAME" content="TEXT">, for each that there is: members of its
+ * results.json, and "converge": converge_path. Ends with NULL. */
+extern const char *const report_origin[];
+
+#endif

@@ -1,0 +1,168 @@
+#include "report_internal.h"
+
+#include "report_similarity.h"
+#include "tools/html/csv_link.h"
+#include "report_evidence.h"
+#include "tools/html/html.h"
+#include "tools/plots/plot_interval.h"
+#include "tools/plots/plot_power.h"
+#include "report_tiles.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void report_reference(FILE *f, const struct claim_ref *claim)
+{
+    html_text(f, member_text(claim->json, "b"));
+    const char *quantity = member_text(claim->json, "quantity");
+    if (quantity != NULL && strcmp(quantity, "mean") != 0) {
+        fputs(", ", f);
+        html_text(f, quantity);
+    }
+}
+
+void report_badge(FILE *f, const struct claim_ref *claim)
+{
+    static const char *const style[] = {"error", "bad", "bad", "good"};
+    static const char *const mark[] = {"!", "✗", "✗", "✓"};
+    fprintf(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> ",
+            style[claim->outcome], mark[claim->outcome]);
+    if (claim->outcome == OUTCOME_NOT_JUDGED && !claim_lacks_time(claim->json))
+        fputs("not judged", f);
+    else
+        html_text(f, member_text(claim->json, "verdict"));
+    fputs("</span>", f);
+}
+
+void report_claim_error(struct page *p, const struct claim_ref *claim)
+{
+    FILE *f = p->f;
+    fprintf(f, "<article class=\"claim\" id=\"claim-%zu\">\n<h3>", claim->index);
+    html_text(f, member_text(claim->json, "a"));
+    fputs(" against ", f);
+    report_reference(f, claim);
+    fputs(" ", f);
+    report_badge(f, claim);
+    fputs("</h3>\n<p class=\"error-line\">This claim could not be judged: ", f);
+    html_text(f, member_text(claim->json, "error"));
+    fputs(claim_lacks_time(claim->json)
+              ? "</p>\n<p class=\"caption\">It counts as inconclusive. A larger budget would "
+                "judge it.</p>\n"
+              : "</p>\n<p class=\"caption\">That is neither a pass nor a failure of the "
+                "renderer. It makes the exit code 3 until the cause is gone.</p>\n",
+          f);
+    const char *rerun = member_text(claim->json, "rerun");
+    if (rerun != NULL) {
+        fputs("<p>To judge this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
+        html_text(f, rerun);
+        fputs("</code></pre>\n", f);
+    }
+    fputs("</article>\n", f);
+}
+
+static void write_histogram(FILE *f, const json_t *claim)
+{
+    int count[20];
+    struct p_histogram h = p_histogram_of(claim, count);
+    fputs("<figure class=\"map\">", f);
+    if (h.num_tiles == 0) {
+        fputs("<figcaption><b>No p-values.</b> No tile has any noise, so there is nothing to test; "
+              "the differences are exact.</figcaption></figure>\n",
+              f);
+        return;
+    }
+    plot_p_values(f, &h, count);
+    fprintf(
+        f,
+        "<figcaption><b>p-values of the %d tiles.</b> If both have the same mean the bars stay near the dashed line "
+        "(%.3g tiles), each in the band 99 times of 100; a pile at the left is a real difference. Here %d tiles are "
+        "below 0.05, where chance alone would put %.1f. ",
+        h.num_tiles, h.expected, h.below_5_percent, 0.05 * h.num_tiles);
+    struct csv csv = csv_open(f, "p_values.csv", "p_from,p_to,tiles");
+    for (int b = 0; b < h.bins; b++) {
+        csv_number(&csv, (double)b / h.bins);
+        csv_number(&csv, (double)(b + 1) / h.bins);
+        csv_number(&csv, count[b]);
+        csv_line(&csv);
+    }
+    csv_close(&csv);
+    fputs("</figcaption></figure>\n", f);
+}
+
+/* An attribute with a claim's list of numbers, three digits, null where there is none. */
+static void write_list(FILE *f, const char *attribute, const json_t *list)
+{
+    fprintf(f, " %s=\"[", attribute);
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const json_t *v = json_array_get(list, i);
+        fputs(i > 0 ? "," : "", f);
+        if (json_is_number(v))
+            fprintf(f, "%.3g", json_number_value(v));
+        else
+            fputs("null", f);
+    }
+    fputs("]\"", f);
+}
+
+/* What had to be assumed about the inputs. */
+static void write_notes(FILE *f, const json_t *claim)
+{
+    const json_t *notes = json_object_get(claim, "notes");
+    if (json_array_size(notes) == 0)
+        return;
+    fputs("<ul class=\"notes\">\n", f);
+    for (size_t i = 0; i < json_array_size(notes); i++) {
+        fputs("<li>", f);
+        html_text(f, json_string_value(json_array_get(notes, i)));
+        fputs("</li>\n", f);
+    }
+    fputs("</ul>\n", f);
+}
+
+bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
+                  const struct claim_side *b, double white, struct err *e)
+{
+    FILE *f = p->f;
+    const json_t *json = claim->json;
+    fprintf(f,
+            "<article class=\"claim\" id=\"claim-%zu\" data-a=\"%zu\" data-b=\"%zu\" "
+            "data-tile=\"%.0f\"",
+            claim->index, a->layer, b->layer, member_number(json, "tile"));
+    write_list(f, "data-tile-p", json_object_get(json, "tile_log10_p"));
+    write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
+    fputs(" data-name=\"", f);
+    html_text(f, member_text(json, "a"));
+    fputs(" against ", f);
+    report_reference(f, claim);
+    bool expected = claim->outcome == OUTCOME_AS_EXPECTED;
+    fprintf(f, "\">\n<details class=\"evidence\"%s>\n<summary><h3>",
+            expected && p->folded ? "" : " open");
+    html_text(f, member_text(json, "a"));
+    fputs(" against ", f);
+    report_reference(f, claim);
+    fputs(" ", f);
+    report_badge(f, claim);
+    if (expected) {
+        fputs(" <small>as expected</small>", f);
+    } else {
+        fputs(" <small>expected ", f);
+        html_text(f, member_text(json, "expected"));
+        fputs("</small>", f);
+    }
+    fputs("</h3><span class=\"reason\">", f);
+    html_text(f, member_text(json, "reason"));
+    fputs("</span></summary>\n", f);
+    write_notes(f, json);
+    if (!report_alike(p, claim, a->m, b->m, white, e))
+        return false;
+    fputs("<div class=\"maps\">\n", f);
+    write_histogram(f, json);
+    if (!report_qq(f, json, e))
+        return false;
+    report_power(f, json);
+    fputs("</div>\n", f);
+    report_tiles(f, json);
+    report_doubt(f, json, !expected);
+    fputs("</details>\n</article>\n", f);
+    return true;
+}

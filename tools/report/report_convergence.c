@@ -1,0 +1,171 @@
+#include "report_convergence.h"
+
+#include "tools/results/convergence_results.h"
+#include "tools/converge/depth_ladder.h"
+#include "tools/plots/plot_convergence.h"
+#include "tools/html/csv_link.h"
+#include "tools/html/html.h"
+#include "report_internal.h"
+
+#include <math.h>
+#include <string.h>
+
+static void write_badge(FILE *f, const char *verdict, enum outcome outcome)
+{
+    static const char *const style[] = {"error", "bad", "bad", "good"};
+    if (strcmp(verdict, "MEASURED") == 0) {
+        fputs("measured", f);
+        return;
+    }
+    fprintf(f, "<span class=\"badge %s\">", style[outcome]);
+    html_text(f, verdict);
+    fputs("</span>", f);
+}
+
+static void write_row(void *ctx, const struct convergence_row *r)
+{
+    FILE *f = ctx;
+    fprintf(f, "<tr%s><th scope=\"row\">",
+            r->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
+    html_text(f, r->engine);
+    fputs("</th><td>", f);
+    html_text(f, r->quantity);
+    fprintf(f, "</td><td class=\"%s\">", r->outcome == OUTCOME_NOT_JUDGED ? "error-cell" : "num");
+    html_text(f, r->value);
+    fputs("</td><td>", f);
+    write_badge(f, r->verdict, r->outcome);
+    fputs("</td></tr>\n", f);
+}
+
+static void write_number(FILE *f, const json_t *object, const char *name, double factor)
+{
+    const json_t *v = json_object_get(object, name);
+    fputs("<td class=\"num\">", f);
+    if (json_is_number(v))
+        fputs(plain_number(factor * json_number_value(v)).s, f);
+    fputs("</td>", f);
+}
+
+static void write_csv(FILE *f, const json_t *engines)
+{
+    static const char *const number[] = {"spp", "rmse", "variance", "bias", "cpu_s", "efficiency"};
+    struct csv csv =
+        csv_open(f, "convergence.csv",
+                 "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
+    for (size_t k = 0; k < json_array_size(engines); k++) {
+        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
+        for (size_t i = 0; i < json_array_size(rungs); i++) {
+            const json_t *g = json_array_get(rungs, i);
+            csv_text(&csv, member_text(j, "engine"));
+            for (size_t n = 0; n < sizeof number / sizeof *number; n++)
+                csv_number(&csv, json_is_number(json_object_get(g, number[n]))
+                                     ? member_number(g, number[n])
+                                     : NAN);
+            csv_interval(&csv, g, "rmse_ci");
+            csv_line(&csv);
+        }
+    }
+    csv_close(&csv);
+}
+
+static void write_rungs(FILE *f, const json_t *scene)
+{
+    fputs("<h4>The rungs</h4>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
+          "aria-label=\"Table of rungs\">\n<table><thead><tr><th scope=\"col\">Engine</th>"
+          "<th scope=\"col\" class=\"num\">Samples</th><th scope=\"col\" class=\"num\">RMSE %</th>"
+          "<th scope=\"col\" class=\"num\">Variance</th><th scope=\"col\" class=\"num\">RMS bias "
+          "%</th><th scope=\"col\" class=\"num\">CPU s</th><th scope=\"col\" "
+          "class=\"num\">Efficiency 1/s</th></tr></thead>\n<tbody>\n",
+          f);
+    const json_t *engines = json_object_get(scene, "engines");
+    for (size_t k = 0; k < json_array_size(engines); k++) {
+        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
+        for (size_t i = 0; i < json_array_size(rungs); i++) {
+            const json_t *g = json_array_get(rungs, i);
+            fputs("<tr><th scope=\"row\">", f);
+            html_text(f, member_text(j, "engine"));
+            fprintf(f, "</th><td class=\"num\">%.0f</td>", member_number(g, "spp"));
+            write_number(f, g, "rmse", 100);
+            write_number(f, g, "variance", 1);
+            write_number(f, g, "bias", 100);
+            write_number(f, g, "cpu_s", 1);
+            write_number(f, g, "efficiency", 1);
+            fputs("</tr>\n", f);
+        }
+    }
+    fputs(
+        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Variance</b>: of one picture, relative, mean over "
+        "the pixels. <b>RMS bias</b>: what is left of the "
+        "error when noise is taken out; negative where the noise, by chance, was more. "
+        "<b>CPU s</b>: of one picture, its share of the engine's start included. "
+        "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out. ",
+        f);
+    write_csv(f, engines);
+    fputs("</p>\n", f);
+}
+
+static void write_scene(FILE *f, const json_t *scene)
+{
+    const char *title = member_text(scene, "title");
+    fputs("<section class=\"scene\">\n<h2>Convergence: ", f);
+    html_text(f, title != NULL ? title : member_text(scene, "scene"));
+    fputs(" <code>", f);
+    html_text(f, member_text(scene, "scene"));
+    fprintf(f,
+            "</code></h2>\n<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f pictures with "
+            "seeds of their own for each number of samples. Errors are against ",
+            member_number(scene, "width"), member_number(scene, "height"),
+            member_number(scene, "depth"), member_number(scene, "replicates"));
+    html_text(f, member_text(scene, "reference"));
+    fprintf(f, " (RMS noise %s). Each interval has the level %.6g\u00a0%%.</p>\n",
+            percent_plain(member_number(scene, "reference_noise")).s,
+            100 * (1 - member_number(scene, "alpha")));
+    fputs("<div class=\"maps\">\n", f);
+    report_convergence_plot(f, scene, false);
+    report_convergence_plot(f, scene, true);
+    report_depths(f, json_object_get(scene, "depths"));
+    fputs("</div>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of "
+          "quantities\">\n<table><thead><tr><th scope=\"col\">Engine</th><th "
+          "scope=\"col\">Quantity</th><th scope=\"col\" class=\"num\">Value and interval</th><th "
+          "scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n",
+          f);
+    convergence_rows(scene, write_row, f);
+    fputs("</tbody></table>\n</div>\n", f);
+    write_rungs(f, scene);
+    fputs("</section>\n", f);
+}
+
+void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
+{
+    size_t num = 0, judged = 0, wrong = 0, errors = 0;
+    if (convergence == NULL)
+        return;
+    for (size_t i = 0; i < json_array_size(convergence); i++) {
+        const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
+        num += json_array_size(engines);
+        for (size_t k = 0; k < json_array_size(engines); k++) {
+            const json_t *j = json_array_get(engines, k);
+            enum outcome o = convergence_outcome(j);
+            errors += o == OUTCOME_NOT_JUDGED;
+            wrong += o == OUTCOME_OPPOSITE || o == OUTCOME_UNDECIDED;
+            judged += json_is_true(json_object_get(j, "judged"));
+        }
+    }
+    const char *tag = alone ? "h1" : "p";
+    fprintf(f, "<%s class=\"%s\">", tag, !alone ? "lede" : errors + wrong == 0 ? "good" : "bad");
+    if (errors > 0)
+        fprintf(f, "Convergence: %zu of %zu engines could not be judged, %zu failed.", errors, num,
+                wrong);
+    else if (wrong > 0)
+        fprintf(f, "Convergence: %zu of %zu judged engines did not converge as they must.", wrong,
+                judged);
+    else
+        fprintf(f, "Convergence: %zu of %zu judged engines converge as they must.", judged, judged);
+    fprintf(f, "</%s>\n", tag);
+}
+
+void report_convergence(FILE *f, const json_t *convergence)
+{
+    for (size_t i = 0; i < json_array_size(convergence); i++)
+        write_scene(f, json_array_get(convergence, i));
+}

@@ -1,0 +1,38 @@
+#include "report_cost.h"
+
+#include "tools/results/render_cost.h"
+#include "tools/html/html.h"
+
+void report_cost(FILE *f, const json_t *results)
+{
+    struct scene_cost cost[MAX_COSTS];
+    int num = cost_gather(results, cost);
+    double sum = 0;
+    for (int i = 0; i < num; i++)
+        sum += cost[i].ours_s + cost[i].references_s;
+    if (sum <= 0)
+        return;
+    fputs("<section>\n<h2>What the time went to</h2>\n<div class=\"wide\" tabindex=\"0\" "
+          "role=\"region\" aria-label=\"Table of costs\">\n<table><thead><tr><th "
+          "scope=\"col\">Scene</th><th scope=\"col\" class=\"num\">Ours s</th><th scope=\"col\" "
+          "class=\"num\">References s</th><th scope=\"col\" class=\"num\">Share %</th><th "
+          "scope=\"col\" class=\"num\">Looks</th><th scope=\"col\" class=\"num\">Samples at "
+          "most</th><th scope=\"col\" class=\"num\">Undecided</th></tr></thead>\n<tbody>\n",
+          f);
+    for (int i = 0; i < num; i++) {
+        const struct scene_cost *c = &cost[i];
+        fprintf(f, "<tr%s><th scope=\"row\">", c->undecided > 0 ? " class=\"bad\"" : "");
+        html_text(f, c->scene);
+        fprintf(f,
+                "</th><td class=\"num\">%.2f</td><td class=\"num\">%.2f</td><td "
+                "class=\"num\">%.1f</td><td class=\"num\">%d</td><td class=\"num\">%.0f</td><td "
+                "class=\"num\">%d of %d</td></tr>\n",
+                c->ours_s, c->references_s, 100 * (c->ours_s + c->references_s) / sum, c->looks,
+                c->largest_n, c->undecided, c->claims);
+    }
+    fprintf(f,
+            "</tbody></table>\n</div>\n<p class=\"caption\">Processor seconds of rendering in this "
+            "run, %.4g in all. Stored references and closed forms cost nothing here. What several "
+            "claims share is counted once.</p>\n</section>\n",
+            sum);
+}

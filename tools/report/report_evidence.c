@@ -1,0 +1,208 @@
+#include "report_evidence.h"
+
+#include "tools/html/html.h"
+#include "report_statistics.h"
+#include "tools/results/results.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static double interval_end(const json_t *object, size_t end)
+{
+    return json_number_value(json_array_get(json_object_get(object, "ci"), end));
+}
+
+static void fact_open(FILE *f, const char *label)
+{
+    fprintf(f, "<div><dt>%s</dt><dd>", label);
+}
+
+static void fact_close(FILE *f)
+{
+    fputs("</dd></div>\n", f);
+}
+
+static void write_numbers(FILE *f, const json_t *claim)
+{
+    double alpha = member_number(claim, "alpha");
+    fact_open(f, "Difference of the image mean");
+    fprintf(f, "%s, %.6g\u00a0%% interval %s to %s",
+            percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
+            percent_prose(interval_end(claim, 0)).s, percent_prose(interval_end(claim, 1)).s);
+    fact_close(f);
+    const json_t *channels = json_object_get(claim, "channel_difference");
+    fact_open(f, "In red, green, blue");
+    fprintf(f, "%s, %s, %s", percent_prose(json_number_value(json_array_get(channels, 0))).s,
+            percent_prose(json_number_value(json_array_get(channels, 1))).s,
+            percent_prose(json_number_value(json_array_get(channels, 2))).s);
+    fact_close(f);
+    fact_open(f, "Margin (counts as equal)");
+    fprintf(f, "±%s for the image, ±%s for a tile",
+            percent_plain(member_number(claim, "margin_global")).s,
+            percent_plain(member_number(claim, "margin_tile")).s);
+    fact_close(f);
+    fact_open(f, "Smallest bias this run would find");
+    fprintf(f, "%s of the image mean, %s of a tile",
+            percent_plain(member_number(claim, "mdb_global")).s,
+            percent_plain(member_number(claim, "mdb_tile")).s);
+    fact_close(f);
+    double log10_p = member_number(claim, "log10_p");
+    fact_open(f, "p of “no difference beyond the margin”");
+    if (log10_p > -4)
+        fprintf(f, "%.3g", pow(10, log10_p));
+    else
+        fprintf(f, "10<sup>%s</sup>", plain_number(log10_p).s);
+    fact_close(f);
+    fact_open(f, "Error rate (alpha)");
+    fprintf(f, "%.3g for this claim, divided over %.0f tests", alpha,
+            member_number(claim, "num_tests"));
+    fact_close(f);
+    fact_open(f, "Error of single pixels, noise removed");
+    fprintf(f, "%s of the mean radiance (root mean square)",
+            percent_plain(member_number(claim, "rms_bias")).s);
+    fact_close(f);
+}
+
+static void write_regions(FILE *f, const json_t *claim)
+{
+    static const char *const channel[] = {"red", "green", "blue", "luminance"};
+    const json_t *tile = json_object_get(claim, "worst_tile");
+    const json_t *worst = json_object_get(claim, "worst");
+    fact_open(f, "Tile that reaches furthest out");
+    fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
+            member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
+            member_number(claim, "tile"), percent_prose(member_number(tile, "difference")).s,
+            percent_prose(interval_end(tile, 0)).s, percent_prose(interval_end(tile, 1)).s,
+            plain_number(member_number(tile, "t")).s);
+    fact_close(f);
+    fact_open(f, "Smallest p of all regions");
+    fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels in %s: %s, t = %s", member_number(worst, "x"),
+            member_number(worst, "y"), member_number(worst, "width"),
+            member_number(worst, "height"), channel[(size_t)member_number(worst, "channel")],
+            percent_prose(member_number(worst, "difference")).s,
+            plain_number(member_number(worst, "t")).s);
+    fact_close(f);
+    fact_open(f, "Very skewed regions");
+    fputs(json_is_true(json_object_get(claim, "skew_limited"))
+              ? "some small ones were merged into larger ones, where the t test holds"
+              : "none",
+          f);
+    fact_close(f);
+    if (member_number(claim, "extra_factor") > 1) {
+        fact_open(f, "Samples that would decide");
+        fprintf(f, "about %s times as many", plain_number(member_number(claim, "extra_factor")).s);
+        fact_close(f);
+    }
+}
+
+static void write_optional_number(FILE *f, const json_t *claim, const char *name,
+                                  const char *format)
+{
+    const json_t *v = json_object_get(claim, name);
+    if (v != NULL)
+        fprintf(f, format, json_number_value(v));
+}
+
+/* Who rendered it, its version, and how often each pixel was observed. side is "a" or "b". */
+static void write_side(FILE *f, const json_t *claim, const char *side)
+{
+    char n[8], spp[8], unit_key[8], version_key[16];
+    snprintf(n, sizeof n, "n_%s", side);
+    snprintf(spp, sizeof spp, "spp_%s", side);
+    snprintf(unit_key, sizeof unit_key, "unit_%s", side);
+    snprintf(version_key, sizeof version_key, "version_%s", side);
+    const char *unit = member_text(claim, unit_key), *version = member_text(claim, version_key);
+    html_text(f, member_text(claim, side));
+    if (version != NULL) {
+        fputs(" (", f);
+        html_text(f, version);
+        fputs(")", f);
+    }
+    if (unit == NULL || strcmp(unit, "sample") == 0) {
+        write_optional_number(f, claim, n, ", %.0f samples per pixel");
+    } else if (strcmp(unit, "exact") == 0) {
+        fputs(", without noise", f);
+    } else {
+        write_optional_number(f, claim, n, ", %.0f ");
+        html_text(f, unit);
+        fputs("s", f);
+        if (member_number(claim, spp) > 0)
+            write_optional_number(f, claim, spp, " of %.0f samples per pixel");
+    }
+}
+
+static void write_provenance(FILE *f, const json_t *claim)
+{
+    fact_open(f, "First image (A)");
+    write_side(f, claim, "a");
+    write_optional_number(f, claim, "seed_a", ", seed %.0f");
+    if (member_number(claim, "seconds_a") > 0)
+        fprintf(f, ", %s", duration_text(member_number(claim, "seconds_a")).s);
+    fact_close(f);
+
+    fact_open(f, "Reference (B)");
+    write_side(f, claim, "b");
+    if (member_number(claim, "seconds_b") > 0)
+        fprintf(f, ", %s when it was made", duration_text(member_number(claim, "seconds_b")).s);
+    const char *fidelity = member_text(claim, "class");
+    if (fidelity != NULL) {
+        fputs(", class ", f);
+        html_text(f, fidelity);
+    }
+    fact_close(f);
+
+    const json_t *seeds = json_object_get(claim, "seeds_b");
+    if (json_array_size(seeds) > 0) {
+        fputs("<div class=\"row\"><dt>Seeds of the reference</dt><dd>", f);
+        for (size_t i = 0; i < json_array_size(seeds); i++)
+            fprintf(f, "%s%" JSON_INTEGER_FORMAT, i > 0 ? ", " : "",
+                    json_integer_value(json_array_get(seeds, i)));
+        fact_close(f);
+    }
+}
+
+static void write_command(FILE *f, const char *what, const char *command)
+{
+    if (command == NULL)
+        return;
+    fprintf(f, "<p class=\"caption\">%s</p>\n<pre tabindex=\"0\"><code>", what);
+    html_text(f, command);
+    fputs("</code></pre>\n", f);
+}
+
+/* Of a stored reference (it has seeds): how to replace it. */
+static void write_approval(FILE *f, const json_t *claim)
+{
+    if (json_object_get(claim, "seeds_b") == NULL)
+        return;
+    fputs(
+        "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
+        "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
+        "tabindex=\"0\"><code>assay golden render --fresh --engine ",
+        f);
+    html_text(f, member_text(claim, "b"));
+    fputs(" --only ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("\nassay golden approve ", f);
+    html_text(f, member_text(claim, "scene"));
+    fputs("/", f);
+    html_text(f, member_text(claim, "b"));
+    fputs("</code></pre>\n", f);
+}
+
+void report_doubt(FILE *f, const json_t *claim, bool open)
+{
+    fprintf(f,
+            "<details%s>\n<summary>Everything needed to doubt it</summary>\n<dl class=\"facts\">\n",
+            open ? " open" : "");
+    write_numbers(f, claim);
+    write_regions(f, claim);
+    write_provenance(f, claim);
+    fputs("</dl>\n", f);
+    report_statistics(f, claim);
+    write_command(f, "To run this claim again:", member_text(claim, "rerun"));
+    write_approval(f, claim);
+    fputs("</details>\n", f);
+}

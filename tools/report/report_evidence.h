@@ -1,0 +1,14 @@
+/* What a reader needs to doubt a verdict: numbers, regions, seeds, samples, versions, which statistic looked, and the
+ * commands that run the claim again and approve another reference. */
+#ifndef ASSAY_REPORT_EVIDENCE_H
+#define ASSAY_REPORT_EVIDENCE_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include <jansson.h>
+
+/* <details> of a judged claim of results.json, unfolded if `open`. */
+void report_doubt(FILE *f, const json_t *claim, bool open);
+
+#endif

@@ -1,0 +1,82 @@
+/* What the parts of the report share: the page under construction and its sections. */
+#ifndef ASSAY_REPORT_INTERNAL_H
+#define ASSAY_REPORT_INTERNAL_H
+
+#include "renderer/image/moments.h"
+#include "tools/results/results.h"
+
+#include <stdint.h>
+#include <stdio.h>
+
+/* Numbers behind a picture (pixel_codec.h), written at the page's end as long as there is room. */
+struct page_layer {
+    char *path;
+    int width, height;
+    double n; /* of every pixel; 0 where they differ and the bytes tell */
+    char unit[16];
+    double spp;
+    uint8_t *bytes;
+    size_t size;
+};
+
+/* One claim where it stands in the page. */
+struct claim_ref {
+    const json_t *json;
+    size_t index; /* in results.json; its anchor is #claim-<index> */
+    enum outcome outcome;
+};
+
+/* A claim's row in the table of report_similarity.h, and its packed FLIP map (pixel_codec.h; NULL: none). */
+struct page_alike {
+    struct claim_ref claim;
+    int width, height;
+    double hdr, ldr; /* NAN: not defined */
+    double idiff_percent;
+    bool idiff_differs;
+    uint8_t *bytes;
+    size_t size;
+};
+
+struct page {
+    FILE *f;
+    char dir[4096]; /* of results.json, with a final slash, or "" */
+    struct page_layer *layer;
+    struct page_alike *alike;
+    size_t num_layers, num_alike, num_scenes;
+    bool folded; /* many claims: the evidence of those that came out as expected is folded */
+};
+
+/* The number on the page of the layer of m, which was read from path; the same path has one. */
+bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
+                    struct err *e) __attribute__((warn_unused_result));
+/* All layers, then the FLIP maps, and the colours of maps, as base64 in elements that no browser runs. */
+void page_write_layers(struct page *p);
+void page_free_layers(struct page *p);
+
+/* <section> of one scene: what it is for, its pictures, each of its claims. All claims are of the
+ * same scene. Fails when a picture cannot be read or the sizes differ. */
+bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* One side of a claim, as loaded. */
+struct claim_side {
+    const struct moments *m;
+    size_t layer; /* its number on the page */
+};
+
+/* <article> of one judged claim: where the page's script puts its maps, the histogram, and all that is
+ * needed to doubt the verdict. `white` is the radiance shown as white. */
+bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
+                  const struct claim_side *b, double white, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* <article> of a claim that could not be judged. */
+void report_claim_error(struct page *p, const struct claim_ref *claim);
+
+/* The verdict as a coloured label with a mark, so that colour is not needed. */
+void report_badge(FILE *f, const struct claim_ref *claim);
+
+/* The reference's name, and the quantity where it is not the mean. */
+void report_reference(FILE *f, const struct claim_ref *claim);
+
+#endif

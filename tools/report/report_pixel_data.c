@@ -1,0 +1,116 @@
+#include "tools/images/pixel_codec.h"
+#include "tools/html/plot_colour.h"
+#include "tools/html/html.h"
+#include "report_internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The page of a suite stays below 5 MB: what is left after the text goes to the numbers behind the
+ * pictures. The page of one scene has them whatever their size. */
+enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
+
+bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
+                    struct err *e)
+{
+    for (*index = 0; *index < p->num_layers; ++*index)
+        if (strcmp(p->layer[*index].path, path) == 0)
+            return true;
+    struct page_layer *grown = realloc(p->layer, (p->num_layers + 1) * sizeof *grown);
+    if (grown == NULL)
+        return err_set(e, "out of memory for the report");
+    p->layer = grown;
+    struct page_layer *l = &grown[*index];
+    bool uniform;
+    *l = (struct page_layer){
+        .path = strdup(path), .width = m->width, .height = m->height, .spp = m->spp};
+    if (l->path == NULL)
+        return err_set(e, "out of memory for the report");
+    memcpy(l->unit, m->unit, sizeof l->unit);
+    if (!layer_encode(m, &l->bytes, &l->size, &uniform, e)) {
+        free(l->path);
+        return false;
+    }
+    l->n = uniform ? m->n[0] : 0;
+    p->num_layers++;
+    return true;
+}
+
+static void write_colours(FILE *f)
+{
+    enum { DIVERGING = 257, SEQUENTIAL = 256 };
+    uint8_t colour[3 * (DIVERGING + SEQUENTIAL)];
+    for (int i = 0; i < DIVERGING; i++)
+        diverging_rgb8(2.0 * i / (DIVERGING - 1) - 1, &colour[3 * i]);
+    for (int i = 0; i < SEQUENTIAL; i++)
+        sequential_rgb8((double)i / (SEQUENTIAL - 1), &colour[3 * (DIVERGING + i)]);
+    fputs("<script type=\"text/plain\" id=\"colours\">", f);
+    html_base64(f, colour, sizeof colour);
+    fputs("</script>\n", f);
+}
+
+/* Whether that many bytes, as base64, may still go into the page. */
+static bool has_room(const struct page *p, size_t size)
+{
+    long here = ftell(p->f);
+    return here >= 0 &&
+           (p->num_scenes <= 1 || (size_t)here + size * 4 / 3 + PAGE_RESERVE <= PAGE_LIMIT);
+}
+
+void page_write_layers(struct page *p)
+{
+    size_t left_out = 0, maps = 0, maps_left_out = 0;
+    if (p->num_layers > 0)
+        write_colours(p->f);
+    for (size_t i = 0; i < p->num_layers; i++) {
+        const struct page_layer *l = &p->layer[i];
+        if (!has_room(p, l->size)) {
+            left_out++;
+            continue;
+        }
+        fprintf(p->f,
+                "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" data-height=\"%d\" "
+                "data-n=\"%.9g\" data-spp=\"%.9g\" data-unit=\"",
+                i, l->width, l->height, l->n, l->spp);
+        html_text(p->f, l->unit);
+        fputs("\">", p->f);
+        html_base64(p->f, l->bytes, l->size);
+        fputs("</script>\n", p->f);
+    }
+    for (size_t i = 0; i < p->num_alike; i++) {
+        const struct page_alike *n = &p->alike[i];
+        maps += n->bytes != NULL;
+        if (n->bytes == NULL || !has_room(p, n->size)) {
+            maps_left_out += n->bytes != NULL;
+            continue;
+        }
+        fprintf(p->f,
+                "<script type=\"text/plain\" id=\"flip-%zu\" data-width=\"%d\" data-height=\"%d\">",
+                n->claim.index, n->width, n->height);
+        html_base64(p->f, n->bytes, n->size);
+        fputs("</script>\n", p->f);
+    }
+    if (left_out > 0)
+        fprintf(
+            p->f,
+            "<p class=\"caption\">To stay below 5 MB this page leaves out the numbers of %zu of "
+            "its %zu pictures, and with them the pictures.</p>\n",
+            left_out, p->num_layers);
+    if (maps_left_out > 0)
+        fprintf(p->f,
+                "<p class=\"caption\">To stay below 5 MB this page leaves out %zu of its %zu FLIP "
+                "maps.</p>\n",
+                maps_left_out, maps);
+}
+
+void page_free_layers(struct page *p)
+{
+    for (size_t i = 0; i < p->num_layers; i++) {
+        free(p->layer[i].path);
+        free(p->layer[i].bytes);
+    }
+    free(p->layer);
+    for (size_t i = 0; i < p->num_alike; i++)
+        free(p->alike[i].bytes);
+    free(p->alike);
+}

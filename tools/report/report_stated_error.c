@@ -1,0 +1,79 @@
+#include "report_stated_error.h"
+
+#include "tools/validate/stated_error_claims.h"
+#include "tools/html/html.h"
+
+static size_t count_good(const json_t *consistency)
+{
+    size_t good = 0;
+    for (size_t i = 0; i < json_array_size(consistency); i++)
+        good += consistency_outcome(json_array_get(consistency, i)) == OUTCOME_AS_EXPECTED;
+    return good;
+}
+
+void report_consistency_headline(FILE *f, const json_t *consistency)
+{
+    size_t num = json_array_size(consistency), good = count_good(consistency);
+    if (num == 0)
+        return;
+    fprintf(f, "<p class=\"lede\">%s%zu of %zu scenes were rendered with errors as stated.%s</p>\n",
+            good < num ? "<strong>" : "", good, num, good < num ? "</strong>" : "");
+}
+
+static void write_row(FILE *f, const json_t *c)
+{
+    bool good = consistency_outcome(c) == OUTCOME_AS_EXPECTED;
+    fprintf(f, "<tr%s><th scope=\"row\">", good ? "" : " class=\"bad\"");
+    html_text(f, member_text(c, "scene"));
+    if (member_text(c, "error") != NULL) {
+        fputs("</th><td colspan=\"7\" class=\"error-cell\">", f);
+        html_text(f, member_text(c, "error"));
+        fputs("</td></tr>\n", f);
+        return;
+    }
+    const json_t *ci = json_object_get(c, "pixels_ci");
+    fprintf(f,
+            "</th><td>%s</td><td class=\"num\">%.0f × %.0f</td><td class=\"num\">%.3f</td><td "
+            "class=\"num\">%.3f to %.3f</td><td class=\"num\">%.2f</td>",
+            member_text(c, "verdict"), member_number(c, "renders"), member_number(c, "spp"),
+            member_number(c, "pixels"), json_number_value(json_array_get(ci, 0)),
+            json_number_value(json_array_get(ci, 1)), member_number(c, "image"));
+    const json_t *noise = json_object_get(c, "noise_ci");
+    if (noise != NULL)
+        fprintf(f, "<td class=\"num\">%.3f (%.3f to %.3f)</td>", member_number(c, "noise"),
+                json_number_value(json_array_get(noise, 0)),
+                json_number_value(json_array_get(noise, 1)));
+    else
+        fputs("<td></td>", f);
+    if (json_object_get(c, "too_early") != NULL)
+        fprintf(f, "<td class=\"num\">%.0f + %.0f</td>", member_number(c, "too_early"),
+                member_number(c, "too_late"));
+    else
+        fputs("<td></td>", f);
+    fputs("</tr>\n", f);
+}
+
+void report_consistency(FILE *f, const json_t *consistency)
+{
+    if (json_array_size(consistency) == 0)
+        return;
+    fputs("<section>\n<h2>Stated errors</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
+          "aria-label=\"Table of stated errors\">\n<table><thead><tr><th "
+          "scope=\"col\">Scene</th><th scope=\"col\">Verdict</th><th scope=\"col\" "
+          "class=\"num\">Renders × samples</th><th scope=\"col\" class=\"num\">Pixels</th><th "
+          "scope=\"col\" class=\"num\">Interval</th><th scope=\"col\" class=\"num\">Sum of "
+          "pixels</th><th scope=\"col\" class=\"num\">Noise</th><th scope=\"col\" "
+          "class=\"num\">Stopped wrong</th></tr></thead>\n<tbody>\n",
+          f);
+    for (size_t i = 0; i < json_array_size(consistency); i++)
+        write_row(f, json_array_get(consistency, i));
+    fputs(
+        "</tbody></table>\n</div>\n<p class=\"caption\">The scene is rendered several times with "
+        "seeds of their own. <b>Pixels</b>: variance between the renders over the variance that "
+        "they state; 1 if samples are independent, 2 if each is computed twice, 0 if the seed has "
+        "no effect. <b>Sum of pixels</b>: the same of the whole picture's sum; large if pixels "
+        "share their random numbers. <b>Noise</b>: what is stated over the closed form of this "
+        "estimator's noise; 2 if every other sample is wasted. <b>Stopped wrong</b>: pixels that "
+        "adaptive sampling stopped too early + too late.</p>\n</section>\n",
+        f);
+}

@@ -1,0 +1,170 @@
+#include "claim_result.h"
+
+#include "tools/base/utf8.h"
+
+#include "renderer/base/shell_quote.h"
+#include "renderer/base/version.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static json_t *region_json(const struct region *r)
+{
+    return json_pack("{s:i, s:i, s:i, s:i, s:i, s:f, s:[f, f], s:f, s:f, s:f}", "x", r->x, "y",
+                     r->y, "width", r->width, "height", r->height, "channel", r->channel,
+                     "difference", r->difference, "ci", r->ci_lo, r->ci_hi, "t", r->t, "log10_p",
+                     r->log10_p, "margin", r->margin);
+}
+
+/* Tiles without noise have no test: null, not a number. */
+static json_t *tile_array(const double *value, int n)
+{
+    json_t *a = json_array();
+    for (int i = 0; i < n; i++)
+        json_array_append_new(a, isfinite(value[i]) ? json_real(value[i]) : json_null());
+    return a;
+}
+
+static json_t *statistics_json(const struct comparison *r)
+{
+    json_t *all = json_array();
+    for (int s = 0; s < NUM_STATISTICS; s++) {
+        const struct statistic *st = &r->statistic[s];
+        json_array_append_new(all, json_pack("{s:s, s:f, s:i, s:f, s:s}", "name", statistic_name[s],
+                                             "share", st->share, "num_tests", st->num_tests,
+                                             "log10_p", st->log10_p, "what", st->what));
+    }
+    return all;
+}
+
+/* Only what is known: a direction that could be tested, a variance ratio with an interval. */
+static bool add_findings(json_t *claim, const struct comparison *r)
+{
+    const struct direction *d = &r->direction;
+    const struct variance_ratio *v = &r->variance;
+    bool ok = true;
+    if (d->name != NULL)
+        ok = json_object_set_new(claim, "direction",
+                                 json_pack("{s:s, s:f, s:f, s:[f, f], s:s}", "name", d->name,
+                                           "explained", d->explained, "amount", d->amount, "ci",
+                                           d->lo, d->hi, "unit", d->unit)) == 0;
+    if (v->valid)
+        ok = ok && json_object_set_new(
+                       claim, "variance_ratio",
+                       json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci", v->lo, v->hi)) == 0;
+    return ok;
+}
+
+static json_t *claim_head(const struct claim_context *c)
+{
+    json_t *j =
+        json_pack("{s:s, s:s, s:s, s:s, s:s, s:f, s:f, s:f, s:i}", "scene",
+                  c->scene ? c->scene->name : "files", "quantity", "mean", "a", c->a, "b", c->b,
+                  "expected", verdict_name(c->expected), "alpha", c->opt.alpha, "margin_global",
+                  c->opt.margin_global, "margin_tile", c->opt.margin_tile, "tile", c->opt.tile);
+    if (j != NULL && c->scene != NULL) {
+        json_object_set_new(j, "title", json_string(c->scene->title));
+        json_object_set_new(j, "detects", json_string(c->scene->detects));
+        json_object_set_new(j, "blind_to", json_string(c->scene->blind_to));
+    }
+    if (j != NULL && c->fidelity != NULL)
+        json_object_set_new(j, "class", json_string(c->fidelity));
+    if (j != NULL && c->rerun != NULL)
+        json_object_set_new(j, "rerun", json_string(c->rerun));
+    return j;
+}
+
+json_t *claim_judged(const struct claim_context *c, const struct comparison *r)
+{
+    json_t *j = claim_head(c);
+    const struct region *g = r->global;
+    int tiles = r->tiles_x * r->tiles_y;
+    json_t *more = json_pack(
+        "{s:s, s:b, s:s, s:f, s:[f, f], s:[f, f, f], s:f, s:f, s:f, s:i, s:f, s:f, s:b, s:i, s:i, "
+        "s:i, s:o, s:o, s:o, s:o, s:o}",
+        "verdict", verdict_name(r->verdict), "passed", r->verdict == c->expected, "reason",
+        r->reason, "difference", g[3].difference, "ci", g[3].ci_lo, g[3].ci_hi,
+        "channel_difference", g[0].difference, g[1].difference, g[2].difference, "log10_p",
+        g[3].log10_p, "mdb_global", r->mdb_global, "mdb_tile", r->mdb_tile, "num_tests",
+        r->num_tests, "rms_bias", r->rms_bias, "extra_factor", r->extra_factor, "skew_limited",
+        r->skew_limited, "finest_side", r->finest_side, "tiles_x", r->tiles_x, "tiles_y",
+        r->tiles_y, "worst", region_json(&r->worst), "worst_tile", region_json(&r->worst_tile),
+        "tile_log10_p", tile_array(r->tile_log10_p, tiles), "tile_t", tile_array(r->tile_t, tiles),
+        "statistics", statistics_json(r));
+    if (j == NULL || more == NULL || json_object_update(j, more) != 0 || !add_findings(j, r)) {
+        json_decref(j);
+        j = NULL;
+    }
+    json_decref(more);
+    return j;
+}
+
+json_t *claim_not_judged(const struct claim_context *c, const char *error)
+{
+    json_t *j = claim_head(c);
+    if (j != NULL) {
+        json_object_set_new(j, "passed", json_false());
+        json_object_set_new(j, "error", json_string(error));
+    }
+    return j;
+}
+
+bool claim_add_observations(json_t *claim, const char *side, const struct moments *m)
+{
+    char key[16];
+    double n = m->n[0];
+    for (size_t p = 1; p < (size_t)m->width * (size_t)m->height; p++)
+        n = m->n[p] < n ? m->n[p] : n;
+    snprintf(key, sizeof key, "n_%s", side);
+    bool ok = json_object_set_new(claim, key, json_real(n)) == 0;
+    snprintf(key, sizeof key, "unit_%s", side);
+    ok = ok && json_object_set_new(claim, key, json_string(m->unit)) == 0;
+    snprintf(key, sizeof key, "spp_%s", side);
+    return ok && json_object_set_new(claim, key, json_real(m->spp)) == 0;
+}
+
+/* "2 x AMD EPYC ...", or only the number where /proc does not say. */
+static void describe_machine(char *text, size_t size)
+{
+    char model[128] = "", line[256];
+    FILE *f = fopen("/proc/cpuinfo", "r");
+    while (f != NULL && model[0] == '\0' && fgets(line, sizeof line, f) != NULL)
+        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':') != NULL)
+            sscanf(strchr(line, ':') + 1, " %127[^\n]", model);
+    if (f != NULL)
+        fclose(f);
+    snprintf(text, size, "%ld x %s", sysconf(_SC_NPROCESSORS_ONLN),
+             model[0] ? model : "unknown processor");
+}
+
+json_t *results_new(int argc, char **argv, double alpha, struct err *e)
+{
+    char date[32], machine[192];
+    assert(argv[argc] == NULL);
+    for (int i = 0; i < argc; i++)
+        if (!utf8_is_valid(argv[i])) {
+            err_set(e, "argument '%s' is no UTF-8, and results hold nothing else", argv[i]);
+            return NULL;
+        }
+    char *command = shell_join("assay", (const char *const *)argv);
+    if (command == NULL) {
+        err_set(e, "out of memory");
+        return NULL;
+    }
+    time_t now = time(NULL);
+    struct tm utc;
+    gmtime_r(&now, &utc);
+    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    describe_machine(machine, sizeof machine);
+    json_t *root =
+        json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command, "version",
+                  assay_version, "date", date, "machine", machine, "alpha", alpha, "claims");
+    free(command);
+    if (root == NULL)
+        err_set(e, "out of memory");
+    return root;
+}

@@ -1,0 +1,31 @@
+/* One claim of results.json (results.h) from what was compared. */
+#ifndef ASSAY_CLAIM_RESULT_H
+#define ASSAY_CLAIM_RESULT_H
+
+#include "tools/compare/compare.h"
+
+#include <jansson.h>
+
+/* Who is compared with whom, and what should come out. */
+struct claim_context {
+    const struct suite_scene *scene; /* NULL: two files; a, b are then their names */
+    const char *a, *b;
+    const char *fidelity; /* "class" in results.json; NULL: none */
+    enum verdict expected;
+    struct compare_options opt;
+    const char *rerun; /* the command that judges this claim alone */
+};
+
+/* New references, NULL if out of memory. */
+json_t *claim_judged(const struct claim_context *c, const struct comparison *result);
+json_t *claim_not_judged(const struct claim_context *c, const char *error);
+
+/* Adds how often and by what a side was observed: n, unit, spp (side "a" or "b"). */
+bool claim_add_observations(json_t *claim, const char *side, const struct moments *m);
+
+/* A new results object with everything but claims: command line (a verb and its arguments, NULL at argv[argc]; in words that
+ * shell_split() reads back), date, machine. NULL with a line if an argument is no UTF-8, and out of memory. */
+json_t *results_new(int argc, char **argv, double alpha, struct err *e)
+    __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,151 @@
+#include "results.h"
+
+#include "reference/base/xml_errors.h"
+#include "renderer/base/fs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include <libxml/xmlwriter.h>
+
+/* A copy in which the control characters that XML 1.0 cannot hold, not even escaped, are '?'. An
+ * engine's last words may well contain them. NULL only out of memory. */
+static char *xml_text(const char *s)
+{
+    char *copy = strdup(s != NULL ? s : "");
+    if (copy == NULL)
+        return NULL;
+    for (char *c = copy; *c != '\0'; c++) {
+        unsigned char u = (unsigned char)*c;
+        if ((u < 0x20 && u != '\t' && u != '\n' && u != '\r') || u == 0x7f)
+            *c = '?';
+    }
+    /* U+FFFE and U+FFFF, UTF-8 EF BF BE and EF BF BF, are no XML characters either. */
+    for (char *c = strstr(copy, "\xef\xbf"); c != NULL; c = strstr(c + 2, "\xef\xbf"))
+        if ((unsigned char)c[2] >= 0xbe)
+            /* NOLINTNEXTLINE(bugprone-not-null-terminated-result): into a longer text. */
+            memcpy(c, "???", 3);
+    return copy;
+}
+
+static bool attribute(xmlTextWriter *w, const char *name, const char *value)
+{
+    char *text = xml_text(value);
+    bool ok = text != NULL && xmlTextWriterWriteAttribute(w, BAD_CAST name, BAD_CAST text) >= 0;
+    free(text);
+    return ok;
+}
+
+static bool number_attribute(xmlTextWriter *w, const char *name, const char *format, double value)
+{
+    char text[64];
+    snprintf(text, sizeof text, format, value);
+    return attribute(w, name, text);
+}
+
+static bool write_text(xmlTextWriter *w, const char *value)
+{
+    char *text = xml_text(value);
+    bool ok = text != NULL && xmlTextWriterWriteString(w, BAD_CAST text) >= 0;
+    free(text);
+    return ok;
+}
+
+static bool write_numbers(xmlTextWriter *w, const json_t *claim)
+{
+    const json_t *ci = json_object_get(claim, "ci");
+    char text[512];
+    snprintf(
+        text, sizeof text,
+        "difference %+.4f %% [%+.4f, %+.4f], margin %.4f %%, minimum detectable bias %.4f %%, "
+        "log10 p %.2f, alpha %.3g over %.0f tests",
+        100 * member_number(claim, "difference"), 100 * json_number_value(json_array_get(ci, 0)),
+        100 * json_number_value(json_array_get(ci, 1)), 100 * member_number(claim, "margin_global"),
+        100 * member_number(claim, "mdb_global"), member_number(claim, "log10_p"),
+        member_number(claim, "alpha"), member_number(claim, "num_tests"));
+    return write_text(w, text);
+}
+
+static bool write_verdict(xmlTextWriter *w, const json_t *claim, enum outcome outcome)
+{
+    if (outcome == OUTCOME_NOT_JUDGED)
+        return xmlTextWriterStartElement(w, BAD_CAST "error") >= 0 &&
+               attribute(w, "type", "not judged") &&
+               attribute(w, "message", member_text(claim, "error")) &&
+               xmlTextWriterEndElement(w) >= 0;
+    if (outcome == OUTCOME_AS_EXPECTED)
+        return xmlTextWriterStartElement(w, BAD_CAST "system-out") >= 0 &&
+               write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
+    char message[128];
+    snprintf(message, sizeof message, "%.40s, expected %.40s", member_text(claim, "verdict"),
+             member_text(claim, "expected"));
+    return xmlTextWriterStartElement(w, BAD_CAST "failure") >= 0 &&
+           attribute(w, "type", member_text(claim, "verdict")) &&
+           attribute(w, "message", message) && write_text(w, member_text(claim, "reason")) &&
+           write_text(w, "\n") && write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
+}
+
+static bool write_testcase(xmlTextWriter *w, const json_t *claim)
+{
+    const char *quantity = member_text(claim, "quantity");
+    return xmlTextWriterStartElement(w, BAD_CAST "testcase") >= 0 &&
+           attribute(w, "classname", member_text(claim, "scene")) &&
+           xmlTextWriterStartAttribute(w, BAD_CAST "name") >= 0 &&
+           write_text(w, member_text(claim, "a")) && write_text(w, " against ") &&
+           write_text(w, member_text(claim, "b")) && write_text(w, ": ") &&
+           write_text(w, quantity != NULL ? quantity : "mean") &&
+           xmlTextWriterEndAttribute(w) >= 0 &&
+           number_attribute(w, "time", "%.3f", member_number(claim, "seconds_a")) &&
+           write_verdict(w, claim, claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
+}
+
+static bool write_testsuite(xmlTextWriter *w, const json_t *results)
+{
+    const json_t *claims = json_object_get(results, "claims");
+    size_t num = json_array_size(claims), count[4] = {0};
+    for (size_t i = 0; i < num; i++)
+        count[claim_outcome(json_array_get(claims, i))]++;
+    size_t failures = count[OUTCOME_OPPOSITE] + count[OUTCOME_UNDECIDED];
+    bool ok = xmlTextWriterSetIndent(w, 1) >= 0 &&
+              xmlTextWriterStartDocument(w, NULL, "UTF-8", NULL) >= 0 &&
+              xmlTextWriterStartElement(w, BAD_CAST "testsuite") >= 0 &&
+              attribute(w, "name", "assay") && number_attribute(w, "tests", "%.0f", (double)num) &&
+              number_attribute(w, "failures", "%.0f", (double)failures) &&
+              number_attribute(w, "errors", "%.0f", (double)count[OUTCOME_NOT_JUDGED]) &&
+              number_attribute(w, "time", "%.3f", member_number(results, "seconds")) &&
+              attribute(w, "timestamp", member_text(results, "date"));
+    /* For `assay reproduce`. */
+    ok = ok && xmlTextWriterStartElement(w, BAD_CAST "properties") >= 0 &&
+         xmlTextWriterStartElement(w, BAD_CAST "property") >= 0 &&
+         attribute(w, "name", "assay:command") &&
+         attribute(w, "value", member_text(results, "command")) &&
+         xmlTextWriterEndElement(w) >= 0 && xmlTextWriterEndElement(w) >= 0;
+    for (size_t i = 0; ok && i < num; i++)
+        ok = write_testcase(w, json_array_get(claims, i));
+    return ok && xmlTextWriterEndDocument(w) >= 0;
+}
+
+bool results_write_junit(const char *path, const json_t *results, struct err *e)
+{
+    bool failed = false;
+    xml_complaints_to(&failed);
+    xmlBuffer *buffer = xmlBufferCreate();
+    xmlTextWriter *writer = buffer != NULL ? xmlNewTextWriterMemory(buffer, 0) : NULL;
+    bool ok = writer != NULL && write_testsuite(writer, results);
+    xmlFreeTextWriter(writer);
+    ok = ok && !failed;
+    xml_complaints_to(NULL);
+    struct out_file out;
+    if (!ok) {
+        /* results_read() has seen that all of it is there and UTF-8. */
+        err_set(e, "%s: out of memory for the JUnit XML", path);
+    } else if (!make_parent_dirs(path, e) || !out_open(&out, path, e)) {
+        ok = false;
+    } else {
+        fwrite(xmlBufferContent(buffer), 1, (size_t)xmlBufferLength(buffer), out.f);
+        ok = out_commit(&out, e);
+    }
+    if (buffer != NULL)
+        xmlBufferFree(buffer);
+    return ok;
+}

@@ -1,0 +1,406 @@
+#include "results.h"
+
+#include "reference/suite/suite.h"
+#include "renderer/base/fs.h"
+#include "tools/validate/stated_error_claims.h"
+#include "convergence_results.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+enum member_type { STRING, NUMBER, COUNT, BOOLEAN, INTERVAL, TRIPLE, COUNTS, OBJECT };
+
+struct member {
+    const char *name;
+    enum member_type type;
+    bool required;
+};
+
+static const struct member root_members[] = {{"command", STRING, true},  {"version", STRING, true},
+                                             {"date", STRING, true},     {"alpha", NUMBER, true},
+                                             {"machine", STRING, false}, {"mode", STRING, false},
+                                             {"seconds", NUMBER, false}};
+
+/* A claim that could not be judged has these and no more. */
+static const struct member any_claim_members[] = {{"scene", STRING, true},
+                                                  {"a", STRING, true},
+                                                  {"b", STRING, true},
+                                                  {"expected", STRING, true},
+                                                  {"passed", BOOLEAN, true},
+                                                  {"title", STRING, false},
+                                                  {"detects", STRING, false},
+                                                  {"blind_to", STRING, false},
+                                                  {"error", STRING, false},
+                                                  {"quantity", STRING, false},
+                                                  {"rerun", STRING, false},
+                                                  {"stages", COUNT, false},
+                                                  {"alpha_claim", NUMBER, false},
+                                                  {"alpha_spent", NUMBER, false},
+                                                  {"cost_s", OBJECT, false}};
+
+static const struct member judged_members[] = {
+    {"quantity", STRING, true},      {"verdict", STRING, true},
+    {"reason", STRING, true},        {"alpha", NUMBER, true},
+    {"margin_global", NUMBER, true}, {"margin_tile", NUMBER, true},
+    {"tile", COUNT, true},           {"difference", NUMBER, true},
+    {"ci", INTERVAL, true},          {"channel_difference", TRIPLE, true},
+    {"log10_p", NUMBER, true},       {"mdb_global", NUMBER, true},
+    {"mdb_tile", NUMBER, true},      {"num_tests", COUNT, true},
+    {"worst_tile", OBJECT, true},    {"worst", OBJECT, true},
+    {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
+    {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
+    {"tiles_y", COUNT, true},        {"files", OBJECT, true},
+    {"direction", OBJECT, false},    {"variance_ratio", OBJECT, false},
+    {"class", STRING, false},        {"n_a", NUMBER, false},
+    {"n_b", NUMBER, false},          {"unit_b", STRING, false},
+    {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
+    {"seconds_b", NUMBER, false},    {"rays_a", OBJECT, false},
+    {"seed_a", COUNT, false},        {"seeds_b", COUNTS, false},
+    {"version_b", STRING, false}};
+
+static const struct member worst_tile_members[] = {{"x", COUNT, true},
+                                                   {"y", COUNT, true},
+                                                   {"difference", NUMBER, true},
+                                                   {"ci", INTERVAL, true},
+                                                   {"t", NUMBER, true}};
+
+static const struct member worst_members[] = {
+    {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},
+    {"height", COUNT, true}, {"channel", COUNT, true}, {"difference", NUMBER, true},
+    {"ci", INTERVAL, true},  {"t", NUMBER, true}};
+
+static const struct member statistic_members[] = {{"name", STRING, true},
+                                                  {"share", NUMBER, true},
+                                                  {"num_tests", COUNT, true},
+                                                  {"log10_p", NUMBER, true},
+                                                  {"what", STRING, true}};
+
+static const struct member direction_members[] = {{"name", STRING, true},
+                                                  {"explained", NUMBER, true},
+                                                  {"amount", NUMBER, true},
+                                                  {"ci", INTERVAL, true},
+                                                  {"unit", STRING, true}};
+
+static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
+                                                       {"ci", INTERVAL, true}};
+
+static const struct member rays_members[] = {
+    {"rays", NUMBER, true}, {"box_tests", NUMBER, true}, {"primitive_tests", NUMBER, true}};
+
+static const struct member file_members[] = {
+    {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
+
+#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
+
+static bool is_count(const json_t *v)
+{
+    return json_is_integer(v) && json_integer_value(v) >= 0;
+}
+
+static bool are_numbers(const json_t *v, size_t size)
+{
+    if (!json_is_array(v) || json_array_size(v) != size)
+        return false;
+    for (size_t i = 0; i < size; i++)
+        if (!json_is_number(json_array_get(v, i)))
+            return false;
+    return true;
+}
+
+/* NULL if v is of that type, else what it should be, in words. */
+static const char *type_error(const json_t *v, enum member_type type)
+{
+    switch (type) {
+    case STRING: return json_is_string(v) ? NULL : "a string";
+    case NUMBER: return json_is_number(v) ? NULL : "a number";
+    case COUNT: return is_count(v) ? NULL : "a whole number of 0 or more";
+    case BOOLEAN: return json_is_boolean(v) ? NULL : "true or false";
+    case INTERVAL:
+        return are_numbers(v, 2) && json_number_value(json_array_get(v, 0)) <=
+                                        json_number_value(json_array_get(v, 1))
+                   ? NULL
+                   : "an array of two numbers, the lower first";
+    case TRIPLE: return are_numbers(v, 3) ? NULL : "an array of three numbers";
+    case COUNTS:
+        if (!json_is_array(v))
+            return "an array of whole numbers";
+        for (size_t i = 0; i < json_array_size(v); i++)
+            if (!is_count(json_array_get(v, i)))
+                return "an array of whole numbers";
+        return NULL;
+    case OBJECT: return json_is_object(v) ? NULL : "an object";
+    }
+    assert(!"unknown member type");
+    return "known";
+}
+
+/* The line begins with where (the file and claim) and within (the object's name and a dot, or "").
+ */
+static bool check_members(const json_t *object, const struct member *member, size_t num,
+                          const char *where, const char *within, struct err *e)
+{
+    for (size_t i = 0; i < num; i++) {
+        const json_t *v = json_object_get(object, member[i].name);
+        if (v == NULL && !member[i].required)
+            continue;
+        if (v == NULL)
+            return err_set(e, "%s: '%s%s' is missing", where, within, member[i].name);
+        const char *wanted = type_error(v, member[i].type);
+        if (wanted != NULL)
+            return err_set(e, "%s: '%s%s' is not %s", where, within, member[i].name, wanted);
+    }
+    return true;
+}
+
+/* One number, or null where a tile has no noise and so no test, for each tile. */
+static bool check_tiles(const json_t *claim, const char *name, size_t num, const char *where,
+                        struct err *e)
+{
+    const json_t *v = json_object_get(claim, name);
+    if (v == NULL)
+        return err_set(e, "%s: '%s' is missing", where, name);
+    if (!json_is_array(v) || json_array_size(v) != num)
+        return err_set(e, "%s: '%s' is not an array of tiles_x * tiles_y = %zu numbers", where,
+                       name, num);
+    for (size_t i = 0; i < num; i++) {
+        const json_t *x = json_array_get(v, i);
+        if (!json_is_number(x) && !json_is_null(x))
+            return err_set(e, "%s: '%s' has an element %zu that is not a number", where, name, i);
+    }
+    return true;
+}
+
+static bool check_statistics(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *all = json_object_get(claim, "statistics");
+    if (all == NULL)
+        return err_set(e, "%s: 'statistics' is missing", where);
+    if (!json_is_array(all) || json_array_size(all) == 0)
+        return err_set(e, "%s: 'statistics' is not an array with at least one statistic", where);
+    for (size_t i = 0; i < json_array_size(all); i++) {
+        const json_t *s = json_array_get(all, i);
+        if (!json_is_object(s))
+            return err_set(e, "%s: 'statistics' has an element %zu that is not an object", where,
+                           i);
+        if (!check_members(s, statistic_members, LENGTH(statistic_members), where, "statistics.",
+                           e))
+            return false;
+    }
+    return true;
+}
+
+/* Members that may be absent. */
+static bool check_findings(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *direction = json_object_get(claim, "direction");
+    const json_t *ratio = json_object_get(claim, "variance_ratio");
+    const json_t *rays = json_object_get(claim, "rays_a");
+    return (rays == NULL ||
+            check_members(rays, rays_members, LENGTH(rays_members), where, "rays_a.", e)) &&
+           (direction == NULL ||
+            check_members(direction, direction_members, LENGTH(direction_members), where,
+                          "direction.", e)) &&
+           (ratio == NULL ||
+            check_members(ratio, variance_ratio_members, LENGTH(variance_ratio_members), where,
+                          "variance_ratio.", e));
+}
+
+static bool check_judged(const json_t *claim, const char *where, struct err *e)
+{
+    if (!check_members(claim, judged_members, LENGTH(judged_members), where, "", e) ||
+        !check_members(json_object_get(claim, "worst_tile"), worst_tile_members,
+                       LENGTH(worst_tile_members), where, "worst_tile.", e) ||
+        !check_members(json_object_get(claim, "worst"), worst_members, LENGTH(worst_members), where,
+                       "worst.", e) ||
+        !check_members(json_object_get(claim, "files"), file_members, LENGTH(file_members), where,
+                       "files.", e) ||
+        !check_statistics(claim, where, e) || !check_findings(claim, where, e))
+        return false;
+
+    json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));
+    json_int_t tiles_y = json_integer_value(json_object_get(claim, "tiles_y"));
+    if (tiles_x < 1 || tiles_y < 1 || tiles_x > 65536 || tiles_y > 65536)
+        return err_set(e, "%s: 'tiles_x' or 'tiles_y' is not from 1 to 65536", where);
+    size_t num_tiles = (size_t)tiles_x * (size_t)tiles_y;
+    if (!check_tiles(claim, "tile_log10_p", num_tiles, where, e) ||
+        !check_tiles(claim, "tile_t", num_tiles, where, e))
+        return false;
+    if (json_integer_value(json_object_get(json_object_get(claim, "worst"), "channel")) > 3)
+        return err_set(e, "%s: 'worst.channel' is not from 0 to 3", where);
+
+    enum verdict verdict, expected;
+    const char *name = member_text(claim, "verdict");
+    if (!verdict_parse(name, &verdict))
+        return err_set(e, "%s: 'verdict' is unknown: '%s'", where, name);
+    if (!verdict_parse(member_text(claim, "expected"), &expected))
+        return err_set(e, "%s: 'expected' is unknown", where);
+    if (json_is_true(json_object_get(claim, "passed")) != (verdict == expected))
+        return err_set(e, "%s: 'passed' contradicts 'verdict' and 'expected'", where);
+    return true;
+}
+
+static const struct member look_members[] = {{"n_a", NUMBER, true},
+                                             {"n_b", NUMBER, true},
+                                             {"alpha", NUMBER, true},
+                                             {"stage", COUNT, true},
+                                             {"verdict", STRING, true}};
+static const struct member cost_members[] = {{"a", NUMBER, true}, {"b", NUMBER, true}};
+
+static bool check_looks(const json_t *claim, const char *where, struct err *e)
+{
+    const json_t *looks = json_object_get(claim, "looks"), *cost = json_object_get(claim, "cost_s");
+    if (looks != NULL && !json_is_array(looks))
+        return err_set(e, "%s: 'looks' is not an array", where);
+    for (size_t i = 0; i < json_array_size(looks); i++)
+        if (!check_members(json_array_get(looks, i), look_members, LENGTH(look_members), where,
+                           "looks.", e))
+            return false;
+    return cost == NULL ||
+           check_members(cost, cost_members, LENGTH(cost_members), where, "cost_s.", e);
+}
+
+static bool check_claim(const json_t *claim, const char *where, struct err *e)
+{
+    if (!json_is_object(claim))
+        return err_set(e, "%s: not an object", where);
+    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e) ||
+        !check_looks(claim, where, e))
+        return false;
+    enum verdict expected;
+    const char *name = member_text(claim, "expected");
+    if (!verdict_parse(name, &expected))
+        return err_set(e, "%s: 'expected' is unknown: '%s'", where, name);
+    if (json_object_get(claim, "error") == NULL)
+        return check_judged(claim, where, e);
+    if (json_is_true(json_object_get(claim, "passed")))
+        return err_set(e, "%s: has an 'error' and yet 'passed'", where);
+    if (json_object_get(claim, "verdict") != NULL && !claim_lacks_time(claim))
+        return err_set(e, "%s: has an 'error' and yet a 'verdict' that is not INCONCLUSIVE", where);
+    return true;
+}
+
+static bool check_results(const json_t *root, const char *path, struct err *e)
+{
+    if (!json_is_object(root))
+        return err_set(e, "%s: not an object", path);
+    const json_t *schema = json_object_get(root, "assay");
+    if (!json_is_integer(schema) || json_integer_value(schema) != 1)
+        return err_set(e, "%s: 'assay' is not 1: not results of this version's schema", path);
+    if (!check_members(root, root_members, LENGTH(root_members), path, "", e))
+        return false;
+    const json_t *claims = json_object_get(root, "claims");
+    const json_t *convergence = json_object_get(root, "convergence");
+    if (convergence != NULL && !convergence_check(convergence, path, e))
+        return false;
+    const json_t *consistency = json_object_get(root, "consistency");
+    if (consistency != NULL && !consistency_check(consistency, path, e))
+        return false;
+    if (!json_is_array(claims) ||
+        (json_array_size(claims) == 0 && convergence == NULL && json_array_size(consistency) == 0))
+        return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const json_t *claim = json_array_get(claims, i);
+        const char *scene = member_text(claim, "scene");
+        const char *b = member_text(claim, "b");
+        char where[512];
+        snprintf(where, sizeof where, "%.300s: claim %zu (%.60s against %.60s)", path, i + 1,
+                 scene != NULL ? scene : "?", b != NULL ? b : "?");
+        if (!check_claim(claim, where, e))
+            return false;
+    }
+    return true;
+}
+
+bool results_read(const char *path, json_t **out, struct err *e)
+{
+    json_error_t parse;
+    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &parse);
+    if (root == NULL)
+        return parse.line > 0 ? err_set(e, "%s:%d: %s", path, parse.line, parse.text)
+                              : err_set(e, "%s: %s", path, parse.text);
+    if (!check_results(root, path, e)) {
+        json_decref(root);
+        return false;
+    }
+    *out = root;
+    return true;
+}
+
+const char *member_text(const json_t *object, const char *name)
+{
+    return json_string_value(json_object_get(object, name));
+}
+
+double member_number(const json_t *object, const char *name)
+{
+    return json_number_value(json_object_get(object, name));
+}
+
+enum outcome claim_outcome(const json_t *claim)
+{
+    if (json_object_get(claim, "error") != NULL)
+        return OUTCOME_NOT_JUDGED;
+    if (json_is_true(json_object_get(claim, "passed")))
+        return OUTCOME_AS_EXPECTED;
+    enum verdict verdict, expected;
+    if (!verdict_parse(member_text(claim, "verdict"), &verdict) ||
+        !verdict_parse(member_text(claim, "expected"), &expected))
+        return OUTCOME_NOT_JUDGED;
+    if (verdict != VERDICT_INCONCLUSIVE && expected != VERDICT_INCONCLUSIVE)
+        return OUTCOME_OPPOSITE;
+    return OUTCOME_UNDECIDED;
+}
+
+bool claim_lacks_time(const json_t *claim)
+{
+    const char *verdict = member_text(claim, "verdict");
+    return json_object_get(claim, "error") != NULL && verdict != NULL &&
+           strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
+static bool any_lacks_time(const json_t *list)
+{
+    size_t i;
+    json_t *c;
+    json_array_foreach(list, i, c)
+    {
+        const char *reason = member_text(c, "reason");
+        if (claim_lacks_time(c) ||
+            (reason != NULL && strncmp(reason, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0))
+            return true;
+    }
+    return false;
+}
+
+bool results_lack_time(const json_t *results)
+{
+    return any_lacks_time(json_object_get(results, "claims")) ||
+           any_lacks_time(json_object_get(results, "consistency"));
+}
+
+int results_exit_code(const json_t *results)
+{
+    const json_t *claims = json_object_get(results, "claims");
+    size_t count[4] = {0};
+    for (size_t i = 0; i < json_array_size(claims); i++)
+        count[claim_lacks_time(json_array_get(claims, i))
+                  ? OUTCOME_UNDECIDED
+                  : claim_outcome(json_array_get(claims, i))]++;
+    const json_t *convergence = json_object_get(results, "convergence");
+    for (size_t i = 0; i < json_array_size(convergence); i++) {
+        const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
+        for (size_t k = 0; k < json_array_size(engines); k++)
+            count[convergence_outcome(json_array_get(engines, k))]++;
+    }
+    const json_t *consistency = json_object_get(results, "consistency");
+    for (size_t i = 0; i < json_array_size(consistency); i++)
+        count[consistency_outcome(json_array_get(consistency, i))]++;
+    if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) ==
+            0 ||
+        count[OUTCOME_NOT_JUDGED] > 0)
+        return EXIT_NOT_JUDGED;
+    if (count[OUTCOME_OPPOSITE] > 0)
+        return EXIT_DIFFERENT;
+    return count[OUTCOME_UNDECIDED] > 0 ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
+}

@@ -1,0 +1,309 @@
+#include "noise_estimate.h"
+
+#include <gsl/gsl_cdf.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BLOCK = 8, FEWEST = 16 };
+static const double tail_factor = 4;    /* Var(sum r^2) / sum r^4 */
+static const double skew_factor = 6;    /* 1 / sum of the kernel cubed */
+static const double most_sd = 2.5;      /* of D where only its level is asked */
+static const double level_error = 1e-3; /* chance that the level is still too low */
+
+/* A grid of values, NAN where there is none. */
+struct grid {
+    int width, height;
+    double *v;
+};
+
+static bool grid_alloc(struct grid *g, int width, int height, struct err *e)
+{
+    *g = (struct grid){width, height, malloc((size_t)width * (size_t)height * sizeof *g->v)};
+    return g->v != NULL || err_set(e, "out of memory for %d x %d pixels", width, height);
+}
+
+static double at(const struct grid *g, int x, int y)
+{
+    return g->v[(size_t)y * (size_t)g->width + (size_t)x];
+}
+
+/* The kernel at x, y; NAN at the border and next to what is missing. */
+static double second_difference(const struct grid *g, int x, int y)
+{
+    if (x < 1 || y < 1 || x > g->width - 2 || y > g->height - 2)
+        return NAN;
+    double row[3];
+    for (int i = 0; i < 3; i++)
+        row[i] = at(g, x - 1, y + i - 1) - 2 * at(g, x, y + i - 1) + at(g, x + 1, y + i - 1);
+    return (row[0] - 2 * row[1] + row[2]) / 6;
+}
+
+/* Sums over one block. */
+struct block {
+    double num, s2, s3, s4;
+};
+
+static struct block block_sums(const struct grid *d, int bx, int by)
+{
+    struct block s = {0};
+    for (int y = by * BLOCK; y < (by + 1) * BLOCK && y < d->height; y++)
+        for (int x = bx * BLOCK; x < (bx + 1) * BLOCK && x < d->width; x++) {
+            double r = second_difference(d, x, y);
+            if (isnan(r))
+                continue;
+            s.num++;
+            s.s2 += r * r;
+            s.s3 += r * r * r;
+            s.s4 += r * r * r * r;
+        }
+    return s;
+}
+
+struct blocks {
+    int nx, ny;
+    struct block *b;
+    double *v,
+        *m4; /* mean r^2 and r^4 of the block, or of the blocks around it too if it has few */
+};
+
+static void blocks_free(struct blocks *g)
+{
+    free(g->b);
+    free(g->v);
+    free(g->m4);
+}
+
+static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
+{
+    *g = (struct blocks){.nx = (d->width - 1) / BLOCK + 1, .ny = (d->height - 1) / BLOCK + 1};
+    size_t num = (size_t)g->nx * (size_t)g->ny;
+    g->b = malloc(num * sizeof *g->b);
+    g->v = malloc(num * sizeof *g->v);
+    g->m4 = malloc(num * sizeof *g->m4);
+    if (g->b == NULL || g->v == NULL || g->m4 == NULL)
+        return err_set(e, "out of memory for %zu blocks", num);
+    double total = 0;
+    for (int y = 0; y < g->ny; y++)
+        for (int x = 0; x < g->nx; x++) {
+            struct block *b = &g->b[(size_t)y * (size_t)g->nx + (size_t)x];
+            *b = block_sums(d, x, y);
+            total += b->num;
+        }
+    if (total < FEWEST)
+        return err_set(e, "too many pixels are saturated to tell the noise of the others");
+    for (int y = 0; y < g->ny; y++)
+        for (int x = 0; x < g->nx; x++) {
+            struct block s = {0};
+            for (int reach = 0; s.num < FEWEST; reach++) {
+                s = (struct block){0};
+                for (int j = y - reach; j <= y + reach; j++)
+                    for (int i = x - reach; i <= x + reach; i++)
+                        if (i >= 0 && j >= 0 && i < g->nx && j < g->ny) {
+                            const struct block *b = &g->b[(size_t)j * (size_t)g->nx + (size_t)i];
+                            s.num += b->num;
+                            s.s2 += b->s2;
+                            s.s4 += b->s4;
+                        }
+            }
+            size_t k = (size_t)y * (size_t)g->nx + (size_t)x;
+            g->v[k] = s.s2 / s.num;
+            g->m4[k] = s.s4 / s.num;
+        }
+    return true;
+}
+
+/* Mean of D over the blocks around one, which follows what the pictures differ by, and 1.25 times the
+ * mean distance from it, the sd of a normal law. */
+static void local_scale(const struct grid *d, int bx, int by, double *mean, double *sd)
+{
+    for (int pass = 0; pass < 2; pass++) {
+        double sum = 0, num = 0;
+        for (int y = (by - 1) * BLOCK; y < (by + 2) * BLOCK; y++)
+            for (int x = (bx - 1) * BLOCK; x < (bx + 2) * BLOCK; x++)
+                if (x >= 0 && y >= 0 && x < d->width && y < d->height && !isnan(at(d, x, y))) {
+                    sum += pass == 0 ? at(d, x, y) : fabs(at(d, x, y) - *mean);
+                    num++;
+                }
+        *(pass == 0 ? mean : sd) = num > 0 ? sum / num : 0;
+    }
+    *sd *= sqrt(M_PI / 2);
+}
+
+/* D less its local mean, cut at +-most_sd: independent if D is, and without the tails that would leave
+ * few degrees of freedom. NAN where nothing varies. */
+static void clip(const struct grid *d, struct grid *out)
+{
+    for (int by = 0; by * BLOCK < d->height; by++)
+        for (int bx = 0; bx * BLOCK < d->width; bx++) {
+            double mean = 0, sd = 0;
+            local_scale(d, bx, by, &mean, &sd);
+            for (int y = by * BLOCK; y < (by + 1) * BLOCK && y < d->height; y++)
+                for (int x = bx * BLOCK; x < (bx + 1) * BLOCK && x < d->width; x++) {
+                    double z = at(d, x, y) - mean;
+                    out->v[(size_t)y * (size_t)d->width + (size_t)x] =
+                        sd > 0 && !isnan(z) ? fmax(-most_sd, fmin(most_sd, z / sd)) : NAN;
+                }
+        }
+}
+
+/* Means of side x side values. */
+static bool bin_means(const struct grid *d, int side, struct grid *bins, struct err *e)
+{
+    if (!grid_alloc(bins, d->width / side, d->height / side, e))
+        return false;
+    for (int y = 0; y < bins->height; y++)
+        for (int x = 0; x < bins->width; x++) {
+            double sum = 0;
+            for (int i = 0; i < side * side; i++)
+                sum += at(d, x * side + i % side, y * side + i / side);
+            bins->v[(size_t)y * (size_t)bins->width + (size_t)x] = sum / (side * side);
+        }
+    return true;
+}
+
+/* Sums of r^2 and r^4 over a grid. */
+static struct block grid_sums(const struct grid *d)
+{
+    struct block s = {0};
+    for (int y = 0; y < d->height; y++)
+        for (int x = 0; x < d->width; x++) {
+            double r = second_difference(d, x, y);
+            if (isnan(r))
+                continue;
+            s.num++;
+            s.s2 += r * r;
+            s.s4 += r * r * r * r;
+        }
+    return s;
+}
+
+/* How much more variance means of 4 x 4 have than if pixels were independent, and an upper bound of
+ * that of ever larger squares: by chi-square with the degrees of freedom that the sums of squares leave,
+ * and by as much again as from 2 x 2 to 4 x 4, as it nears its limit like 1/side. */
+static bool level(const struct grid *d, double *factor, double *bound, struct err *e)
+{
+    struct grid fine = {0}, twos = {0}, fours = {0};
+    bool ok = grid_alloc(&fine, d->width, d->height, e);
+    *factor = *bound = 1;
+    if (ok)
+        clip(d, &fine);
+    ok = ok && bin_means(&fine, 2, &twos, e) && bin_means(&fine, 4, &fours, e);
+    if (ok) {
+        struct block f = grid_sums(&fine), g = grid_sums(&twos), h = grid_sums(&fours);
+        bool noisy = f.s2 > 0;
+        if (noisy && h.num < FEWEST)
+            ok = err_set(e, "too few pixels vary or are not saturated to tell their noise");
+        if (noisy && ok && h.s2 > 0) {
+            double dof = 2 / (tail_factor * (f.s4 / (f.s2 * f.s2) + h.s4 / (h.s2 * h.s2)));
+            double two = 4 * (g.s2 / g.num) / (f.s2 / f.num);
+            *factor = 16 * (h.s2 / h.num) / (f.s2 / f.num);
+            *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) + fmax(0, *factor - two);
+        }
+    }
+    free(fine.v);
+    free(twos.v);
+    free(fours.v);
+    return ok;
+}
+
+/* Mean of (r/sd)^3 over the picture; the error from the scatter of the blocks' sums. */
+static void skewness(const struct blocks *g, double *skew, double *error)
+{
+    size_t blocks = (size_t)g->nx * (size_t)g->ny;
+    double num = 0, sum = 0, scatter = 0;
+    for (size_t k = 0; k < blocks; k++)
+        if (g->v[k] > 0) {
+            num += g->b[k].num;
+            sum += g->b[k].s3 / pow(g->v[k], 1.5);
+        }
+    *skew = *error = 0;
+    if (num == 0)
+        return;
+    double mean = sum / num;
+    for (size_t k = 0; k < blocks; k++)
+        if (g->v[k] > 0)
+            scatter += pow(g->b[k].s3 / pow(g->v[k], 1.5) - mean * g->b[k].num, 2);
+    *skew = skew_factor * mean;
+    *error = skew_factor * sqrt(scatter) / num;
+}
+
+/* Writes one side's pixel so that compare.c reads v for its variance and k3 for its third cumulant:
+ * n = 3, M2 = v n (n-1), M3 = k3 n (n-1)(n-2). */
+static void set_pixel(struct moments *m, size_t i, double v, double k3)
+{
+    m->m2[i] = 6 * v;
+    m->m3[i] = 6 * k3;
+}
+
+/* compare.c takes the variance of v as k3^2/v: a third cumulant s on both sides, which cancels in the
+ * difference, says tail_factor m4 for v/2 + v/2, as 2 s^2/(v/2) = 4 m4. */
+static void set_channel(struct moments *a, struct moments *b, int c, const struct blocks *g,
+                        double bound, double skew, const double *more_a, const double *more_b,
+                        const unsigned char *censored)
+{
+    for (int y = 0; y < a->height; y++)
+        for (int x = 0; x < a->width; x++) {
+            size_t p = (size_t)y * (size_t)a->width + (size_t)x, i = 3 * p + (size_t)c;
+            size_t k = (size_t)(y / BLOCK) * (size_t)g->nx + (size_t)(x / BLOCK);
+            double v = bound * g->v[k], s = sqrt(tail_factor / 4 * bound * bound * g->m4[k] * v);
+            double half_skew = skew * v * sqrt(v) / 2;
+            if (censored != NULL && censored[p]) {
+                set_pixel(a, i, 0, 0);
+                set_pixel(b, i, 0, 0);
+                continue;
+            }
+            set_pixel(a, i, v / 2 + (more_a != NULL ? more_a[i] : 0), s + half_skew);
+            set_pixel(b, i, v / 2 + (more_b != NULL ? more_b[i] : 0), s - half_skew);
+        }
+}
+
+static bool one_channel(struct moments *a, struct moments *b, int c, struct grid *d,
+                        const double *more_a, const double *more_b, const unsigned char *censored,
+                        struct spatial *out, struct err *e)
+{
+    size_t pixels = (size_t)d->width * (size_t)d->height;
+    for (size_t p = 0; p < pixels; p++) {
+        size_t i = 3 * p + (size_t)c;
+        d->v[p] = censored != NULL && censored[p] ? NAN : a->mean[i] - b->mean[i];
+    }
+    struct blocks g;
+    double bound = 1;
+    bool ok = blocks_make(d, &g, e) && level(d, &out->factor[c], &bound, e);
+    if (ok) {
+        skewness(&g, &out->skewness[c], &out->skew_error[c]);
+        double skew = out->skewness[c] + copysign(out->skew_error[c], out->skewness[c]);
+        set_channel(a, b, c, &g, fmax(1, bound), skew, more_a, more_b, censored);
+    }
+    blocks_free(&g);
+    return ok;
+}
+
+bool spatial_variance(struct moments *a, struct moments *b, const double *more_a,
+                      const double *more_b, const unsigned char *censored, struct spatial *out,
+                      struct err *e)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    bool same = true;
+    for (size_t i = 0; i < 3 * pixels && same; i++)
+        same = (censored != NULL && censored[i / 3]) || a->mean[i] == b->mean[i];
+    if (same)
+        return err_set(e, "A and B are the same picture: nothing tells how noisy it is");
+    if (a->width < 4 * BLOCK || a->height < 4 * BLOCK)
+        return err_set(e,
+                       "%d x %d pixels are too few to tell noise by its neighbours, 32 x 32 are "
+                       "needed",
+                       a->width, a->height);
+    struct grid d;
+    if (!grid_alloc(&d, a->width, a->height, e))
+        return false;
+    bool ok = true;
+    for (int c = 0; ok && c < 3; c++)
+        ok = one_channel(a, b, c, &d, more_a, more_b, censored, out, e);
+    free(d.v);
+    for (size_t p = 0; p < pixels; p++)
+        a->n[p] = b->n[p] = 3;
+    strcpy(a->unit, "picture");
+    strcpy(b->unit, "picture");
+    return ok;
+}

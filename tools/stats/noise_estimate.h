@@ -1,0 +1,41 @@
+/* The noise of two pictures that come without any: from how their difference varies from pixel to
+ * pixel. The difference of two unbiased renders is nothing but noise; if they differ by more, then
+ * by something smooth, which second differences do not see.
+ *
+ * r = the 3 x 3 kernel (1 -2 1; -2 4 -2; 1 -2 1)/6 on D = A - B: its mean square is the variance of
+ * independent noise [Immerkaer96], and no sum f(x) + g(y) contributes. Blocks of 8 x 8 pixels share
+ * one estimate. Its level is set by the same kernel on means of 4 x 4 pixels, which see noise that
+ * neighbouring pixels share (filters wider than a pixel): the blocks' variances are multiplied by
+ * the upper end of a one-sided 99.9 % interval of that factor and what still larger squares would add,
+ * or by 1 if that is larger. The factor is that of D cut at 2.5 standard deviations: independence
+ * survives the cut, heavy tails do not.
+ *
+ * Degrees of freedom: Var(sum r^2) is at most 4 sum r^4, for normal noise (2.52: neighbouring r are
+ * correlated) and for the heaviest tails alike; a picture of N pixels of normal noise has N/6.
+ * Skewness of D: 6 sum r^3 (the kernel cubed sums to 1/6), one coefficient for the picture, with its
+ * jackknife error over the blocks on top.
+ *
+ * What this cannot see: an error as fine as a pixel or two looks like noise and hides itself; noise
+ * shared over more than 4 pixels (denoisers) is taken for a difference. */
+#ifndef ASSAY_NOISE_ESTIMATE_H
+#define ASSAY_NOISE_ESTIMATE_H
+
+#include "renderer/image/moments.h"
+
+/* What was found, per channel. */
+struct spatial {
+    double factor[3];   /* variance of means of 4 x 4 pixels over what independent pixels have */
+    double skewness[3]; /* of D in one pixel */
+    double skew_error[3];
+};
+
+/* Sets n, M2 and M3 of both from their means, in units "picture": half of the variance to each side,
+ * written as 3 observations so that the comparison finds the variance, the degrees of freedom and
+ * the skewness above; n is no count of anything. `more` (3 per pixel and side, or NULL) is variance
+ * that the side has besides. Pixels with censored[p] != 0 take no part and get no noise. Fails with a
+ * line where the pictures are the same, smaller than 32 x 32, or too much is censored. */
+bool spatial_variance(struct moments *a, struct moments *b, const double *more_a,
+                      const double *more_b, const unsigned char *censored, struct spatial *out,
+                      struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,329 @@
+#include "validate_internal.h"
+
+#include "reference/base/json_file.h"
+#include "reference/store/reference_render.h"
+#include "reference/truth/truth.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "run_pathtracer.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Error rates were measured from 16 samples on; an engine's start costs more than a few replicates. */
+enum { LEAST_SAMPLES = 16, LEAST_REPLICATES = 8 };
+
+/* Where the fresh stream begins: another seed of ours, and replicates that no first stream reaches. */
+static const uint64_t fresh_seed = 0xd1b54a32d192ed03u;
+enum { FRESH_REPLICATE = 1 << 24 };
+
+static void observed_free(struct observed *o)
+{
+    moments_free(&o->m);
+    json_decref(o->manifest);
+    *o = (struct observed){0};
+}
+
+void side_free(struct side *s)
+{
+    for (int k = 0; k < NUM_STAGES; k++)
+        for (int l = 0; l < NUM_LOOKS; l++)
+            observed_free(&s->at[k][l]);
+}
+
+/* Ways of ours whose samples cannot be taken in parts. */
+static bool is_whole(const struct suite_variant *v)
+{
+    static const char *const whole[] = {"-a",        "--adaptive", "--adaptive-unbiased",
+                                        "--sampler", "--time",     "--error"};
+    for (const char *const *o = v != NULL ? v->options : NULL; o != NULL && *o != NULL; o++)
+        for (size_t i = 0; i < sizeof whole / sizeof *whole; i++)
+            if (strcmp(*o, whole[i]) == 0)
+                return true;
+    return false;
+}
+
+bool side_grows(const struct side *s)
+{
+    return s->kind == SIDE_LIVE || (s->kind == SIDE_OURS && !is_whole(s->variant));
+}
+
+bool side_is_at_any_look(const struct side *s)
+{
+    return side_grows(s) || s->kind == SIDE_TRUTH || s->kind == SIDE_GOLDEN;
+}
+
+bool side_can_be_fresh(const struct side *s)
+{
+    return s->kind != SIDE_GOLDEN;
+}
+
+static int declared(const struct side *s)
+{
+    if (s->kind == SIDE_LIVE)
+        return s->ref->replicates;
+    return s->variant != NULL ? s->variant->spp : s->scene->spp;
+}
+
+int side_count(const struct side *s, int look)
+{
+    int all = declared(s);
+    switch (s->kind) {
+    case SIDE_OURS:
+        if (is_whole(s->variant))
+            return look == LOOK_DECLARED ? all : 0;
+        return sequence_count(look, all, LEAST_SAMPLES);
+    case SIDE_LIVE: {
+        int least = all < LEAST_REPLICATES ? all : LEAST_REPLICATES,
+            n = sequence_count(look, all, 1);
+        return n > least ? n : least;
+    }
+    case SIDE_ENGINE: return look == LOOK_DECLARED;
+    case SIDE_TRUTH:
+    case SIDE_GOLDEN: break;
+    }
+    return 1;
+}
+
+/* Where a look's image is kept: looks of as many observations share it. */
+static int slot(const struct side *s, int look)
+{
+    int n = side_count(s, look), l = look;
+    while (l > 0 && side_count(s, l - 1) == n)
+        l--;
+    return l;
+}
+
+/* The largest look of fewer observations that is there, or -1. */
+static int below(const struct side *s, int stage, int look)
+{
+    int l = slot(s, look) - 1;
+    while (l >= 0 && !s->at[stage][l].present)
+        l--;
+    return l;
+}
+
+double side_cost(const struct side *s, int look)
+{
+    if (s->at[0][slot(s, look)].present || s->failed || s->kind == SIDE_TRUTH ||
+        s->kind == SIDE_GOLDEN)
+        return 0;
+    int l = below(s, 0, look);
+    double n = side_count(s, look) - (l >= 0 ? side_count(s, l) : 0);
+    double samples = s->kind == SIDE_OURS ? 1 : 64; /* in a replicate, about */
+    return n * samples * s->scene->width * s->scene->height;
+}
+
+/* data/scene/name[_fresh][_n].ending */
+static void file_of(const struct validation *v, const struct side *s, int stage, int look,
+                    const char *ending, char file[256])
+{
+    char n[16] = "";
+    if (v->sequence != &sequence_single && side_grows(s))
+        snprintf(n, sizeof n, "_%d", side_count(s, look));
+    snprintf(file, 256, "data/%s/%s%s%s.%s", s->scene->name, s->name,
+             stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n, ending);
+}
+
+static void full_path(const struct validation *v, const char *file, char path[MAX_PATH])
+{
+    snprintf(path, MAX_PATH, "%s/%s", v->opt->out_dir, file);
+}
+
+static double program_time(const struct validation *v)
+{
+    return fmin(v->opt->timeout_s, time_left(v));
+}
+
+/* Samples first .. last-1. The only look of a run leaves the renderer's own file. */
+static bool render_ours(const struct validation *v, const struct side *s, int stage, int look,
+                        int first, struct observed *out, struct err *e)
+{
+    char file[256], path[MAX_PATH], log[MAX_PATH];
+    bool keep = first == 0 && v->sequence == &sequence_single;
+    file_of(v, s, stage, look, "log", file);
+    full_path(v, file, log);
+    file_of(v, s, stage, look, keep ? "exr" : "part.exr", file);
+    full_path(v, file, path);
+    const struct ours_job job = {.program = v->opt->pathtracer,
+                                 .scene = s->scene,
+                                 .first = first,
+                                 .spp = side_count(s, look),
+                                 .seed = stage > 0 ? v->opt->seed ^ fresh_seed : v->opt->seed,
+                                 .options = s->variant != NULL ? s->variant->options : NULL,
+                                 .threads = v->opt->threads,
+                                 .timeout_s = program_time(v),
+                                 .picture = path,
+                                 .log = log};
+    if (!make_parent_dirs(path, e) || !ours_render(&job, &out->m, &out->seconds, &out->rays, e))
+        return false;
+    out->written = keep;
+    if (!keep) {
+        unlink(path);
+        unlink(log);
+    }
+    return true;
+}
+
+static bool render_live(const struct validation *v, const struct side *s, int stage, int look,
+                        int first, struct observed *out, struct err *e)
+{
+    const struct validate_options *o = v->opt;
+    struct suite_reference ref = *s->ref;
+    ref.replicates = side_count(s, look) - first;
+    const struct reference_options ro = {.seed = o->reference_seed,
+                                         .first_replicate = first + stage * FRESH_REPLICATE,
+                                         .threads = o->threads,
+                                         .timeout_s = program_time(v),
+                                         .work_dir = o->out_dir,
+                                         .share_dir = o->share_dir};
+    return reference_render(s->scene, &ref, &ro, &out->m, &out->manifest, e);
+}
+
+static bool render_engine(const struct validation *v, const struct side *s, int stage,
+                          struct observed *out, struct err *e)
+{
+    const struct validate_options *o = v->opt;
+    const struct engine_options eo = {.spp = o->engine_spp,
+                                      .replicates = o->engine_replicates,
+                                      .seed = stage > 0 ? ~o->reference_seed : o->reference_seed,
+                                      .threads = o->threads,
+                                      .timeout_s = program_time(v),
+                                      .work_dir = o->out_dir};
+    char path[MAX_PATH], file[256];
+    file_of(v, s, stage, LOOK_DECLARED, "json", file);
+    full_path(v, file, path);
+    if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
+        return false;
+    return make_parent_dirs(path, e) && json_write(path, out->manifest, e);
+}
+
+static bool copy(const struct moments *m, struct moments *out, struct err *e)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    if (!moments_alloc(out, m->width, m->height, e))
+        return false;
+    memcpy(out->unit, m->unit, sizeof out->unit);
+    out->spp = m->spp;
+    memcpy(out->n, m->n, pixels * sizeof *m->n);
+    memcpy(out->mean, m->mean, 3 * pixels * sizeof *m->mean);
+    memcpy(out->m2, m->m2, 3 * pixels * sizeof *m->m2);
+    memcpy(out->m3, m->m3, 3 * pixels * sizeof *m->m3);
+    return true;
+}
+
+static bool copy_observed(const struct observed *o, struct observed *out, struct err *e)
+{
+    if (!copy(&o->m, &out->m, e))
+        return false;
+    out->manifest = json_incref(o->manifest);
+    out->seconds = o->seconds;
+    out->rays = o->rays;
+    return true;
+}
+
+/* `more` becomes what was there before and it. The manifest is the first one's, with all seeds. */
+static bool add_before(const struct observed *before, struct observed *more, struct err *e)
+{
+    struct moments sum;
+    if (!copy(&before->m, &sum, e))
+        return false;
+    if (!moments_merge(&sum, &more->m, e)) {
+        moments_free(&sum);
+        return false;
+    }
+    moments_free(&more->m);
+    more->m = sum;
+    more->seconds += before->seconds;
+    more->rays.rays += before->rays.rays;
+    more->rays.box_tests += before->rays.box_tests;
+    more->rays.primitive_tests += before->rays.primitive_tests;
+    if (before->manifest == NULL)
+        return true;
+    json_t *manifest = json_deep_copy(before->manifest);
+    json_t *seeds = json_object_get(manifest, "seeds");
+    if (seeds != NULL)
+        json_array_extend(seeds, json_object_get(more->manifest, "seeds"));
+    json_decref(more->manifest);
+    more->manifest = manifest;
+    return manifest != NULL || err_set(e, "out of memory");
+}
+
+static bool make(struct validation *v, struct side *s, int stage, int look, struct observed *out)
+{
+    int l = below(s, stage, look);
+    int first = l >= 0 ? side_count(s, l) : 0;
+    const struct observed *before = l >= 0 ? &s->at[stage][l] : NULL;
+    /* An engine without noise has no more to say. */
+    if (before != NULL && (first == side_count(s, look) || strcmp(before->m.unit, "exact") == 0))
+        return copy_observed(before, out, &s->e);
+    bool ok = false;
+    switch (s->kind) {
+    case SIDE_OURS: ok = render_ours(v, s, stage, look, first, out, &s->e); break;
+    case SIDE_TRUTH: ok = truth_render(s->scene, s->ref, &out->m, &s->e); break;
+    case SIDE_GOLDEN:
+        ok = golden_read(v->opt->golden_dir, s->scene, s->ref, &out->m, &out->manifest, &s->e);
+        break;
+    case SIDE_LIVE: ok = render_live(v, s, stage, look, first, out, &s->e); break;
+    case SIDE_ENGINE: ok = render_engine(v, s, stage, out, &s->e); break;
+    }
+    if (!ok)
+        return false;
+    if (out->manifest != NULL)
+        out->seconds = json_number_value(json_object_get(out->manifest, "cpu_s"));
+    if (s->kind != SIDE_GOLDEN)
+        s->cpu_s += out->seconds;
+    return before == NULL || add_before(before, out, &s->e);
+}
+
+enum got side_at(struct validation *v, struct side *s, int stage, int look, struct observed **out)
+{
+    struct observed *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
+    assert(stage == 0 || side_can_be_fresh(s));
+    *out = o;
+    if (o->present)
+        return GOT;
+    if (s->failed)
+        return GOT_NOTHING;
+    int l = below(s, stage, look);
+    double more = side_count(s, look) - (l >= 0 ? side_count(s, l) : 0);
+    double predicted = s->units > 0 ? s->wall_s / s->units * more : 0;
+    if (time_left(v) <= predicted)
+        return GOT_NO_TIME;
+    if (s->kind != SIDE_TRUTH && s->kind != SIDE_GOLDEN) {
+        char note[160];
+        snprintf(note, sizeof note, "rendering with %s%s", s->name,
+                 stage > 0 ? ", fresh seeds" : "");
+        say(v, s->scene->name, note);
+    }
+    double begun = now_seconds();
+    if (!make(v, s, stage, look, o)) {
+        observed_free(o);
+        /* A program that was stopped because the time is over has done nothing wrong. */
+        if (time_left(v) <= 0)
+            return GOT_NO_TIME;
+        s->failed = true;
+        return GOT_NOTHING;
+    }
+    s->wall_s += now_seconds() - begun;
+    s->units += more;
+    o->present = true;
+    return GOT;
+}
+
+bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
+                struct err *e)
+{
+    struct observed *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
+    char path[MAX_PATH];
+    assert(o->present);
+    file_of(v, s, stage, look, "exr", file);
+    full_path(v, file, path);
+    if (!o->written && !(make_parent_dirs(path, e) && moments_write(path, &o->m, NULL, 0, e)))
+        return false;
+    o->written = true;
+    return true;
+}

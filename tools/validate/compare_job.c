@@ -1,0 +1,279 @@
+#include "compare_job.h"
+
+#include "tools/results/claim_result.h"
+#include "tools/sequential/two_stage.h"
+#include "tools/results/results.h"
+
+#include "renderer/base/fs.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* 16, or what divides the image at all. */
+static int default_tile(const struct moments *m)
+{
+    if (m->width % 16 == 0 && m->height % 16 == 0)
+        return 16;
+    return m->width == m->height ? m->width : 1;
+}
+
+/* Two sides as compare_moments() wants them. */
+struct pair {
+    struct input in[2];
+};
+
+static void pair_free(struct pair *p)
+{
+    input_free(&p->in[0]);
+    input_free(&p->in[1]);
+}
+
+static bool pair_read(const struct compare_job *job, const char *const path[2], struct pair *p,
+                      struct notes *notes, struct err *e)
+{
+    *p = (struct pair){0};
+    bool ok = input_read(path[0], 'a', &job->input[0], &p->in[0], notes, e) &&
+              input_read(path[1], 'b', &job->input[1], &p->in[1], notes, e);
+    for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
+        ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
+             p->in[1].censored != NULL ||
+             err_set(e, "--curve is for pictures of integers, neither %s nor %s is one", path[0],
+                     path[1]);
+    ok = ok && input_pair(&p->in[0], &p->in[1], notes, e);
+    if (!ok)
+        pair_free(p);
+    return ok;
+}
+
+/* The pair's moments become the result's; what is left of it is freed. */
+static void keep_pair(const char *const path[2], struct pair *p, struct compared *out)
+{
+    for (int i = 0; i < 2; i++) {
+        moments_free(&out->m[i]);
+        out->m[i] = p->in[i].m;
+        p->in[i].m = (struct moments){0};
+        out->is_file[i] = p->in[i].kind == INPUT_MOMENTS && !p->in[i].is_guessed &&
+                          p->in[i].censored == NULL && !p->in[i].is_xyz;
+        out->path[i] = path[i];
+    }
+    out->is_guessed = p->in[0].is_guessed;
+    pair_free(p);
+}
+
+static bool check_fresh(const char *const path[2], const struct moments first[2],
+                        const struct pair *again, struct err *e)
+{
+    for (int i = 0; i < 2; i++)
+        if (!gate_check_fresh(&first[i], &again->in[i].m, e))
+            return err_prefix(e, "%s", path[i]);
+    return true;
+}
+
+static bool second_stage(const struct compare_job *job, const struct compare_options *opt,
+                         struct compared *out, struct err *e)
+{
+    struct pair again;
+    struct comparison first = out->r, second = {0};
+    if (!pair_read(job, job->again, &again, &out->notes, e))
+        return false;
+    bool ok = check_fresh(job->again, out->m, &again, e) &&
+              gate_confirm(&first, &again.in[0].m, &again.in[1].m, opt, &second, e);
+    if (ok) {
+        input_limit(&again.in[0], opt->tile, &second);
+        comparison_free(&first);
+        out->r = second;
+        keep_pair(job->again, &again, out);
+    } else {
+        pair_free(&again);
+    }
+    return ok;
+}
+
+static bool run_moments(const struct compare_job *job, struct compared *out, struct err *e)
+{
+    struct pair p;
+    struct compare_options opt = job->opt;
+    if (!pair_read(job, job->path, &p, &out->notes, e))
+        return false;
+    if (opt.tile == 0)
+        opt.tile = default_tile(&p.in[1].m);
+    out->tile = opt.tile;
+    bool two = job->again[0] != NULL;
+    bool ok = two ? gate_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
+                  : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
+    if (ok && p.in[0].is_guessed && opt.margin_variance > 0)
+        ok =
+            err_set(e, "--margin-variance: a picture without moments tells no variance of its own");
+    if (ok)
+        input_limit(&p.in[0], opt.tile, &out->r);
+    keep_pair(job->path, &p, out);
+    if (ok && two && out->r.verdict != VERDICT_DIFFERENT)
+        notes_add(&out->notes, "nothing was flagged: %s and %s were not needed", job->again[0],
+                  job->again[1]);
+    return ok && (!two || out->r.verdict != VERDICT_DIFFERENT || second_stage(job, &opt, out, e));
+}
+
+static bool same_picture(const struct renders *r, const struct renders *s, const char *dir,
+                         struct err *e)
+{
+    if (r->width != s->width || r->height != s->height)
+        return err_set(e, "%s: is %d x %d pixels, the first render %d x %d", dir, s->width,
+                       s->height, r->width, r->height);
+    size_t bytes = 3 * (size_t)r->width * (size_t)r->height * sizeof **r->rgb;
+    for (int i = 0; i < r->num; i++)
+        for (int j = 0; j < s->num; j++)
+            if (memcmp(r->rgb[i], s->rgb[j], bytes) == 0)
+                return err_set(e,
+                               "%s: %s is also in the first render: a second stage needs fresh "
+                               "seeds",
+                               dir, s->name[j]);
+    return true;
+}
+
+static bool permute_again(const struct compare_job *job, const struct renders first[2],
+                          const struct permutation_options *stage, struct compared *out,
+                          struct err *e)
+{
+    struct renders again[2] = {{0}};
+    struct permutation found = out->perm;
+    bool ok = true;
+    for (int i = 0; ok && i < 2; i++)
+        ok = renders_read(job->again[i], &again[i], e) &&
+             same_picture(&first[i], &again[i], job->again[i], e);
+    ok = ok && permutation_confirm(&found, &again[0], &again[1], stage, &out->perm, e);
+    renders_free(&again[0]);
+    renders_free(&again[1]);
+    return ok;
+}
+
+/* The moments give the maps and intervals, the permutation decides. */
+static bool run_exchangeable(const struct compare_job *job, struct compared *out, struct err *e)
+{
+    struct renders r[2] = {{0}};
+    struct compare_options opt = job->opt;
+    bool two = job->again[0] != NULL;
+    struct permutation_options stage = {two ? gate_stage_alpha(opt.alpha) : opt.alpha,
+                                        job->min_side};
+    bool ok = renders_read(job->path[0], &r[0], e) && renders_read(job->path[1], &r[1], e);
+    for (int i = 0; ok && i < 2; i++) {
+        ok = renders_moments(&r[i], &out->m[i], e);
+        out->path[i] = job->path[i];
+    }
+    ok = ok && permutation_test(&r[0], &r[1], &stage, &out->perm, e);
+    if (ok && opt.tile == 0)
+        opt.tile = default_tile(&out->m[1]);
+    out->tile = opt.tile;
+    ok = ok && compare_moments(&out->m[0], &out->m[1], &opt, &out->r, e);
+    double mdb = out->perm.mdb;
+    if (ok && two && out->perm.verdict == VERDICT_DIFFERENT)
+        ok = permute_again(job, r, &stage, out, e);
+    if (ok) {
+        out->r.verdict = out->perm.verdict;
+        out->r.extra_factor = 1;
+        out->r.mdb_global = mdb;
+        snprintf(out->r.reason, sizeof out->r.reason, "%s", out->perm.reason);
+        notes_add(&out->notes,
+                  "judged by permutation of %d and %d replicates, smallest p possible %.2g: exact "
+                  "if equal renderers make them from independent seeds; intervals and the MDB of a "
+                  "tile are those of the moments",
+                  r[0].num, r[1].num, out->perm.smallest_p);
+    }
+    renders_free(&r[0]);
+    renders_free(&r[1]);
+    return ok;
+}
+
+bool compared_run(const struct compare_job *job, struct compared *out, struct err *e)
+{
+    *out = (struct compared){0};
+    bool ok = job->exchangeable ? run_exchangeable(job, out, e) : run_moments(job, out, e);
+    if (!ok)
+        compared_free(out);
+    return ok;
+}
+
+void compared_free(struct compared *c)
+{
+    comparison_free(&c->r);
+    moments_free(&c->m[0]);
+    moments_free(&c->m[1]);
+}
+
+static json_t *notes_json(const struct notes *notes)
+{
+    json_t *lines = json_array();
+    for (int i = 0; i < notes->num; i++)
+        json_array_append_new(lines, json_string(notes->line[i]));
+    return lines;
+}
+
+static json_t *permutation_json(const struct permutation *p)
+{
+    return json_pack("{s:f, s:f, s:i, s:b, s:i, s:f, s:f}", "p", p->p, "smallest_p", p->smallest_p,
+                     "labellings", p->num_labellings, "exhaustive", p->is_exhaustive, "regions",
+                     p->num_regions, "t", p->t, "mdb", p->mdb);
+}
+
+/* The report reads moments: of a side that is none, they are written beside the results. */
+static bool side_file(const struct compared *c, int side, const char *json, char *out, size_t size,
+                      struct err *e)
+{
+    const char *slash = strrchr(json, '/');
+    if (c->is_file[side]) {
+        char full[PATH_MAX];
+        if (realpath(c->path[side], full) == NULL || strlen(full) >= size)
+            return err_set(e, "%s: its full path is not known", c->path[side]);
+        strcpy(out, full);
+        return true;
+    }
+    snprintf(out, size, "%s.%c.exr", json, "ab"[side]);
+    bool ok = moments_write(out, &c->m[side], NULL, 0, e);
+    snprintf(out, size, "%s.%c.exr", slash != NULL ? slash + 1 : json, "ab"[side]);
+    return ok;
+}
+
+bool compared_write_json(const struct compare_job *job, const struct compared *c,
+                         enum verdict expected, const char *path, int argc, char **argv,
+                         struct err *e)
+{
+    struct claim_context context = {
+        .a = job->path[0], .b = job->path[1], .expected = expected, .opt = job->opt};
+    context.opt.tile = c->tile;
+    char z[4096], relative[4096], side[2][4096];
+    const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
+    snprintf(z, sizeof z, "%s.z.exr", path);
+    snprintf(relative, sizeof relative, "%s.relative.exr", path);
+    json_t *root = results_new(argc, argv, job->opt.alpha, e);
+    if (root == NULL)
+        return false;
+    if (!make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
+        !image_write_exr(relative, &c->r.relative, e) ||
+        !side_file(c, 0, path, side[0], sizeof side[0], e) ||
+        !side_file(c, 1, path, side[1], sizeof side[1], e)) {
+        json_decref(root);
+        return false;
+    }
+    json_t *claim = claim_judged(&context, &c->r);
+    bool ok = claim != NULL;
+    if (ok && !c->is_guessed)
+        ok = claim_add_observations(claim, "a", &c->m[0]) &&
+             claim_add_observations(claim, "b", &c->m[1]);
+    if (ok && c->notes.num > 0)
+        ok = json_object_set_new(claim, "notes", notes_json(&c->notes)) == 0;
+    if (ok && job->exchangeable)
+        ok = json_object_set_new(claim, "permutation", permutation_json(&c->perm)) == 0;
+    ok = ok &&
+         json_object_set_new(claim, "files",
+                             json_pack("{s:s, s:s, s:s+, s:s+}", "a", side[0], "b", side[1], "z",
+                                       base, ".z.exr", "relative", base, ".relative.exr")) == 0;
+    ok = ok && json_array_append(json_object_get(root, "claims"), claim) == 0;
+    if (!ok)
+        err_set(e, "%s: out of memory", path);
+    ok = ok && json_write(path, root, e);
+    json_decref(claim);
+    json_decref(root);
+    return ok;
+}

@@ -1,0 +1,40 @@
+/* One run of `assay compare`: from paths to a verdict with its notes, and its results.json. */
+#ifndef ASSAY_COMPARE_JOB_H
+#define ASSAY_COMPARE_JOB_H
+
+#include "tools/input/input.h"
+#include "tools/compare/permutation.h"
+
+struct compare_job {
+    const char *path[2];  /* A is tested, B the reference */
+    const char *again[2]; /* fresh renders of both for a second stage, or NULL */
+    struct input_options input[2];
+    struct compare_options opt; /* tile 0: 16, or the whole image where 16 does not divide it */
+    bool exchangeable;          /* judge by permutation of replicates */
+    int min_side;               /* of a region to permute; 0: permutation.h chooses */
+};
+
+struct compared {
+    struct moments m[2];     /* what was compared last: the first pair or, flagged, the second */
+    bool is_guessed;         /* their n and unit are not of observations (input.h) */
+    bool is_file[2];         /* the side is a moments EXR, path[] */
+    const char *path[2];     /* of that pair; the job's */
+    struct comparison r;     /* its verdict and reason are the claim's, whoever reached it */
+    struct permutation perm; /* of an exchangeable job; of the last stage */
+    struct notes notes;
+    int tile;
+};
+
+/* Reads, compares, and, with a second pair, confirms. The caller frees with compared_free(). */
+bool compared_run(const struct compare_job *job, struct compared *out, struct err *e)
+    __attribute__((warn_unused_result));
+void compared_free(struct compared *c);
+
+/* results.json at `path` with one claim, and beside it what the report shows: PATH.z.exr,
+ * PATH.relative.exr and, for sides that are no moments EXR, PATH.a.exr and PATH.b.exr. argc, argv:
+ * the command line. */
+bool compared_write_json(const struct compare_job *job, const struct compared *c,
+                         enum verdict expected, const char *path, int argc, char **argv,
+                         struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,87 @@
+#include "import_result.h"
+
+#include "tools/results/results.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+bool import_check_suite(const struct suite *suite, const char *const *only, int num_only,
+                        const struct import_options *opt, json_t **reports, struct err *e)
+{
+    int num = num_only > 0 ? num_only : suite->num_scenes;
+    /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
+    const struct suite_scene **scene = malloc((size_t)num * sizeof *scene);
+    bool ok = scene != NULL || err_set(e, "out of memory");
+    for (int i = 0; ok && i < num; i++) {
+        scene[i] = num_only > 0 ? suite_find(suite, only[i]) : &suite->scene[i];
+        ok = scene[i] != NULL || err_set(e, "no scene '%s' in the suite", only[i]);
+    }
+    ok = ok && import_check(scene, num, opt, reports, e);
+    free(scene);
+    return ok;
+}
+
+static long long number(const json_t *report, const char *key)
+{
+    return (long long)json_integer_value(json_object_get(report, key));
+}
+
+/* ", 2 spheres": only what there is. */
+static void add_unread(char *text, size_t size, const json_t *report, const char *key,
+                       const char *what)
+{
+    size_t used = strlen(text);
+    if (number(report, key) > 0)
+        snprintf(text + used, size - used, "%s%lld %s", used > 0 ? ", " : "", number(report, key),
+                 what);
+}
+
+void import_print(FILE *f, const json_t *reports)
+{
+    static const char *const unread[][2] = {{"unread_cameras", "camera by lookat"},
+                                            {"unread_spheres", "spheres"},
+                                            {"unread_rectangles", "rectangles of light"},
+                                            {"unread_environments", "environment"},
+                                            {"unread_normals", "normals"}};
+    size_t agree = 0, i;
+    long long triangles = 0;
+    const json_t *report;
+    fprintf(f, "Blender's own importer against ours:\n");
+    json_array_foreach(reports, i, report)
+    {
+        const char *error = json_string_value(json_object_get(report, "error"));
+        const char *what = json_string_value(json_object_get(report, "what"));
+        const char *scene = json_string_value(json_object_get(report, "scene"));
+        char rest[256] = "";
+        if (error != NULL || what != NULL) {
+            fprintf(f, "  %-20s %s: %s\n", scene, error ? "NOT JUDGED" : "DIFFER",
+                    error ? error : what);
+            continue;
+        }
+        for (size_t k = 0; k < sizeof unread / sizeof *unread; k++)
+            add_unread(rest, sizeof rest, report, unread[k][0], unread[k][1]);
+        fprintf(f, "  %-20s agree: %lld camera, %lld triangles, %lld normals, %lld lights%s%s\n",
+                scene, 1 - number(report, "unread_cameras"), number(report, "triangles"),
+                number(report, "normals"), number(report, "lights"),
+                rest[0] != '\0' ? "; Blender does not read: " : "", rest);
+        agree++;
+        triangles += number(report, "triangles");
+    }
+    fprintf(f, "  %zu of %zu scenes agree, %lld triangles\n", agree, json_array_size(reports),
+            triangles);
+}
+
+int import_exit_code(const json_t *reports)
+{
+    int code = EXIT_EQUIVALENT;
+    size_t i;
+    const json_t *report;
+    json_array_foreach(reports, i, report)
+    {
+        if (!json_is_boolean(json_object_get(report, "agrees")))
+            return EXIT_NOT_JUDGED;
+        if (!json_is_true(json_object_get(report, "agrees")))
+            code = EXIT_DIFFERENT;
+    }
+    return code;
+}

@@ -1,0 +1,305 @@
+#include "validate_internal.h"
+
+#include "renderer/base/progress.h"
+#include "tools/results/claim_result.h"
+#include "stated_error_claims.h"
+#include "tools/results/results.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* The command that judges this claim alone, and yet with the same alpha. */
+static void rerun_command(const struct validation *v, const struct task *t, char *out, size_t size)
+{
+    char live[64] = "", engine[4200] = "", how[96] = "";
+    const struct validate_options *o = v->opt;
+    if (o->live)
+        snprintf(live, sizeof live, " --live --reference-seed %u", o->reference_seed);
+    if (o->engine != NULL && !o->live)
+        snprintf(live, sizeof live, " --reference-seed %u", o->reference_seed);
+    if (o->engine != NULL)
+        snprintf(engine, sizeof engine, " --engine %s --engine-spp %d --engine-replicates %d",
+                 o->engine->file, o->engine_spp, o->engine_replicates);
+    if (o->budget_s > 0)
+        snprintf(how, sizeof how, " --budget %gs", o->budget_s);
+    else if (v->sequence != &sequence_single)
+        snprintf(how, sizeof how, " --until-different");
+    char name[CLAIM_NAME];
+    task_name(t, name);
+    /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
+    snprintf(out, size, "assay validate --only %s --alpha %.6g --stages %d --seed %llu%s%s%s", name,
+             v->alpha, v->stages, (unsigned long long)o->seed, live, engine, how);
+}
+
+static struct claim_context context(const struct validation *v, const struct task *t,
+                                    const char *rerun)
+{
+    double share = t->looks->share[t->seen ? t->look : LOOK_DECLARED];
+    return (struct claim_context){.scene = t->scene,
+                                  .a = t->a->name,
+                                  .b = t->ref.engine,
+                                  .fidelity = t->ref.fidelity,
+                                  .expected = t->expected,
+                                  .rerun = rerun,
+                                  .opt = {.alpha = v->alpha * share,
+                                          .margin_global = t->ref.margin_global,
+                                          .margin_tile = t->ref.margin_tile,
+                                          .tile = t->scene->tile}};
+}
+
+static bool write_maps(const struct validation *v, const struct task *t, json_t *files,
+                       struct err *e)
+{
+    static const char *const kind[2] = {"z", "rel"};
+    const struct image *map[2] = {&t->c.z, &t->c.relative};
+    for (int k = 0; k < 2; k++) {
+        char path[MAX_PATH], file[256];
+        snprintf(file, sizeof file, "data/%s/%s_%s_%s.exr", t->scene->name, kind[k], t->a->name,
+                 t->ref.engine);
+        snprintf(path, sizeof path, "%s/%s", v->opt->out_dir, file);
+        if (!image_write_exr(path, map[k], e))
+            return false;
+        json_object_set_new(files, k == 0 ? "z" : "relative", json_string(file));
+    }
+    return true;
+}
+
+static void add_provenance(json_t *claim, struct validation *v, const struct task *t)
+{
+    struct observed *a, *b;
+    enum got had_a = side_at(v, t->a, t->stage, t->look, &a);
+    enum got had_b = side_at(v, t->b, t->stage, t->look, &b);
+    assert(had_a == GOT && had_b == GOT);
+    (void)had_a, (void)had_b;
+    claim_add_observations(claim, "a", &a->m);
+    claim_add_observations(claim, "b", &b->m);
+    json_object_set_new(claim, "seconds_a", json_real(a->seconds));
+    json_object_set_new(claim, "seconds_b", json_real(b->seconds));
+    if (a->rays.rays > 0)
+        json_object_set_new(claim, "rays_a",
+                            json_pack("{s:f, s:f, s:f}", "rays", a->rays.rays, "box_tests",
+                                      a->rays.box_tests, "primitive_tests",
+                                      a->rays.primitive_tests));
+    if (a->manifest == NULL)
+        json_object_set_new(claim, "seed_a", json_integer((json_int_t)v->opt->seed));
+    json_t *version = json_object_get(b->manifest, "version");
+    json_t *seeds = json_object_get(b->manifest, "seeds");
+    if (version != NULL)
+        json_object_set(claim, "version_b", version);
+    if (seeds != NULL)
+        json_object_set(claim, "seeds_b", seeds);
+}
+
+static json_t *files_of(const struct validation *v, const struct task *t, struct err *e)
+{
+    char a[256], b[256];
+    if (!side_write(v, t->a, t->stage, t->look, a, e) ||
+        !side_write(v, t->b, t->stage, t->look, b, e))
+        return NULL;
+    json_t *files = json_pack("{s:s, s:s}", "a", a, "b", b);
+    if (files == NULL || !write_maps(v, t, files, e)) {
+        json_decref(files);
+        return NULL;
+    }
+    return files;
+}
+
+static void release(struct side *s)
+{
+    if (--s->users == 0)
+        side_free(s);
+}
+
+/* How it was looked at, at what cost. */
+static void add_looks(json_t *claim, const struct validation *v, const struct task *t)
+{
+    double spent = 0;
+    for (size_t i = 0; i < json_array_size(t->history); i++)
+        spent += member_number(json_array_get(t->history, i), "alpha");
+    json_object_set(claim, "looks", t->history);
+    json_object_set_new(claim, "stages", json_integer(t->stages));
+    json_object_set_new(claim, "alpha_claim", json_real(v->alpha));
+    json_object_set_new(claim, "alpha_spent", json_real(spent));
+    json_object_set_new(claim, "cost_s", json_pack("{sf,sf}", "a", t->cpu_a, "b", t->cpu_b));
+}
+
+static void announce(struct validation *v, struct task *t)
+{
+    const char *verdict = member_text(t->result, "verdict"),
+               *error = member_text(t->result, "error");
+    v->done++;
+    say(v, t->scene->name, error != NULL ? error : verdict);
+    if (t->a != NULL) {
+        release(t->a);
+        release(t->b);
+    }
+}
+
+/* The claim is what the last look said; why, if not NULL, comes before its reason. */
+static void finish(struct validation *v, struct task *t, const char *why)
+{
+    char rerun[8192], reason[512];
+    struct err e = {""};
+    rerun_command(v, t, rerun, sizeof rerun);
+    struct claim_context c = context(v, t, rerun);
+    json_t *files = files_of(v, t, &e);
+    if (files != NULL)
+        t->result = claim_judged(&c, &t->c);
+    if (t->result != NULL) {
+        json_object_set(t->result, "files", files);
+        add_provenance(t->result, v, t);
+        if (why != NULL) {
+            snprintf(reason, sizeof reason, "%s; %s", why, t->c.reason);
+            json_object_set_new(t->result, "reason", json_string(reason));
+        }
+    } else {
+        t->result = claim_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
+    }
+    json_decref(files);
+    add_looks(t->result, v, t);
+    announce(v, t);
+}
+
+static void finish_unseen(struct validation *v, struct task *t, const char *error, bool no_time)
+{
+    char rerun[8192];
+    rerun_command(v, t, rerun, sizeof rerun);
+    struct claim_context c = context(v, t, rerun);
+    t->result = claim_not_judged(&c, error);
+    if (no_time)
+        json_object_set_new(t->result, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
+    add_looks(t->result, v, t);
+    announce(v, t);
+}
+
+struct pair {
+    struct validation *v;
+    struct task *t;
+    bool no_time;
+    double n_a, n_b;
+};
+
+static bool one_of(struct pair *p, struct side *s, int stage, const struct moments **m,
+                   struct err *e)
+{
+    struct observed *o;
+    switch (side_at(p->v, s, stage, p->t->next, &o)) {
+    case GOT: *m = &o->m; return true;
+    case GOT_NOTHING: *e = s->e; return false;
+    case GOT_NO_TIME: p->no_time = true; break;
+    }
+    return err_set(e, "the budget is spent");
+}
+
+static bool both_of(void *ctx, int stage, const struct moments **a, const struct moments **b,
+                    struct err *e)
+{
+    struct pair *p = ctx;
+    if (!one_of(p, p->t->a, stage, a, e) || !one_of(p, p->t->b, stage, b, e))
+        return false;
+    p->n_a = (*a)->n[0];
+    p->n_b = (*b)->n[0];
+    return true;
+}
+
+/* The share of a in the variance of the difference, all pixels and channels together. */
+static double noise_share(struct validation *v, const struct task *t)
+{
+    struct observed *o[2];
+    double sum[2] = {0, 0};
+    if (side_at(v, t->a, t->stage, t->look, &o[0]) != GOT ||
+        side_at(v, t->b, t->stage, t->look, &o[1]) != GOT)
+        return 1;
+    for (int k = 0; k < 2; k++)
+        for (size_t p = 0; p < (size_t)o[k]->m.width * (size_t)o[k]->m.height; p++)
+            for (int c = 0; c < 3; c++)
+                sum[k] += moments_var_of_mean(&o[k]->m, p, c);
+    return sum[0] + sum[1] > 0 ? sum[0] / (sum[0] + sum[1]) : 1;
+}
+
+/* Below this, more samples of ours are lost on a reference that stays as it is. */
+static const double least_noise_share = 0.1;
+
+static void look(struct validation *v, struct task *t)
+{
+    struct pair p = {.v = v, .t = t};
+    struct compare_options opt = {.alpha = v->alpha,
+                                  .margin_global = t->ref.margin_global,
+                                  .margin_tile = t->ref.margin_tile,
+                                  .tile = t->scene->tile};
+    struct comparison c;
+    struct err e = {""};
+    int stage;
+    double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
+    bool ok = sequence_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
+    t->cpu_a += t->a->cpu_s - before_a;
+    t->cpu_b += t->b->cpu_s - before_b;
+    if (!ok && p.no_time) {
+        t->stalled = true;
+        return;
+    }
+    if (!ok) {
+        finish_unseen(v, t, e.msg, false);
+        return;
+    }
+    comparison_free(&t->c);
+    t->c = c;
+    t->stage = stage;
+    t->look = t->next++;
+    t->seen = true;
+    json_array_append_new(t->history,
+                          json_pack("{sf,sf,sf,si,ss}", "n_a", p.n_a, "n_b", p.n_b, "alpha",
+                                    v->alpha * t->looks->share[t->look], "stage", stage + 1,
+                                    "verdict", verdict_name(c.verdict)));
+    task_settle(t);
+    if (c.verdict != VERDICT_INCONCLUSIVE)
+        finish(v, t, NULL);
+    else if (t->next == NUM_LOOKS)
+        finish(v, t, t->looks == &sequence_single ? NULL : "all looks are taken");
+    else if (t->look >= LOOK_DECLARED && t->b->kind == SIDE_GOLDEN &&
+             noise_share(v, t) < least_noise_share)
+        finish(v, t, "the noise left is that of the stored reference");
+}
+
+void task_look(struct validation *v, struct task *t)
+{
+    if (t->a != NULL) {
+        look(v, t);
+        return;
+    }
+    say(v, t->scene->name, "rendering with seeds of their own");
+    t->result = consistency_run(v->opt, t->scene, v->alpha, v->deadline);
+    announce(v, t);
+}
+
+void task_give_up(struct validation *v, struct task *t, const char *why)
+{
+    if (t->a == NULL)
+        t->result = consistency_run(v->opt, t->scene, v->alpha, 0);
+    if (t->a == NULL)
+        announce(v, t);
+    else if (t->seen)
+        finish(v, t, why);
+    else
+        finish_unseen(v, t, BUDGET_SPENT " before a first look was possible", true);
+}
+
+bool task_differs(const struct task *t)
+{
+    if (t->result == NULL)
+        return false;
+    if (t->a == NULL)
+        return consistency_outcome(t->result) == OUTCOME_OPPOSITE;
+    const char *verdict = member_text(t->result, "verdict");
+    return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
+           claim_outcome(t->result) == OUTCOME_OPPOSITE;
+}
+
+void task_free(struct task *t)
+{
+    comparison_free(&t->c);
+    json_decref(t->history);
+    json_decref(t->result);
+}

@@ -1,0 +1,73 @@
+#include "run_pathtracer.h"
+
+#include "reference/base/process.h"
+
+#include <stdio.h>
+
+enum { MAX_ARGUMENTS = 64 };
+
+/* As renderer/pathtracer/output.c writes it. */
+static struct ours_rays read_rays(const struct image *im)
+{
+    struct ours_rays r;
+    const char *text = image_get_attr(im, "assay:rays");
+    if (text != NULL && sscanf(text, "%lf rays, %lf box tests, %lf primitive tests", &r.rays,
+                               &r.box_tests, &r.primitive_tests) == 3)
+        return r;
+    return (struct ours_rays){0};
+}
+
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
+                 struct ours_rays *rays, struct err *e)
+{
+    const struct suite_scene *s = job->scene;
+    char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
+    char range[32];
+    snprintf(width, sizeof width, "%d", s->width);
+    snprintf(height, sizeof height, "%d", s->height);
+    snprintf(spp, sizeof spp, "%d", job->spp);
+    snprintf(depth, sizeof depth, "%d", s->depth);
+    snprintf(threads, sizeof threads, "%d", job->threads);
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
+    snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
+    snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
+    snprintf(range, sizeof range, "%d:%d", job->first, job->spp);
+    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,       "-s",
+                                       spp,          "-m", depth, "-t",         threads,
+                                       "--seed",     seed, "-f",  job->picture, s->dae};
+    int argc = 15;
+    if (s->environment[0] != '\0') {
+        argv[argc++] = "-e";
+        argv[argc++] = s->environment;
+    }
+    if (s->lens_radius > 0) {
+        argv[argc++] = "-b";
+        argv[argc++] = lens;
+        argv[argc++] = "-d";
+        argv[argc++] = focus;
+    }
+    if (job->first > 0) {
+        argv[argc++] = "--samples";
+        argv[argc++] = range;
+    }
+    for (const char *const *o = job->options; o != NULL && *o != NULL; o++) {
+        if (argc == MAX_ARGUMENTS - 1)
+            return err_set(e, "%s: too many options", s->name);
+        argv[argc++] = *o;
+    }
+    const struct process p = {.argv = argv, .log = job->log, .timeout_s = job->timeout_s};
+    struct process_usage usage;
+    struct image im;
+    if (!process_run(&p, &usage, e) || !moments_read(job->picture, out, &im, e))
+        return false;
+    if (rays != NULL)
+        *rays = read_rays(&im);
+    image_free(&im);
+    *cpu_s = usage.cpu_s;
+    if (out->width == s->width && out->height == s->height)
+        return true;
+    err_set(e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d", s->name, out->width,
+            out->height, s->width, s->height);
+    moments_free(out);
+    return false;
+}

@@ -1,0 +1,30 @@
+/* One run of the program under test on a scene of the suite. */
+#ifndef ASSAY_RUN_PATHTRACER_H
+#define ASSAY_RUN_PATHTRACER_H
+
+#include "reference/suite/suite.h"
+#include "renderer/image/moments.h"
+
+struct ours_job {
+    const char *program; /* pathtracer, or what stands in for it */
+    const struct suite_scene *scene;
+    int first, spp; /* samples first .. spp-1 of each pixel; 0 and spp: one render */
+    uint64_t seed;
+    const char *const *options; /* further ones, NULL at the end; NULL: none */
+    int threads;
+    double timeout_s;
+    const char *picture, *log; /* files to write; their directory exists */
+};
+
+/* What tracing took, as the picture says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
+ * leaves, of up to eight boxes or triangles each (renderer/bvh/bvh.h). */
+struct ours_rays {
+    double rays, box_tests, primitive_tests;
+};
+
+/* The picture's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
+ * fails, and on a picture of another size. */
+bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
+                 struct ours_rays *rays, struct err *e) __attribute__((warn_unused_result));
+
+#endif

@@ -1,0 +1,256 @@
+#include "validate_internal.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Is it SCENE or SCENE/CLAIM? */
+static bool is_of_scene(const char *only, const char *scene)
+{
+    size_t n = strcspn(only, "/");
+    return strlen(scene) == n && strncmp(only, scene, n) == 0;
+}
+
+bool scene_is_selected(const struct validate_options *o, const char *name)
+{
+    for (int i = 0; i < o->num_only; i++)
+        if (is_of_scene(o->only[i], name))
+            return true;
+    return o->num_only == 0;
+}
+
+bool scene_is_selected_whole(const struct validate_options *o, const char *name)
+{
+    for (int i = 0; i < o->num_only; i++)
+        if (strcmp(o->only[i], name) == 0)
+            return true;
+    return o->num_only == 0;
+}
+
+void task_name(const struct task *t, char name[CLAIM_NAME])
+{
+    if (t->a == NULL)
+        snprintf(name, CLAIM_NAME, "%s/consistency", t->scene->name);
+    else if (t->a->kind == SIDE_OURS)
+        snprintf(name, CLAIM_NAME, "%s/%s", t->scene->name,
+                 t->a->variant != NULL ? t->a->name : t->ref.engine);
+    else
+        snprintf(name, CLAIM_NAME, "%s/%s:%s", t->scene->name, t->a->name, t->ref.engine);
+}
+
+static bool check_scenes(const struct validation *v, struct err *e)
+{
+    for (int i = 0; i < v->opt->num_only; i++) {
+        int k = 0;
+        while (k < v->suite.num_scenes && !is_of_scene(v->opt->only[i], v->suite.scene[k].name))
+            k++;
+        if (k == v->suite.num_scenes)
+            return err_set(e, "no scene '%.*s' in %s", (int)strcspn(v->opt->only[i], "/"),
+                           v->opt->only[i], v->opt->suite_dir);
+    }
+    return true;
+}
+
+/* Each SCENE/CLAIM has to be one of the tasks, which are all those of the scenes. */
+static bool check_claims(const struct validation *v, struct err *e)
+{
+    for (int i = 0; i < v->opt->num_only; i++) {
+        const char *only = v->opt->only[i];
+        char name[CLAIM_NAME], names[sizeof e->msg] = "";
+        size_t n = 0;
+        bool found = strchr(only, '/') == NULL;
+        for (int k = 0; k < v->num_tasks && !found; k++) {
+            if (!is_of_scene(only, v->task[k].scene->name))
+                continue;
+            task_name(&v->task[k], name);
+            found = strcmp(name, only) == 0;
+            n += (size_t)snprintf(names + n, sizeof names - n, "%s%s", n > 0 ? ", " : "",
+                                  strchr(name, '/') + 1);
+            n = n < sizeof names ? n : sizeof names - 1;
+        }
+        if (!found)
+            return err_set(e, "--only: no claim '%s'; there are %s", only, names);
+    }
+    return true;
+}
+
+/* Leaves those of the tasks that were asked for. */
+static void keep_selected(struct validation *v)
+{
+    int kept = 0;
+    for (int k = 0; k < v->num_tasks; k++) {
+        struct task *t = &v->task[k];
+        char name[CLAIM_NAME];
+        bool keep = scene_is_selected_whole(v->opt, t->scene->name);
+        task_name(t, name);
+        for (int i = 0; i < v->opt->num_only && !keep; i++)
+            keep = strcmp(v->opt->only[i], name) == 0;
+        if (keep) {
+            v->task[kept++] = *t;
+            continue;
+        }
+        if (t->a != NULL) {
+            t->a->users--;
+            t->b->users--;
+        }
+        task_free(t);
+    }
+    v->num_tasks = kept;
+}
+
+/* Which of the selected scenes the further engine can express; appends the others to `cannot`. */
+static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, struct err *e)
+{
+    const struct validate_options *o = v->opt;
+    int num_can = 0;
+    if (o->engine == NULL)
+        return true;
+    for (int i = 0; i < v->suite.num_scenes; i++) {
+        const struct suite_scene *s = &v->suite.scene[i];
+        if (!scene_is_selected(o, s->name))
+            continue;
+        can[i] = engine_expresses(o->engine, s, o->out_dir, e);
+        num_can += can[i];
+        if (!can[i])
+            json_array_append_new(cannot, json_pack("{ss,ss,ss}", "scene", s->name, "engine",
+                                                    o->engine->name, "reason", e->msg));
+    }
+    if (num_can == 0 && o->of_claims == 0) /* the larger run has other scenes */
+        return err_prefix(e, "%s can express none of the scenes, of the last because",
+                          o->engine->name);
+    e->msg[0] = '\0';
+    return true;
+}
+
+static void init_sides(struct validation *v)
+{
+    for (int i = 0; i < v->suite.num_scenes; i++) {
+        const struct suite_scene *s = &v->suite.scene[i];
+        struct scene_sides *own = &v->sides[i];
+        own->ours = (struct side){.kind = SIDE_OURS, .name = "pathtracer", .scene = s};
+        if (v->opt->engine != NULL)
+            own->engine =
+                (struct side){.kind = SIDE_ENGINE, .name = v->opt->engine->name, .scene = s};
+        for (int k = 0; k < s->num_variants; k++)
+            own->variant[k] = (struct side){.kind = SIDE_OURS,
+                                            .name = s->variant[k].name,
+                                            .scene = s,
+                                            .variant = &s->variant[k]};
+        for (int k = 0; k < s->num_references; k++) {
+            const struct suite_reference *ref = &s->reference[k];
+            own->reference[k] = (struct side){.kind = strcmp(ref->engine, "truth") == 0 ? SIDE_TRUTH
+                                                      : v->opt->live                    ? SIDE_LIVE
+                                                                     : SIDE_GOLDEN,
+                                              .name = ref->engine,
+                                              .scene = s,
+                                              .ref = ref};
+        }
+    }
+}
+
+/* Counts are by the scene file and the options alone, so which looks there are is fixed beforehand. */
+void task_settle(struct task *t)
+{
+    for (; t->next < NUM_LOOKS; t->next++) {
+        if (t->looks->share[t->next] == 0)
+            continue;
+        int a = side_count(t->a, t->next), b = side_count(t->b, t->next);
+        bool is_new = !t->seen || a != side_count(t->a, t->look) || b != side_count(t->b, t->look);
+        if (a > 0 && b > 0 && is_new)
+            return;
+    }
+}
+
+/* v's looks, if the other side can follow at other sizes than the declared one. */
+static const struct sequence *looks_of(const struct validation *v, const struct side *a,
+                                       const struct side *b)
+{
+    bool grows = side_grows(a) || side_grows(b);
+    return grows && side_is_at_any_look(a) && side_is_at_any_look(b) ? v->sequence
+                                                                     : &sequence_single;
+}
+
+static void add_task(struct validation *v, const struct suite_scene *s, struct side *a,
+                     struct side *b, const struct suite_reference *ref, enum verdict expected)
+{
+    struct task *t = &v->task[v->num_tasks++];
+    bool can_be_fresh = side_can_be_fresh(a) && side_can_be_fresh(b);
+    *t = (struct task){.scene = s,
+                       .a = a,
+                       .b = b,
+                       .ref = *ref,
+                       .expected = expected,
+                       .looks = looks_of(v, a, b),
+                       .stages = can_be_fresh ? v->stages : 1,
+                       .history = json_array()};
+    a->users++;
+    b->users++;
+    task_settle(t);
+}
+
+/* In the order of the results: ours against each reference; each engine against the closed form, where
+ * there is one: the probes that show the engine to be set up right; a further engine against all of
+ * these and ours; variants; consistency. */
+static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can)
+{
+    struct scene_sides *own = &v->sides[s - v->suite.scene];
+    struct side *from =
+        v->sides[suite_find(&v->suite, s->references_of) - v->suite.scene].reference;
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
+    struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
+    int t = truth != NULL ? (int)(truth - s->reference) : 0;
+    for (int i = 0; i < s->num_references; i++)
+        add_task(v, s, &own->ours, &from[i], &s->reference[i], s->expect);
+    for (int i = 0; truth != NULL && i < s->num_references; i++)
+        if (i != t)
+            add_task(v, s, &from[i], &from[t], truth, s->expect);
+    for (int i = 0; engine_can && i < s->num_references; i++) {
+        const struct suite_reference *ref = &s->reference[i];
+        add_task(v, s, &own->engine, &from[i], ref, s->expect);
+        /* Against ours inside the widest margins. */
+        self.margin_global = fmax(self.margin_global, ref->margin_global);
+        self.margin_tile = fmax(self.margin_tile, ref->margin_tile);
+    }
+    if (engine_can) /* of the same scene, also 9x */
+        add_task(v, s, &own->engine, &own->ours, &self, VERDICT_EQUIVALENT);
+    /* Our other ways to the same picture, against the closed form or else the first reference. */
+    for (int i = 0; i < s->num_variants; i++) {
+        struct suite_reference ref = s->reference[t];
+        ref.margin_global = s->variant[i].margin_global;
+        ref.margin_tile = s->variant[i].margin_tile;
+        add_task(v, s, &own->variant[i], &from[t], &ref, s->expect);
+    }
+    if (s->consistency.renders > 0)
+        v->task[v->num_tasks++] =
+            (struct task){.scene = s, .looks = &sequence_single, .next = LOOK_DECLARED};
+}
+
+bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
+{
+    size_t num = (size_t)v->suite.num_scenes;
+    if (!check_scenes(v, e))
+        return false;
+    v->sides = calloc(num, sizeof *v->sides);
+    bool *can = calloc(num, sizeof *can);
+    if (v->sides == NULL || can == NULL) {
+        free(can);
+        return err_set(e, "out of memory");
+    }
+    init_sides(v);
+    bool ok = ask_engine(v, can, cannot, e);
+    int most = 0;
+    v->num_tasks = 0;
+    for (int i = 0; ok && i < v->suite.num_scenes; i++)
+        most += scene_is_selected(v->opt, v->suite.scene[i].name) ? MAX_CLAIMS : 0;
+    v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
+    ok = ok && (v->task != NULL || err_set(e, "out of memory"));
+    for (int i = 0; ok && i < v->suite.num_scenes; i++)
+        if (scene_is_selected(v->opt, v->suite.scene[i].name))
+            add_scene(v, &v->suite.scene[i], can[i]);
+    free(can);
+    ok = ok && check_claims(v, e);
+    if (ok)
+        keep_selected(v);
+    return ok;
+}

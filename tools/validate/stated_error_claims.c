@@ -1,0 +1,271 @@
+#include "stated_error_claims.h"
+
+#include "reference/replicates/engine_driver.h"
+#include "reference/truth/truth_noise.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "tools/stats/stated_error.h"
+#include "tools/stats/sample_efficiency.h"
+#include "run_pathtracer.h"
+#include "tools/sequential/adaptive_stop.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PATH_SIZE = 8192 };
+
+/* Render k of the scene with those samples and further options; the picture is removed. */
+static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
+                       int spp, const char *const *options, double deadline, struct moments *out,
+                       double *seconds, struct err *e)
+{
+    double left = deadline - now_seconds();
+    if (left <= 0)
+        return err_set(e, "the budget is spent");
+    char picture[PATH_SIZE], log[PATH_SIZE];
+    snprintf(picture, sizeof picture, "%s/data/%s/consistency.exr", opt->out_dir, s->name);
+    snprintf(log, sizeof log, "%s/data/%s/consistency.log", opt->out_dir, s->name);
+    const struct ours_job job = {.program = opt->pathtracer,
+                                 .scene = s,
+                                 .spp = spp,
+                                 .options = options,
+                                 .seed = replicate_seed((uint32_t)opt->seed, k),
+                                 .threads = opt->threads,
+                                 .timeout_s = fmin(left, opt->timeout_s),
+                                 .picture = picture,
+                                 .log = log};
+    double cpu_s;
+    if (!make_parent_dirs(picture, e) || !ours_render(&job, out, &cpu_s, NULL, e))
+        return false;
+    *seconds += cpu_s;
+    unlink(picture);
+    unlink(log);
+    return true;
+}
+
+/* What the three questions came to; the later ones are asked of some scenes. */
+struct findings {
+    struct consistency c;
+    struct efficiency noise;
+    struct stop_rule stop;
+};
+
+static bool judge_noise(const struct suite_scene *s, const struct moments *render, double alpha,
+                        struct efficiency *out, struct err *e)
+{
+    double *variance;
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
+    if (!truth_noise(s, truth, &variance, e))
+        return false;
+    bool ok = efficiency_judge(render, s->consistency.renders, s->consistency.spp, variance,
+                               s->consistency.noise_margin, alpha, out, e);
+    free(variance);
+    return ok;
+}
+
+static bool judge_stop(const struct validate_options *opt, const struct suite_scene *s,
+                       double deadline, struct stop_rule *out, double *seconds, struct err *e)
+{
+    char batch[16], tolerance[32];
+    snprintf(batch, sizeof batch, "%d", s->consistency.batch);
+    snprintf(tolerance, sizeof tolerance, "%.17g", s->consistency.tolerance);
+    const char *const options[] = {"-a", batch, tolerance, NULL};
+    struct moments m;
+    if (!render_one(opt, s, s->consistency.renders, s->consistency.most, options, deadline, &m,
+                    seconds, e))
+        return false;
+    *out = stop_rule_check(&m, s->consistency.batch, s->consistency.tolerance, s->consistency.most);
+    moments_free(&m);
+    return true;
+}
+
+/* The first of them that differs, else the first that is undecided. */
+static enum verdict overall(const struct suite_scene *s, const struct findings *f, char reason[256])
+{
+    if (f->stop.too_early + f->stop.too_late > 0 && f->c.verdict != VERDICT_DIFFERENT) {
+        snprintf(reason, 256,
+                 "adaptive sampling: %d pixels stop before their interval is inside the tolerance, "
+                 "%d after it must have been",
+                 f->stop.too_early, f->stop.too_late);
+        return VERDICT_DIFFERENT;
+    }
+    bool noise = s->consistency.noise_margin > 0 && f->c.verdict != VERDICT_DIFFERENT &&
+                 f->noise.verdict != VERDICT_EQUIVALENT &&
+                 !(f->c.verdict == VERDICT_INCONCLUSIVE && f->noise.verdict != VERDICT_DIFFERENT);
+    snprintf(reason, 256, "%s", noise ? f->noise.reason : f->c.reason);
+    return noise ? f->noise.verdict : f->c.verdict;
+}
+
+static json_t *judged(const struct suite_scene *s, double alpha, const struct findings *f,
+                      double seconds)
+{
+    char reason[256];
+    const struct consistency *c = &f->c;
+    enum verdict v = overall(s, f, reason);
+    json_t *j =
+        json_pack("{ss,ss,si,si,sf,sf,ss,sb,ss,sf,s[ff],sf,s[ff],sf}", "scene", s->name, "engine",
+                  "pathtracer", "renders", s->consistency.renders, "spp", s->consistency.spp,
+                  "alpha", alpha, "margin", s->consistency.margin, "verdict", verdict_name(v),
+                  "passed", v == VERDICT_EQUIVALENT, "reason", reason, "pixels", c->pixels,
+                  "pixels_ci", c->pixels_lo, c->pixels_hi, "image", c->image, "image_range",
+                  c->image_lo, c->image_hi, "seconds", seconds);
+    if (j != NULL && s->consistency.noise_margin > 0) {
+        json_object_set_new(j, "noise", json_real(f->noise.ratio));
+        json_object_set_new(j, "noise_ci", json_pack("[ff]", f->noise.lo, f->noise.hi));
+    }
+    if (j != NULL && s->consistency.batch > 0) {
+        json_object_set_new(j, "too_early", json_integer(f->stop.too_early));
+        json_object_set_new(j, "too_late", json_integer(f->stop.too_late));
+    }
+    return j;
+}
+
+json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
+                        double alpha, double deadline)
+{
+    int num = s->consistency.renders, done = 0;
+    bool asks_noise = s->consistency.noise_margin > 0;
+    double each = asks_noise ? alpha / 2 : alpha;
+    struct moments *render = calloc((size_t)num, sizeof *render);
+    struct findings f = {0};
+    struct err e = {""};
+    double seconds = 0;
+    bool ok = render != NULL || err_set(&e, "out of memory");
+    for (; ok && done < num; done += ok)
+        ok = render_one(opt, s, done, s->consistency.spp, NULL, deadline, &render[done], &seconds,
+                        &e);
+    ok = ok && consistency_judge(render, num, s->consistency.margin, each, &f.c, &e) &&
+         (!asks_noise || judge_noise(s, render, each, &f.noise, &e)) &&
+         (s->consistency.batch == 0 || judge_stop(opt, s, deadline, &f.stop, &seconds, &e));
+    for (int k = 0; k < done; k++)
+        moments_free(&render[k]);
+    free(render);
+    if (!ok && now_seconds() >= deadline)
+        return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
+                         "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
+                         BUDGET_SPENT " before its renders were done");
+    return ok ? judged(s, alpha, &f, seconds)
+              : json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
+                          "error", e.msg);
+}
+
+static bool is_interval(const json_t *v)
+{
+    return json_array_size(v) == 2 && json_is_number(json_array_get(v, 0)) &&
+           json_is_number(json_array_get(v, 1));
+}
+
+/* Of a claim with an error. */
+static bool only_time_missing(const json_t *c)
+{
+    const char *verdict = member_text(c, "verdict");
+    return verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
+}
+
+static bool check_one(const json_t *c, const char *where, struct err *e)
+{
+    static const char *const numbers[] = {"renders", "spp",   "alpha",  "margin",
+                                          "pixels",  "image", "seconds"};
+    bool passed = json_is_true(json_object_get(c, "passed"));
+    if (member_text(c, "scene") == NULL || member_text(c, "engine") == NULL)
+        return err_set(e, "%s: 'scene' or 'engine' is missing", where);
+    if (member_text(c, "error") != NULL)
+        return (!passed && only_time_missing(c)) ||
+               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        if (!json_is_number(json_object_get(c, numbers[i])))
+            return err_set(e, "%s: '%s' is not a number", where, numbers[i]);
+    if (!is_interval(json_object_get(c, "pixels_ci")) ||
+        !is_interval(json_object_get(c, "image_range")))
+        return err_set(e, "%s: 'pixels_ci' or 'image_range' is not an interval", where);
+    const json_t *noise = json_object_get(c, "noise"), *early = json_object_get(c, "too_early");
+    if (noise != NULL && (!json_is_number(noise) || !is_interval(json_object_get(c, "noise_ci"))))
+        return err_set(e, "%s: 'noise' is not a number or 'noise_ci' is not an interval", where);
+    if (early != NULL &&
+        (!json_is_integer(early) || !json_is_integer(json_object_get(c, "too_late"))))
+        return err_set(e, "%s: 'too_early' or 'too_late' is not a whole number", where);
+    enum verdict v;
+    const char *verdict = member_text(c, "verdict");
+    if (verdict == NULL || !verdict_parse(verdict, &v) || member_text(c, "reason") == NULL)
+        return err_set(e, "%s: 'verdict' or 'reason' is missing or unknown", where);
+    return passed == (v == VERDICT_EQUIVALENT) ||
+           err_set(e, "%s: 'passed' contradicts 'verdict'", where);
+}
+
+bool consistency_check(const json_t *consistency, const char *path, struct err *e)
+{
+    if (!json_is_array(consistency))
+        return err_set(e, "%s: 'consistency' is not an array", path);
+    for (size_t i = 0; i < json_array_size(consistency); i++) {
+        char where[512];
+        snprintf(where, sizeof where, "%.400s: consistency %zu", path, i + 1);
+        if (!check_one(json_array_get(consistency, i), where, e))
+            return false;
+    }
+    return true;
+}
+
+enum outcome consistency_outcome(const json_t *claim)
+{
+    enum verdict v;
+    if (member_text(claim, "verdict") == NULL || !verdict_parse(member_text(claim, "verdict"), &v))
+        return OUTCOME_NOT_JUDGED;
+    switch (v) {
+    case VERDICT_EQUIVALENT: return OUTCOME_AS_EXPECTED;
+    case VERDICT_DIFFERENT: return OUTCOME_OPPOSITE;
+    case VERDICT_INCONCLUSIVE: break;
+    }
+    return OUTCOME_UNDECIDED;
+}
+
+static double end_of(const json_t *c, const char *name, size_t end)
+{
+    return json_number_value(json_array_get(json_object_get(c, name), end));
+}
+
+/* The last columns: noise, and pixels that break the stop rule; empty where the scene does not ask. */
+static void print_more(FILE *f, const json_t *c, const char *before)
+{
+    fputs(before, f);
+    if (json_object_get(c, "noise") != NULL)
+        fprintf(f, "%.3f [%.3f, %.3f]", member_number(c, "noise"), end_of(c, "noise_ci", 0),
+                end_of(c, "noise_ci", 1));
+    fputs(before, f);
+    if (json_object_get(c, "too_early") != NULL)
+        fprintf(f, "%.0f + %.0f", member_number(c, "too_early"), member_number(c, "too_late"));
+}
+
+void consistency_print(FILE *f, const json_t *consistency, bool markdown)
+{
+    if (json_array_size(consistency) == 0)
+        return;
+    fputs(markdown ? "\n| scene | renders | error squared, between renders / stated [interval] | "
+                     "the same of the sum of all pixels | noise / closed form [interval] | pixels "
+                     "stopped too early + too late | verdict |\n|---|--:|--:|--:|--:|--:|---|\n"
+                   : "\nerror between renders / error that they state, squared; of pixels; of the "
+                     "sum of all pixels\n(then noise / closed form; pixels that adaptive sampling "
+                     "stopped too early + too late)\n",
+          f);
+    for (size_t i = 0; i < json_array_size(consistency); i++) {
+        const json_t *c = json_array_get(consistency, i);
+        if (member_text(c, "error") != NULL) {
+            fprintf(f, markdown ? "| %s | | | | | | %s: %s |\n" : "%s  %s: %s\n",
+                    member_text(c, "scene"),
+                    member_text(c, "verdict") != NULL ? member_text(c, "verdict") : "NOT JUDGED",
+                    member_text(c, "error"));
+            continue;
+        }
+        fprintf(f,
+                markdown ? "| %s | %.0f x %.0f spp | %.3f [%.3f, %.3f] | %.2f"
+                         : "%s  %.0f x %.0f spp  %.3f [%.3f, %.3f]  %.2f",
+                member_text(c, "scene"), member_number(c, "renders"), member_number(c, "spp"),
+                member_number(c, "pixels"), end_of(c, "pixels_ci", 0), end_of(c, "pixels_ci", 1),
+                member_number(c, "image"));
+        if (markdown || json_object_get(c, "noise") != NULL ||
+            json_object_get(c, "too_early") != NULL)
+            print_more(f, c, markdown ? " | " : "  ");
+        fprintf(f, markdown ? " | %s |\n" : "  %s\n", member_text(c, "verdict"));
+    }
+}

@@ -1,0 +1,38 @@
+/* Claims of consistency (stated_error.h): rendered, judged, and as "consistency" in results.json:
+ *
+ *   [ {"scene": "41_cornell", "engine": "pathtracer", "renders": 8, "spp": 32, "alpha": 1e-5,
+ *      "margin": .1, "verdict": "EQUIVALENT", "passed": true, "reason": "one sentence",
+ *      "pixels": 1.003, "pixels_ci": [.95, 1.06], "image": 1.2, "image_range": [.1, 4.1],
+ *      "seconds": 3.1,
+ *      "noise": 1.002, "noise_ci": [.99, 1.01],       (where the scene asks for it: sample_efficiency.h)
+ *      "too_early": 0, "too_late": 0}                 (the same: adaptive_stop.h)
+ *   | {"scene": , "engine": , "passed": false, "error": "one line", "verdict": "INCONCLUSIVE" where
+ *      only the time was missing} ]
+ *
+ * pixels and image are 0 where two renders are the same. */
+#ifndef ASSAY_STATED_ERROR_CLAIMS_H
+#define ASSAY_STATED_ERROR_CLAIMS_H
+
+#include "tools/results/results.h"
+#include "validate.h"
+
+#include "reference/suite/suite.h"
+
+#include <stdio.h>
+
+/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
+ * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
+ * an "error" that says so. */
+json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
+                        double alpha, double deadline);
+
+/* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
+bool consistency_check(const json_t *consistency, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+enum outcome consistency_outcome(const json_t *claim);
+
+/* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
+void consistency_print(FILE *f, const json_t *consistency, bool markdown);
+
+#endif

@@ -1,0 +1,285 @@
+#include "validate.h"
+
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "tools/results/claim_result.h"
+#include "stated_error_claims.h"
+#include "import_result.h"
+#include "tools/results/results.h"
+#include "validate_internal.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+double time_left(const struct validation *v)
+{
+    return v->deadline - now_seconds();
+}
+
+void say(const struct validation *v, const char *scene, const char *what)
+{
+    if (v->opt->quiet)
+        return;
+    fprintf(stderr, "[%2d/%d", v->done, v->num_tasks);
+    if (isfinite(v->deadline))
+        fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, time_left(v)), v->opt->budget_s);
+    fprintf(stderr, "] %s: %s\n", scene, what);
+}
+
+/* What starting a program and judging its picture costs, in vertices of paths. */
+static const double start_cost = 3e5;
+
+/* About what the next look of a claim costs, in vertices of paths. */
+static double cost(const struct task *t)
+{
+    const struct suite_scene *s = t->scene;
+    double samples, starts = 1;
+    if (t->a == NULL) {
+        samples = (double)s->width * s->height * s->consistency.renders * s->consistency.spp;
+        starts = s->consistency.renders + (s->consistency.batch > 0);
+    } else {
+        samples = side_cost(t->a, t->next) + side_cost(t->b, t->next);
+    }
+    return samples > 0 ? samples * (s->depth + 1) + starts * start_cost : 0;
+}
+
+/* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
+ * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
+ * look of others, comes before that round, or after the first if nothing is rendered for it. --until-different
+ * goes by cost alone; a scene that must differ cannot be what it waits for, and comes last. */
+static double round_of(const struct validation *v, const struct task *t)
+{
+    if (v->opt->until_different)
+        return t->scene->expect == VERDICT_DIFFERENT;
+    if (t->looks == &sequence_single)
+        return cost(t) > 0 ? 1.5 : 0.5;
+    return (double)json_array_size(t->history);
+}
+
+static struct task *choose(const struct validation *v)
+{
+    struct task *best = NULL;
+    for (int i = 0; i < v->num_tasks; i++) {
+        struct task *t = &v->task[i];
+        if (t->result != NULL || t->stalled)
+            continue;
+        if (v->sequence == &sequence_single)
+            return t;
+        if (best == NULL || round_of(v, t) < round_of(v, best) ||
+            (round_of(v, t) == round_of(v, best) && cost(t) < cost(best)))
+            best = t;
+    }
+    return best;
+}
+
+static void tell_round(const struct validation *v, const struct task *t)
+{
+    char note[160];
+    if (t->a == NULL || v->sequence == &sequence_single)
+        return;
+    snprintf(note, sizeof note, "look %d of %d, %s against %s: %d samples; %d claims undecided",
+             t->next + 1, NUM_LOOKS, t->a->name, t->ref.engine, side_count(t->a, t->next),
+             v->num_tasks - v->done);
+    say(v, t->scene->name, note);
+}
+
+/* Claims that --until-different did not look at are not in the results. */
+static void collect(const struct validation *v, json_t *root)
+{
+    json_t *consistency = json_array();
+    json_object_set_new(root, "consistency", consistency);
+    for (int i = 0; i < v->num_tasks; i++)
+        if (v->task[i].result != NULL)
+            json_array_append(v->task[i].a != NULL ? json_object_get(root, "claims") : consistency,
+                              v->task[i].result);
+    json_object_set_new(root, "seconds", json_real(now_seconds() - v->start));
+}
+
+/* If it is time again. */
+static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
+{
+    if (!(v->opt->show_every_s > 0) || now_seconds() < v->shown + v->opt->show_every_s)
+        return true;
+    json_t *copy = json_copy((json_t *)root), *claims = json_array();
+    bool ok = copy != NULL && claims != NULL && json_object_set(copy, "claims", claims) == 0;
+    if (!ok)
+        err_set(e, "out of memory");
+    if (ok)
+        collect(v, copy);
+    int left = v->num_tasks;
+    for (int i = 0; i < v->num_tasks; i++)
+        left -= v->task[i].result != NULL;
+    if (ok && json_array_size(claims) > 0) {
+        json_object_set_new(copy, "unfinished", json_integer(left));
+        ok = v->opt->show(copy, v->opt, e);
+    }
+    json_decref(claims);
+    json_decref(copy);
+    v->shown = now_seconds();
+    return ok;
+}
+
+/* Until all is decided, or the time is over, or, for --until-different, one differs: what was not looked
+ * at by then stays without a result. */
+static bool take_looks(struct validation *v, const json_t *root, struct err *e)
+{
+    bool found = false, ok = true;
+    for (struct task *t; ok && !found && (t = choose(v)) != NULL && time_left(v) > 0;) {
+        tell_round(v, t);
+        task_look(v, t);
+        found = v->opt->until_different && task_differs(t);
+        ok = show_so_far(v, root, e);
+    }
+    for (int i = 0; i < v->num_tasks; i++) {
+        struct task *t = &v->task[i];
+        if (t->result == NULL && (t->seen || !found))
+            task_give_up(v, t, found ? "stopped at the difference of another claim" : BUDGET_SPENT);
+    }
+    return ok;
+}
+
+static const double small_alpha = 1e-5; /* of a run: below, no tail is known well enough */
+
+static const struct sequence *sequence_of(const struct validate_options *o)
+{
+    if (o->budget_s > 0)
+        return &sequence_open;
+    return o->until_different ? &sequence_declared : &sequence_single;
+}
+
+static int stages_of(const struct validate_options *o)
+{
+    return o->stages > 0 ? o->stages : o->alpha < small_alpha ? 2 : 1;
+}
+
+bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
+                    struct err *e)
+{
+    json_t *root = results_new(argc, argv, o->alpha, e);
+    if (root == NULL)
+        return false;
+    json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));
+    if (o->live)
+        json_object_set_new(root, "reference_seed", json_integer(o->reference_seed));
+    json_object_set_new(root, "stages", json_integer(stages_of(o)));
+    if (o->budget_s > 0)
+        json_object_set_new(root, "budget_s", json_real(o->budget_s));
+    *results = root;
+    return true;
+}
+
+static void validation_free(struct validation *v)
+{
+    for (int i = 0; i < v->num_tasks; i++)
+        task_free(&v->task[i]);
+    for (int i = 0; v->sides != NULL && i < v->suite.num_scenes; i++) {
+        struct scene_sides *s = &v->sides[i];
+        side_free(&s->ours);
+        side_free(&s->engine);
+        for (int k = 0; k < MAX_VARIANTS; k++)
+            side_free(&s->variant[k]);
+        for (int k = 0; k < MAX_REFERENCES; k++)
+            side_free(&s->reference[k]);
+    }
+    free(v->task);
+    free(v->sides);
+    suite_free(&v->suite);
+}
+
+/* The loader is not believed either: each selected scene, once. */
+static bool check_loader(const struct validation *v, const struct import_options *io,
+                         json_t **loader, struct err *e)
+{
+    const char **scene = calloc((size_t)v->suite.num_scenes, sizeof *scene);
+    int num = 0;
+    for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
+        if (scene_is_selected(v->opt, v->suite.scene[i].name))
+            scene[num++] = v->suite.scene[i].name;
+    bool ok = scene != NULL || err_set(e, "out of memory");
+    ok = ok && import_check_suite(&v->suite, scene, num, io, loader, e);
+    free(scene);
+    return ok;
+}
+
+bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
+              struct err *e)
+{
+    struct validation v = {
+        .opt = opt, .start = now_seconds(), .shown = now_seconds(), .sequence = sequence_of(opt)};
+    json_t *root = NULL, *cannot = json_array();
+    v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
+    v.stages = stages_of(opt);
+    if (!suite_load(opt->suite_dir, &v.suite, e)) {
+        json_decref(cannot);
+        return false;
+    }
+    bool ok = make_dirs(opt->out_dir, e) && plan_tasks(&v, cannot, e);
+    if (!ok)
+        goto done;
+    /* Bonferroni over the claims of this run: one alpha for the whole family. */
+    v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
+    ok = validate_start(opt, argc, argv, &root, e);
+    if (!ok)
+        goto done;
+    if (opt->engine != NULL)
+        json_object_set(root, "not_expressible", cannot);
+    if (opt->live) {
+        const struct import_options io = {
+            .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};
+        json_t *loader;
+        ok = check_loader(&v, &io, &loader, e);
+        if (!ok)
+            goto done;
+        json_object_set_new(root, "loader", loader);
+    }
+    ok = take_looks(&v, root, e);
+    if (!ok)
+        goto done;
+    collect(&v, root);
+    *results = root;
+    root = NULL;
+done:
+    json_decref(root);
+    json_decref(cannot);
+    validation_free(&v);
+    return ok;
+}
+
+/* Tasks first .. last-1, which are of one scene. */
+static bool call_part(const struct validation *v, int first, int last, bool by_claim,
+                      bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
+                      void *ctx, struct err *e)
+{
+    char name[MAX_CLAIMS][CLAIM_NAME];
+    const char *only[MAX_CLAIMS];
+    struct validate_part p = {
+        .scene = v->task[first].scene, .only = only, .num_claims = v->num_tasks};
+    if (!by_claim && scene_is_selected_whole(v->opt, p.scene->name))
+        only[p.num_only++] = p.scene->name;
+    else
+        for (int i = first; i < last; i++, p.num_only++) {
+            task_name(&v->task[i], name[p.num_only]);
+            only[p.num_only] = name[p.num_only];
+        }
+    return part(ctx, &p, e);
+}
+
+bool validate_parts(const struct validate_options *opt, bool by_claim,
+                    bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
+                    void *ctx, struct err *e)
+{
+    struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
+    json_t *cannot = json_array();
+    bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
+              plan_tasks(&v, cannot, e);
+    for (int i = 0, end; ok && i < v.num_tasks; i = end) {
+        for (end = i + 1; !by_claim && end < v.num_tasks && v.task[end].scene == v.task[i].scene;)
+            end++;
+        ok = call_part(&v, i, end, by_claim, part, ctx, e);
+    }
+    json_decref(cannot);
+    validation_free(&v);
+    return ok;
+}

@@ -1,0 +1,127 @@
+/* What the parts of validate.c share: the run, the images of both sides (claim_side.c), which claims
+ * there are (select_claims.c), and the judging of one (judge_claim.c). */
+#ifndef ASSAY_VALIDATE_INTERNAL_H
+#define ASSAY_VALIDATE_INTERNAL_H
+
+#include "renderer/image/moments.h"
+#include "run_pathtracer.h"
+#include "tools/sequential/alpha_spending.h"
+#include "validate.h"
+
+enum { MAX_PATH = 8192, MAX_REFERENCES = 3, NUM_STAGES = 2, CLAIM_NAME = 256 };
+/* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants, consistency. */
+enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 2 };
+
+enum side_kind {
+    SIDE_OURS,   /* the program under test, or a variant of it */
+    SIDE_TRUTH,  /* a closed form: exact, for every look */
+    SIDE_GOLDEN, /* stored: the same for every look, and its noise in every stage */
+    SIDE_LIVE,   /* an engine's replicates, rendered now */
+    SIDE_ENGINE  /* the further engine */
+};
+
+/* An image as it was at one look. */
+struct observed {
+    bool present, written;
+    struct moments m;
+    json_t *manifest;      /* of a reference; NULL for ours */
+    double seconds;        /* CPU time that it took to make, whenever that was */
+    struct ours_rays rays; /* of ours; 0: not known */
+};
+
+/* One side of a claim, in two streams of samples of different seeds. Image l of a stream holds that of
+ * each smaller look. */
+struct side {
+    enum side_kind kind;
+    const char *name;
+    const struct suite_scene *scene;
+    const struct suite_variant *variant; /* SIDE_OURS; NULL: pathtracer itself */
+    const struct suite_reference *ref;   /* SIDE_TRUTH to SIDE_LIVE */
+    int users;                           /* claims that may want another look */
+    struct observed at[NUM_STAGES][NUM_LOOKS];
+    double wall_s, units; /* of what was rendered in this run: time and observations */
+    double cpu_s;
+    bool failed;
+    struct err e;
+};
+
+struct scene_sides {
+    struct side ours, variant[MAX_VARIANTS], reference[MAX_REFERENCES], engine;
+};
+
+/* One claim on its way. */
+struct task {
+    const struct suite_scene *scene;
+    struct side *a, *b;         /* NULL: the claim of consistency */
+    struct suite_reference ref; /* b's name and class; the claim's margins */
+    enum verdict expected;
+    const struct sequence *looks;
+    int stages;   /* 1 or 2 */
+    int next;     /* look; NUM_LOOKS: none is left */
+    bool stalled; /* what is left of the budget is too short for it */
+    /* What the last look saw; seen is false before the first. */
+    bool seen;
+    int look, stage;
+    struct comparison c;
+    json_t *history; /* "looks" of the results */
+    double cpu_a, cpu_b;
+    json_t *result; /* the finished claim */
+};
+
+struct validation {
+    const struct validate_options *opt;
+    struct suite suite;
+    struct scene_sides *sides; /* per scene */
+    struct task *task;
+    int num_tasks, done;
+    const struct sequence *sequence;
+    int stages;
+    double start, deadline; /* of now_seconds(); deadline INFINITY: none */
+    double shown;           /* when the last look so far was shown, or the start */
+    double alpha;           /* of one claim */
+};
+
+/* A line of progress. */
+void say(const struct validation *v, const char *scene, const char *what);
+/* Wall time that is left, INFINITY without a budget. */
+double time_left(const struct validation *v);
+
+enum got { GOT, GOT_NOTHING /* the side's e says why */, GOT_NO_TIME };
+
+/* Can it have more samples, and can it be had again with fresh seeds? Adaptive variants cannot grow,
+ * as their samples depend on each other, nor can the further engine. */
+bool side_grows(const struct side *s);
+bool side_is_at_any_look(const struct side *s);
+bool side_can_be_fresh(const struct side *s);
+/* Observations at a look, 0 if it has none there. Sides that never change always have 1. */
+int side_count(const struct side *s, int look);
+/* About what the missing part of a look costs, in path samples; 0 where it is there. */
+double side_cost(const struct side *s, int look);
+/* The image of a stream at a look, rendered as far as it is missing. */
+enum got side_at(struct validation *v, struct side *s, int stage, int look, struct observed **out);
+/* Writes it for the report, once; file, relative to out_dir, has 256 characters. */
+bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
+                struct err *e) __attribute__((warn_unused_result));
+void side_free(struct side *s);
+
+/* Does --only want any, does it want all of a scene's claims? */
+bool scene_is_selected(const struct validate_options *o, const char *name);
+bool scene_is_selected_whole(const struct validate_options *o, const char *name);
+/* SCENE/CLAIM, as --only takes it: see validate.h. */
+void task_name(const struct task *t, char name[CLAIM_NAME]);
+/* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
+ * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
+bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
+    __attribute__((warn_unused_result));
+/* Whether t->next is a look at which anything is new; else moves on to the next that is, or to
+ * NUM_LOOKS. */
+void task_settle(struct task *t);
+/* Takes one look, of which t->result is set if it decides or was the last. */
+void task_look(struct validation *v, struct task *t);
+/* Ends it, INCONCLUSIVE; why: what comes before the last look's reason. Without a look the time is over. */
+void task_give_up(struct validation *v, struct task *t, const char *why);
+/* DIFFERENT where EQUIVALENT should be. */
+bool task_differs(const struct task *t);
+void task_free(struct task *t);
+
+#endif
