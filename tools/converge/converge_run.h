@@ -20,8 +20,8 @@ struct converge_options {
     int ladder[CONVERGE_MAX_RUNGS]; /* ascending */
     int num_rungs;                  /* at least 3 */
     int replicates;                 /* at least 4 */
-    int depth_spp;                  /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
-    int shrink;                     /* pictures are so many times smaller on both sides */
+    int depth_spp; /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
+    int shrink;    /* pictures are so many times smaller on both sides */
     enum converge_against against;
     uint32_t seed;
     double alpha;        /* of all judgements of the run together */

@@ -295,8 +295,11 @@ static void blender_reads_what_we_read(void **state)
     if (!process_find("blender", path, sizeof path))
         skip();
     assert_non_null(mkdtemp(dir));
-    struct suite_scene suite = {
-        .name = "import", .dae = "tests/reference/import_check/import.dae", .width = 60, .height = 40, .depth = 1};
+    struct suite_scene suite = {.name = "import",
+                                .dae = "tests/reference/import_check/import.dae",
+                                .width = 60,
+                                .height = 40,
+                                .depth = 1};
     const struct suite_scene *scenes[] = {&suite};
     const struct import_options opt = {.work_dir = dir, .share_dir = "reference", .timeout_s = 300};
     json_t *dumps;

@@ -462,7 +462,8 @@ static void test_page(void **state)
         snprintf(kept, sizeof kept, "tests/studies/anchors/%s", files[i]);
         char *a = contents(made), *b = contents(kept);
         if (strcmp(a, b) != 0)
-            fail_msg("%s is not what results.json gives: make_anchors --page tests/studies/anchors", kept);
+            fail_msg("%s is not what results.json gives: make_anchors --page tests/studies/anchors",
+                     kept);
         free(a);
         free(b);
     }

@@ -26,7 +26,8 @@ static double order_cdf(int i, int n, double x)
 static void qq_band_is_binomial(void **state)
 {
     (void)state;
-    static const int of[][2] = {{1, 4}, {4, 4}, {1, 64}, {10, 64}, {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
+    static const int of[][2] = {{1, 4},   {4, 4},     {1, 64},   {10, 64},
+                                {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
     for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
         double low, high;
         qq_band(of[k][0], of[k][1], &low, &high);
