@@ -90,7 +90,8 @@ static bool name_bug(void *ctx, struct err *e)
 {
     const struct catalogue *c = ctx;
     const struct diagnose_options opt = {.alpha = 1e-6};
-    struct clue clue = {.view = &c->view[0], .seen = c->view[0].correct, .is_consistent = true};
+    struct observation clue = {
+        .view = &c->view[0], .seen = c->view[0].correct, .is_consistent = true};
     struct diagnosis d;
     for (int i = 0; i < 3 * 16 * 12; i++) {
         clue.seen.mean[i] += (double)c->view[0].effect[1]->mean[i];

@@ -170,7 +170,7 @@ static bool grade_pictures(void *ctx, struct err *e)
     return ok;
 }
 
-static bool same_noise(void *ctx, struct err *e)
+static bool find_same_noise(void *ctx, struct err *e)
 {
     struct work *w = ctx;
     struct alike_noise n = {0};
@@ -194,7 +194,7 @@ static void students(void **state)
                                  WIDTH, HEIGHT, &w.h.picture[i], &e));
     alloc_fail_each("grading_all", ALLOC_ALL, grade_pictures, &w);
     assert_true(w.points > 10); /* the pictures are right, so the checks got that far */
-    alloc_fail_each("alike_noise_of", ALLOC_ALL, same_noise, &w);
+    alloc_fail_each("alike_noise_of", ALLOC_ALL, find_same_noise, &w);
     for (int i = 0; i < 2; i++)
         student_free(&w.h.picture[i]);
 }

@@ -116,7 +116,7 @@ static bool read_rubric(void *ctx, struct err *e)
     return ok;
 }
 
-static bool hash_tree(void *ctx, struct err *e)
+static bool hash_a_tree(void *ctx, struct err *e)
 {
     char hex[65], *right = ctx;
     bool ok = tree_hash(file(0, "scenes"), NULL, hex, e);
@@ -142,7 +142,7 @@ static void descriptions(void **state)
             copy(from, file(0, to));
         }
     alloc_fail_each("suite_load", ALLOC_ALL, load_suite, NULL);
-    alloc_fail_each("tree_hash", ALLOC_ALL, hash_tree, hex);
+    alloc_fail_each("tree_hash", ALLOC_ALL, hash_a_tree, hex);
     alloc_fail_each("engine_load", ALLOC_ALL, load_engine, "tests/fuzz/seeds/engine1.json");
     assert_true(suite_load(file(0, "scenes"), &suite, &e));
     alloc_fail_each("rubric_read", ALLOC_ALL, read_rubric, &suite);

@@ -38,7 +38,7 @@ struct look {
 };
 
 static bool look_at(const struct rates *r, const struct look *look, const char *work,
-                    struct clue *clue, struct err *e)
+                    struct observation *clue, struct err *e)
 {
     for (int i = 0; i < r->c.num_views; i++) {
         const struct view *v = &r->c.view[i];
@@ -53,12 +53,12 @@ static bool look_at(const struct rates *r, const struct look *look, const char *
                                    .threads = 1,
                                    .timeout_s = 600,
                                    .work_dir = work};
-        clue[i] = (struct clue){.view = v};
-        if (!view_scene(v, &r->suite, &job.scene, &job.variant, e) ||
+        clue[i] = (struct observation){.view = v};
+        if (!catalogue_view_scene(v, &r->suite, &job.scene, &job.variant, e) ||
             !diagnose_render(&job, alpha / (2 * r->c.num_views), &clue[i].seen,
                              &clue[i].is_consistent, e))
             return false;
-        sight_set_spread(&clue[i].seen, &v->correct);
+        signature_set_spread(&clue[i].seen, &v->correct);
     }
     return true;
 }
@@ -68,7 +68,7 @@ static bool look_at(const struct rates *r, const struct look *look, const char *
 struct task {
     struct look look;
     char program[4400];
-    struct clue *clue;
+    struct observation *clue;
     bool ok;
     struct err e;
 };
@@ -234,25 +234,25 @@ static double normal(uint64_t *state)
 /* Means of the pool, per view. */
 struct pool {
     const struct task *task;
-    double (*mean)[SIGHT_VALUES];
+    double (*mean)[SIGNATURE_VALUES];
     struct moments *single; /* POOL of the view that asks for consistency */
     int consistent_view;    /* -1: none */
 };
 
 /* All samples have one value. A rare event in one render of the pool moves the pool's mean, and with it the others away
  * from the value that they have: such a cell stays as it was rendered. */
-static bool is_still(const struct sight *s, int value)
+static bool is_still(const struct signature *s, int value)
 {
     return sqrt(s->var[value]) <= 1e-5 * s->mean[value];
 }
 
 static void draw_cells(const struct rates *r, const struct pool *p, int view, uint64_t *state,
-                       struct clue *out)
+                       struct observation *out)
 {
-    const struct sight *c = &r->c.view[view].correct;
+    const struct signature *c = &r->c.view[view].correct;
     *out = p->task[(int)(uniform(state) * POOL)].clue[view];
     for (int i = 0; i < c->columns * c->rows; i++) {
-        const struct sight *from = &p->task[(int)(uniform(state) * POOL)].clue[view].seen;
+        const struct signature *from = &p->task[(int)(uniform(state) * POOL)].clue[view].seen;
         for (int j = 3 * i; j < 3 * i + 3; j++) {
             double noise = (from->mean[j] - p->mean[view][j]) * sqrt(POOL / (POOL - 1.0));
             double moved = fmax(0, c->mean[j] + noise + sqrt(c->var[j]) * normal(state));
@@ -264,12 +264,12 @@ static void draw_cells(const struct rates *r, const struct pool *p, int view, ui
 }
 
 static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_t *state,
-                            struct clue *out, struct err *e)
+                            struct observation *out, struct err *e)
 {
     enum { MOST_RENDERS = 32 };
     const struct view *v = &r->c.view[p->consistent_view];
     struct moments chosen[MOST_RENDERS];
-    struct sight s[MOST_RENDERS];
+    struct signature s[MOST_RENDERS];
     struct consistency c;
     bool taken[POOL] = {false};
     for (int k = 0; k < v->renders; k++) {
@@ -279,18 +279,18 @@ static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_
         while (taken[i]);
         taken[i] = true;
         chosen[k] = p->single[i];
-        if (!sight_of(&chosen[k], v->correct.columns, v->spp, &s[k], e))
+        if (!signature_of(&chosen[k], v->correct.columns, v->spp, &s[k], e))
             return false;
     }
     double share = alpha / (2 * r->c.num_views);
     if (!consistency_judge(chosen, v->renders, 0.02, share, &c, e))
         return false;
-    *out = (struct clue){.view = v,
-                         .seen = sight_average(s, v->renders),
-                         .is_consistent = c.verdict != VERDICT_DIFFERENT};
-    sight_set_consistency(&out->seen, c.pixels, c.pixels_lo, c.pixels_hi, c.image, v->renders,
-                          share);
-    sight_set_spread(&out->seen, &v->correct);
+    *out = (struct observation){.view = v,
+                                .seen = signature_average(s, v->renders),
+                                .is_consistent = c.verdict != VERDICT_DIFFERENT};
+    signature_set_stated_error(&out->seen, c.pixels, c.pixels_lo, c.pixels_hi, c.image, v->renders,
+                               share);
+    signature_set_spread(&out->seen, &v->correct);
     return true;
 }
 
@@ -305,7 +305,7 @@ static bool fill_pool(const struct rates *r, struct pool *p, struct err *e)
         if (r->c.view[v].renders >= 4)
             p->consistent_view = v;
         for (int k = 0; k < POOL; k++)
-            for (int i = 0; i < SIGHT_VALUES; i++)
+            for (int i = 0; i < SIGNATURE_VALUES; i++)
                 p->mean[v][i] += p->task[k].clue[v].seen.mean[i] / POOL;
     }
     return true;
@@ -323,7 +323,7 @@ static bool render_singles(const struct rates *r, struct pool *p, const char *pr
     const struct suite_variant *variant;
     snprintf(picture, sizeof picture, "%s/diagnose_rates/%d.0/single.exr", r->build, (int)getpid());
     snprintf(log, sizeof log, "%s/diagnose_rates/%d.0/single.log", r->build, (int)getpid());
-    if (!view_scene(v, &r->suite, &found, &variant, e))
+    if (!catalogue_view_scene(v, &r->suite, &found, &variant, e))
         return false;
     struct suite_scene scene = *found;
     scene.width = v->width;
@@ -351,7 +351,7 @@ static int count_accused(const struct diagnosis *d)
 
 static bool rate_synthetic(const struct rates *r, struct pool *p, struct err *e)
 {
-    struct clue *clue = calloc((size_t)r->c.num_views, sizeof *clue);
+    struct observation *clue = calloc((size_t)r->c.num_views, sizeof *clue);
     struct diagnose_options opt = {.alpha = alpha};
     uint64_t state = 9;
     int accused = 0;

@@ -65,7 +65,7 @@ struct maker {
 /* The correct renderer's batches, kept while a view's bugs are rendered. */
 struct base {
     struct diagnose_job job;
-    struct sight batch[BATCHES];
+    struct signature batch[BATCHES];
 };
 
 static int by_name(const void *a, const void *b)
@@ -87,7 +87,7 @@ static bool list_bugs(const char *dir, struct catalogue *c, struct err *e)
         const char *dot = strrchr(entry[i]->d_name, '.');
         snprintf(path, sizeof path, "%s/%s", dir, entry[i]->d_name);
         if (ok && dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST)
-            ok = bug_of_patch(path, &c->bug[c->num_bugs++], e);
+            ok = catalogue_bug_of_patch(path, &c->bug[c->num_bugs++], e);
         free(entry[i]);
     }
     free(entry);
@@ -130,7 +130,7 @@ static bool is_same_view(const struct view *a, const struct view *b)
            a->seed == b->seed;
 }
 
-static bool render(const struct base *base, const char *program, int batch, struct sight *out,
+static bool render(const struct base *base, const char *program, int batch, struct signature *out,
                    struct err *e)
 {
     struct diagnose_job job = base->job;
@@ -139,19 +139,19 @@ static bool render(const struct base *base, const char *program, int batch, stru
     return diagnose_render(&job, 1e-3, out, NULL, e);
 }
 
-static bool same_values(const struct sight *a, const struct sight *b)
+static bool same_values(const struct signature *a, const struct signature *b)
 {
     return memcmp(a->mean, b->mean, sizeof a->mean) == 0 &&
            memcmp(a->var, b->var, sizeof a->var) == 0 && a->n == b->n;
 }
 
 /* `times` pictures of as many samples as a batch, with this average. */
-static int repeat(const struct sight *s, int times, struct sight *all)
+static int repeat(const struct signature *s, int times, struct signature *all)
 {
     for (int i = 0; i < times; i++) {
         all[i] = *s;
         all[i].n /= times;
-        for (int j = 0; j < SIGHT_VALUES; j++) {
+        for (int j = 0; j < SIGNATURE_VALUES; j++) {
             all[i].var[j] *= times;
             all[i].k3[j] *= times * times;
         }
@@ -170,7 +170,7 @@ static bool make_batches(struct base *base, const char *program, struct err *e)
 /* A mean that depends on the number of samples asked for needs more renders instead of longer ones. */
 static bool make_correct(struct base *base, const char *program, struct view *v, struct err *e)
 {
-    struct sight all[BATCHES + LONG_FACTOR * LONG], s;
+    struct signature all[BATCHES + LONG_FACTOR * LONG], s;
     int num = BATCHES, times = v->fixed_spp ? 1 : LONG_FACTOR;
     memcpy(all, base->batch, sizeof base->batch);
     struct diagnose_job job = base->job;
@@ -183,10 +183,10 @@ static bool make_correct(struct base *base, const char *program, struct view *v,
             return false;
         num += repeat(&s, times, &all[num]);
     }
-    v->correct = sight_average(all, num);
+    v->correct = signature_average(all, num);
     /* The facts have the values that a correct renderer should have, not those of these few pictures; how
      * many samples an adaptive render takes is measured. */
-    struct sight batches = sight_average(base->batch, BATCHES);
+    struct signature batches = signature_average(base->batch, BATCHES);
     for (int f = 0; f < NUM_FACTS; f++)
         v->correct.fact[f] = v->correct.fact_sd[f] = f >= FACT_PIXELS && v->renders < 4 ? NAN : 0;
     v->correct.fact[FACT_SAMPLES] = batches.fact[FACT_SAMPLES];
@@ -195,12 +195,13 @@ static bool make_correct(struct base *base, const char *program, struct view *v,
 }
 
 /* The mean difference and its variance. */
-static void set_effect(const struct base *base, const struct sight *bug, const struct view *v,
+static void set_effect(const struct base *base, const struct signature *bug, const struct view *v,
                        struct effect *out)
 {
     int values = 3 * v->correct.columns * v->correct.rows;
     bool same = same_values(&bug[0], &bug[1]); /* the seed is ignored */
-    struct sight a = sight_average(bug, BATCHES), c = sight_average(base->batch, BATCHES);
+    struct signature a = signature_average(bug, BATCHES),
+                     c = signature_average(base->batch, BATCHES);
     double level = 0, chi2 = 0;
     int noisy = 0;
     for (int i = 0; i < values; i++) {
@@ -225,7 +226,7 @@ static void set_effect(const struct base *base, const struct sight *bug, const s
         memset(out->mean, 0, sizeof out->mean);
         memset(out->var, 0, sizeof out->var);
     }
-    sight_set_spread(&a, &c);
+    signature_set_spread(&a, &c);
     for (int f = 0; f < NUM_FACTS; f++) {
         out->fact[f] = a.fact[f];
         out->fact_sd[f] = a.fact_sd[f];
@@ -235,7 +236,7 @@ static void set_effect(const struct base *base, const struct sight *bug, const s
 static bool make_effect(const struct maker *m, const struct base *base, struct view *v, int b,
                         struct err *e)
 {
-    struct sight bug[BATCHES];
+    struct signature bug[BATCHES];
     char program[4400];
     snprintf(program, sizeof program, "%s/mutants/%s/pathtracer", m->build, m->made.bug[b].name);
     if (!render(base, program, 0, &bug[0], e))
@@ -360,7 +361,7 @@ static bool make_view(struct maker *m, int i, struct err *e)
                                           .threads = 1,
                                           .timeout_s = 600,
                                           .work_dir = m->work};
-        ok = view_scene(v, &m->suite, &base->job.scene, &base->job.variant, e);
+        ok = catalogue_view_scene(v, &m->suite, &base->job.scene, &base->job.variant, e);
     }
     for (int b = 0; ok && b < m->made.num_bugs; b++)
         any = any || missing[b];

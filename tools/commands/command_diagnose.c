@@ -109,19 +109,19 @@ static void print_help(const struct catalogue *c)
         "judge.");
 }
 
-static bool gather(const struct settings *s, const struct gather_options *g, struct clue *clue,
-                   int *num, json_t *skipped, struct err *e)
+static bool gather(const struct settings *s, const struct diagnose_gather_options *g,
+                   struct observation *clue, int *num, json_t *skipped, struct err *e)
 {
     if (s->input == NULL)
-        return gather_program(g, s->pathtracer, clue, num, e);
+        return diagnose_gather_program(g, s->pathtracer, clue, num, e);
     if (s->view == NULL)
-        return gather_results(g, s->input, clue, num, skipped, e);
+        return diagnose_gather_results(g, s->input, clue, num, skipped, e);
     *num = 1;
-    return gather_picture(g, s->view, s->input, clue, e);
+    return diagnose_gather_image(g, s->view, s->input, clue, e);
 }
 
-static bool run(const struct settings *s, const struct gather_options *g, struct clue *clue,
-                struct diagnosis *d, struct err *e)
+static bool run(const struct settings *s, const struct diagnose_gather_options *g,
+                struct observation *clue, struct diagnosis *d, struct err *e)
 {
     int num = 0;
     json_t *skipped = json_array();
@@ -129,9 +129,9 @@ static bool run(const struct settings *s, const struct gather_options *g, struct
     ok = ok && gather(s, g, clue, &num, skipped, e) &&
          diagnose(g->catalogue, clue, num, &s->diagnose, d, e);
     if (ok && !s->quiet)
-        diagnosis_print(stdout, g->catalogue, clue, num, d, skipped);
+        diagnose_print(stdout, g->catalogue, clue, num, d, skipped);
     if (ok && s->json != NULL) {
-        json_t *root = diagnosis_json(g->catalogue, clue, num, d, skipped);
+        json_t *root = diagnose_print_json(g->catalogue, clue, num, d, skipped);
         ok = (root != NULL || err_set(e, "out of memory")) && json_write(s->json, root, e);
         json_decref(root);
     }
@@ -144,7 +144,7 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
     struct temp_dir work;
     struct suite suite;
     struct diagnosis d;
-    struct clue *clue = calloc((size_t)c->num_views, sizeof *clue);
+    struct observation *clue = calloc((size_t)c->num_views, sizeof *clue);
     if (clue == NULL) {
         err_set(e, "out of memory");
         return EXIT_NOT_JUDGED;
@@ -153,13 +153,14 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
         free(clue);
         return EXIT_NOT_JUDGED;
     }
-    const struct gather_options g = {.catalogue = c,
-                                     .suite = &suite,
-                                     .alpha = s->diagnose.alpha,
-                                     .seed = s->seed,
-                                     .threads = s->threads == 0 ? cli_processors() : s->threads,
-                                     .timeout_s = s->timeout_s,
-                                     .work_dir = work.path};
+    const struct diagnose_gather_options g = {.catalogue = c,
+                                              .suite = &suite,
+                                              .alpha = s->diagnose.alpha,
+                                              .seed = s->seed,
+                                              .threads =
+                                                  s->threads == 0 ? cli_processors() : s->threads,
+                                              .timeout_s = s->timeout_s,
+                                              .work_dir = work.path};
     bool ok = suite_load(s->suite_dir, &suite, e);
     if (ok) {
         ok = run(s, &g, clue, &d, e);

@@ -27,8 +27,8 @@ static uint32_t seed_of(const struct converge_job *job, int engine, int rung, in
 }
 
 /* Runs our program once and reads what it wrote. */
-static bool run_pathtracer(const struct converge_job *job, const char *sampler, int spp,
-                           uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
+static bool render_by_pathtracer(const struct converge_job *job, const char *sampler, int spp,
+                                 uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
 {
     char path[4224], log[4224];
     const char *const options[] = {"--sampler", sampler, NULL};
@@ -59,7 +59,8 @@ static bool render_ours(const struct converge_job *job, enum converge_engine eng
     for (int k = 0; k < job->replicates; k++) {
         struct moments m;
         double seconds;
-        if (!run_pathtracer(job, sampler, spp, seed_of(job, engine, rung, k), &m, &seconds, e))
+        if (!render_by_pathtracer(job, sampler, spp, seed_of(job, engine, rung, k), &m, &seconds,
+                                  e))
             return false;
         for (size_t i = 0; i < size; i++)
             images[(size_t)k * size + i] = (float)m.mean[i];
@@ -135,5 +136,5 @@ bool converge_render_own(const struct converge_job *job, int spp, struct moments
                          struct err *e)
 {
     double cpu_s;
-    return run_pathtracer(job, "independent", spp, seed_of(job, OWN, 0, 0), out, &cpu_s, e);
+    return render_by_pathtracer(job, "independent", spp, seed_of(job, OWN, 0, 0), out, &cpu_s, e);
 }

@@ -51,8 +51,9 @@ int catalogue_bug(const struct catalogue *c, const char *name)
     return -1;
 }
 
-bool view_scene(const struct view *v, const struct suite *suite, const struct suite_scene **scene,
-                const struct suite_variant **variant, struct err *e)
+bool catalogue_view_scene(const struct view *v, const struct suite *suite,
+                          const struct suite_scene **scene, const struct suite_variant **variant,
+                          struct err *e)
 {
     *scene = suite_find(suite, v->scene);
     *variant = NULL;
@@ -90,7 +91,7 @@ static bool is_of_the_bug(const char *line, bool in_code)
                          strncmp(line, "--- ", 4) == 0 || strncmp(line, "+++ ", 4) == 0);
 }
 
-bool bug_of_patch(const char *path, struct bug *out, struct err *e)
+bool catalogue_bug_of_patch(const char *path, struct bug *out, struct err *e)
 {
     char line[1024], text[MAX_PATCH] = "";
     const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
@@ -138,7 +139,7 @@ bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct 
         if (n < sizeof end || strcmp(entry->d_name + n - (sizeof end - 1), end) != 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", patch_dir, entry->d_name);
-        ok = bug_of_patch(path, &bug, e);
+        ok = catalogue_bug_of_patch(path, &bug, e);
         int b = ok ? catalogue_bug(c, bug.name) : 0;
         if (ok && b < 0)
             ok = err_set(e, "%s: not in the catalogue of bugs: make catalogue", path);
@@ -257,7 +258,7 @@ bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
         if (ok)
             json_array_append_new(views, view_json(&c->view[v], c, picture, sha256));
     }
-    json_t *root = json_pack("{si,so,so}", "side", SIGHT_SIDE, "bugs", bugs, "views", views);
+    json_t *root = json_pack("{si,so,so}", "side", SIGNATURE_SIDE, "bugs", bugs, "views", views);
     snprintf(path, sizeof path, "%s/manifest.json", dir);
     ok = ok && (root != NULL || err_set(e, "out of memory")) && json_write(path, root, e);
     json_decref(root);
@@ -353,10 +354,10 @@ static bool get_picture(const char *dir, struct view *v, const struct catalogue 
     if (!image_read_exr(path, &im, NULL, e))
         return false;
     int cs = image_channel(&im, "cs");
-    struct sight *s = &v->correct;
+    struct signature *s = &v->correct;
     s->columns = im.width;
     s->rows = im.height;
-    bool ok = im.width <= SIGHT_SIDE && im.height <= SIGHT_SIDE && cs >= 0 &&
+    bool ok = im.width <= SIGNATURE_SIDE && im.height <= SIGNATURE_SIDE && cs >= 0 &&
               im.width * v->height == im.height * v->width &&
               get_channels(&im, "c", s->mean, NULL) && get_channels(&im, "cv", s->var, NULL) &&
               get_channels(&im, "ck", s->k3, NULL);
@@ -411,10 +412,10 @@ static bool fill(const char *dir, struct catalogue *c, const json_t *root, struc
 {
     const json_t *bugs = json_object_get(root, "bugs"), *views = json_object_get(root, "views");
     size_t num_bugs = json_object_size(bugs), num_views = json_array_size(views);
-    if (json_integer_value(json_object_get(root, "side")) != SIGHT_SIDE || num_bugs == 0 ||
+    if (json_integer_value(json_object_get(root, "side")) != SIGNATURE_SIDE || num_bugs == 0 ||
         num_views == 0)
         return err_set(e, "%s/manifest.json: no catalogue of bugs with %d cells across", dir,
-                       SIGHT_SIDE);
+                       SIGNATURE_SIDE);
     c->bug = calloc(num_bugs, sizeof *c->bug);
     c->view = calloc(num_views, sizeof *c->view);
     if (c->bug == NULL || c->view == NULL)

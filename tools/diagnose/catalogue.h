@@ -31,7 +31,7 @@ struct bug {
 
 struct effect {
     bool pixels; /* false: mean and var are all 0 */
-    float mean[SIGHT_VALUES], var[SIGHT_VALUES];
+    float mean[SIGNATURE_VALUES], var[SIGNATURE_VALUES];
     double fact[NUM_FACTS], fact_sd[NUM_FACTS];
 };
 
@@ -48,7 +48,7 @@ struct view {
     int renders;    /* with seeds of their own; 4 or more: also stated_error.h is asked */
     bool fixed_spp; /* the mean depends on the number of samples asked for (adaptive) */
     uint64_t seed;
-    struct sight correct;
+    struct signature correct;
     struct effect **effect; /* per bug; NULL: no difference at all */
 };
 
@@ -69,15 +69,15 @@ void catalogue_free(struct catalogue *c);
 
 /* The scene and the variant (NULL: none) of a view. Fails if the suite has no such, or if the scene is not
  * the one that the catalogue was made with. */
-bool view_scene(const struct view *v, const struct suite *suite, const struct suite_scene **scene,
-                const struct suite_variant **variant, struct err *e)
-    __attribute__((warn_unused_result));
+bool catalogue_view_scene(const struct view *v, const struct suite *suite,
+                          const struct suite_scene **scene, const struct suite_variant **variant,
+                          struct err *e) __attribute__((warn_unused_result));
 const struct view *catalogue_view(const struct catalogue *c, const char *name);
 /* Its number, -1 if there is none. */
 int catalogue_bug(const struct catalogue *c, const char *name);
 
 /* The header lines and the hash of a patch; the bug's name is the file's. Fails if a line is missing. */
-bool bug_of_patch(const char *path, struct bug *out, struct err *e)
+bool catalogue_bug_of_patch(const char *path, struct bug *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* Holds the catalogue against a directory of patches: fails, naming the first, if one has no entry, has

@@ -32,13 +32,13 @@ static const double samples_z = 7;
 
 /* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
  * than the correct renderer has at as many samples is not believed. */
-static double variance_of(const struct clue *clue, int i, double factor)
+static double variance_of(const struct observation *clue, int i, double factor)
 {
-    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
     return fmax(factor * a->var[i], c->var[i] * c->n / a->n) + c->var[i];
 }
 
-static double mean_of(const struct sight *s)
+static double mean_of(const struct signature *s)
 {
     double sum = 0;
     for (int i = 0; i < 3 * s->columns * s->rows; i++)
@@ -58,7 +58,7 @@ static double student(double z2, double var, double dof)
 }
 
 /* How much noisier a bug makes the mean of a cell than its pixels state. */
-static double inflation(const struct effect *e, const struct sight *seen)
+static double inflation(const struct effect *e, const struct signature *seen)
 {
     double r = e->fact[FACT_PIXELS], s = e->fact[FACT_IMAGE], factor = 1;
     if (isfinite(r) && r > 0.25)
@@ -68,10 +68,10 @@ static double inflation(const struct effect *e, const struct sight *seen)
     return factor;
 }
 
-static void add_cell(const struct clue *clue, const struct effect *e, double amplitude,
+static void add_cell(const struct observation *clue, const struct effect *e, double amplitude,
                      double factor, double scale, int cell, struct tally *t)
 {
-    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
     double log_likelihood = 0, chi2 = 0, chi2_mean = 0;
     for (int i = 3 * cell; i < 3 * cell + 3; i++) {
         double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
@@ -93,7 +93,7 @@ static void add_cell(const struct clue *clue, const struct effect *e, double amp
 }
 
 /* What a bug makes of S at the size of the picture at hand: where all pixels depend on each other, S grows with their number. */
-static double image_fact(const struct effect *e, const struct clue *clue)
+static double image_fact(const struct effect *e, const struct observation *clue)
 {
     double s = e->fact[FACT_IMAGE];
     if (s > log(10))
@@ -101,10 +101,10 @@ static double image_fact(const struct effect *e, const struct clue *clue)
     return s;
 }
 
-static void add_facts(const struct clue *clue, const struct effect *e, double amplitude,
+static void add_facts(const struct observation *clue, const struct effect *e, double amplitude,
                       struct tally *t)
 {
-    const struct sight *c = &clue->view->correct;
+    const struct signature *c = &clue->view->correct;
     for (int f = 0; f < NUM_FACTS; f++) {
         double fact = c->fact[f], sd = c->fact_sd[f];
         if (isnan(clue->seen.fact[f]) || isnan(fact))
@@ -129,7 +129,7 @@ static void add_facts(const struct clue *clue, const struct effect *e, double am
 }
 
 /* e NULL: the bug does nothing here, or "correct". factor: inflation() of the bug. */
-static void add_view(const struct clue *clue, const struct effect *e, double amplitude,
+static void add_view(const struct observation *clue, const struct effect *e, double amplitude,
                      double factor, struct tally *t)
 {
     double scale = mean_of(&clue->view->correct);
@@ -140,7 +140,7 @@ static void add_view(const struct clue *clue, const struct effect *e, double amp
 
 /* The largest over the views at hand: only some of them show how pixels depend on each other. Where a bug makes all renders
  * the same, their average is no surer than one of them. */
-static double inflation_of(const struct catalogue *c, int bug, const struct clue *clue)
+static double inflation_of(const struct catalogue *c, int bug, const struct observation *clue)
 {
     double factor = 1, repeats = 1;
     for (int v = 0; v < c->num_views; v++) {
@@ -148,7 +148,7 @@ static double inflation_of(const struct catalogue *c, int bug, const struct clue
         if (e == NULL)
             continue;
         factor = fmax(factor, inflation(e, &clue->seen));
-        if (e->fact[FACT_PIXELS] <= SIGHT_SAME)
+        if (e->fact[FACT_PIXELS] <= SIGNATURE_SAME)
             repeats = clue->view->renders;
     }
     return factor * repeats;
@@ -156,7 +156,7 @@ static double inflation_of(const struct catalogue *c, int bug, const struct clue
 
 struct hypotheses {
     const struct catalogue *c;
-    const struct clue *clue;
+    const struct observation *clue;
     int num_clues;
     struct tally *correct; /* per clue */
 };
@@ -219,7 +219,7 @@ static double first_amplitude(const struct hypotheses *h, int bug)
     double along = 0, norm = 0;
     for (int k = 0; k < h->num_clues; k++) {
         const struct effect *e = h->clue[k].view->effect[bug];
-        const struct sight *a = &h->clue[k].seen, *c = &h->clue[k].view->correct;
+        const struct signature *a = &h->clue[k].seen, *c = &h->clue[k].view->correct;
         double tiny = rounding * mean_of(c);
         for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
             double effect = (double)e->mean[i];
@@ -284,15 +284,15 @@ static int greatest_divisor(int a, int b)
     return b == 0 ? a : greatest_divisor(b, a % b);
 }
 
-static bool gate_mean(const struct clue *clue, double alpha, int num_tests, bool *differs,
+static bool gate_mean(const struct observation *clue, double alpha, int num_tests, bool *differs,
                       struct diagnosis *out, struct err *e)
 {
     struct moments a, b;
     struct comparison r;
-    struct sight seen = sight_as_noisy_as(&clue->seen, &clue->view->correct);
-    if (!sight_moments(&seen, &a, e))
+    struct signature seen = signature_as_noisy_as(&clue->seen, &clue->view->correct);
+    if (!signature_moments(&seen, &a, e))
         return false;
-    bool ok = sight_moments(&clue->view->correct, &b, e);
+    bool ok = signature_moments(&clue->view->correct, &b, e);
     if (!ok) {
         moments_free(&a);
         return false;
@@ -320,15 +320,15 @@ static bool gate_mean(const struct clue *clue, double alpha, int num_tests, bool
 }
 
 /* A renderer that takes another number of samples than it was asked for. */
-static bool takes_other_samples(const struct clue *clue)
+static bool takes_other_samples(const struct observation *clue)
 {
-    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
     double difference = a->fact[FACT_SAMPLES] - c->fact[FACT_SAMPLES];
     return fabs(difference) >
            samples_z * hypot(a->fact_sd[FACT_SAMPLES], c->fact_sd[FACT_SAMPLES]) + 1e-3;
 }
 
-static bool gate(const struct clue *clue, int num_clues, double alpha, bool *differs,
+static bool gate(const struct observation *clue, int num_clues, double alpha, bool *differs,
                  struct diagnosis *out, struct err *e)
 {
     int num_tests = num_clues;
@@ -447,15 +447,15 @@ static bool tally_correct(struct hypotheses *h, struct err *e)
     return true;
 }
 
-static bool check(const struct clue *clue, struct err *e)
+static bool check(const struct observation *clue, struct err *e)
 {
-    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
     return (a->columns == c->columns && a->rows == c->rows) ||
            err_set(e, "%s: a picture of %d x %d cells, the catalogue has %d x %d: another shape",
                    clue->view->name, a->columns, a->rows, c->columns, c->rows);
 }
 
-bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
+bool diagnose(const struct catalogue *c, const struct observation *clue, int num_clues,
               const struct diagnose_options *opt, struct diagnosis *out, struct err *e)
 {
     assert(num_clues > 0 && opt->alpha > 0 && opt->alpha < 0.5);
@@ -491,11 +491,11 @@ bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
 
 /* ---- evidence */
 
-static void strongest(const struct clue *clue, const struct effect *e, double amplitude,
+static void strongest(const struct observation *clue, const struct effect *e, double amplitude,
                       struct evidence *out)
 {
     enum { SIDE = 4 };
-    const struct sight *a = &clue->seen, *c = &clue->view->correct;
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
     double best = -INFINITY;
     out->columns = a->columns < SIDE ? a->columns : SIDE;
     out->rows = a->rows < SIDE ? a->rows : SIDE;
@@ -520,11 +520,11 @@ static void strongest(const struct clue *clue, const struct effect *e, double am
         }
 }
 
-struct evidence diagnose_evidence(const struct catalogue *c, const struct clue *clue,
+struct evidence diagnose_evidence(const struct catalogue *c, const struct observation *clue,
                                   const struct candidate *candidate)
 {
     const struct effect *e = clue->view->effect[candidate->bug];
-    const struct sight *a = &clue->seen, *correct = &clue->view->correct;
+    const struct signature *a = &clue->seen, *correct = &clue->view->correct;
     struct evidence out = {.explained = NAN};
     struct tally t = {0}, none = {0};
     add_view(clue, NULL, 0, 1, &none);

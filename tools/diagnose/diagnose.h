@@ -8,9 +8,9 @@
 enum { DIAGNOSE_CANDIDATES = 8 };
 
 /* One look at the tested renderer. */
-struct clue {
+struct observation {
     const struct view *view;
-    struct sight seen;  /* with the facts that are known */
+    struct signature seen; /* with the facts that are known */
     bool is_consistent; /* false: a claim of consistency came out DIFFERENT at its share of alpha */
 };
 
@@ -56,11 +56,11 @@ struct diagnosis {
 };
 
 /* clues: at least one, of views of c, each seen at most once and independent of each other. */
-bool diagnose(const struct catalogue *c, const struct clue *clue, int num_clues,
+bool diagnose(const struct catalogue *c, const struct observation *clue, int num_clues,
               const struct diagnose_options *opt, struct diagnosis *out, struct err *e)
     __attribute__((warn_unused_result));
 
-struct evidence diagnose_evidence(const struct catalogue *c, const struct clue *clue,
+struct evidence diagnose_evidence(const struct catalogue *c, const struct observation *clue,
                                   const struct candidate *candidate);
 
 /* What a lead has to reach. */

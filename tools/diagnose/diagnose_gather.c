@@ -10,13 +10,13 @@
 enum { MAX_PATH = 8192 };
 
 /* What only a comparison with the correct renderer's noise tells. */
-static void finish(struct clue *clue)
+static void finish(struct observation *clue)
 {
-    sight_set_spread(&clue->seen, &clue->view->correct);
+    signature_set_spread(&clue->seen, &clue->view->correct);
 }
 
-bool gather_program(const struct gather_options *opt, const char *program, struct clue *clue,
-                    int *num, struct err *e)
+bool diagnose_gather_program(const struct diagnose_gather_options *opt, const char *program,
+                             struct observation *clue, int *num, struct err *e)
 {
     const struct catalogue *c = opt->catalogue;
     for (int i = 0; i < c->num_views; i++) {
@@ -33,8 +33,8 @@ bool gather_program(const struct gather_options *opt, const char *program, struc
                                    .threads = opt->threads,
                                    .timeout_s = opt->timeout_s,
                                    .work_dir = opt->work_dir};
-        clue[i] = (struct clue){.view = v};
-        if (!view_scene(v, opt->suite, &job.scene, &job.variant, e) ||
+        clue[i] = (struct observation){.view = v};
+        if (!catalogue_view_scene(v, opt->suite, &job.scene, &job.variant, e) ||
             !diagnose_render(&job, opt->alpha / (2 * c->num_views), &clue[i].seen,
                              &clue[i].is_consistent, e))
             return false;
@@ -45,14 +45,14 @@ bool gather_program(const struct gather_options *opt, const char *program, struc
 }
 
 /* asked: 0 where a picture does not say, and it matters only for adaptive sampling. */
-static bool read_picture(const struct view *v, const char *path, int asked, struct clue *clue,
-                         struct err *e)
+static bool read_picture(const struct view *v, const char *path, int asked,
+                         struct observation *clue, struct err *e)
 {
     struct moments m;
-    *clue = (struct clue){.view = v, .is_consistent = true};
+    *clue = (struct observation){.view = v, .is_consistent = true};
     if (!moments_read(path, &m, NULL, e))
         return false;
-    bool ok = sight_of(&m, v->correct.columns, v->fixed_spp ? asked : 0, &clue->seen, e) ||
+    bool ok = signature_of(&m, v->correct.columns, v->fixed_spp ? asked : 0, &clue->seen, e) ||
               err_prefix(e, "%s", path);
     moments_free(&m);
     if (ok && clue->seen.rows != v->correct.rows)
@@ -62,15 +62,16 @@ static bool read_picture(const struct view *v, const char *path, int asked, stru
     return ok;
 }
 
-bool gather_picture(const struct gather_options *opt, const char *view, const char *path,
-                    struct clue *clue, struct err *e)
+bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char *view,
+                           const char *path, struct observation *clue, struct err *e)
 {
     const struct view *v = catalogue_view(opt->catalogue, view);
     const struct suite_scene *scene;
     const struct suite_variant *variant;
     if (v == NULL)
         return err_set(e, "--scene: the catalogue of bugs has no '%s' (see --help)", view);
-    return view_scene(v, opt->suite, &scene, &variant, e) && read_picture(v, path, v->spp, clue, e);
+    return catalogue_view_scene(v, opt->suite, &scene, &variant, e) &&
+           read_picture(v, path, v->spp, clue, e);
 }
 
 /* The path of the picture that claims of this scene and engine were judged by. */
@@ -94,7 +95,7 @@ static bool find_picture(const json_t *results, const char *json_path, const str
     return false;
 }
 
-static void add_consistency(const json_t *results, struct clue *clue)
+static void add_consistency(const json_t *results, struct observation *clue)
 {
     size_t i;
     const json_t *c;
@@ -104,17 +105,17 @@ static void add_consistency(const json_t *results, struct clue *clue)
             member_text(c, "error") != NULL || clue->view->renders < 4)
             continue;
         const json_t *ci = json_object_get(c, "pixels_ci");
-        sight_set_consistency(&clue->seen, member_number(c, "pixels"),
-                              json_number_value(json_array_get(ci, 0)),
-                              json_number_value(json_array_get(ci, 1)), member_number(c, "image"),
-                              (int)member_number(c, "renders"), member_number(c, "alpha"));
+        signature_set_stated_error(
+            &clue->seen, member_number(c, "pixels"), json_number_value(json_array_get(ci, 0)),
+            json_number_value(json_array_get(ci, 1)), member_number(c, "image"),
+            (int)member_number(c, "renders"), member_number(c, "alpha"));
         clue->is_consistent =
             strcmp(member_text(c, "verdict"), verdict_name(VERDICT_DIFFERENT)) != 0;
     }
 }
 
-bool gather_results(const struct gather_options *opt, const char *path, struct clue *clue, int *num,
-                    json_t *skipped, struct err *e)
+bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
+                             struct observation *clue, int *num, json_t *skipped, struct err *e)
 {
     const struct catalogue *c = opt->catalogue;
     json_t *results;
@@ -128,7 +129,7 @@ bool gather_results(const struct gather_options *opt, const char *path, struct c
         const struct suite_variant *variant;
         struct err why = {""};
         char picture[MAX_PATH];
-        ok = view_scene(v, opt->suite, &scene, &variant, e);
+        ok = catalogue_view_scene(v, opt->suite, &scene, &variant, e);
         if (!ok)
             break;
         bool there = find_picture(results, path, v, picture) || err_set(&why, "no picture");

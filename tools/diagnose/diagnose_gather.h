@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-struct gather_options {
+struct diagnose_gather_options {
     const struct catalogue *catalogue;
     const struct suite *suite;
     double alpha; /* of the diagnosis; claims of consistency get their share of it */
@@ -19,17 +19,20 @@ struct gather_options {
 /* At most catalogue->num_views of them, in clue[]; the number in *num. */
 
 /* Renders every view with `program`. */
-bool gather_program(const struct gather_options *opt, const char *program, struct clue *clue,
-                    int *num, struct err *e) __attribute__((warn_unused_result));
+bool diagnose_gather_program(const struct diagnose_gather_options *opt, const char *program,
+                             struct observation *clue, int *num, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* Of the pictures and claims of consistency of a results.json by `assay validate`. Views that it has no
  * picture of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
  * if none is left. */
-bool gather_results(const struct gather_options *opt, const char *path, struct clue *clue, int *num,
-                    json_t *skipped, struct err *e) __attribute__((warn_unused_result));
+bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
+                             struct observation *clue, int *num, json_t *skipped, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* One moments image of the view of that name. */
-bool gather_picture(const struct gather_options *opt, const char *view, const char *path,
-                    struct clue *clue, struct err *e) __attribute__((warn_unused_result));
+bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char *view,
+                           const char *path, struct observation *clue, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

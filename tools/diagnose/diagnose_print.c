@@ -19,8 +19,8 @@ static void print_bug(FILE *f, const struct catalogue *c, const struct candidate
         fprintf(f, "    with %.2f times its effect\n", k->amplitude);
 }
 
-static void print_views(FILE *f, const struct catalogue *c, const struct clue *clue, int num_clues,
-                        const struct candidate *best)
+static void print_views(FILE *f, const struct catalogue *c, const struct observation *clue,
+                        int num_clues, const struct candidate *best)
 {
     fprintf(f, "\n%-36s %9s %9s %10s  %s\n", "view", "T", "log10 L", "explained",
             "where it shows most (pixels)");
@@ -69,8 +69,8 @@ static void print_next(FILE *f, const struct catalogue *c, const struct diagnosi
     }
 }
 
-void diagnosis_print(FILE *f, const struct catalogue *c, const struct clue *clue, int num_clues,
-                     const struct diagnosis *d, const json_t *skipped)
+void diagnose_print(FILE *f, const struct catalogue *c, const struct observation *clue,
+                    int num_clues, const struct diagnosis *d, const json_t *skipped)
 {
     switch (d->finding) {
     case FINDING_CORRECT: fprintf(f, "nothing wrong found: %s\n", d->gate); break;
@@ -101,7 +101,7 @@ static json_t *number(double v)
     return isfinite(v) ? json_real(v) : json_null();
 }
 
-static json_t *view_json(const struct catalogue *c, const struct clue *clue,
+static json_t *view_json(const struct catalogue *c, const struct observation *clue,
                          const struct candidate *best)
 {
     struct evidence v = diagnose_evidence(c, clue, best);
@@ -115,8 +115,8 @@ static json_t *view_json(const struct catalogue *c, const struct clue *clue,
                      region);
 }
 
-json_t *diagnosis_json(const struct catalogue *c, const struct clue *clue, int num_clues,
-                       const struct diagnosis *d, const json_t *skipped)
+json_t *diagnose_print_json(const struct catalogue *c, const struct observation *clue,
+                            int num_clues, const struct diagnosis *d, const json_t *skipped)
 {
     static const char *const finding[] = {
         [FINDING_CORRECT] = "correct", [FINDING_BUG] = "bug", [FINDING_UNKNOWN] = "unknown"};

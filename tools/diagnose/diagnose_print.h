@@ -7,9 +7,9 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* skipped: as of gather_results(). */
-void diagnosis_print(FILE *f, const struct catalogue *c, const struct clue *clue, int num_clues,
-                     const struct diagnosis *d, const json_t *skipped);
+/* skipped: as of diagnose_gather_results(). */
+void diagnose_print(FILE *f, const struct catalogue *c, const struct observation *clue,
+                    int num_clues, const struct diagnosis *d, const json_t *skipped);
 
 /* { "finding": "correct" | "bug" | "unknown", "gate": "one line", "log10_p": -40.1,
  *   "known_bugs": 100, "probability": 0.999 (bug only),
@@ -20,7 +20,7 @@ void diagnosis_print(FILE *f, const struct catalogue *c, const struct clue *clue
  *              "region": {"x": , "y": , "width": , "height": , "change": } | null}],  of the likeliest
  *   "skipped": [{"view": , "reason": }] }
  * A new reference; NULL out of memory. */
-json_t *diagnosis_json(const struct catalogue *c, const struct clue *clue, int num_clues,
-                       const struct diagnosis *d, const json_t *skipped);
+json_t *diagnose_print_json(const struct catalogue *c, const struct observation *clue,
+                            int num_clues, const struct diagnosis *d, const json_t *skipped);
 
 #endif

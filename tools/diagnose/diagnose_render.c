@@ -40,7 +40,7 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
 }
 
 /* A black picture has no noise to judge; that it is black is for others to find. */
-static bool has_noise(const struct sight *s)
+static bool has_noise(const struct signature *s)
 {
     double sum = 0;
     for (int i = 0; i < s->columns * s->rows; i++)
@@ -49,29 +49,29 @@ static bool has_noise(const struct sight *s)
 }
 
 static bool judge(const struct moments *m, const struct diagnose_job *job, double alpha,
-                  struct sight *s, bool *consistent, struct err *e)
+                  struct signature *s, bool *consistent, struct err *e)
 {
     struct consistency c;
     if (!consistency_judge(m, job->renders, consistency_margin, alpha, &c, e))
         return false;
-    sight_set_consistency(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders, alpha);
+    signature_set_stated_error(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders, alpha);
     *consistent = c.verdict != VERDICT_DIFFERENT;
     return true;
 }
 
-bool diagnose_render(const struct diagnose_job *job, double alpha, struct sight *out,
+bool diagnose_render(const struct diagnose_job *job, double alpha, struct signature *out,
                      bool *consistent, struct err *e)
 {
     size_t num = (size_t)job->renders;
     struct moments *m = calloc(num, sizeof *m);
-    struct sight *s = calloc(num, sizeof *s);
+    struct signature *s = calloc(num, sizeof *s);
     bool ok = (m != NULL && s != NULL) || err_set(e, "out of memory"), judged = true;
     int done = 0;
     for (; ok && done < job->renders; done += ok)
         ok = render_one(job, done, &m[done], e) &&
-             sight_of(&m[done], job->columns, job->spp, &s[done], e);
+             signature_of(&m[done], job->columns, job->spp, &s[done], e);
     if (ok)
-        *out = sight_average(s, job->renders);
+        *out = signature_average(s, job->renders);
     if (ok && job->renders >= FEWEST_CONSISTENT && has_noise(out))
         ok = judge(m, job, alpha, out, &judged, e);
     if (consistent != NULL)

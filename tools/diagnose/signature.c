@@ -12,7 +12,7 @@ static const double other_size = 0.35;
 static bool check(const struct moments *m, int columns, struct err *e)
 {
     int cell = m->width / columns;
-    if (m->width % columns != 0 || m->height % cell != 0 || m->height / cell > SIGHT_SIDE)
+    if (m->width % columns != 0 || m->height % cell != 0 || m->height / cell > SIGNATURE_SIDE)
         return err_set(
             e,
             "%d x %d pixels: the width has to be a multiple of %d, and the height of the "
@@ -27,7 +27,7 @@ static bool check(const struct moments *m, int columns, struct err *e)
     return true;
 }
 
-static void add_pixel(const struct moments *m, size_t p, int cell_at, struct sight *s)
+static void add_pixel(const struct moments *m, size_t p, int cell_at, struct signature *s)
 {
     double n = m->n[p], pixels = (double)s->cell * s->cell;
     for (int c = 0; c < 3; c++) {
@@ -42,7 +42,7 @@ static void add_pixel(const struct moments *m, size_t p, int cell_at, struct sig
 }
 
 /* Of the number of samples: all alike unless the render is adaptive. */
-static void set_samples(const struct moments *m, double asked, struct sight *s)
+static void set_samples(const struct moments *m, double asked, struct signature *s)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
     double sum = 0, squares = 0;
@@ -60,11 +60,12 @@ static void set_samples(const struct moments *m, double asked, struct sight *s)
     }
 }
 
-bool sight_of(const struct moments *m, int columns, double asked, struct sight *out, struct err *e)
+bool signature_of(const struct moments *m, int columns, double asked, struct signature *out,
+                  struct err *e)
 {
     if (!check(m, columns, e))
         return false;
-    *out = (struct sight){0};
+    *out = (struct signature){0};
     out->columns = columns;
     out->cell = m->width / columns;
     out->rows = m->height / out->cell;
@@ -76,9 +77,9 @@ bool sight_of(const struct moments *m, int columns, double asked, struct sight *
     return true;
 }
 
-struct sight sight_average(const struct sight *s, int num)
+struct signature signature_average(const struct signature *s, int num)
 {
-    struct sight a = s[0];
+    struct signature a = s[0];
     int cells = a.columns * a.rows;
     double variance = pow(a.fact_sd[FACT_SAMPLES], 2);
     for (int k = 1; k < num; k++) {
@@ -106,11 +107,11 @@ struct sight sight_average(const struct sight *s, int num)
     return a;
 }
 
-void sight_set_consistency(struct sight *s, double pixels, double lo, double hi, double image,
-                           int renders, double alpha)
+void signature_set_stated_error(struct signature *s, double pixels, double lo, double hi,
+                                double image, int renders, double alpha)
 {
     bool same = !(pixels > 0);
-    s->fact[FACT_PIXELS] = same ? SIGHT_SAME : log(pixels);
+    s->fact[FACT_PIXELS] = same ? SIGNATURE_SAME : log(pixels);
     s->fact_sd[FACT_PIXELS] =
         same ? 0 : log(hi / lo) / (2 * stats_t_quantile(alpha / 2, renders - 1));
     /* Where all pictures are the same, their sums have nothing to say. The logarithm of chi^2/(K-1) has
@@ -119,7 +120,7 @@ void sight_set_consistency(struct sight *s, double pixels, double lo, double hi,
     s->fact_sd[FACT_IMAGE] = sqrt(gsl_sf_psi_1((renders - 1) / 2.0));
 }
 
-void sight_set_spread(struct sight *s, const struct sight *correct)
+void signature_set_spread(struct signature *s, const struct signature *correct)
 {
     double sum = 0, sum_correct = 0, squares = 0;
     int cells = s->columns * s->rows;
@@ -137,9 +138,9 @@ void sight_set_spread(struct sight *s, const struct sight *correct)
     s->fact_sd[FACT_SPREAD] = hypot(sqrt(squares) / sum, s->cell == correct->cell ? 0 : other_size);
 }
 
-struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correct)
+struct signature signature_as_noisy_as(const struct signature *s, const struct signature *correct)
 {
-    struct sight out = *s;
+    struct signature out = *s;
     double ratio = correct->n / s->n;
     for (int i = 0; i < 3 * s->columns * s->rows; i++) {
         double var = correct->var[i] * ratio, k3 = correct->k3[i] * ratio * ratio;
@@ -150,7 +151,7 @@ struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correc
     return out;
 }
 
-bool sight_moments(const struct sight *s, struct moments *out, struct err *e)
+bool signature_moments(const struct signature *s, struct moments *out, struct err *e)
 {
     if (!moments_alloc(out, s->columns, s->rows, e))
         return false;

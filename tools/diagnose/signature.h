@@ -1,7 +1,7 @@
 /* What a diagnosis sees of a scene's picture: means over a coarse grid of cells, how sure they are, and
  * a few facts about the noise.
  *
- * A cell is a square of pixels; across a picture there are at most SIGHT_SIDE cells, a number that is fixed for
+ * A cell is a square of pixels; across a picture there are at most SIGNATURE_SIDE cells, a number that is fixed for
  * each scene, so pictures of any size whose sides are whole numbers of cells can be held against each other,
  * as long as they show the same field of view. Cells are numbered row by row from the top left; each has three channels, RGB. */
 #ifndef ASSAY_SIGNATURE_H
@@ -10,7 +10,11 @@
 #include "renderer/image/moments.h"
 #include "tools/stats/stated_error.h"
 
-enum { SIGHT_SIDE = 16, SIGHT_CELLS = SIGHT_SIDE * SIGHT_SIDE, SIGHT_VALUES = 3 * SIGHT_CELLS };
+enum {
+    SIGNATURE_SIDE = 16,
+    SIGNATURE_CELLS = SIGNATURE_SIDE * SIGNATURE_SIDE,
+    SIGNATURE_VALUES = 3 * SIGNATURE_CELLS
+};
 
 /* Logarithms of what is 1 for a picture made as asked by a renderer that states its error rightly. */
 enum fact {
@@ -21,45 +25,46 @@ enum fact {
     NUM_FACTS
 };
 
-struct sight {
+struct signature {
     int columns, rows, cell; /* cell: its side in pixels; of an average of sights the first's */
-    double mean[SIGHT_VALUES];
-    double var[SIGHT_VALUES];   /* of the mean */
-    double k3[SIGHT_VALUES];    /* third cumulant of the mean */
-    double spread[SIGHT_CELLS]; /* variance of one sample, sum over channels, mean over pixels */
-    double n;                   /* samples in a cell, mean over cells; of an average their sum */
-    double fact[NUM_FACTS];     /* NAN: not known */
+    double mean[SIGNATURE_VALUES];
+    double var[SIGNATURE_VALUES]; /* of the mean */
+    double k3[SIGNATURE_VALUES];  /* third cumulant of the mean */
+    double
+        spread[SIGNATURE_CELLS]; /* variance of one sample, sum over channels, mean over pixels */
+    double n;                    /* samples in a cell, mean over cells; of an average their sum */
+    double fact[NUM_FACTS];      /* NAN: not known */
     double fact_sd[NUM_FACTS];
 };
 
-/* columns: cells across, at most SIGHT_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
+/* columns: cells across, at most SIGNATURE_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
  * cells, on pixels with fewer than 2 observations, and on moments that do not state an error ("stratified",
  * "exact"). FACT_SAMPLES is known if `asked` is. */
-bool sight_of(const struct moments *m, int columns, double asked, struct sight *out, struct err *e)
-    __attribute__((warn_unused_result));
+bool signature_of(const struct moments *m, int columns, double asked, struct signature *out,
+                  struct err *e) __attribute__((warn_unused_result));
 
 /* The average of num >= 1 independent sights of one shape, as of one longer render; FACT_SAMPLES is
  * averaged, the others are those of the first. */
-struct sight sight_average(const struct sight *s, int num);
+struct signature signature_average(const struct signature *s, int num);
 
 /* FACT_PIXELS and FACT_IMAGE from R with its 1 - alpha interval and S over `renders` pictures. Two pictures
- * that are the same have R = 0, kept as a logarithm of SIGHT_SAME. */
-#define SIGHT_SAME (-10.0)
-void sight_set_consistency(struct sight *s, double pixels, double lo, double hi, double image,
-                           int renders, double alpha);
+ * that are the same have R = 0, kept as a logarithm of SIGNATURE_SAME. */
+#define SIGNATURE_SAME (-10.0)
+void signature_set_stated_error(struct signature *s, double pixels, double lo, double hi,
+                                double image, int renders, double alpha);
 
 /* FACT_SPREAD of s against the correct renderer's: log ratio of the sums of `spread`, its standard deviation
  * from the residuals of the cells (ratio estimator). Unknown where either has no spread. Where pixels are of another
  * size it is known to a third only: how much a sample varies depends on how much a pixel covers. */
-void sight_set_spread(struct sight *s, const struct sight *correct);
+void signature_set_spread(struct signature *s, const struct signature *correct);
 
 /* s with at least the variance and the third cumulant that means of the correct renderer have at as many samples: a render
  * that happens to miss rare bright samples states less of both than is true of it. */
-struct sight sight_as_noisy_as(const struct sight *s, const struct sight *correct);
+struct signature signature_as_noisy_as(const struct signature *s, const struct signature *correct);
 
 /* The same as moments over cells, for compare_moments(): n, M2 and M3 such that the variance and the third
  * cumulant of the mean are those of the sight. The caller frees them. */
-bool sight_moments(const struct sight *s, struct moments *out, struct err *e)
+bool signature_moments(const struct signature *s, struct moments *out, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -84,22 +84,22 @@ bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128
     return true;
 }
 
-/* The side of a cell: the smallest that makes at most SIGHT_SIDE of them each way. */
+/* The side of a cell: the smallest that makes at most SIGNATURE_SIDE of them each way. */
 static int cell_of(const struct rubric_picture *p)
 {
     int longer = p->width > p->height ? p->width : p->height;
-    int cell = (longer + SIGHT_SIDE - 1) / SIGHT_SIDE;
+    int cell = (longer + SIGNATURE_SIDE - 1) / SIGNATURE_SIDE;
     while (cell < longer && (p->width % cell != 0 || p->height % cell != 0))
         cell++;
     return cell;
 }
 
-static bool start(const struct rubric_picture *p, struct sight *s, struct err *e)
+static bool start(const struct rubric_picture *p, struct signature *s, struct err *e)
 {
-    *s = (struct sight){.cell = cell_of(p)};
+    *s = (struct signature){.cell = cell_of(p)};
     if (p->width % s->cell != 0 || p->height % s->cell != 0)
         return err_set(e, "picture '%s': %d x %d is not of whole cells, at most %d each way",
-                       p->name, p->width, p->height, SIGHT_SIDE);
+                       p->name, p->width, p->height, SIGNATURE_SIDE);
     s->columns = p->width / s->cell;
     s->rows = p->height / s->cell;
     s->n = (double)p->spp * s->cell * s->cell;
@@ -109,7 +109,7 @@ static bool start(const struct rubric_picture *p, struct sight *s, struct err *e
 }
 
 /* The first of the three values of the cell that pixel p lies in. */
-static size_t cell_at(const struct sight *s, size_t p)
+static size_t cell_at(const struct signature *s, size_t p)
 {
     size_t width = (size_t)s->columns * (size_t)s->cell, cell = (size_t)s->cell;
     return 3 * (p / width / cell * (size_t)s->columns + p % width / cell);
@@ -136,7 +136,7 @@ static double clipped_mean(double mean, double sd, double clip)
 }
 
 bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments *m,
-                       struct sight *out, struct err *e)
+                       struct signature *out, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
     bool counts = rubric_bugs_counts(r, picture);
@@ -180,7 +180,7 @@ struct seen {
 
 /* Pixels that are masked are taken to be right. */
 static void fill_cells(const struct rubric *r, const struct student *s, const struct moments *m,
-                       double clip, struct sight *out, struct seen *cells)
+                       double clip, struct signature *out, struct seen *cells)
 {
     for (size_t i = 0; i < (size_t)s->width * (size_t)s->height; i++)
         for (size_t c = 0; c < 3; c++) {
@@ -197,9 +197,10 @@ static void fill_cells(const struct rubric *r, const struct student *s, const st
 }
 
 /* The variance of its pixels over that of ours: the median over the cells, as a bug makes pixels of one cell differ too. */
-static double noise_of(const struct sight *s, const struct sight *correct, const struct seen *cells)
+static double noise_of(const struct signature *s, const struct signature *correct,
+                       const struct seen *cells)
 {
-    double ratio[SIGHT_VALUES], pixels = (double)s->cell * s->cell;
+    double ratio[SIGNATURE_VALUES], pixels = (double)s->cell * s->cell;
     size_t num = 0;
     for (int j = 0; j < 3 * s->columns * s->rows; j++) {
         double ours = correct->var[j] * correct->n / s->n * pixels,
@@ -215,10 +216,10 @@ static double noise_of(const struct sight *s, const struct sight *correct, const
 }
 
 static bool sight_of_student(const struct rubric *r, int picture, const struct student *s,
-                             const struct moments *m, const struct sight *correct,
-                             struct sight *out, struct err *e)
+                             const struct moments *m, const struct signature *correct,
+                             struct signature *out, struct err *e)
 {
-    struct seen cells[SIGHT_VALUES] = {0};
+    struct seen cells[SIGNATURE_VALUES] = {0};
     if (!start(&r->picture[picture], out, e))
         return false;
     double clip = clip_of(r), pixels = (double)out->cell * out->cell;
@@ -232,7 +233,7 @@ static bool sight_of_student(const struct rubric *r, int picture, const struct s
 }
 
 static bool count_samples(const struct rubric *r, int picture, const struct answers *a,
-                          const struct made *made, struct sight *s, struct err *e)
+                          const struct made *made, struct signature *s, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
     struct rates rates;
@@ -248,7 +249,8 @@ static bool count_samples(const struct rubric *r, int picture, const struct answ
 }
 
 static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answers *a,
-                 const struct handed_in *h, int set, struct clue *clue, int *num, struct err *e)
+                 const struct handed_in *h, int set, struct observation *clue, int *num,
+                 struct err *e)
 {
     *num = 0;
     for (int i = 0; i < r->num_pictures; i++) {
@@ -256,8 +258,8 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
             continue;
         const struct view *v = &b->catalogue.view[b->view[set][i]];
         const struct answer *answer = &a->of[rubric_bugs_set(a, set, i)][i];
-        struct clue *out = &clue[(*num)++];
-        *out = (struct clue){.view = v, .is_consistent = true};
+        struct observation *out = &clue[(*num)++];
+        *out = (struct observation){.view = v, .is_consistent = true};
         if (!sight_of_student(r, i, &h->picture[i], &answer->m, &v->correct, &out->seen, e))
             return false;
         if (rubric_bugs_counts(r, i) && !count_samples(r, i, a, &h->made[i], &out->seen, e))
@@ -271,7 +273,7 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                           struct diagnosis *found, int *with, struct err *e)
 {
     const struct diagnose_options opt = {.alpha = alpha, .by_likelihood = true};
-    struct clue *clue = calloc((size_t)r->num_pictures, sizeof *clue);
+    struct observation *clue = calloc((size_t)r->num_pictures, sizeof *clue);
     bool ok = clue != NULL || err_set(e, "out of memory");
     double best = -INFINITY;
     *found = (struct diagnosis){0};

@@ -34,7 +34,7 @@ bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128
 /* Cells of a render of ours as above: mean, variance of the mean, n = samples in a cell (of counting pictures: as if
  * all had been taken), FACT_SAMPLES of counting pictures. Fails on a size that is not of whole cells. */
 bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments *m,
-                       struct sight *out, struct err *e) __attribute__((warn_unused_result));
+                       struct signature *out, struct err *e) __attribute__((warn_unused_result));
 
 /* Reads r->bugs. Fails if a view is missing or has been made of another picture. The caller closes it. */
 bool rubric_bugs_open(const struct rubric *r, const struct answers *a, struct rubric_bugs *out,

@@ -247,7 +247,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
 }
 
 /* same_noise.h */
-static void same_noise(FILE *f, const json_t *grades, int *group)
+static void show_same_noise(FILE *f, const json_t *grades, int *group)
 {
     int number = 0;
     size_t i;
@@ -287,7 +287,7 @@ bool grade_overview(FILE *f, const json_t *grades, struct err *e)
     common_bugs(f, grades, t);
     slowest(f, grades, t);
     look_alikes(f, grades);
-    same_noise(f, grades, group);
+    show_same_noise(f, grades, group);
     table(f, grades);
     free(t);
     free(group);

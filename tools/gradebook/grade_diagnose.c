@@ -22,7 +22,7 @@ static bool add_view(const struct view *v, const struct suite *suite, struct rub
     const struct suite_variant *variant;
     if (r->num_pictures == RUBRIC_PICTURES)
         return err_set(e, "more than %d views to diagnose by", RUBRIC_PICTURES);
-    if (!view_scene(v, suite, &scene, &variant, e))
+    if (!catalogue_view_scene(v, suite, &scene, &variant, e))
         return false;
     struct rubric_picture *p = &r->picture[r->num_pictures++];
     *p = (struct rubric_picture){.suite = scene,
@@ -72,18 +72,18 @@ void diagnosis_close(struct grade_diagnosis *d)
 /* One view rendered by the submission; the picture goes away again. */
 static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
                  const struct submission *s, int view, const char *work, uint64_t seed, int threads,
-                 double alpha, struct clue *clue, struct err *e)
+                 double alpha, struct observation *clue, struct err *e)
 {
     char out[4400];
     struct made made;
-    const struct gather_options opt = {
+    const struct diagnose_gather_options opt = {
         .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
     snprintf(out, sizeof out, "%s/diagnose", work);
     if (!make_dirs(out, e) || !submission_picture(d->rubric, box, s, view, d->stage, work, out,
                                                   seed * 1000u + (uint64_t)view, threads, &made, e))
         return false;
     bool ok = made.why[0] == '\0'
-                  ? gather_picture(&opt, d->catalogue.view[view].name, made.path, clue, e)
+                  ? diagnose_gather_image(&opt, d->catalogue.view[view].name, made.path, clue, e)
                   : err_set(e, "%.500s", made.why);
     struct err ignored;
     return remove_tree(out, ok ? e : &ignored) && ok;
@@ -129,7 +129,7 @@ json_t *diagnosis_of(const struct grade_diagnosis *d, const struct sandbox *box,
 {
     const struct catalogue *c = &d->catalogue;
     const struct diagnose_options opt = {.alpha = alpha};
-    struct clue *clue = calloc((size_t)c->num_views, sizeof *clue);
+    struct observation *clue = calloc((size_t)c->num_views, sizeof *clue);
     struct diagnosis found;
     struct err e = {""};
     bool ok = clue != NULL || err_set(&e, "out of memory");

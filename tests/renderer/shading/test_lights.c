@@ -156,7 +156,7 @@ static void bright_texel(void **state)
  * reflected again and again. Light sampling has no part in it. */
 enum view { VIEW_SKY, VIEW_MIRROR, VIEW_NO_GLASS, NUM_VIEWS };
 
-static struct scene view_scene(enum view view, vec3 w, float reflectance)
+static struct scene catalogue_view_scene(enum view view, vec3 w, float reflectance)
 {
     struct scene s = build_scene();
     uint32_t m = build_material(&s, grey(reflectance), grey(0));
@@ -199,7 +199,7 @@ static void seen_directly_and_in_mirrors(void **state)
         for (int view = 0; view < NUM_VIEWS; view++)
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
                 vec3 w = v3(directions[k][0], directions[k][1], directions[k][2]);
-                struct scene s = view_scene((enum view)view, w, 0.8f);
+                struct scene s = catalogue_view_scene((enum view)view, w, 0.8f);
                 give_sky(&s, sky_environment(&sky));
                 check_finish(&s);
                 struct integrator_options io = path_options;
@@ -227,7 +227,7 @@ static void glass_in_a_constant_sky(void **state)
 {
     (void)state;
     struct err e;
-    struct scene s = view_scene(VIEW_NO_GLASS, v3(0, 0, -1), 1);
+    struct scene s = catalogue_view_scene(VIEW_NO_GLASS, v3(0, 0, -1), 1);
     s.materials[0].ior = 1.5f;
     s.camera.hfov = 0.3f;
     give_sky(&s, environment_constant(grey(3), &e));
@@ -267,7 +267,7 @@ static void upper_half(void **state)
             scene_free(&s);
         }
     for (int view = 0; view < NUM_VIEWS; view++) {
-        struct scene s = view_scene((enum view)view, v3(0, 1, 0), 0.8f);
+        struct scene s = catalogue_view_scene((enum view)view, v3(0, 1, 0), 0.8f);
         give_sky(&s, environment_upper_half(grey(2), &e));
         check_finish(&s);
         struct integrator_options io = path_options;

@@ -43,7 +43,7 @@ static bool look_up(const char *id, const char *patches, const char *submissions
     if (plus != NULL)
         snprintf(first, sizeof first, "%.*s and ", (int)(plus - id < 100 ? plus - id : 100), id);
     snprintf(path, sizeof path, "%.3800s/%.128s.patch", patches, plus != NULL ? plus + 1 : id);
-    if (bug_of_patch(path, &bug, &e)) {
+    if (catalogue_bug_of_patch(path, &bug, &e)) {
         part_of(bug.where, out->part);
         snprintf(out->what, sizeof out->what, "%s%s", first, bug.what);
         return true;

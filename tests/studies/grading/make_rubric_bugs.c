@@ -29,8 +29,8 @@ struct maker {
     struct answers *answers;
     struct catalogue made;
     int picture[RUBRIC_SETS * RUBRIC_PICTURES], set[RUBRIC_SETS * RUBRIC_PICTURES]; /* of a view */
-    struct sight (*batch)[BATCHES]; /* of a view: the correct renderer's */
-    struct moments *one;            /* likewise, one sample a pixel; of views without deviations */
+    struct signature (*batch)[BATCHES]; /* of a view: the correct renderer's */
+    struct moments *one; /* likewise, one sample a pixel; of views without deviations */
     pthread_mutex_t lock;
     int next;
     bool ok;
@@ -52,7 +52,7 @@ static bool list_bugs(const char *dir, struct catalogue *c, struct err *e)
         const char *dot = strrchr(entry->d_name, '.');
         snprintf(path, sizeof path, "%s/%s", dir, entry->d_name);
         if (dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST_BUGS)
-            ok = bug_of_patch(path, &c->bug[c->num_bugs++], e);
+            ok = catalogue_bug_of_patch(path, &c->bug[c->num_bugs++], e);
     }
     if (d != NULL)
         closedir(d);
@@ -77,7 +77,7 @@ static bool open_cache(const struct maker *m, const char *name, const char *hash
 }
 
 static bool render(const struct maker *m, int view, int batch, const struct answer_options *opt,
-                   struct sight *out, struct err *e)
+                   struct signature *out, struct err *e)
 {
     const struct rubric *r = m->rubric;
     int picture = m->picture[view], spp = r->picture[picture].spp;
@@ -108,17 +108,18 @@ static bool is_same(const struct maker *m, int view, const struct answer_options
 }
 
 /* For the variance of one picture: c->n is to that of a picture as the variances are. */
-static double of_one(const struct rubric *r, int picture, const struct sight *s, int i)
+static double of_one(const struct rubric *r, int picture, const struct signature *s, int i)
 {
     return s->var[i] * s->n / ((double)r->picture[picture].spp * s->cell * s->cell);
 }
 
-static void set_effect(const struct maker *m, int view, const struct sight *bug, struct effect *out)
+static void set_effect(const struct maker *m, int view, const struct signature *bug,
+                       struct effect *out)
 {
-    const struct sight *correct = m->batch[view];
+    const struct signature *correct = m->batch[view];
     int values = 3 * bug->columns * bug->rows, noisy = 0;
     double level = 0, chi2 = 0;
-    struct sight a = sight_average(bug, BATCHES), c = sight_average(correct, BATCHES);
+    struct signature a = signature_average(bug, BATCHES), c = signature_average(correct, BATCHES);
     for (int i = 0; i < values; i++) {
         double shape = a.var[i] + c.var[i], squares = 0;
         for (int k = 0; k < BATCHES; k++)
@@ -150,7 +151,7 @@ static void set_effect(const struct maker *m, int view, const struct sight *bug,
     }
 }
 
-static bool is_needed(const struct effect *e, const struct sight *correct)
+static bool is_needed(const struct effect *e, const struct signature *correct)
 {
     double far = e->fact[FACT_SAMPLES] - correct->fact[FACT_SAMPLES]; /* NAN: not counted */
     return e->pixels || fabs(far) > 0.01;
@@ -159,7 +160,7 @@ static bool is_needed(const struct effect *e, const struct sight *correct)
 static bool make_view(struct maker *m, int view, int b, const struct answer_options *bug,
                       struct err *e)
 {
-    struct sight s[BATCHES];
+    struct signature s[BATCHES];
     struct view *v = &m->made.view[view];
     const struct view *plain = &m->made.view[0];
     bool same = false, counts = rubric_bugs_counts(m->rubric, m->picture[view]);
@@ -240,7 +241,7 @@ static bool make_correct(struct maker *m, int view, const struct answer_options 
     if (!rubric_bugs_counts(m->rubric, picture))
         return rubric_bugs_sight(m->rubric, picture, &m->answers->of[m->set[view]][picture].m,
                                  &v->correct, e);
-    v->correct = sight_average(m->batch[view], BATCHES);
+    v->correct = signature_average(m->batch[view], BATCHES);
     return true;
 }
 

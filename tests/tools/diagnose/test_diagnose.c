@@ -22,7 +22,7 @@ static const double alpha = 1e-6;
 
 struct fixture {
     struct catalogue c;
-    struct clue *clue;
+    struct observation *clue;
     gsl_rng *rng;
     char dir[64];
 };
@@ -113,7 +113,7 @@ static void test_what_a_patch_is_by(void **state)
         assert_non_null(out);
         fprintf(out, "%s%s", head, cases[i].text);
         assert_int_equal(fclose(out), 0);
-        assert_true(bug_of_patch(path, &bug, &e));
+        assert_true(catalogue_bug_of_patch(path, &bug, &e));
         assert_string_equal(bug.what, "b");
         assert_string_equal(bug.where, "w");
         if (i == 0)
@@ -182,11 +182,11 @@ static void test_a_sight_pools_pixels(void **state)
 {
     (void)state;
     struct err e;
-    struct sight s;
+    struct signature s;
     uint64_t seed = 4;
     struct moments m = new_moments(48, 24, "sample");
     simulate(&m, LAW_EXPONENTIAL, 2, 9, false, &seed);
-    assert_true(sight_of(&m, 16, 18, &s, &e));
+    assert_true(signature_of(&m, 16, 18, &s, &e));
     assert_int_equal(s.columns, 16);
     assert_int_equal(s.rows, 8);
     for (int cell = 0; cell < 128; cell += 37) {
@@ -204,11 +204,11 @@ static void test_a_sight_pools_pixels(void **state)
     assert_true(fabs(s.fact[FACT_SAMPLES] - log(0.5)) < 1e-12);
     moments_free(&m);
     m = new_moments(30, 30, "sample");
-    assert_false(sight_of(&m, 16, 0, &s, &e));
+    assert_false(signature_of(&m, 16, 0, &s, &e));
     assert_non_null(strstr(e.msg, "30 x 30"));
     moments_free(&m);
     m = new_moments(32, 32, "stratified");
-    assert_false(sight_of(&m, 16, 0, &s, &e));
+    assert_false(signature_of(&m, 16, 0, &s, &e));
     assert_non_null(strstr(e.msg, "does not state its error"));
     moments_free(&m);
 }
@@ -218,16 +218,16 @@ static void test_an_average_of_sights(void **state)
 {
     (void)state;
     struct err e;
-    struct sight s[2];
+    struct signature s[2];
     uint64_t seed = 5;
     for (int k = 0; k < 2; k++) {
         struct moments m = new_moments(16, 16, "sample");
         simulate(&m, LAW_NORMAL, 1, 50, true, &seed);
-        assert_true(sight_of(&m, 16, 50, &s[k], &e));
+        assert_true(signature_of(&m, 16, 50, &s[k], &e));
         moments_free(&m);
     }
-    struct sight a = sight_average(s, 2);
-    for (int i = 0; i < SIGHT_VALUES; i += 101) {
+    struct signature a = signature_average(s, 2);
+    for (int i = 0; i < SIGNATURE_VALUES; i += 101) {
         assert_true(fabs(a.mean[i] - (s[0].mean[i] + s[1].mean[i]) / 2) < 1e-12);
         assert_true(fabs(a.var[i] - (s[0].var[i] + s[1].var[i]) / 4) < 1e-12);
     }
@@ -256,10 +256,10 @@ static void draw_look(struct fixture *f, int view, const struct effect *bug, dou
                       double noise)
 {
     const struct view *v = &f->c.view[view];
-    const struct sight *c = &v->correct;
-    struct clue *out = &f->clue[view];
-    *out = (struct clue){.view = v, .seen = *c, .is_consistent = true};
-    struct sight *a = &out->seen;
+    const struct signature *c = &v->correct;
+    struct observation *out = &f->clue[view];
+    *out = (struct observation){.view = v, .seen = *c, .is_consistent = true};
+    struct signature *a = &out->seen;
     a->n = (double)v->spp * v->renders * a->cell * a->cell;
     for (int i = 0; i < 3 * a->columns * a->rows; i++) {
         double mean = c->mean[i] + gsl_ran_gaussian(f->rng, sqrt(c->var[i]));
@@ -330,7 +330,7 @@ static void test_an_unknown_difference_is_not_named(void **state)
     gsl_rng_set(f->rng, 13);
     for (int v = 0; v < f->c.num_views; v++) {
         draw_look(f, v, NULL, 0, 1);
-        for (int i = 0; i < SIGHT_VALUES; i++)
+        for (int i = 0; i < SIGNATURE_VALUES; i++)
             f->clue[v].seen.mean[i] *= i % 7 < 3 ? 1.3 : 0.9;
     }
     const struct diagnose_options opt = {.alpha = alpha};
