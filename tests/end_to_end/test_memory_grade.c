@@ -132,21 +132,21 @@ static int tear_down(void **state)
 static bool read_student(void *ctx, struct err *e)
 {
     double *right = ctx;
-    struct student s = {0};
-    bool ok = student_read(file(0, "class/ada/p0.png"), "cgl", WIDTH, HEIGHT, &s, e);
+    struct submitted_image s = {0};
+    bool ok = submitted_image_read(file(0, "class/ada/p0.png"), "cgl", WIDTH, HEIGHT, &s, e);
     alloc_fail_off();
     assert_true(ok || err_is_of_memory(e));
     if (ok) {
         if (*right == 0)
             *right = s.mean[100];
         assert_true(s.mean[100] == *right);
-        student_free(&s);
+        submitted_image_free(&s);
     }
     return ok;
 }
 
 struct work {
-    struct handed_in h;
+    struct submitted_images h;
     double points;
 };
 
@@ -190,13 +190,13 @@ static void students(void **state)
     double right = 0;
     alloc_fail_each("student_read", ALLOC_OURS, read_student, &right);
     for (int i = 0; i < 2; i++)
-        assert_true(student_read(file(0, i == 0 ? "class/ada/p0.png" : "class/ada/p1.png"), "cgl",
-                                 WIDTH, HEIGHT, &w.h.picture[i], &e));
+        assert_true(submitted_image_read(file(0, i == 0 ? "class/ada/p0.png" : "class/ada/p1.png"),
+                                         "cgl", WIDTH, HEIGHT, &w.h.picture[i], &e));
     alloc_fail_each("grading_all", ALLOC_ALL, grade_pictures, &w);
     assert_true(w.points > 10); /* the pictures are right, so the checks got that far */
     alloc_fail_each("alike_noise_of", ALLOC_ALL, find_same_noise, &w);
     for (int i = 0; i < 2; i++)
-        student_free(&w.h.picture[i]);
+        submitted_image_free(&w.h.picture[i]);
 }
 
 static json_t *a_class(double share)

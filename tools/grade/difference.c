@@ -24,7 +24,7 @@ double interval_half(const struct interval *i)
 
 /* A pair of pictures being compared. */
 struct pair {
-    const struct student *a, *b;
+    const struct submitted_image *a, *b;
     const unsigned char *use;
 };
 
@@ -164,7 +164,7 @@ static bool interval_from(const struct sums *s, double unit, double dof, double 
     return factor < 1;
 }
 
-static struct rect around(const struct student *s, struct rect r)
+static struct rect around(const struct submitted_image *s, struct rect r)
 {
     int x0 = r.x - RUBRIC_TILE, y0 = r.y - RUBRIC_TILE, x1 = r.x + 2 * RUBRIC_TILE,
         y1 = r.y + 2 * RUBRIC_TILE;
@@ -201,8 +201,8 @@ static void measure_tile(const struct pair *p, struct rect r, const struct noise
     out->tile_y = r.y;
 }
 
-bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
-                       double alpha, struct agreement *out, struct err *e)
+bool agreement_measure(const struct submitted_image *a, const struct submitted_image *b,
+                       const unsigned char *use, double alpha, struct agreement *out, struct err *e)
 {
     const struct pair p = {a, b, use};
     const struct rect whole = {0, 0, a->width, a->height};
@@ -242,8 +242,8 @@ void agreement_free(struct agreement *a)
     *a = (struct agreement){0};
 }
 
-bool agreement_noise(const struct student *p, const struct student *reference_p,
-                     const struct student *q, const struct student *reference_q,
+bool agreement_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
+                     const struct submitted_image *q, const struct submitted_image *reference_q,
                      const unsigned char *use, double alpha, struct interval *out, struct err *e)
 {
     const struct rect whole = {0, 0, p->width, p->height};

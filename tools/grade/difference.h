@@ -28,7 +28,7 @@ struct agreement {
 /* A against B over the pixels with use[p] != 0; means elsewhere are not looked at.
  *
  * Noise. Neither file states any. What is known is the variance that a render of as many samples by our own
- * renderer has in each pixel (struct student: variance), and that neighbouring pixels of A - B differ by noise alone
+ * renderer has in each pixel (struct submitted_image: variance), and that neighbouring pixels of A - B differ by noise alone
  * where the pictures agree: r = second differences, as in noise_estimate.h, with E[r^2] = kappa m + c, m from those
  * variances, c from rounding. kappa, the noise of this program over ours, is their weighted least squares slope,
  * one for the picture, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
@@ -41,15 +41,15 @@ struct agreement {
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
  * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
  * frees with agreement_free(). */
-bool agreement_measure(const struct student *a, const struct student *b, const unsigned char *use,
-                       double alpha, struct agreement *out, struct err *e)
+bool agreement_measure(const struct submitted_image *a, const struct submitted_image *b,
+                       const unsigned char *use, double alpha, struct agreement *out, struct err *e)
     __attribute__((warn_unused_result));
 void agreement_free(struct agreement *a);
 
 /* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
  * that of ours does. Fails where there is no noise in one of them. */
-bool agreement_noise(const struct student *p, const struct student *reference_p,
-                     const struct student *q, const struct student *reference_q,
+bool agreement_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
+                     const struct submitted_image *q, const struct submitted_image *reference_q,
                      const unsigned char *use, double alpha, struct interval *out, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -12,7 +12,7 @@ static void free_results(struct result *out, int num)
 
 /* On failure there is nothing to free. */
 static bool grade_with(const struct rubric *r, const struct answers *a, int set,
-                       struct handed_in *h, double alpha, struct result *out, double *points,
+                       struct submitted_images *h, double alpha, struct result *out, double *points,
                        struct err *e)
 {
     *points = 0;
@@ -41,8 +41,8 @@ static bool explains(const struct rubric *r, const double *plain, const struct r
     return false;
 }
 
-bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
-                 struct result *out, int *set, struct err *e)
+bool grading_all(const struct rubric *r, const struct answers *a, struct submitted_images *h,
+                 double alpha, struct result *out, int *set, struct err *e)
 {
     static const double worth_telling = 0.01; /* of all points */
     double plain[RUBRIC_CHECKS], best, points, total = rubric_points(r);

@@ -37,7 +37,7 @@ struct work {
     const struct rubric_check *check;
     const struct answers *answers;
     int set;
-    struct handed_in *h;
+    struct submitted_images *h;
     double alpha;
 };
 
@@ -46,7 +46,7 @@ static const struct rubric_picture *picture(const struct work *w, int k)
     return &w->r->picture[w->check->picture[k]];
 }
 
-static const struct student *student(const struct work *w, int k)
+static const struct submitted_image *student(const struct work *w, int k)
 {
     return &w->h->picture[w->check->picture[k]];
 }
@@ -65,7 +65,7 @@ static const struct moments *expected_noise(const struct work *w, int k)
     return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
 }
 
-static bool is_masked(const struct work *w, const struct student *s, size_t p)
+static bool is_masked(const struct work *w, const struct submitted_image *s, size_t p)
 {
     return rubric_masks(w->r, s->width, s->height, p);
 }
@@ -78,7 +78,8 @@ static unsigned char *usable(const struct work *w, struct err *e)
     for (size_t p = 0; ok && p < pixels; p++)
         use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; ok && k < w->check->num_pictures; k++)
-        ok = student_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp, use, e);
+        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp,
+                                        use, e);
     if (ok)
         return use;
     free(use);
@@ -87,12 +88,13 @@ static unsigned char *usable(const struct work *w, struct err *e)
 
 /* The noise of the reference itself, in a picture that should have noise of its own: a copy. A share of values
  * that lie in their code's bin around the reference, where only chance would put so many of them. */
-static bool is_copy(const struct student *s, const struct moments *m, double spp,
+static bool is_copy(const struct submitted_image *s, const struct moments *m, double spp,
                     const unsigned char *use)
 {
     double same = 0, expected = 0, num = 0;
     for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
-        double sd = student_expected_sd(m, i, spp), bin = s->tolerance[i] + 1e-6 * m->mean[i];
+        double sd = submitted_image_expected_sd(m, i, spp),
+               bin = s->tolerance[i] + 1e-6 * m->mean[i];
         if (!use[i / 3] || s->clipped[i] || !(sd > 0))
             continue;
         num++;
@@ -142,8 +144,9 @@ static void score_agreement(const struct rubric_check *c, struct result *out)
 }
 
 /* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
-static bool compare(const struct work *w, const struct student *a, const struct student *b,
-                    const unsigned char *use, struct result *out, struct err *e)
+static bool compare(const struct work *w, const struct submitted_image *a,
+                    const struct submitted_image *b, const unsigned char *use, struct result *out,
+                    struct err *e)
 {
     struct err why;
     if (agreement_measure(a, b, use, w->alpha, &out->agreement, &why))
@@ -160,17 +163,17 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
     const struct rubric_picture *p = picture(w, 0);
     const struct moments *plain = &w->answers->of[0][w->check->picture[0]].m;
     unsigned char *use = usable(w, e);
-    struct student b;
+    struct submitted_image b;
     snprintf(
         out->expected, sizeof out->expected,
         "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
-    if (use == NULL || !student_from(reference(w, 0), student(w, 0), &b, e)) {
+    if (use == NULL || !submitted_image_from(reference(w, 0), student(w, 0), &b, e)) {
         free(use);
         return false;
     }
     const bool ok = compare(w, student(w, 0), &b, use, out, e);
-    student_free(&b);
+    submitted_image_free(&b);
     if (!ok) {
         free(use);
         return false;
@@ -189,22 +192,22 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
 }
 
 /* A copy of q, moved by the difference of two references, with their noise. */
-static bool moved(const struct student *q, const struct moments *to, const struct moments *from,
-                  struct student *out, struct err *e)
+static bool moved(const struct submitted_image *q, const struct moments *to,
+                  const struct moments *from, struct submitted_image *out, struct err *e)
 {
-    struct student a, b;
-    if (!student_from(to, q, &a, e))
+    struct submitted_image a, b;
+    if (!submitted_image_from(to, q, &a, e))
         return false;
-    bool ok = student_from(from, q, &b, e);
-    if (ok && !(ok = student_copy(q, out, e)))
-        student_free(&b);
+    bool ok = submitted_image_from(from, q, &b, e);
+    if (ok && !(ok = submitted_image_copy(q, out, e)))
+        submitted_image_free(&b);
     for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
         out->mean[i] += a.mean[i] - b.mean[i];
         out->variance[i] += a.variance[i] + b.variance[i];
     }
     if (ok)
-        student_free(&b);
-    student_free(&a);
+        submitted_image_free(&b);
+    submitted_image_free(&a);
     return ok;
 }
 
@@ -223,30 +226,30 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
         return true;
     }
     unsigned char *use = usable(w, e);
-    struct student b = {0};
+    struct submitted_image b = {0};
     bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
     ok = ok && compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out, e);
-    student_free(&b);
+    submitted_image_free(&b);
     free(use);
     return ok;
 }
 
 static bool check_sum(const struct work *w, struct result *out, struct err *e)
 {
-    struct student sum;
+    struct submitted_image sum;
     unsigned char *use = usable(w, e);
-    bool ok = use != NULL && student_from(NULL, student(w, 0), &sum, e);
+    bool ok = use != NULL && submitted_image_from(NULL, student(w, 0), &sum, e);
     snprintf(out->expected, sizeof out->expected,
              "%s is the sum of the other %d pictures, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
              picture(w, 0)->name, w->check->num_pictures - 1, 100 * w->check->image.full,
              100 * w->check->tile.full);
     for (int k = 1; ok && k < w->check->num_pictures; k++)
-        student_add(&sum, student(w, k));
+        submitted_image_add(&sum, student(w, k));
     if (ok)
-        student_unclipped(&sum, use);
+        submitted_image_unclipped(&sum, use);
     if (ok) {
         ok = compare(w, student(w, 0), &sum, use, out, e);
-        student_free(&sum);
+        submitted_image_free(&sum);
     }
     free(use);
     return ok;
@@ -279,7 +282,7 @@ static void map_wrong(struct agreement *map, int columns, int x, int y)
 static bool check_exact(const struct work *w, struct result *out, struct err *e)
 {
     static const double allowed_sd = 6;
-    const struct student *s = student(w, 0);
+    const struct submitted_image *s = student(w, 0);
     const struct moments *m = reference(w, 0);
     double wrong = 0, num = 0;
     int first = -1, columns = s->width / RUBRIC_TILE;
@@ -291,8 +294,8 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
         bool off = false, lit = false;
         for (size_t i = 3 * p; i < 3 * p + 3; i++) {
-            double sd = hypot(student_expected_sd(m, i, picture(w, 0)->spp),
-                              student_expected_sd(m, i, m->n[p] * fmax(1, m->spp)));
+            double sd = hypot(submitted_image_expected_sd(m, i, picture(w, 0)->spp),
+                              submitted_image_expected_sd(m, i, m->n[p] * fmax(1, m->spp)));
             lit |= m->mean[i] > 0;
             off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
                    allowed_sd * sd + 2 * s->tolerance[i] + 1e-3;
@@ -319,7 +322,7 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
 
 static bool check_noise(const struct work *w, struct result *out, struct err *e)
 {
-    const struct student *p = student(w, 0), *q = student(w, 1);
+    const struct submitted_image *p = student(w, 0), *q = student(w, 1);
     snprintf(out->expected, sizeof out->expected,
              "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
              picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
@@ -329,12 +332,12 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         return true;
     }
     unsigned char *use = usable(w, e);
-    struct student rp, rq;
+    struct submitted_image rp, rq;
     struct interval i;
     struct err why;
-    bool ok = use != NULL && student_from(reference(w, 0), p, &rp, e);
-    if (ok && !student_from(reference(w, 1), q, &rq, e)) {
-        student_free(&rp);
+    bool ok = use != NULL && submitted_image_from(reference(w, 0), p, &rp, e);
+    if (ok && !submitted_image_from(reference(w, 1), q, &rq, e)) {
+        submitted_image_free(&rp);
         ok = false;
     }
     if (!ok) {
@@ -349,8 +352,8 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     } else {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
     }
-    student_free(&rp);
-    student_free(&rq);
+    submitted_image_free(&rp);
+    submitted_image_free(&rq);
     free(use);
     return true;
 }
@@ -396,12 +399,12 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
 static void expect_noise(const struct work *w)
 {
     for (int k = 0; k < w->check->num_pictures; k++)
-        student_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
-                       picture(w, k)->spp);
+        submitted_image_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
+                               picture(w, k)->spp);
 }
 
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   const struct answers *a, int set, struct submitted_images *h, double alpha,
                    struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,

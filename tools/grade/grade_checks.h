@@ -60,24 +60,25 @@ struct result {
 };
 
 /* One student's pictures, read. */
-struct handed_in {
+struct submitted_images {
     struct made made[RUBRIC_PICTURES];
-    struct student picture[RUBRIC_PICTURES]; /* mean NULL: not there, or not readable */
-    char why[RUBRIC_PICTURES][400];          /* why not */
+    struct submitted_image picture[RUBRIC_PICTURES]; /* mean NULL: not there, or not readable */
+    char why[RUBRIC_PICTURES][400];                  /* why not */
 };
 
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
  * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, int set, struct handed_in *h, double alpha,
+                   const struct answers *a, int set, struct submitted_images *h, double alpha,
                    struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
  * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
-bool grading_all(const struct rubric *r, const struct answers *a, struct handed_in *h, double alpha,
-                 struct result *out, int *set, struct err *e) __attribute__((warn_unused_result));
+bool grading_all(const struct rubric *r, const struct answers *a, struct submitted_images *h,
+                 double alpha, struct result *out, int *set, struct err *e)
+    __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

@@ -152,7 +152,7 @@ bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments
         squares += taken * taken;
         for (size_t c = 0; c < 3; c++) {
             size_t k = 3 * i + c;
-            double sd = student_expected_sd(m, k, counts ? taken : p->spp);
+            double sd = submitted_image_expected_sd(m, k, counts ? taken : p->spp);
             double below = sd > 0 ? gsl_cdf_ugaussian_P((clip - m->mean[k]) / sd) : 1;
             out->mean[cell_at(out, i) + c] += clipped_mean(m->mean[k], sd, clip) / area;
             out->var[cell_at(out, i) + c] +=
@@ -179,8 +179,9 @@ struct seen {
 };
 
 /* Pixels that are masked are taken to be right. */
-static void fill_cells(const struct rubric *r, const struct student *s, const struct moments *m,
-                       double clip, struct signature *out, struct seen *cells)
+static void fill_cells(const struct rubric *r, const struct submitted_image *s,
+                       const struct moments *m, double clip, struct signature *out,
+                       struct seen *cells)
 {
     for (size_t i = 0; i < (size_t)s->width * (size_t)s->height; i++)
         for (size_t c = 0; c < 3; c++) {
@@ -215,7 +216,7 @@ static double noise_of(const struct signature *s, const struct signature *correc
     return fmax(1, gsl_stats_median_from_sorted_data(ratio, 1, num));
 }
 
-static bool sight_of_student(const struct rubric *r, int picture, const struct student *s,
+static bool sight_of_student(const struct rubric *r, int picture, const struct submitted_image *s,
                              const struct moments *m, const struct signature *correct,
                              struct signature *out, struct err *e)
 {
@@ -249,7 +250,7 @@ static bool count_samples(const struct rubric *r, int picture, const struct answ
 }
 
 static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answers *a,
-                 const struct handed_in *h, int set, struct observation *clue, int *num,
+                 const struct submitted_images *h, int set, struct observation *clue, int *num,
                  struct err *e)
 {
     *num = 0;
@@ -269,8 +270,8 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
 }
 
 bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answers *a, const struct handed_in *h, int set, double alpha,
-                          struct diagnosis *found, int *with, struct err *e)
+                          const struct answers *a, const struct submitted_images *h, int set,
+                          double alpha, struct diagnosis *found, int *with, struct err *e)
 {
     const struct diagnose_options opt = {.alpha = alpha, .by_likelihood = true};
     struct observation *clue = calloc((size_t)r->num_pictures, sizeof *clue);

@@ -46,8 +46,8 @@ void rubric_bugs_close(struct rubric_bugs *b);
  * is told a bug with a probability of at most alpha for each set, as far as its pictures are independent (not if all
  * have one seed). */
 bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answers *a, const struct handed_in *h, int set, double alpha,
-                          struct diagnosis *found, int *with, struct err *e)
+                          const struct answers *a, const struct submitted_images *h, int set,
+                          double alpha, struct diagnosis *found, int *with, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -24,7 +24,7 @@ static bool check_header(const char *path, int width, int height, struct image_i
     return info->channels <= 64 || err_set(e, "the picture has %d channels", info->channels);
 }
 
-static bool allocate(struct student *s, struct err *e)
+static bool allocate(struct submitted_image *s, struct err *e)
 {
     size_t n = 3 * (size_t)s->width * (size_t)s->height;
     s->mean = calloc(n, sizeof *s->mean);
@@ -38,7 +38,8 @@ static bool allocate(struct student *s, struct err *e)
            err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
 }
 
-static void set_code(struct student *s, size_t i, const struct curve *curve, int k, int steps)
+static void set_code(struct submitted_image *s, size_t i, const struct curve *curve, int k,
+                     int steps)
 {
     double lo, hi;
     curve_bin(curve, k, steps, &lo, &hi);
@@ -59,7 +60,7 @@ static double float_step(const struct picture *pic, float v, const float *px)
     return strcmp(pic->info.format, "hdr") == 0 && brightest > 0 ? 2 * ldexp(1, exponent - 8) : 0;
 }
 
-static bool fill(struct student *s, const struct picture *pic, const struct curve *curve,
+static bool fill(struct submitted_image *s, const struct picture *pic, const struct curve *curve,
                  struct err *e)
 {
     size_t n = 3 * (size_t)s->width * (size_t)s->height;
@@ -86,24 +87,24 @@ static bool fill(struct student *s, const struct picture *pic, const struct curv
     return true;
 }
 
-bool student_read(const char *path, const char *curve, int width, int height, struct student *out,
-                  struct err *e)
+bool submitted_image_read(const char *path, const char *curve, int width, int height,
+                          struct submitted_image *out, struct err *e)
 {
     struct picture pic;
     struct image_info info;
     struct curve c;
-    *out = (struct student){.width = width, .height = height};
+    *out = (struct submitted_image){.width = width, .height = height};
     if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
         !picture_read_inspected(path, &info, &pic, e))
         return false;
     bool ok = allocate(out, e) && fill(out, &pic, &c, e) && sha256_file(path, out->sha256, e);
     picture_free(&pic);
     if (!ok)
-        student_free(out);
+        submitted_image_free(out);
     return ok;
 }
 
-void student_free(struct student *s)
+void submitted_image_free(struct submitted_image *s)
 {
     free(s->mean);
     free(s->tolerance);
@@ -111,10 +112,10 @@ void student_free(struct student *s)
     free(s->variance);
     free(s->k3);
     free(s->clipped);
-    *s = (struct student){0};
+    *s = (struct submitted_image){0};
 }
 
-void student_expect(struct student *s, const struct moments *m, double spp)
+void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp)
 {
     for (int y = 0; y < s->height; y++)
         for (int x = 0; x < s->width; x++)
@@ -139,12 +140,13 @@ void student_expect(struct student *s, const struct moments *m, double spp)
             }
 }
 
-bool student_from(const struct moments *m, const struct student *like, struct student *out,
-                  struct err *e)
+bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
+                          struct submitted_image *out, struct err *e)
 {
-    *out = (struct student){.width = like->width, .height = like->height, .clip = like->clip};
+    *out =
+        (struct submitted_image){.width = like->width, .height = like->height, .clip = like->clip};
     if (!allocate(out, e)) {
-        student_free(out);
+        submitted_image_free(out);
         return false;
     }
     for (size_t i = 0; m != NULL && i < 3 * (size_t)m->width * (size_t)m->height; i++) {
@@ -158,17 +160,18 @@ bool student_from(const struct moments *m, const struct student *like, struct st
     return true;
 }
 
-bool student_copy(const struct student *s, struct student *out, struct err *e)
+bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
+                          struct err *e)
 {
-    if (!student_from(NULL, s, out, e))
+    if (!submitted_image_from(NULL, s, out, e))
         return false;
     memcpy(out->sha256, s->sha256, sizeof out->sha256);
-    student_add(out, s);
+    submitted_image_add(out, s);
     memcpy(out->k3, s->k3, 3 * (size_t)s->width * (size_t)s->height * sizeof *s->k3);
     return true;
 }
 
-void student_add(struct student *dst, const struct student *src)
+void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src)
 {
     for (size_t i = 0; i < 3 * (size_t)dst->width * (size_t)dst->height; i++) {
         dst->mean[i] += src->mean[i];
@@ -180,15 +183,15 @@ void student_add(struct student *dst, const struct student *src)
     }
 }
 
-double student_expected_sd(const struct moments *reference, size_t i, double spp)
+double submitted_image_expected_sd(const struct moments *reference, size_t i, double spp)
 {
     double n = reference->n[i / 3], paths = fmax(1, reference->spp);
     return n > 1 ? sqrt(reference->m2[i] / (n - 1) * paths / spp) : 0;
 }
 
 /* Clears use[p] where mark[] is `kind` or more in p or beside it, but not where p itself is `spared`. */
-static void clear_around(const struct student *s, const unsigned char *mark, unsigned char kind,
-                         unsigned char spared, unsigned char *use)
+static void clear_around(const struct submitted_image *s, const unsigned char *mark,
+                         unsigned char kind, unsigned char spared, unsigned char *use)
 {
     for (int y = 0; y < s->height; y++)
         for (int x = 0; x < s->width; x++) {
@@ -205,8 +208,8 @@ static void clear_around(const struct student *s, const unsigned char *mark, uns
 }
 
 /* A few pixels at the rim of a lamp, or of a caustic, can hold most of a picture's noise and all of its skewness. */
-static void drop_loudest(const struct student *s, const struct moments *m, double spp, double *v,
-                         unsigned char *use)
+static void drop_loudest(const struct submitted_image *s, const struct moments *m, double spp,
+                         double *v, unsigned char *use)
 {
     static const double loudest = 20; /* times the mean variance */
     size_t pixels = (size_t)s->width * (size_t)s->height;
@@ -214,7 +217,7 @@ static void drop_loudest(const struct student *s, const struct moments *m, doubl
     for (size_t p = 0; p < pixels; p++) {
         double sum = 0;
         for (size_t i = 3 * p; i < 3 * p + 3; i++)
-            sum += m->mean[i] < s->clip ? pow(student_expected_sd(m, i, spp), 2) : 0;
+            sum += m->mean[i] < s->clip ? pow(submitted_image_expected_sd(m, i, spp), 2) : 0;
         v[p] = sum;
         if (use[p] && sum > 0) {
             total += sum;
@@ -228,8 +231,8 @@ static void drop_loudest(const struct student *s, const struct moments *m, doubl
 
 enum mark { MARK_NONE, MARK_CLIPPED, MARK_UNKNOWN };
 
-bool student_comparable(const struct student *s, const struct moments *m, double spp,
-                        unsigned char *use, struct err *e)
+bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
+                                double spp, unsigned char *use, struct err *e)
 {
     size_t pixels = (size_t)s->width * (size_t)s->height;
     unsigned char *mark = calloc(pixels, 1);
@@ -241,7 +244,7 @@ bool student_comparable(const struct student *s, const struct moments *m, double
     }
     for (size_t i = 0; i < 3 * pixels; i++) {
         double far = m->mean[i] - s->clip;
-        if (fabs(far) < clip_sd * student_expected_sd(m, i, spp) + s->tolerance[i])
+        if (fabs(far) < clip_sd * submitted_image_expected_sd(m, i, spp) + s->tolerance[i])
             mark[i / 3] = MARK_UNKNOWN;
         else if (far > 0 && mark[i / 3] == MARK_NONE)
             mark[i / 3] = MARK_CLIPPED;
@@ -253,7 +256,7 @@ bool student_comparable(const struct student *s, const struct moments *m, double
     return true;
 }
 
-void student_unclipped(const struct student *s, unsigned char *use)
+void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use)
 {
     for (int y = 0; y < s->height; y++)
         for (int x = 0; x < s->width; x++)

@@ -10,48 +10,51 @@
 
 #include "renderer/image/moments.h"
 
-struct student {
+struct submitted_image {
     int width, height;
     double *mean, *tolerance,
-        *rounding;          /* 3 per pixel: value, how far a whole area may be off, variance */
-    double *variance;       /* 3 per pixel: expected of the mean, 0 until student_expect() */
-    double *k3;             /* 3 per pixel: third cumulant of the mean, likewise */
+        *rounding;    /* 3 per pixel: value, how far a whole area may be off, variance */
+    double *variance; /* 3 per pixel: expected of the mean, 0 until submitted_image_expect() */
+    double *k3;       /* 3 per pixel: third cumulant of the mean, likewise */
     unsigned char *clipped; /* 3 per pixel: at the brightest code */
     double clip;            /* the radiance of that code; INFINITY of floats */
     char sha256[65];        /* of the file */
 };
 
 /* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no picture of that size.
- * The header is looked at before anything is decoded. The caller frees with student_free(). */
-bool student_read(const char *path, const char *curve, int width, int height, struct student *out,
-                  struct err *e) __attribute__((warn_unused_result));
-void student_free(struct student *s);
+ * The header is looked at before anything is decoded. The caller frees with submitted_image_free(). */
+bool submitted_image_read(const char *path, const char *curve, int width, int height,
+                          struct submitted_image *out, struct err *e)
+    __attribute__((warn_unused_result));
+void submitted_image_free(struct submitted_image *s);
 
 /* Sets variance and k3 to those that a render of spp samples by our renderer has, whose moments are m: means over
  * 3 x 3 pixels, as what is rare may have been missed in one. A pixel beyond the clipping point does not vary. */
-void student_expect(struct student *s, const struct moments *m, double spp);
+void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
 /* A picture of the same kind as `like`: what m says, with the variance of its mean; m NULL: black. */
-bool student_from(const struct moments *m, const struct student *like, struct student *out,
-                  struct err *e) __attribute__((warn_unused_result));
-
-/* The caller frees it with student_free(). */
-bool student_copy(const struct student *s, struct student *out, struct err *e)
+bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
+                          struct submitted_image *out, struct err *e)
     __attribute__((warn_unused_result));
 
+/* The caller frees it with submitted_image_free(). */
+bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
+                          struct err *e) __attribute__((warn_unused_result));
+
 /* dst += src, clipped where either is. */
-void student_add(struct student *dst, const struct student *src);
+void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 
 /* What can be compared with a render of spp samples a pixel, told by the moments of one of ours: use[p] becomes 0
  * within 5 standard errors of the clipping point, and beside such pixels and beside clipped ones, whose variance says
  * nothing of their neighbours', and where the variance is more than 20 times the mean of the picture. use: one per pixel, set by the caller to not 0. */
-bool student_comparable(const struct student *s, const struct moments *m, double spp,
-                        unsigned char *use, struct err *e) __attribute__((warn_unused_result));
+bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
+                                double spp, unsigned char *use, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* The same without knowing better: not 0 but where s is clipped, and beside it. */
-void student_unclipped(const struct student *s, unsigned char *use);
+void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use);
 
 /* Standard deviation that channel i (3 per pixel) of a render of spp samples has, by the reference's samples. */
-double student_expected_sd(const struct moments *reference, size_t i, double spp);
+double submitted_image_expected_sd(const struct moments *reference, size_t i, double spp);
 
 #endif

@@ -38,7 +38,7 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
 
 /* Pictures are made one after the other, so that a student's time does not depend on how many others there are. */
 static bool make_pictures(const struct grade_job *job, const struct submission *s, const char *work,
-                          const char *out, struct handed_in *h, struct err *e)
+                          const char *out, struct submitted_images *h, struct err *e)
 {
     const struct rubric *r = job->rubric;
     for (int i = 0; i < r->num_pictures; i++) {
@@ -49,7 +49,8 @@ static bool make_pictures(const struct grade_job *job, const struct submission *
             return false;
         if (h->made[i].path[0] == '\0')
             err_set(&why, "%s", h->made[i].why);
-        else if (student_read(h->made[i].path, r->curve, p->width, p->height, &h->picture[i], &why))
+        else if (submitted_image_read(h->made[i].path, r->curve, p->width, p->height,
+                                      &h->picture[i], &why))
             why.msg[0] = '\0';
         else if (err_is_of_memory(&why)) /* which is our trouble */
             return err_set(e, "%s: %s", p->name, why.msg);
@@ -110,7 +111,7 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
 }
 
 static json_t *picture_json(const struct rubric_picture *p, const struct made *made,
-                            const struct student *s, const char *why)
+                            const struct submitted_image *s, const char *why)
 {
     const char *slash = strrchr(made->path, '/');
     return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, ss?}", "name", p->name, "file",
@@ -122,8 +123,8 @@ static json_t *picture_json(const struct rubric_picture *p, const struct made *m
                      s->mean != NULL ? s->sha256 : NULL);
 }
 
-static bool add_checks(const struct grade_job *job, struct handed_in *h, json_t *grade, int *set,
-                       struct err *e)
+static bool add_checks(const struct grade_job *job, struct submitted_images *h, json_t *grade,
+                       int *set, struct err *e)
 {
     const struct rubric *r = job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
@@ -175,7 +176,7 @@ static bool is_flagged(const json_t *grade)
 
 /* By the pictures that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
 static json_t *name_bug(const struct grade_job *job, const struct submission *s,
-                        const struct handed_in *h, int set, const char *work)
+                        const struct submitted_images *h, int set, const char *work)
 {
     json_t *by_pictures =
         job->bugs != NULL
@@ -196,7 +197,7 @@ static json_t *name_bug(const struct grade_job *job, const struct submission *s,
 static bool grade_made(const struct grade_job *job, const struct submission *s, const char *work,
                        const char *out, json_t *grade, struct err *e)
 {
-    struct handed_in *h = calloc(1, sizeof *h);
+    struct submitted_images *h = calloc(1, sizeof *h);
     int set = 0;
     bool ok = h != NULL || err_set(e, "out of memory");
     ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
@@ -205,7 +206,7 @@ static bool grade_made(const struct grade_job *job, const struct submission *s, 
     json_object_set_new(grade, "diagnosis",
                         lost && !is_flagged(grade) ? name_bug(job, s, h, set, work) : json_null());
     for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
-        student_free(&h->picture[i]);
+        submitted_image_free(&h->picture[i]);
     free(h);
     return ok;
 }

@@ -18,12 +18,12 @@ void alike_noise_free(struct alike_noise *n)
 }
 
 /* Is there noise in all four pixels that rounding and clipping leave as it is? */
-static bool is_usable(const struct student *s, const struct moments *m, const size_t pixel[4],
-                      double spp)
+static bool is_usable(const struct submitted_image *s, const struct moments *m,
+                      const size_t pixel[4], double spp)
 {
     for (int k = 0; k < 4; k++) {
         size_t i = 3 * pixel[k] + GREEN;
-        double sd = student_expected_sd(m, i, spp);
+        double sd = submitted_image_expected_sd(m, i, spp);
         if (!(sd > 0) || sd < 2 * s->tolerance[i] || s->clipped[i] ||
             m->mean[i] + clip_sd * sd > s->clip)
             return false;
@@ -31,7 +31,7 @@ static bool is_usable(const struct student *s, const struct moments *m, const si
     return true;
 }
 
-bool alike_noise_of(const struct student *s, const struct moments *m, double spp,
+bool alike_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
                     struct alike_noise *out, struct err *e)
 {
     int columns = s->width / 2, rows = s->height / 2;
@@ -53,7 +53,7 @@ bool alike_noise_of(const struct student *s, const struct moments *m, double spp
             size_t i = 3 * pixel[k] + GREEN;
             double n = m->n[pixel[k]];
             d[k] = s->mean[i] - m->mean[i];
-            ours += pow(student_expected_sd(m, i, spp), 2) / 4;
+            ours += pow(submitted_image_expected_sd(m, i, spp), 2) / 4;
             reference += n > 1 ? m->m2[i] / (n * (n - 1)) / 4 : 0;
         }
         float *detail = out->detail + DETAILS * b;
@@ -135,17 +135,17 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
     const struct rubric_picture *p = &r->picture[i];
     const struct moments *own = &a->of[set_of(r, grade)][i].m, *plain = &a->of[0][i].m;
-    struct student s;
+    struct submitted_image s;
     struct err why;
     char path[4600];
     snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, text_of(grade, "id"),
              text_of(made, "file"));
     if (!is_right(grade, p->name) || text_of(made, "file")[0] == '\0')
         return true;
-    if (!student_read(path, r->curve, p->width, p->height, &s, &why))
+    if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     bool ok = alike_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
-    student_free(&s);
+    submitted_image_free(&s);
     return ok;
 }
 

@@ -26,7 +26,7 @@ struct alike_noise {
 /* Of a picture of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
  * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the picture has less
  * than a quarter of the noise of ours, no block is. False: out of memory. The caller frees. */
-bool alike_noise_of(const struct student *s, const struct moments *m, double spp,
+bool alike_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
                     struct alike_noise *out, struct err *e) __attribute__((warn_unused_result));
 void alike_noise_free(struct alike_noise *n);
 

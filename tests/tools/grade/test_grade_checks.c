@@ -114,11 +114,11 @@ static int tear_down(void **state)
     return system(command);
 }
 
-static struct student read_back(const char *path)
+static struct submitted_image read_back(const char *path)
 {
-    struct student s;
+    struct submitted_image s;
     struct err e;
-    if (!student_read(path, "cgl", WIDTH, HEIGHT, &s, &e))
+    if (!submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e))
         fail_msg("%s", e.msg);
     return s;
 }
@@ -151,7 +151,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
                            const double *spp, const int *asked, double alpha)
 {
     struct rubric *r = a_rubric(kind, num);
-    struct handed_in *h = calloc(1, sizeof *h);
+    struct submitted_images *h = calloc(1, sizeof *h);
     struct answers *a = calloc(1, sizeof *a);
     struct result out;
     struct err e;
@@ -168,7 +168,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
     if (!grading_check(r, &r->check[0], a, 0, h, alpha, &out, &e))
         fail_msg("%s", e.msg);
     for (int i = 0; i < num; i++)
-        student_free(&h->picture[i]);
+        submitted_image_free(&h->picture[i]);
     free(r);
     free(h);
     free(a);
@@ -343,7 +343,7 @@ static void a_copy_of_the_reference_is_seen(void **state)
     char path[128];
     struct err e;
     struct rubric *r = a_rubric(CHECK_EQUAL, 1);
-    struct handed_in *h = calloc(1, sizeof *h);
+    struct submitted_images *h = calloc(1, sizeof *h);
     struct answers *a = calloc(1, sizeof *a);
     struct result out;
     for (size_t i = 0; i < 3 * PIXELS; i++)
@@ -356,7 +356,7 @@ static void a_copy_of_the_reference_is_seen(void **state)
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
     result_free(&out);
-    student_free(&h->picture[0]);
+    submitted_image_free(&h->picture[0]);
     free(r);
     free(h);
     free(a);
@@ -390,7 +390,7 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
         m->m3[i] = 1.2 * 1.2 * 1.2 * reference.m3[i];
     }
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-        struct handed_in *h = calloc(1, sizeof *h);
+        struct submitted_images *h = calloc(1, sizeof *h);
         struct result out;
         char path[128];
         int set = -1;
@@ -403,7 +403,7 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");
         result_free(&out);
-        student_free(&h->picture[0]);
+        submitted_image_free(&h->picture[0]);
         free(h);
     }
     moments_free(m);
@@ -426,7 +426,7 @@ static void a_watermark_is_masked(void **state)
     for (int kind = 0; kind < 2; kind++)
         for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
             struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
-            struct handed_in *h = calloc(1, sizeof *h);
+            struct submitted_images *h = calloc(1, sizeof *h);
             struct answers *a = calloc(1, sizeof *a);
             struct result out;
             struct err e;
@@ -440,7 +440,7 @@ static void a_watermark_is_masked(void **state)
             if ((out.share == 1) != cases[k].all)
                 fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
             result_free(&out);
-            student_free(&h->picture[0]);
+            submitted_image_free(&h->picture[0]);
             free(r);
             free(h);
             free(a);
@@ -565,7 +565,7 @@ static void bad_pictures_get_a_line(void **state)
                  {"svg", "<svg></svg>", 11}};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         char path[128];
-        struct student s;
+        struct submitted_image s;
         struct err e = {""};
         snprintf(path, sizeof path, "%s/%s", dir, files[i].name);
         FILE *f = fopen(path, "wb");
@@ -574,16 +574,16 @@ static void bad_pictures_get_a_line(void **state)
         for (int k = 0; k < 3 * PIXELS && strcmp(files[i].name, "nan") == 0; k++)
             fwrite(&(float){(float)NAN}, sizeof(float), 1, f);
         fclose(f);
-        assert_false(student_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
+        assert_false(submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
         assert_true(e.msg[0] != '\0' && strchr(e.msg, '\n') == NULL);
         if (strcmp(files[i].name, "bomb") == 0)
             assert_non_null(strstr(e.msg, "65536 x 65536"));
     }
-    struct student s;
+    struct submitted_image s;
     struct err e;
     char path[128];
     write_picture("right", &none, SPP, path);
-    assert_false(student_read(path, "cgl", WIDTH, WIDTH, &s, &e));
+    assert_false(submitted_image_read(path, "cgl", WIDTH, WIDTH, &s, &e));
     assert_string_equal(e.msg, "the picture is 64 x 48 pixels, not 64 x 64");
 }
 

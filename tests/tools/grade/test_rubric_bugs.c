@@ -104,7 +104,7 @@ static int tear_down(void **state)
 }
 
 /* bug -1: none. Noise: variance over ours. */
-static void hand_in(int set, int bug, double noise, struct handed_in *h)
+static void hand_in(int set, int bug, double noise, struct submitted_images *h)
 {
     static uint8_t rgb8[3 * 128 * 96];
     for (int i = 0; i < rubric->num_pictures; i++) {
@@ -123,7 +123,7 @@ static void hand_in(int set, int bug, double noise, struct handed_in *h)
         }
         snprintf(path, sizeof path, "%s/%s.png", dir, p->name);
         if (!image_write_png(path, p->width, p->height, rgb8, &e) ||
-            !student_read(path, rubric->curve, p->width, p->height, &h->picture[i], &e))
+            !submitted_image_read(path, rubric->curve, p->width, p->height, &h->picture[i], &e))
             fail_msg("%s", e.msg);
     }
 }
@@ -131,7 +131,7 @@ static void hand_in(int set, int bug, double noise, struct handed_in *h)
 /* The name of the likeliest, "" if there is none. */
 static const char *name(int set, int bug, double noise, int graded, int *with, int *named)
 {
-    struct handed_in *h = calloc(1, sizeof *h);
+    struct submitted_images *h = calloc(1, sizeof *h);
     struct diagnosis found;
     struct err e;
     assert_non_null(h);
@@ -139,7 +139,7 @@ static const char *name(int set, int bug, double noise, int graded, int *with, i
     if (!rubric_bugs_diagnose(&bugs, rubric, answers, h, graded, 1e-5, &found, with, &e))
         fail_msg("%s", e.msg);
     for (int i = 0; i < rubric->num_pictures; i++)
-        student_free(&h->picture[i]);
+        submitted_image_free(&h->picture[i]);
     free(h);
     *named = found.num_named;
     return found.num_named > 0 ? bugs.catalogue.bug[found.candidate[0].bug].name : "";

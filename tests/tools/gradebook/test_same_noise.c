@@ -66,7 +66,7 @@ static struct alike_noise noise_of(const double *own, const double *other, doubl
 {
     static double mean[3 * PIXELS], tolerance[3 * PIXELS];
     static unsigned char clipped[3 * PIXELS];
-    struct student s = {
+    struct submitted_image s = {
         .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
     struct alike_noise out;
     struct curve curve;
