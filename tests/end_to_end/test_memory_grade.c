@@ -27,7 +27,7 @@ static char dir[] = "/tmp/test_memory_grade_XXXXXX";
 static char path_text[4][128];
 static struct moments reference;
 static struct rubric *rubric;
-static struct answers *answers;
+static struct answer_key *answers;
 
 static const char *file(int slot, const char *name)
 {

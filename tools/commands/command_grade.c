@@ -62,7 +62,7 @@ static bool needs_staff(const json_t *grades)
 }
 
 static int run_batch(const struct grade_settings *s, const struct rubric *r,
-                     const struct suite *suite, const struct answers *answers,
+                     const struct suite *suite, const struct answer_key *answers,
                      const char *const *word, const struct sandbox *box, struct err *e)
 {
     char stage[sizeof box->dir.path + 16], views[sizeof stage];
@@ -112,7 +112,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
                  int argc, char **argv, struct err *e)
 {
     char cache[4400], pathtracer[PATH_MAX];
-    struct answers *answers = calloc(1, sizeof *answers);
+    struct answer_key *answers = calloc(1, sizeof *answers);
     struct sandbox box;
     int code = EXIT_NOT_JUDGED;
     if (answers == NULL) {
@@ -129,7 +129,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
                                        .threads = cli_processors(),
                                        .timeout_s = 3600};
     if (s->prepare) {
-        code = make_dirs(cache, e) && answers_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
+        code = make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
         if (code == 0 && !s->quiet)
             printf("references of %s: %s\n", r->path, cache);
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
@@ -137,14 +137,14 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
         int num;
         char **word = grade_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");
-        if (ok && make_dirs(cache, e) && answers_make(r, &opt, answers, e))
+        if (ok && make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
         free(word);
         sandbox_close(&box);
     } else if (!s->unsafe) {
         err_prefix(e, "programs are not run (--unsafe-no-sandbox)");
     }
-    answers_free(answers);
+    answer_key_free(answers);
     free(answers);
     return code;
 }

@@ -150,7 +150,7 @@ static void slope(const struct base *base, int x, int y, bool down, double out[3
 }
 
 /* d from the rows (columns) beside that of the pixel, `same` from its own: no pixel is in both. */
-static void shift(const struct base *base, bool down, int x, int y, struct difference *out)
+static void shift(const struct base *base, bool down, int x, int y, struct error_change *out)
 {
     double left[3], right[3];
     if (x < 1 || y < 1 || x >= base->width - 1 || y >= base->height - 1)
@@ -164,7 +164,7 @@ static void shift(const struct base *base, bool down, int x, int y, struct diffe
 
 /* B of channel from[c] around the pixel (or, moved, of another pixel) less B around it. */
 static void exchange(const struct base *base, size_t own, size_t other, const int from[3],
-                     struct difference *out)
+                     struct error_change *out)
 {
     const struct base *s = base;
     bool moved = own != other;
@@ -183,9 +183,9 @@ static void exchange(const struct base *base, size_t own, size_t other, const in
     out->coupled = (moved ? to_other * to_own : 0) + near * near / 8;
 }
 
-struct difference direction_at(const struct base *base, enum direction_kind kind, int x, int y)
+struct error_change direction_at(const struct base *base, enum direction_kind kind, int x, int y)
 {
-    struct difference out = {0};
+    struct error_change out = {0};
     static const int same[3] = {0, 1, 2};
     int w = base->width, h = base->height;
     size_t own = at(base, x, y), other;

@@ -53,7 +53,7 @@ void base_free(struct base *base);
 bool direction_applies(const struct base *base, enum direction_kind kind);
 
 /* One direction in one pixel. */
-struct difference {
+struct error_change {
     double d[3]; /* free of what is seen in the pixel */
     double
         same[3]; /* the same quantity with noise of its own, for the amount; d where has_amount is
@@ -63,7 +63,7 @@ struct difference {
      * their product's mean does not vanish where d is B alone. */
     double coupled;
 };
-struct difference direction_at(const struct base *base, enum direction_kind kind, int x, int y);
+struct error_change direction_at(const struct base *base, enum direction_kind kind, int x, int y);
 
 /* Whether a multiple of the direction means something: a shift by 0.3 pixels, but no flip by 0.3. */
 bool direction_has_amount(enum direction_kind kind);

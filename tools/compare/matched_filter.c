@@ -41,7 +41,7 @@ static struct sums sum_up(const struct judge *j, const struct base *base, enum d
     struct sums s = {0};
     for (int y = 0; y < base->height; y++)
         for (int x = 0; x < base->width; x++) {
-            struct difference dif = direction_at(base, kind, x, y);
+            struct error_change dif = direction_at(base, kind, x, y);
             size_t p = (size_t)y * (size_t)base->width + (size_t)x, i = 3 * p;
             double w[3];
             for (size_t c = 0; c < 3; c++) {

@@ -130,8 +130,9 @@ static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
     return render_ours(r, &ours, "", opt, out, e);
 }
 
-bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
-                   const struct answer_options *opt, struct moments *out, struct err *e)
+bool answer_key_render(const struct rubric *r, int picture, bool as_asked, const char *words,
+                       int spp, const struct answer_options *opt, struct moments *out,
+                       struct err *e)
 {
     struct rubric_picture ours = r->picture[picture];
     char all[sizeof ours.reference_options + sizeof r->set->words + 64];
@@ -152,7 +153,8 @@ static bool as_asked(const struct rubric *r, int picture, const char *words,
     bool needed = false;
     for (int i = 0; i < r->num_checks; i++)
         needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
-    return !needed || answer_render(r, picture, true, words, r->picture[picture].spp, opt, out, e);
+    return !needed ||
+           answer_key_render(r, picture, true, words, r->picture[picture].spp, opt, out, e);
 }
 
 /* Does our renderer make another picture with these words? Told by one sample a pixel, of the same seed. */
@@ -198,11 +200,11 @@ static bool deviating(const struct rubric *r, const struct rubric_set *set, int 
                         as_asked(r, i, set->words, opt, &out->as_asked, e)));
 }
 
-bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
-                  struct err *e)
+bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
+                     struct answer_key *out, struct err *e)
 {
     char path[MAX_PATH];
-    *out = (struct answers){0};
+    *out = (struct answer_key){0};
     snprintf(path, sizeof path, "%s/scene", opt->cache);
     bool ok = submission_stage(r, path, e);
     for (int i = 0; ok && i < r->num_pictures; i++) {
@@ -214,11 +216,11 @@ bool answers_make(const struct rubric *r, const struct answer_options *opt, stru
             ok = deviating(r, &r->set[k], i, opt, &out->of[k][i], e);
     }
     if (!ok)
-        answers_free(out);
+        answer_key_free(out);
     return ok;
 }
 
-void answers_free(struct answers *a)
+void answer_key_free(struct answer_key *a)
 {
     for (int k = 0; k < RUBRIC_SETS; k++)
         for (int i = 0; i < RUBRIC_PICTURES; i++) {

@@ -177,7 +177,7 @@ static struct rect around(const struct submitted_image *s, struct rect r)
 
 static void measure_tile(const struct pair *p, struct rect r, const struct noise *whole,
                          double floor, double alpha, double *furthest, double *relative,
-                         struct agreement *out)
+                         struct difference *out)
 {
     struct noise noise = noise_in(p, around(p->a, r));
     if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
@@ -201,14 +201,15 @@ static void measure_tile(const struct pair *p, struct rect r, const struct noise
     out->tile_y = r.y;
 }
 
-bool agreement_measure(const struct submitted_image *a, const struct submitted_image *b,
-                       const unsigned char *use, double alpha, struct agreement *out, struct err *e)
+bool difference_measure(const struct submitted_image *a, const struct submitted_image *b,
+                        const unsigned char *use, double alpha, struct difference *out,
+                        struct err *e)
 {
     const struct pair p = {a, b, use};
     const struct rect whole = {0, 0, a->width, a->height};
     int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
     double pixels = (double)a->width * a->height, furthest = -1;
-    *out = (struct agreement){0};
+    *out = (struct difference){0};
     struct noise noise = noise_in(&p, whole);
     struct sums luminance = sum_pixels(&p, whole, CHANNEL_LUMINANCE, noise.kappa);
     out->compared = luminance.used / pixels;
@@ -236,15 +237,15 @@ bool agreement_measure(const struct submitted_image *a, const struct submitted_i
     return true;
 }
 
-void agreement_free(struct agreement *a)
+void difference_free(struct difference *a)
 {
     free(a->relative);
-    *a = (struct agreement){0};
+    *a = (struct difference){0};
 }
 
-bool agreement_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
-                     const struct submitted_image *q, const struct submitted_image *reference_q,
-                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
+bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
+                      const struct submitted_image *q, const struct submitted_image *reference_q,
+                      const unsigned char *use, double alpha, struct interval *out, struct err *e)
 {
     const struct rect whole = {0, 0, p->width, p->height};
     const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};

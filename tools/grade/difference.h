@@ -14,7 +14,7 @@ struct interval {
 double interval_distance(const struct interval *i);
 double interval_half(const struct interval *i);
 
-struct agreement {
+struct difference {
     struct interval
         image[NUM_CHANNELS]; /* relative difference of the means of R, G, B, luminance */
     struct interval tile;    /* of the tile furthest from agreeing, luminance */
@@ -40,17 +40,17 @@ struct agreement {
  * Differences are relative to B's mean in the same place, but to no less than a quarter of the picture's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
  * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
- * frees with agreement_free(). */
-bool agreement_measure(const struct submitted_image *a, const struct submitted_image *b,
-                       const unsigned char *use, double alpha, struct agreement *out, struct err *e)
-    __attribute__((warn_unused_result));
-void agreement_free(struct agreement *a);
+ * frees with difference_free(). */
+bool difference_measure(const struct submitted_image *a, const struct submitted_image *b,
+                        const unsigned char *use, double alpha, struct difference *out,
+                        struct err *e) __attribute__((warn_unused_result));
+void difference_free(struct difference *a);
 
 /* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
  * that of ours does. Fails where there is no noise in one of them. */
-bool agreement_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
-                     const struct submitted_image *q, const struct submitted_image *reference_q,
-                     const unsigned char *use, double alpha, struct interval *out, struct err *e)
+bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
+                      const struct submitted_image *q, const struct submitted_image *reference_q,
+                      const unsigned char *use, double alpha, struct interval *out, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -11,7 +11,7 @@ static void free_results(struct result *out, int num)
 }
 
 /* On failure there is nothing to free. */
-static bool grade_with(const struct rubric *r, const struct answers *a, int set,
+static bool grade_with(const struct rubric *r, const struct answer_key *a, int set,
                        struct submitted_images *h, double alpha, struct result *out, double *points,
                        struct err *e)
 {
@@ -41,7 +41,7 @@ static bool explains(const struct rubric *r, const double *plain, const struct r
     return false;
 }
 
-bool grading_all(const struct rubric *r, const struct answers *a, struct submitted_images *h,
+bool grading_all(const struct rubric *r, const struct answer_key *a, struct submitted_images *h,
                  double alpha, struct result *out, int *set, struct err *e)
 {
     static const double worth_telling = 0.01; /* of all points */

@@ -35,7 +35,7 @@ double score_chance(const struct margin *m, const struct interval *i)
 struct work {
     const struct rubric *r;
     const struct rubric_check *check;
-    const struct answers *answers;
+    const struct answer_key *answers;
     int set;
     struct submitted_images *h;
     double alpha;
@@ -104,7 +104,7 @@ static bool is_copy(const struct submitted_image *s, const struct moments *m, do
     return num >= 100 && same > 0.98 * num && expected < 0.6 * num;
 }
 
-static void tell(const struct agreement *a, char *text, size_t size)
+static void tell(const struct difference *a, char *text, size_t size)
 {
     const struct interval *worst = &a->image[0];
     static const char *const names[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
@@ -149,7 +149,7 @@ static bool compare(const struct work *w, const struct submitted_image *a,
                     struct err *e)
 {
     struct err why;
-    if (agreement_measure(a, b, use, w->alpha, &out->agreement, &why))
+    if (difference_measure(a, b, use, w->alpha, &out->agreement, &why))
         score_agreement(w->check, out);
     else if (err_is_of_memory(&why))
         return err_set(e, "%s", why.msg);
@@ -265,7 +265,7 @@ static void score_pixels(const struct work *w, double wrong, double num, struct 
 }
 
 /* One wrong pixel: the share of its tile's, and which tile has most. */
-static void map_wrong(struct agreement *map, int columns, int x, int y)
+static void map_wrong(struct difference *map, int columns, int x, int y)
 {
     double *here = &map->relative[y / RUBRIC_TILE * columns + x / RUBRIC_TILE];
     *here += 1.0 / (RUBRIC_TILE * RUBRIC_TILE);
@@ -286,7 +286,7 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     const struct moments *m = reference(w, 0);
     double wrong = 0, num = 0;
     int first = -1, columns = s->width / RUBRIC_TILE;
-    struct agreement *map = &out->agreement;
+    struct difference *map = &out->agreement;
     map->relative =
         calloc((size_t)columns * (size_t)(s->height / RUBRIC_TILE), sizeof *map->relative);
     if (map->relative == NULL)
@@ -344,7 +344,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    if (agreement_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+    if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
         out->share = score_share(&w->check->log_ratio, &i);
@@ -404,7 +404,7 @@ static void expect_noise(const struct work *w)
 }
 
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, int set, struct submitted_images *h, double alpha,
+                   const struct answer_key *a, int set, struct submitted_images *h, double alpha,
                    struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
@@ -428,5 +428,5 @@ bool grading_check(const struct rubric *r, const struct rubric_check *check,
 
 void result_free(struct result *r)
 {
-    agreement_free(&r->agreement);
+    difference_free(&r->agreement);
 }

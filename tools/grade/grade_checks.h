@@ -14,7 +14,7 @@ struct answer {
         as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
 };
 /* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
-struct answers {
+struct answer_key {
     struct answer of[RUBRIC_SETS][RUBRIC_PICTURES];
 };
 
@@ -24,15 +24,15 @@ struct answer_options {
     int threads;
     double timeout_s;
 };
-bool answers_make(const struct rubric *r, const struct answer_options *opt, struct answers *out,
-                  struct err *e) __attribute__((warn_unused_result));
-void answers_free(struct answers *a);
+bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
+                     struct answer_key *out, struct err *e) __attribute__((warn_unused_result));
+void answer_key_free(struct answer_key *a);
 
 /* One picture by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
  * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
-bool answer_render(const struct rubric *r, int picture, bool as_asked, const char *words, int spp,
-                   const struct answer_options *opt, struct moments *out, struct err *e)
-    __attribute__((warn_unused_result));
+bool answer_key_render(const struct rubric *r, int picture, bool as_asked, const char *words,
+                       int spp, const struct answer_options *opt, struct moments *out,
+                       struct err *e) __attribute__((warn_unused_result));
 
 /* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
  * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
@@ -56,7 +56,7 @@ struct result {
     int picture;        /* that shows it best: index in the rubric */
     /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
      * are wrong, and where most are. */
-    struct agreement agreement;
+    struct difference agreement;
 };
 
 /* One student's pictures, read. */
@@ -69,14 +69,14 @@ struct submitted_images {
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
  * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
 bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answers *a, int set, struct submitted_images *h, double alpha,
+                   const struct answer_key *a, int set, struct submitted_images *h, double alpha,
                    struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
  * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
-bool grading_all(const struct rubric *r, const struct answers *a, struct submitted_images *h,
+bool grading_all(const struct rubric *r, const struct answer_key *a, struct submitted_images *h,
                  double alpha, struct result *out, int *set, struct err *e)
     __attribute__((warn_unused_result));
 void result_free(struct result *r);

@@ -42,7 +42,7 @@ bool rubric_bugs_counts(const struct rubric *r, int picture)
     return rates_check(r, picture) != NULL;
 }
 
-int rubric_bugs_set(const struct answers *a, int set, int picture)
+int rubric_bugs_set(const struct answer_key *a, int set, int picture)
 {
     const struct moments *m = &a->of[set][picture].m, *first = &a->of[0][picture].m;
     if (m->width == 0)
@@ -233,7 +233,7 @@ static bool sight_of_student(const struct rubric *r, int picture, const struct s
     return true;
 }
 
-static bool count_samples(const struct rubric *r, int picture, const struct answers *a,
+static bool count_samples(const struct rubric *r, int picture, const struct answer_key *a,
                           const struct made *made, struct signature *s, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
@@ -249,7 +249,7 @@ static bool count_samples(const struct rubric *r, int picture, const struct answ
     return true;
 }
 
-static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answers *a,
+static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answer_key *a,
                  const struct submitted_images *h, int set, struct observation *clue, int *num,
                  struct err *e)
 {
@@ -270,7 +270,7 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
 }
 
 bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answers *a, const struct submitted_images *h, int set,
+                          const struct answer_key *a, const struct submitted_images *h, int set,
                           double alpha, struct diagnosis *found, int *with, struct err *e)
 {
     const struct diagnose_options opt = {.alpha = alpha, .by_likelihood = true};
@@ -303,7 +303,7 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
 
 /* ---- the catalogue */
 
-static bool find_views(const struct rubric *r, const struct answers *a, struct rubric_bugs *b,
+static bool find_views(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *b,
                        struct err *e)
 {
     for (int k = 0; k < r->num_sets; k++)
@@ -326,7 +326,7 @@ static bool find_views(const struct rubric *r, const struct answers *a, struct r
     return true;
 }
 
-bool rubric_bugs_open(const struct rubric *r, const struct answers *a, struct rubric_bugs *out,
+bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e)
 {
     char dir[4400];

@@ -26,7 +26,7 @@ bool rubric_bugs_sees(const struct rubric *r, int picture);
 /* Is the number of its samples a fact (a check of rates)? */
 bool rubric_bugs_counts(const struct rubric *r, int picture);
 /* The first set of deviations whose reference is, bit by bit, that of `set`. */
-int rubric_bugs_set(const struct answers *a, int set, int picture);
+int rubric_bugs_set(const struct answer_key *a, int set, int picture);
 /* Name of a view and a hash of all that decides its correct picture. */
 bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128], char key[65],
                      struct err *e) __attribute__((warn_unused_result));
@@ -37,7 +37,7 @@ bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments
                        struct signature *out, struct err *e) __attribute__((warn_unused_result));
 
 /* Reads r->bugs. Fails if a view is missing or has been made of another picture. The caller closes it. */
-bool rubric_bugs_open(const struct rubric *r, const struct answers *a, struct rubric_bugs *out,
+bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e) __attribute__((warn_unused_result));
 void rubric_bugs_close(struct rubric_bugs *b);
 
@@ -46,7 +46,7 @@ void rubric_bugs_close(struct rubric_bugs *b);
  * is told a bug with a probability of at most alpha for each set, as far as its pictures are independent (not if all
  * have one seed). */
 bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answers *a, const struct submitted_images *h, int set,
+                          const struct answer_key *a, const struct submitted_images *h, int set,
                           double alpha, struct diagnosis *found, int *with, struct err *e)
     __attribute__((warn_unused_result));
 

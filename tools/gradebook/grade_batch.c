@@ -65,7 +65,7 @@ static json_t *number(double v)
     return isfinite(v) ? json_real(v) : json_null();
 }
 
-static json_t *relative_of(const struct agreement *a, const struct rubric_picture *p)
+static json_t *relative_of(const struct difference *a, const struct rubric_picture *p)
 {
     if (a->relative == NULL)
         return json_null();
@@ -76,7 +76,7 @@ static json_t *relative_of(const struct agreement *a, const struct rubric_pictur
 }
 
 /* What points are a function of, with the margins. */
-static json_t *intervals_of(const struct agreement *a, const struct rubric_check *c)
+static json_t *intervals_of(const struct difference *a, const struct rubric_check *c)
 {
     static const char *const names[] = {"red", "green", "blue", "luminance", "furthest tile"};
     json_t *array = json_array();

@@ -9,7 +9,7 @@
 
 struct grade_job {
     const struct rubric *rubric;
-    const struct answers *answers;
+    const struct answer_key *answers;
     const struct sandbox *sandbox;
     const char *stage;       /* submission_stage() */
     const char *out;         /* OUT/ID/grade.json and what else there is of it */

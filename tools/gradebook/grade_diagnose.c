@@ -104,7 +104,7 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
 }
 
 json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
-                              const struct answers *a, const struct submitted_images *h, int set,
+                              const struct answer_key *a, const struct submitted_images *h, int set,
                               double alpha)
 {
     struct diagnosis found;

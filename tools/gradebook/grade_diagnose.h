@@ -23,7 +23,7 @@ void diagnosis_close(struct grade_diagnosis *d);
 /* By the pictures, graded with the deviations of `set`, in the form below; "correct" is never said of pictures that lost points:
  * "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no picture. */
 json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
-                              const struct answers *a, const struct submitted_images *h, int set,
+                              const struct answer_key *a, const struct submitted_images *h, int set,
                               double alpha);
 
 /* { "finding": "correct" | "bug" | "unknown", "gate": "one line",

@@ -129,7 +129,7 @@ static bool is_right(const json_t *grade, const char *picture)
 }
 
 /* Pictures that cannot be read any more are left out; for want of memory none is. */
-static bool read_noise(const char *out, const struct rubric *r, const struct answers *a, int i,
+static bool read_noise(const char *out, const struct rubric *r, const struct answer_key *a, int i,
                        const json_t *grade, struct alike_noise *noise, struct err *e)
 {
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
@@ -166,8 +166,8 @@ static void add_like(json_t *grade, const json_t *other, const char *picture, do
         list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", picture, "t", t, "bound", bound));
 }
 
-bool grade_alike(const char *out, const struct rubric *r, const struct answers *a, json_t *grades,
-                 struct err *e)
+bool grade_alike(const char *out, const struct rubric *r, const struct answer_key *a,
+                 json_t *grades, struct err *e)
 {
     size_t num = json_array_size(grades);
     struct alike_noise *noise = calloc(num + 1, sizeof *noise);

@@ -39,7 +39,7 @@ double alike_bound(double tests, double alpha);
  * have would not be noise), at most ALPHA false alarms in a class on average. Each grade that has a like gets
  * "alike": [{"id": , "picture": , "t": , "bound": }]. */
 #define ALIKE_ALPHA 1e-3
-bool grade_alike(const char *out, const struct rubric *r, const struct answers *a, json_t *grades,
-                 struct err *e) __attribute__((warn_unused_result));
+bool grade_alike(const char *out, const struct rubric *r, const struct answer_key *a,
+                 json_t *grades, struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -86,7 +86,7 @@ static bool brute_force_factor(const struct bench_scene *s, const struct bvh *wi
     if (brute == NULL)
         return false;
     struct ray_set set = ray_set_new();
-    struct answers a = answers_new();
+    struct answer_key a = answers_new();
     struct bvh_stats stats = {0};
     vec3 lo, hi;
     bench_scene_bounds(&s->scene, &lo, &hi);

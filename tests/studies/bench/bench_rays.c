@@ -54,7 +54,7 @@ static struct result measure(const struct bench_scene *of, enum isa isa, int rou
     out.mtri_per_s = bench_median(mine, builds);
     out.bytes_per_triangle = (double)t[WIDE].bytes / scene_num_primitives(s);
     struct ray_set set[NUM_SETS];
-    struct answers answer[NUM_TRACERS];
+    struct answer_key answer[NUM_TRACERS];
     for (int k = 0; k < NUM_SETS; k++)
         set[k] = ray_set_new();
     for (int k = 0; k < NUM_TRACERS; k++)

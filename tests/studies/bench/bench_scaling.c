@@ -60,7 +60,7 @@ static struct at_size measure_mesh(const struct bench_options *o, uint32_t trian
     }
     out.bytes = (double)t[0].bytes / s->num_triangles;
     struct ray_set primary = ray_set_new(), bounce = ray_set_new(), shadow = ray_set_new();
-    struct answers a = answers_new();
+    struct answer_key a = answers_new();
     struct bvh_stats stats = {0};
     vec3 lo, hi;
     bench_scene_bounds(s, &lo, &hi);

@@ -32,7 +32,7 @@ static vec3 normal_of(const struct scene *s, uint32_t prim, vec3 p)
     return normalize(cross(sub(c[1], c[0]), sub(c[2], c[0])));
 }
 
-void ray_set_go_on(const struct scene *s, const struct ray_set *in, const struct answers *a,
+void ray_set_go_on(const struct scene *s, const struct ray_set *in, const struct answer_key *a,
                    float size, vec3 light, uint32_t seed, struct ray_set *bounce,
                    struct ray_set *shadow)
 {
@@ -92,15 +92,15 @@ struct ray_set ray_set_new(void)
     return (struct ray_set){.batch = bench_allocate(batches * sizeof(struct rays))};
 }
 
-struct answers answers_new(void)
+struct answer_key answers_new(void)
 {
     const size_t batches = MAX_RAYS / BATCH_LANES + 1;
-    return (struct answers){bench_allocate(batches * sizeof(struct hits)),
-                            bench_allocate(batches * BATCH_LANES * sizeof(bool))};
+    return (struct answer_key){bench_allocate(batches * sizeof(struct hits)),
+                               bench_allocate(batches * BATCH_LANES * sizeof(bool))};
 }
 
-size_t ray_set_different(const struct ray_set *s, bool shadow, const struct answers *a,
-                         const struct answers *b, float size)
+size_t ray_set_different(const struct ray_set *s, bool shadow, const struct answer_key *a,
+                         const struct answer_key *b, float size)
 {
     size_t n = 0;
     for (size_t k = 0; k < s->num_rays; k++) {

@@ -12,7 +12,7 @@ struct ray_set {
     size_t num_rays;
 };
 
-struct answers {
+struct answer_key {
     struct hits *hit;              /* by batch */
     bool (*occluded)[BATCH_LANES]; /* by batch */
 };
@@ -30,17 +30,17 @@ static inline int ray_set_size(const struct ray_set *s, size_t b)
 
 /* Empty, with room for what the functions below make; free batch, hit, occluded. */
 struct ray_set ray_set_new(void);
-struct answers answers_new(void);
+struct answer_key answers_new(void);
 
 /* From the scene's own camera, or from outside at `size` (half the diagonal) about the middle. */
 void ray_set_camera(const struct bench_scene *of, vec3 middle, float size, struct ray_set *out);
 /* Rays that go on from what `in` hit: a cosine-distributed direction (bounce may be NULL), and one to
  * the light. */
-void ray_set_go_on(const struct scene *s, const struct ray_set *in, const struct answers *a,
+void ray_set_go_on(const struct scene *s, const struct ray_set *in, const struct answer_key *a,
                    float size, vec3 light, uint32_t seed, struct ray_set *bounce,
                    struct ray_set *shadow);
 /* How many rays of a set have another answer. */
-size_t ray_set_different(const struct ray_set *s, bool shadow, const struct answers *a,
-                         const struct answers *b, float size);
+size_t ray_set_different(const struct ray_set *s, bool shadow, const struct answer_key *a,
+                         const struct answer_key *b, float size);
 
 #endif

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 static void embree_trace(const struct tracer *t, const struct ray_set *s, bool shadow,
-                         struct answers *a)
+                         struct answer_key *a)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -41,7 +41,7 @@ static void embree_trace(const struct tracer *t, const struct ray_set *s, bool s
 }
 
 static void our_trace(const struct tracer *t, const struct ray_set *s, bool shadow,
-                      struct answers *a, struct bvh_stats *stats)
+                      struct answer_key *a, struct bvh_stats *stats)
 {
     uint16_t lane[BATCH_LANES];
     for (int i = 0; i < BATCH_LANES; i++)
@@ -53,8 +53,8 @@ static void our_trace(const struct tracer *t, const struct ray_set *s, bool shad
             bvh_closest(t->bvh, &s->batch[b], lane, ray_set_size(s, b), &a->hit[b], stats);
 }
 
-double tracer_run(const struct tracer *t, const struct ray_set *s, bool shadow, struct answers *a,
-                  struct bvh_stats *stats)
+double tracer_run(const struct tracer *t, const struct ray_set *s, bool shadow,
+                  struct answer_key *a, struct bvh_stats *stats)
 {
     double start = bench_cpu_seconds();
     if (t->bvh != NULL)

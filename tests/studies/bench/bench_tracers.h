@@ -25,7 +25,7 @@ struct tracer tracer_ours(const struct scene *s, enum isa isa);
 void tracer_free(struct tracer *t);
 
 /* CPU seconds of tracing the set; answers into *a, what ours costs added to *stats. */
-double tracer_run(const struct tracer *t, const struct ray_set *s, bool shadow, struct answers *a,
-                  struct bvh_stats *stats);
+double tracer_run(const struct tracer *t, const struct ray_set *s, bool shadow,
+                  struct answer_key *a, struct bvh_stats *stats);
 
 #endif

@@ -26,7 +26,7 @@ struct maker {
     char build[PATH_MAX];
     struct suite suite;
     struct rubric *rubric;
-    struct answers *answers;
+    struct answer_key *answers;
     struct catalogue made;
     int picture[RUBRIC_SETS * RUBRIC_PICTURES], set[RUBRIC_SETS * RUBRIC_PICTURES]; /* of a view */
     struct signature (*batch)[BATCHES]; /* of a view: the correct renderer's */
@@ -86,7 +86,7 @@ static bool render(const struct maker *m, int view, int batch, const struct answ
     struct moments made;
     snprintf(words, sizeof words, "--seed %d %s", SEED + batch, r->set[m->set[view]].words);
     spp = counts || spp / 4 < LEAST_SPP ? spp : spp / 4;
-    if (!answer_render(r, picture, counts, words, spp, opt, &made, e))
+    if (!answer_key_render(r, picture, counts, words, spp, opt, &made, e))
         return false;
     bool ok = rubric_bugs_sight(r, picture, &made, out, e);
     moments_free(&made);
@@ -99,7 +99,7 @@ static bool is_same(const struct maker *m, int view, const struct answer_options
 {
     struct moments a;
     const struct moments *b = &m->one[view];
-    if (!answer_render(m->rubric, m->picture[view], false, "", 1, bug, &a, e))
+    if (!answer_key_render(m->rubric, m->picture[view], false, "", 1, bug, &a, e))
         return false;
     *same = a.width == b->width && a.height == b->height &&
             memcmp(a.mean, b->mean, 3 * (size_t)a.width * (size_t)a.height * sizeof *a.mean) == 0;
@@ -236,7 +236,7 @@ static bool make_correct(struct maker *m, int view, const struct answer_options 
         if (!render(m, view, k, ours, &m->batch[view][k], e))
             return false;
     if (m->set[view] == 0 &&
-        !answer_render(m->rubric, picture, false, "", 1, ours, &m->one[view], e))
+        !answer_key_render(m->rubric, picture, false, "", 1, ours, &m->one[view], e))
         return false;
     if (!rubric_bugs_counts(m->rubric, picture))
         return rubric_bugs_sight(m->rubric, picture, &m->answers->of[m->set[view]][picture].m,
@@ -289,7 +289,7 @@ static bool make(struct maker *m, const char *patches, struct err *e)
     snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
     if (!list_bugs(patches, &m->made, e) ||
         !open_cache(m, "correct", "references", ours, cache, &opt, e) ||
-        !answers_make(m->rubric, &opt, m->answers, e) || !add_views(m, &opt, e))
+        !answer_key_make(m->rubric, &opt, m->answers, e) || !add_views(m, &opt, e))
         return false;
     while (started < workers && pthread_create(&thread[started], NULL, work, m) == 0)
         started++;
@@ -331,7 +331,7 @@ int main(int argc, char **argv)
         moments_free(&m.one[v]);
     catalogue_free(&m.made);
     if (m.answers != NULL)
-        answers_free(m.answers);
+        answer_key_free(m.answers);
     suite_free(&m.suite);
     free(m.one);
     free(m.batch);

@@ -152,7 +152,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
 {
     struct rubric *r = a_rubric(kind, num);
     struct submitted_images *h = calloc(1, sizeof *h);
-    struct answers *a = calloc(1, sizeof *a);
+    struct answer_key *a = calloc(1, sizeof *a);
     struct result out;
     struct err e;
     assert_true(h != NULL && a != NULL);
@@ -344,7 +344,7 @@ static void a_copy_of_the_reference_is_seen(void **state)
     struct err e;
     struct rubric *r = a_rubric(CHECK_EQUAL, 1);
     struct submitted_images *h = calloc(1, sizeof *h);
-    struct answers *a = calloc(1, sizeof *a);
+    struct answer_key *a = calloc(1, sizeof *a);
     struct result out;
     for (size_t i = 0; i < 3 * PIXELS; i++)
         rgb8[i] = tone_map(TONE_CGL, reference.mean[i]);
@@ -376,7 +376,7 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
                  {{.scale = 1, .square = 1, .noise = 1}, 0, 1},
                  {{.scale = 1.5, .square = 1, .noise = 1}, 0, 0}};
     struct rubric *r = a_rubric(CHECK_EQUAL, 1);
-    struct answers *a = calloc(1, sizeof *a);
+    struct answer_key *a = calloc(1, sizeof *a);
     struct err e;
     assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
     r->num_sets = 2;
@@ -427,7 +427,7 @@ static void a_watermark_is_masked(void **state)
         for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
             struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
             struct submitted_images *h = calloc(1, sizeof *h);
-            struct answers *a = calloc(1, sizeof *a);
+            struct answer_key *a = calloc(1, sizeof *a);
             struct result out;
             struct err e;
             char path[128];

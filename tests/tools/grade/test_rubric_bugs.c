@@ -22,7 +22,7 @@
 static gsl_rng *rng;
 static struct suite suite;
 static struct rubric *rubric;
-static struct answers *answers;
+static struct answer_key *answers;
 static struct rubric_bugs bugs;
 static char dir[64];
 
@@ -95,7 +95,7 @@ static int tear_down(void **state)
     struct err e;
     (void)state;
     rubric_bugs_close(&bugs);
-    answers_free(answers);
+    answer_key_free(answers);
     free(answers);
     free(rubric);
     suite_free(&suite);
