@@ -89,7 +89,7 @@ static void make_rubric(void)
                                    .tile = {0.3, 0.9, true},
                                    .share = {0.1, 0.5, true},
                                    .log_ratio = {0.7, 1.5, true}};
-        snprintf(c->name, sizeof c->name, "%s", check_kind_name[kind[i]]);
+        snprintf(c->name, sizeof c->name, "%s", rubric_check_kind_name[kind[i]]);
     }
 }
 
@@ -156,7 +156,7 @@ static bool grade_pictures(void *ctx, struct err *e)
     static struct result result[RUBRIC_CHECKS];
     int set;
     memset(result, 0, sizeof result);
-    bool ok = grading_all(rubric, answers, &w->h, 1e-4, result, &set, e);
+    bool ok = grade_all_checks(rubric, answers, &w->h, 1e-4, result, &set, e);
     alloc_fail_off();
     double points = 1;
     for (int i = 0; ok && i < rubric->num_checks; i++) {
@@ -173,12 +173,12 @@ static bool grade_pictures(void *ctx, struct err *e)
 static bool find_same_noise(void *ctx, struct err *e)
 {
     struct work *w = ctx;
-    struct alike_noise n = {0};
-    bool ok = alike_noise_of(&w->h.picture[0], &reference, SPP, &n, e);
+    struct noise_print n = {0};
+    bool ok = same_noise_of(&w->h.picture[0], &reference, SPP, &n, e);
     alloc_fail_off();
     assert_true(!ok || n.blocks == PIXELS / 4);
     if (ok)
-        alike_noise_free(&n);
+        same_noise_free(&n);
     return ok;
 }
 
@@ -234,7 +234,7 @@ static bool find_alike(void *ctx, struct err *e)
     alloc_fail_off();
     json_t *grades = a_class(1);
     alloc_fail_on();
-    bool ok = grade_alike(file(0, "class"), rubric, answers, grades, e);
+    bool ok = same_noise(file(0, "class"), rubric, answers, grades, e);
     alloc_fail_off();
     if (ok)
         assert_int_equal(json_array_size(json_object_get(json_array_get(grades, 0), "alike")), 1);

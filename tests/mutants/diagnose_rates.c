@@ -24,7 +24,7 @@
 enum { POOL = 200, TRIES = 10000, CONSISTENT_DRAWS = 1000, MOST_VIEWS = 64, MOST_THREADS = 64 };
 static const double alpha = 1e-6;
 
-struct rates {
+struct rate_image {
     const char *build;
     struct suite suite;
     struct catalogue c;
@@ -37,7 +37,7 @@ struct look {
     uint64_t seed;
 };
 
-static bool look_at(const struct rates *r, const struct look *look, const char *work,
+static bool look_at(const struct rate_image *r, const struct look *look, const char *work,
                     struct observation *clue, struct err *e)
 {
     for (int i = 0; i < r->c.num_views; i++) {
@@ -74,7 +74,7 @@ struct task {
 };
 
 struct crew {
-    const struct rates *r;
+    const struct rate_image *r;
     struct task *task;
     int num, next;
     pthread_mutex_t lock;
@@ -101,7 +101,7 @@ static void *work(void *arg)
     }
 }
 
-static bool look_at_all(const struct rates *r, struct task *task, int num, struct err *e)
+static bool look_at_all(const struct rate_image *r, struct task *task, int num, struct err *e)
 {
     static struct worker worker[MOST_THREADS];
     struct crew crew = {.r = r, .task = task, .num = num};
@@ -135,7 +135,7 @@ static void free_tasks(struct task *task, int num)
 
 /* ---- bugs */
 
-static void print_named(const struct rates *r, const struct diagnosis *d)
+static void print_named(const struct rate_image *r, const struct diagnosis *d)
 {
     if (d->finding != FINDING_BUG)
         printf("%s", d->finding == FINDING_CORRECT ? "nothing wrong found" : "none of the known");
@@ -150,7 +150,7 @@ struct score {
     int first, group, unknown, missed, wrong;
 };
 
-static bool judge_bug(const struct rates *r, const struct task *t, int bug, struct score *s,
+static bool judge_bug(const struct rate_image *r, const struct task *t, int bug, struct score *s,
                       struct score *without, struct err *e)
 {
     struct diagnose_options opt = {.alpha = alpha};
@@ -188,7 +188,7 @@ static bool judge_bug(const struct rates *r, const struct task *t, int bug, stru
     return true;
 }
 
-static bool rate_bugs(const struct rates *r, int scale_percent, int spp_percent, uint64_t seed,
+static bool rate_bugs(const struct rate_image *r, int scale_percent, int spp_percent, uint64_t seed,
                       struct err *e)
 {
     int num = r->c.num_bugs;
@@ -246,7 +246,7 @@ static bool is_still(const struct signature *s, int value)
     return sqrt(s->var[value]) <= 1e-5 * s->mean[value];
 }
 
-static void draw_cells(const struct rates *r, const struct pool *p, int view, uint64_t *state,
+static void draw_cells(const struct rate_image *r, const struct pool *p, int view, uint64_t *state,
                        struct observation *out)
 {
     const struct signature *c = &r->c.view[view].correct;
@@ -263,7 +263,7 @@ static void draw_cells(const struct rates *r, const struct pool *p, int view, ui
     }
 }
 
-static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_t *state,
+static bool draw_consistent(const struct rate_image *r, const struct pool *p, uint64_t *state,
                             struct observation *out, struct err *e)
 {
     enum { MOST_RENDERS = 32 };
@@ -294,7 +294,7 @@ static bool draw_consistent(const struct rates *r, const struct pool *p, uint64_
     return true;
 }
 
-static bool fill_pool(const struct rates *r, struct pool *p, struct err *e)
+static bool fill_pool(const struct rate_image *r, struct pool *p, struct err *e)
 {
     p->mean = calloc((size_t)r->c.num_views, sizeof *p->mean);
     p->single = calloc(POOL, sizeof *p->single);
@@ -312,7 +312,7 @@ static bool fill_pool(const struct rates *r, struct pool *p, struct err *e)
 }
 
 /* The pool's renders of the view that asks for consistency, one by one. */
-static bool render_singles(const struct rates *r, struct pool *p, const char *program,
+static bool render_singles(const struct rate_image *r, struct pool *p, const char *program,
                            struct err *e)
 {
     if (p->consistent_view < 0)
@@ -349,7 +349,7 @@ static int count_accused(const struct diagnosis *d)
     return d->finding != FINDING_CORRECT;
 }
 
-static bool rate_synthetic(const struct rates *r, struct pool *p, struct err *e)
+static bool rate_synthetic(const struct rate_image *r, struct pool *p, struct err *e)
 {
     struct observation *clue = calloc((size_t)r->c.num_views, sizeof *clue);
     struct diagnose_options opt = {.alpha = alpha};
@@ -378,7 +378,7 @@ static bool rate_synthetic(const struct rates *r, struct pool *p, struct err *e)
     return ok;
 }
 
-static bool rate_correct(const struct rates *r, struct err *e)
+static bool rate_correct(const struct rate_image *r, struct err *e)
 {
     char program[4400];
     struct task *task = calloc(POOL, sizeof *task);
@@ -426,7 +426,7 @@ static bool rate_correct(const struct rates *r, struct err *e)
 int main(int argc, char **argv)
 {
     struct err e = {""};
-    struct rates r = {0};
+    struct rate_image r = {0};
     const char *part = argc == 3 ? argv[2] : "";
     if (argc != 2 && argc != 3) {
         fprintf(stderr, "usage: diagnose_rates BUILD [same|large|small|few|correct]\n");

@@ -94,14 +94,14 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
         job.bugs = bugs;
     }
     if (ok && r->diagnose[0] != '\0') {
-        ok = diagnosis_open(r, s->catalogue, suite, views, &diagnosis, e);
+        ok = grade_diagnose_open(r, s->catalogue, suite, views, &diagnosis, e);
         job.diagnosis = &diagnosis;
     }
-    ok = ok && grade_all(&job, &grades, e) && grade_alike(s->out, r, answers, grades, e);
+    ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
     if (ok && grade_write(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
-    diagnosis_close(&diagnosis);
+    grade_diagnose_close(&diagnosis);
     if (bugs != NULL)
         rubric_bugs_close(bugs);
     free(bugs);
@@ -135,7 +135,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
                             &box, e)) {
         int num;
-        char **word = grade_words(argc, argv, s, &num);
+        char **word = grade_options_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");
         if (ok && make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
@@ -152,16 +152,16 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
 int verb_grade(int argc, char **argv, struct err *e)
 {
     struct grade_paths at;
-    struct grade_settings s = grade_defaults(argc, &at);
+    struct grade_settings s = grade_options_default(argc, &at);
     struct suite suite = {0};
     struct rubric *r = calloc(1, sizeof *r);
     struct rubric_mistakes m;
     int code = EXIT_NOT_JUDGED;
     if (r == NULL || s.submission == NULL) {
         err_set(e, "out of memory");
-    } else if (grade_parse(argc, argv, &s, e)) {
+    } else if (grade_options_parse(argc, argv, &s, e)) {
         if (s.help) {
-            grade_print_help();
+            grade_options_help();
             code = 0;
         } else if (s.slurm) {
             code = slurm_command(NULL, argc, argv, NULL, e);

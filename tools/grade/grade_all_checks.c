@@ -17,7 +17,7 @@ static bool grade_with(const struct rubric *r, const struct answer_key *a, int s
 {
     *points = 0;
     for (int i = 0; i < r->num_checks; i++) {
-        if (!grading_check(r, &r->check[i], a, set, h, alpha, &out[i], e)) {
+        if (!grade_checks_run(r, &r->check[i], a, set, h, alpha, &out[i], e)) {
             free_results(out, i);
             return false;
         }
@@ -41,8 +41,9 @@ static bool explains(const struct rubric *r, const double *plain, const struct r
     return false;
 }
 
-bool grading_all(const struct rubric *r, const struct answer_key *a, struct submitted_images *h,
-                 double alpha, struct result *out, int *set, struct err *e)
+bool grade_all_checks(const struct rubric *r, const struct answer_key *a,
+                      struct submitted_images *h, double alpha, struct result *out, int *set,
+                      struct err *e)
 {
     static const double worth_telling = 0.01; /* of all points */
     double plain[RUBRIC_CHECKS], best, points, total = rubric_points(r);

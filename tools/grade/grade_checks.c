@@ -364,7 +364,7 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     const struct made *made = &w->h->made[c->picture[0]];
     const struct moments *own = &w->answers->of[w->set][c->picture[0]].as_asked,
                          *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
-    struct rates rates;
+    struct rate_image rates;
     struct err why;
     snprintf(
         out->expected, sizeof out->expected,
@@ -374,8 +374,8 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
         snprintf(out->seen, sizeof out->seen, "there is no rate picture");
         return true;
     }
-    if (!rates_read(made->rates, student(w, 0)->width, student(w, 0)->height, picture(w, 0)->spp,
-                    c->batch, ours->n, &rates, &why)) {
+    if (!rate_image_read(made->rates, student(w, 0)->width, student(w, 0)->height,
+                         picture(w, 0)->spp, c->batch, ours->n, &rates, &why)) {
         if (err_is_of_memory(&why))
             return err_set(e, "%s", why.msg);
         snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
@@ -403,9 +403,9 @@ static void expect_noise(const struct work *w)
                                picture(w, k)->spp);
 }
 
-bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answer_key *a, int set, struct submitted_images *h, double alpha,
-                   struct result *out, struct err *e)
+bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
+                      const struct answer_key *a, int set, struct submitted_images *h, double alpha,
+                      struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
                                                 struct err *) = {

@@ -68,17 +68,17 @@ struct submitted_images {
 
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
  * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
-bool grading_check(const struct rubric *r, const struct rubric_check *check,
-                   const struct answer_key *a, int set, struct submitted_images *h, double alpha,
-                   struct result *out, struct err *e) __attribute__((warn_unused_result));
+bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
+                      const struct answer_key *a, int set, struct submitted_images *h, double alpha,
+                      struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
  * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
-bool grading_all(const struct rubric *r, const struct answer_key *a, struct submitted_images *h,
-                 double alpha, struct result *out, int *set, struct err *e)
-    __attribute__((warn_unused_result));
+bool grade_all_checks(const struct rubric *r, const struct answer_key *a,
+                      struct submitted_images *h, double alpha, struct result *out, int *set,
+                      struct err *e) __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

@@ -17,13 +17,13 @@ static double distance(const float *px, const uint8_t code[3])
     return d;
 }
 
-bool rates_read(const char *path, int width, int height, int most, int batch,
-                const double *expected, struct rates *out, struct err *e)
+bool rate_image_read(const char *path, int width, int height, int most, int batch,
+                     const double *expected, struct rate_image *out, struct err *e)
 {
     struct picture pic;
     struct image_info info;
     double ours = 0, squares = 0;
-    *out = (struct rates){0};
+    *out = (struct rate_image){0};
     if (most / batch > MOST_BATCHES)
         return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
     if (!image_inspect(path, &info, e))

@@ -4,7 +4,7 @@
 
 #include "renderer/base/err.h"
 
-struct rates {
+struct rate_image {
     double pixels, odd; /* odd: of a colour that no multiple of the batch has, to 2 codes */
     double early;       /* that did not take all samples */
     double mean;        /* samples a pixel */
@@ -13,8 +13,8 @@ struct rates {
 
 /* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
  * counts varies from pixel to pixel by noise alone). Fails on what is no picture of that size, and where batches are too small against `most` to tell apart. */
-bool rates_read(const char *path, int width, int height, int most, int batch,
-                const double *expected, struct rates *out, struct err *e)
+bool rate_image_read(const char *path, int width, int height, int most, int batch,
+                     const double *expected, struct rate_image *out, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -11,8 +11,8 @@
 
 enum { MAX_FILE = 1 << 20, MAX_LINE = 2048 };
 
-const char *const check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
-                                                      "exact", "noise", "rates"};
+const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
+                                                             "exact", "noise", "rates"};
 
 /* A line being read: its words are taken one by one. */
 struct statement {
@@ -24,7 +24,7 @@ struct statement {
     struct rubric_check *check;
 };
 
-void mistake(struct rubric_mistakes *m, int line, const char *format, ...)
+void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
 {
     if (m->num < (int)(sizeof m->at / sizeof *m->at)) {
         va_list ap;
@@ -50,11 +50,11 @@ static char *take_word(struct statement *s)
 static void take_text(struct statement *s, const char *what, char *out, size_t size)
 {
     if (s->rest[0] == '\0')
-        mistake(s->m, s->line, "'%s' needs a text", what);
+        rubric_mistake(s->m, s->line, "'%s' needs a text", what);
     else if (out[0] != '\0')
-        mistake(s->m, s->line, "a second '%s'", what);
+        rubric_mistake(s->m, s->line, "a second '%s'", what);
     else if (strlen(s->rest) >= size)
-        mistake(s->m, s->line, "'%s' is longer than %zu characters", what, size - 1);
+        rubric_mistake(s->m, s->line, "'%s' is longer than %zu characters", what, size - 1);
     else
         snprintf(out, size, "%s", s->rest);
     s->rest += strlen(s->rest);
@@ -65,14 +65,14 @@ static bool take_name(struct statement *s, const char *what, char *out, size_t s
 {
     char *word = take_word(s);
     if (word[0] == '\0') {
-        mistake(s->m, s->line, "'%s' needs a name", what);
+        rubric_mistake(s->m, s->line, "'%s' needs a name", what);
         return false;
     }
     if (word[strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")] !=
             '\0' ||
         word[0] == '-' || strlen(word) >= size) {
-        mistake(s->m, s->line, "'%s' is no name: letters, digits, _ and -, at most %zu", word,
-                size - 1);
+        rubric_mistake(s->m, s->line, "'%s' is no name: letters, digits, _ and -, at most %zu",
+                       word, size - 1);
         return false;
     }
     snprintf(out, size, "%s", word);
@@ -84,11 +84,11 @@ static bool take_number(struct statement *s, const char *what, double lo, double
     struct err e;
     char *word = take_word(s);
     if (word[0] == '\0')
-        mistake(s->m, s->line, "'%s' needs a number", what);
+        rubric_mistake(s->m, s->line, "'%s' needs a number", what);
     else if (cli_double(what, word, lo, hi, out, &e))
         return true;
     else
-        mistake(s->m, s->line, "%.150s", e.msg);
+        rubric_mistake(s->m, s->line, "%.150s", e.msg);
     return false;
 }
 
@@ -97,9 +97,9 @@ static void take_int(struct statement *s, const char *what, int lo, int hi, int 
     struct err e;
     char *word = take_word(s);
     if (word[0] == '\0')
-        mistake(s->m, s->line, "'%s' needs a whole number", what);
+        rubric_mistake(s->m, s->line, "'%s' needs a whole number", what);
     else if (!cli_int(what, word, lo, hi, out, &e))
-        mistake(s->m, s->line, "%.150s", e.msg);
+        rubric_mistake(s->m, s->line, "%.150s", e.msg);
 }
 
 static void take_margin(struct statement *s, const char *what, struct margin *out)
@@ -108,9 +108,9 @@ static void take_margin(struct statement *s, const char *what, struct margin *ou
     if (!take_number(s, what, 0, 100, &m.full) || !take_number(s, what, 0, 100, &m.none))
         return;
     if (m.full >= m.none)
-        mistake(s->m, s->line,
-                "'%s': full points up to %g and none from %g: the first must be less", what, m.full,
-                m.none);
+        rubric_mistake(s->m, s->line,
+                       "'%s': full points up to %g and none from %g: the first must be less", what,
+                       m.full, m.none);
     *out = m;
 }
 
@@ -136,14 +136,14 @@ static void read_limit(struct statement *s)
             l->file = l->disk < l->file ? l->disk : l->file;
         }
     } else
-        mistake(s->m, s->line, "'limit %s' is none of wall, cpu, build, memory, disk, processes",
-                what);
+        rubric_mistake(s->m, s->line,
+                       "'limit %s' is none of wall, cpu, build, memory, disk, processes", what);
 }
 
 static void read_mask(struct statement *s)
 {
     if (s->r->mask[2] > 0)
-        mistake(s->m, s->line, "a second 'mask'");
+        rubric_mistake(s->m, s->line, "a second 'mask'");
     for (int i = 0; i < 4; i++)
         take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
 }
@@ -154,7 +154,7 @@ static void read_picture(struct statement *s)
     s->check = NULL;
     s->picture = NULL;
     if (r->num_pictures == RUBRIC_PICTURES) {
-        mistake(s->m, s->line, "more than %d pictures", RUBRIC_PICTURES);
+        rubric_mistake(s->m, s->line, "more than %d pictures", RUBRIC_PICTURES);
         return;
     }
     struct rubric_picture *p = &r->picture[r->num_pictures];
@@ -164,8 +164,8 @@ static void read_picture(struct statement *s)
         return;
     for (int i = 0; i < r->num_pictures; i++)
         if (strcmp(r->picture[i].name, p->name) == 0)
-            mistake(s->m, s->line, "picture '%s' is already in line %d", p->name,
-                    r->picture[i].line);
+            rubric_mistake(s->m, s->line, "picture '%s' is already in line %d", p->name,
+                           r->picture[i].line);
     r->num_pictures++;
 }
 
@@ -175,7 +175,7 @@ static void read_part(struct statement *s)
     s->check = NULL;
     s->picture = NULL;
     if (r->num_parts == RUBRIC_PARTS) {
-        mistake(s->m, s->line, "more than %d parts", RUBRIC_PARTS);
+        rubric_mistake(s->m, s->line, "more than %d parts", RUBRIC_PARTS);
         return;
     }
     struct rubric_part *p = &r->part[r->num_parts++];
@@ -190,37 +190,38 @@ static void read_check(struct statement *s)
     s->check = NULL;
     s->picture = NULL;
     if (r->num_checks == RUBRIC_CHECKS) {
-        mistake(s->m, s->line, "more than %d checks", RUBRIC_CHECKS);
+        rubric_mistake(s->m, s->line, "more than %d checks", RUBRIC_CHECKS);
         return;
     }
     struct rubric_check *c = &r->check[r->num_checks++];
     *c = (struct rubric_check){.line = s->line, .part = r->num_parts - 1};
     s->check = c;
     if (r->num_parts == 0)
-        mistake(s->m, s->line, "a check before the first 'part'");
+        rubric_mistake(s->m, s->line, "a check before the first 'part'");
     if (!take_name(s, "check", c->name, sizeof c->name) ||
         !take_number(s, "points", 0, 1e4, &c->points))
         return;
     for (int i = 0; i < r->num_checks - 1; i++)
         if (strcmp(r->check[i].name, c->name) == 0)
-            mistake(s->m, s->line, "check '%s' is already in line %d", c->name, r->check[i].line);
+            rubric_mistake(s->m, s->line, "check '%s' is already in line %d", c->name,
+                           r->check[i].line);
     char *kind = take_word(s);
     int k = 0;
-    while (k < NUM_CHECK_KINDS && strcmp(kind, check_kind_name[k]) != 0)
+    while (k < NUM_CHECK_KINDS && strcmp(kind, rubric_check_kind_name[k]) != 0)
         k++;
     c->kind = (enum check_kind)k;
     if (k == NUM_CHECK_KINDS)
-        mistake(s->m, s->line, "'%s' is no kind of check: equal, agree, sum, exact, noise or rates",
-                kind);
+        rubric_mistake(s->m, s->line,
+                       "'%s' is no kind of check: equal, agree, sum, exact, noise or rates", kind);
     while (s->rest[0] != '\0') {
         char *name = take_word(s);
         int i = 0;
         while (i < r->num_pictures && strcmp(r->picture[i].name, name) != 0)
             i++;
         if (i == r->num_pictures)
-            mistake(s->m, s->line, "no picture '%s' above", name);
+            rubric_mistake(s->m, s->line, "no picture '%s' above", name);
         else if (c->num_pictures == CHECK_PICTURES)
-            mistake(s->m, s->line, "more than %d pictures", CHECK_PICTURES);
+            rubric_mistake(s->m, s->line, "more than %d pictures", CHECK_PICTURES);
         else {
             c->picture[c->num_pictures++] = i;
             r->picture[i].used = true;
@@ -233,12 +234,13 @@ static void read_reference(struct statement *s, struct rubric_picture *p)
     static const char *const kinds[] = {"none", "truth", "cycles", "povray", "ours"};
     char *kind = take_word(s);
     if (p->reference != REFERENCE_NONE)
-        mistake(s->m, s->line, "a second 'reference'");
+        rubric_mistake(s->m, s->line, "a second 'reference'");
     for (int k = REFERENCE_TRUTH; k <= REFERENCE_OURS; k++)
         if (strcmp(kind, kinds[k]) == 0)
             p->reference = (enum rubric_reference)k;
     if (p->reference == REFERENCE_NONE)
-        mistake(s->m, s->line, "reference '%s' is none of truth, cycles, povray, ours", kind);
+        rubric_mistake(s->m, s->line, "reference '%s' is none of truth, cycles, povray, ours",
+                       kind);
     if (p->reference == REFERENCE_OURS) {
         take_int(s, "reference ours", 1, 1 << 20, &p->reference_spp);
         if (s->rest[0] != '\0')
@@ -249,7 +251,7 @@ static void read_reference(struct statement *s, struct rubric_picture *p)
 static void read_accept(struct statement *s, struct accepted *list, int most, int *num)
 {
     if (*num == most) {
-        mistake(s->m, s->line, "more than %d accepted deviations", most);
+        rubric_mistake(s->m, s->line, "more than %d accepted deviations", most);
         return;
     }
     struct accepted *a = &list[*num];
@@ -259,7 +261,8 @@ static void read_accept(struct statement *s, struct accepted *list, int most, in
     take_text(s, "accept NAME", a->how, sizeof a->how);
     for (int i = 0; i < *num; i++)
         if (strcmp(list[i].name, a->name) == 0)
-            mistake(s->m, s->line, "'%s' is already accepted in line %d", a->name, list[i].line);
+            rubric_mistake(s->m, s->line, "'%s' is already accepted in line %d", a->name,
+                           list[i].line);
     ++*num;
 }
 
@@ -333,7 +336,7 @@ static void read_statement(struct statement *s)
         take_text(s, word, r->diagnose, sizeof r->diagnose);
     else if (strcmp(word, "bugs") == 0) {
         if (r->bugs[0] != '\0')
-            mistake(s->m, s->line, "a second 'bugs'");
+            rubric_mistake(s->m, s->line, "a second 'bugs'");
         take_name(s, word, r->bugs, sizeof r->bugs);
     } else if (strcmp(word, "output") == 0)
         take_text(s, word, r->output, sizeof r->output);
@@ -357,14 +360,14 @@ static void read_statement(struct statement *s)
         read_check(s);
     else if (!(s->picture != NULL && read_in_picture(s, word)) &&
              !(s->check != NULL && read_in_check(s, word))) {
-        mistake(s->m, s->line, "'%s' is no statement %s", word,
-                s->picture != NULL ? "of a picture"
-                : s->check != NULL ? "of a check"
-                                   : "here");
+        rubric_mistake(s->m, s->line, "'%s' is no statement %s", word,
+                       s->picture != NULL ? "of a picture"
+                       : s->check != NULL ? "of a check"
+                                          : "here");
         return;
     }
     if (s->rest[0] != '\0')
-        mistake(s->m, s->line, "'%.100s' is too much for '%s'", s->rest, word);
+        rubric_mistake(s->m, s->line, "'%.100s' is too much for '%s'", s->rest, word);
 }
 
 static int by_line(const void *a, const void *b)
@@ -393,7 +396,7 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
         read += n;
         s.line++;
         if (n == sizeof line - 1 && line[n - 1] != '\n') {
-            mistake(m, s.line, "longer than %d characters", MAX_LINE - 2);
+            rubric_mistake(m, s.line, "longer than %d characters", MAX_LINE - 2);
             for (int c; (c = getc(f)) != EOF && c != '\n';)
                 read++;
         }

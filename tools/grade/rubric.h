@@ -75,7 +75,7 @@ enum check_kind {
     CHECK_RATES,
     NUM_CHECK_KINDS
 };
-extern const char *const check_kind_name[NUM_CHECK_KINDS];
+extern const char *const rubric_check_kind_name[NUM_CHECK_KINDS];
 
 enum rubric_reference {
     REFERENCE_NONE,

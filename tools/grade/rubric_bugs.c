@@ -237,12 +237,12 @@ static bool count_samples(const struct rubric *r, int picture, const struct answ
                           const struct made *made, struct signature *s, struct err *e)
 {
     const struct rubric_picture *p = &r->picture[picture];
-    struct rates rates;
+    struct rate_image rates;
     struct err why;
     if (made->rates[0] == '\0')
         return true;
-    if (!rates_read(made->rates, p->width, p->height, p->spp, rates_check(r, picture)->batch,
-                    a->of[0][picture].as_asked.n, &rates, &why)) /* its check has said so */
+    if (!rate_image_read(made->rates, p->width, p->height, p->spp, rates_check(r, picture)->batch,
+                         a->of[0][picture].as_asked.n, &rates, &why)) /* its check has said so */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     s->fact[FACT_SAMPLES] = log(rates.mean / p->spp);
     s->fact_sd[FACT_SAMPLES] = rates.sd;

@@ -34,10 +34,10 @@ static void check_command(const char *what, const char *command, struct rubric_m
         size_t n = strcspn(c + 1, "} ");
         snprintf(name, sizeof name, "%.*s", (int)(n < 31 ? n : 31), c + 1);
         if (!is_word(name, known))
-            mistake(m, LINE_WHOLE, "%s: {%s} is nothing that is replaced", what, name);
+            rubric_mistake(m, LINE_WHOLE, "%s: {%s} is nothing that is replaced", what, name);
     }
     if (strstr(command, "{out}") == NULL)
-        mistake(m, LINE_WHOLE, "%s: without {out} there is no picture", what);
+        rubric_mistake(m, LINE_WHOLE, "%s: without {out} there is no picture", what);
 }
 
 static bool is_beside(const struct rubric *r, const char *file)
@@ -52,22 +52,23 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     struct curve curve;
     struct err e;
     if (r->title[0] == '\0')
-        mistake(m, LINE_WHOLE, "no 'rubric TITLE'");
+        rubric_mistake(m, LINE_WHOLE, "no 'rubric TITLE'");
     set_default(r->curve, sizeof r->curve, "cgl");
     set_default(r->output, sizeof r->output, "out.png");
     set_default(r->program, sizeof r->program, "pathtracer");
     if (!curve_parse(r->curve, &curve, &e))
-        mistake(m, LINE_WHOLE, "curve '%s' is none of: srgb, linear, gamma=G, cgl", r->curve);
+        rubric_mistake(m, LINE_WHOLE, "curve '%s' is none of: srgb, linear, gamma=G, cgl",
+                       r->curve);
     const char *dot = strrchr(r->output, '.');
     if (dot == NULL || !is_word(dot, (const char *const[]){".png", ".exr", ".pfm", ".hdr", NULL}) ||
         r->output[strspn(r->output,
                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-")] !=
             '\0' ||
         r->output[0] == '.' || r->output[0] == '-')
-        mistake(m, LINE_WHOLE, "output '%s' is no file name ending in .png, .exr, .pfm or .hdr",
-                r->output);
+        rubric_mistake(m, LINE_WHOLE,
+                       "output '%s' is no file name ending in .png, .exr, .pfm or .hdr", r->output);
     if (r->program[0] == '/' || strstr(r->program, "..") != NULL)
-        mistake(m, LINE_WHOLE, "program '%s' is not inside the submission", r->program);
+        rubric_mistake(m, LINE_WHOLE, "program '%s' is not inside the submission", r->program);
     set_default(r->command, sizeof r->command,
                 "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} "
                 "{options} -f {out} {scene}");
@@ -75,7 +76,7 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     if (r->diagnose[0] != '\0')
         check_command("diagnose", r->diagnose, m);
     if (r->bugs[0] != '\0' && !is_beside(r, r->bugs))
-        mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
+        rubric_mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
 }
 
 static void check_golden(const struct rubric_picture *p, const char *engine,
@@ -84,12 +85,13 @@ static void check_golden(const struct rubric_picture *p, const char *engine,
     const struct suite_reference *ref =
         p->suite != NULL ? suite_reference_of(p->suite, engine) : NULL;
     if (ref == NULL)
-        mistake(m, p->line, "picture '%s': '%s' has no reference '%s'", p->name, p->scene, engine);
+        rubric_mistake(m, p->line, "picture '%s': '%s' has no reference '%s'", p->name, p->scene,
+                       engine);
     else if (strcmp(engine, "truth") != 0 &&
              (p->width != p->suite->width || p->height != p->suite->height ||
               p->bounces != p->suite->depth))
-        mistake(m, p->line, "picture '%s': the golden of %s is %d x %d with %d bounces", p->name,
-                p->scene, p->suite->width, p->suite->height, p->suite->depth);
+        rubric_mistake(m, p->line, "picture '%s': the golden of %s is %d x %d with %d bounces",
+                       p->name, p->scene, p->suite->width, p->suite->height, p->suite->depth);
 }
 
 static void check_picture(const struct rubric *r, struct rubric_picture *p,
@@ -99,31 +101,34 @@ static void check_picture(const struct rubric *r, struct rubric_picture *p,
     size_t n = strlen(p->scene);
     p->suite = suite_find(suite, p->scene);
     if (p->scene[0] == '\0')
-        mistake(m, p->line, "picture '%s' has no 'scene'", p->name);
+        rubric_mistake(m, p->line, "picture '%s' has no 'scene'", p->name);
     else if (p->suite == NULL && (n < 5 || strcmp(p->scene + n - 4, ".dae") != 0))
-        mistake(m, p->line, "picture '%s': the suite has no scene '%s' (a file ends in .dae)",
-                p->name, p->scene);
+        rubric_mistake(m, p->line,
+                       "picture '%s': the suite has no scene '%s' (a file ends in .dae)", p->name,
+                       p->scene);
     else if (p->suite == NULL && !is_beside(r, p->scene))
-        mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name, p->scene);
+        rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
+                       p->scene);
     if (p->width == 0)
-        mistake(m, p->line, "picture '%s' has no 'size'", p->name);
+        rubric_mistake(m, p->line, "picture '%s' has no 'size'", p->name);
     if (p->width % RUBRIC_TILE != 0 || p->height % RUBRIC_TILE != 0)
-        mistake(m, p->line, "picture '%s': %d x %d are not whole tiles of %d", p->name, p->width,
-                p->height, RUBRIC_TILE);
+        rubric_mistake(m, p->line, "picture '%s': %d x %d are not whole tiles of %d", p->name,
+                       p->width, p->height, RUBRIC_TILE);
     if (p->spp == 0)
-        mistake(m, p->line, "picture '%s' has no 'spp'", p->name);
+        rubric_mistake(m, p->line, "picture '%s' has no 'spp'", p->name);
     if (p->bounces < 0)
-        mistake(m, p->line, "picture '%s' has no 'bounces'", p->name);
+        rubric_mistake(m, p->line, "picture '%s' has no 'bounces'", p->name);
     if (p->reference >= REFERENCE_TRUTH && p->reference <= REFERENCE_POVRAY && p->scene[0] != '\0')
         check_golden(p, engines[p->reference], m);
     if (p->environment[0] != '\0' && !is_beside(r, p->environment))
-        mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
-                p->environment);
+        rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
+                       p->environment);
     for (int i = 0; i < p->num_accepted; i++)
         if (!is_beside(r, p->accept[i].how))
-            mistake(m, p->accept[i].line, "no file '%s' beside the rubric", p->accept[i].how);
+            rubric_mistake(m, p->accept[i].line, "no file '%s' beside the rubric",
+                           p->accept[i].how);
     if (!p->used)
-        mistake(m, p->line, "picture '%s' is in no check", p->name);
+        rubric_mistake(m, p->line, "picture '%s' is in no check", p->name);
 }
 
 /* Which statements a kind of check has, and how many pictures. */
@@ -144,11 +149,12 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
                                                "visible", NULL};
     if (c->kind == NUM_CHECK_KINDS)
         return;
-    const char *kind = check_kind_name[c->kind];
+    const char *kind = rubric_check_kind_name[c->kind];
     if (c->num_pictures < kinds[c->kind].least || c->num_pictures > kinds[c->kind].most)
-        mistake(m, c->line, "check '%s': '%s' takes %d%s pictures, not %d", c->name, kind,
-                kinds[c->kind].least, kinds[c->kind].most > kinds[c->kind].least ? " or more" : "",
-                c->num_pictures);
+        rubric_mistake(m, c->line, "check '%s': '%s' takes %d%s pictures, not %d", c->name, kind,
+                       kinds[c->kind].least,
+                       kinds[c->kind].most > kinds[c->kind].least ? " or more" : "",
+                       c->num_pictures);
     const struct {
         const char *name;
         bool given, wanted;
@@ -160,26 +166,27 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
                       {"count", c->count.given, kinds[c->kind].batch}};
     for (size_t i = 0; i < sizeof statements / sizeof *statements; i++) {
         if (statements[i].given && !statements[i].wanted)
-            mistake(m, c->line, "check '%s': '%s' is not for '%s'", c->name, statements[i].name,
-                    kind);
+            rubric_mistake(m, c->line, "check '%s': '%s' is not for '%s'", c->name,
+                           statements[i].name, kind);
         if (!statements[i].given && statements[i].wanted)
-            mistake(m, c->line, "check '%s': '%s' needs '%s'", c->name, kind, statements[i].name);
+            rubric_mistake(m, c->line, "check '%s': '%s' needs '%s'", c->name, kind,
+                           statements[i].name);
     }
     for (int i = 0; i < c->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[c->picture[i]],
                                     *first = &r->picture[c->picture[0]];
         if (kinds[c->kind].reference && p->reference == REFERENCE_NONE)
-            mistake(m, p->line, "picture '%s' has no 'reference', which check '%s' needs", p->name,
-                    c->name);
+            rubric_mistake(m, p->line, "picture '%s' has no 'reference', which check '%s' needs",
+                           p->name, c->name);
         if (p->width != first->width || p->height != first->height)
-            mistake(m, c->line, "check '%s': '%s' and '%s' have different sizes", c->name,
-                    first->name, p->name);
+            rubric_mistake(m, c->line, "check '%s': '%s' and '%s' have different sizes", c->name,
+                           first->name, p->name);
     }
     if (c->points == 0)
-        mistake(m, c->line, "check '%s' is worth nothing", c->name);
+        rubric_mistake(m, c->line, "check '%s' is worth nothing", c->name);
     set_default(c->visibility, sizeof c->visibility, "visible");
     if (!is_word(c->visibility, visibilities))
-        mistake(
+        rubric_mistake(
             m, c->line,
             "check '%s': visibility '%s' is none of hidden, after_due_date, after_published, visible",
             c->name, c->visibility);
@@ -209,9 +216,9 @@ static void list_sets(struct rubric *r, struct rubric_mistakes *m)
             while (k < r->num_sets && strcmp(r->set[k].name, by->name) != 0)
                 k++;
             if (k < r->num_sets && r->set[k].words[0] != '\0')
-                mistake(m, by->line, "'%s' is already accepted by words", by->name);
+                rubric_mistake(m, by->line, "'%s' is already accepted by words", by->name);
             else if (k == RUBRIC_SETS)
-                mistake(m, by->line, "more accepted deviations than there is room for");
+                rubric_mistake(m, by->line, "more accepted deviations than there is room for");
             else if (k == r->num_sets)
                 append(r->set[r->num_sets++].name, sizeof r->set->name, "", by->name);
         }
@@ -226,15 +233,15 @@ void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubr
         check_check(r, &r->check[i], m);
     list_sets(r, m);
     if (r->num_checks == 0)
-        mistake(m, LINE_WHOLE, "no checks");
+        rubric_mistake(m, LINE_WHOLE, "no checks");
     for (int i = 0; i < r->num_parts; i++) {
         bool any = false;
         for (int k = 0; k < r->num_checks; k++)
             any |= r->check[k].part == i;
         if (!any)
-            mistake(m, r->part[i].line, "part '%s' has no checks", r->part[i].number);
+            rubric_mistake(m, r->part[i].line, "part '%s' has no checks", r->part[i].number);
     }
     if (r->total > 0 && fabs(rubric_points(r) - r->total) > 1e-9)
-        mistake(m, LINE_WHOLE, "the checks add up to %g points, not to %g", rubric_points(r),
-                r->total);
+        rubric_mistake(m, LINE_WHOLE, "the checks add up to %g points, not to %g", rubric_points(r),
+                       r->total);
 }

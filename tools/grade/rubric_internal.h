@@ -4,7 +4,7 @@
 
 #include "rubric.h"
 
-void mistake(struct rubric_mistakes *m, int line, const char *format, ...)
+void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* What is missing or does not fit together, once all lines are read. */

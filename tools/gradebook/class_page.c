@@ -64,14 +64,14 @@ static void table(FILE *f, const json_t *grades)
     json_array_foreach(parts, k, p)
     {
         fputs("<th class=\"n\">", f);
-        html_text(f, grade_text(p, "number"));
+        html_text(f, student_page_text(p, "number"));
         fputs("</th>", f);
     }
     fputs("<th>bug</th><th>for you to look at</th></tr>\n", f);
     json_array_foreach(grades, i, g)
     {
         fputs("<tr><td>", f);
-        link_to(f, grade_text(g, "id"));
+        link_to(f, student_page_text(g, "id"));
         fprintf(f, "</td><td class=\"n\">%.2f</td>", member_number(g, "points"));
         json_array_foreach(json_object_get(g, "parts"), k, p)
         {
@@ -83,30 +83,30 @@ static void table(FILE *f, const json_t *grades)
         json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, p)
         {
             fputs(k > 0 ? " or " : "", f);
-            html_text(f, grade_text(p, "name"));
+            html_text(f, student_page_text(p, "name"));
         }
         /* Of other deviations than those it was graded with: staff may want to know. */
-        const char *with = grade_text(json_object_get(g, "diagnosis"), "with");
-        if (k > 0 && with[0] != '\0' && strcmp(with, grade_text(g, "accepted")) != 0) {
+        const char *with = student_page_text(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, student_page_text(g, "accepted")) != 0) {
             fputs(" on top of ", f);
             html_text(f, with);
         }
         fputs("</td><td>", f);
-        html_text(f, grade_text(g, "trouble"));
-        html_text(f, grade_text(g, "wrong"));
-        if (grade_text(g, "accepted")[0] != '\0') {
+        html_text(f, student_page_text(g, "trouble"));
+        html_text(f, student_page_text(g, "wrong"));
+        if (student_page_text(g, "accepted")[0] != '\0') {
             fputs("accepted: ", f);
-            html_text(f, grade_text(g, "accepted"));
+            html_text(f, student_page_text(g, "accepted"));
             fputs("; ", f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             bool judged = json_is_true(json_object_get(c, "judged"));
-            if (grade_text(c, "flag")[0] == '\0' && judged)
+            if (student_page_text(c, "flag")[0] == '\0' && judged)
                 continue;
-            html_text(f, grade_text(c, "name"));
+            html_text(f, student_page_text(c, "name"));
             fputs(": ", f);
-            html_text(f, grade_text(c, "flag"));
+            html_text(f, student_page_text(c, "flag"));
             fputs(judged ? "; " : " not judged; ", f);
         }
         fputs("</td></tr>\n", f);
@@ -146,7 +146,7 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
         const json_t *first =
             json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
         if (first != NULL)
-            num = count_one(t, num, grade_text(first, "bug"));
+            num = count_one(t, num, student_page_text(first, "bug"));
     }
     if (num == 0)
         return;
@@ -165,7 +165,7 @@ static void slowest(FILE *f, const json_t *grades, struct tally *t)
     size_t i, num = 0;
     json_t *g;
     json_array_foreach(grades, i, g) t[num++] =
-        (struct tally){.text = grade_text(g, "id"), .num = member_number(g, "cpu_s")};
+        (struct tally){.text = student_page_text(g, "id"), .num = member_number(g, "cpu_s")};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
     for (i = 0; i < num && i < SLOWEST; i++) {
@@ -190,9 +190,9 @@ static void look_alikes(FILE *f, const json_t *grades)
             h = json_array_get(grades, k);
             json_array_foreach(json_object_get(g, "pictures"), m, p)
             {
-                const char *a = grade_text(p, "sha256"),
-                           *b = grade_text(json_array_get(json_object_get(h, "pictures"), m),
-                                           "sha256");
+                const char *a = student_page_text(p, "sha256"),
+                           *b = student_page_text(json_array_get(json_object_get(h, "pictures"), m),
+                                                  "sha256");
                 num += a[0] != '\0';
                 same += a[0] != '\0' && strcmp(a, b) == 0;
             }
@@ -205,9 +205,9 @@ static void look_alikes(FILE *f, const json_t *grades)
                     f);
             any = true;
             fputs("<li>", f);
-            html_text(f, grade_text(g, "id"));
+            html_text(f, student_page_text(g, "id"));
             fputs(" and ", f);
-            html_text(f, grade_text(h, "id"));
+            html_text(f, student_page_text(h, "id"));
             fputs("</li>\n", f);
         }
     }
@@ -225,7 +225,8 @@ static void join_group(const json_t *grades, size_t i, int number, int *group)
     {
         json_array_foreach(grades, m, other)
         {
-            if (group[m] == 0 && strcmp(grade_text(other, "id"), grade_text(like, "id")) == 0)
+            if (group[m] == 0 &&
+                strcmp(student_page_text(other, "id"), student_page_text(like, "id")) == 0)
                 join_group(grades, m, number, group);
         }
     }
@@ -241,7 +242,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
         if (group[i] != number)
             continue;
         fputs(members++ > 0 ? ", " : "", f);
-        link_to(f, grade_text(g, "id"));
+        link_to(f, student_page_text(g, "id"));
     }
     fputs("</li>\n", f);
 }
@@ -268,7 +269,7 @@ static void show_same_noise(FILE *f, const json_t *grades, int *group)
     fputs(number > 0 ? "</ul>\n" : "", f);
 }
 
-bool grade_overview(FILE *f, const json_t *grades, struct err *e)
+bool class_page(FILE *f, const json_t *grades, struct err *e)
 {
     struct tally *t = calloc(json_array_size(grades) + 1, sizeof *t);
     int *group = calloc(json_array_size(grades) + 1, sizeof *group);
@@ -277,11 +278,11 @@ bool grade_overview(FILE *f, const json_t *grades, struct err *e)
         free(group);
         return err_set(e, "out of memory for the page of the class");
     }
-    fputs(grade_page_head, f);
+    fputs(student_page_head, f);
     fputs("<meta name=\"generator\" content=\"" GRADE_CLASS_ORIGIN
           "\">\n<title>Grades</title>\n<h1>",
           f);
-    html_text(f, grade_text(json_array_get(grades, 0), "rubric"));
+    html_text(f, student_page_text(json_array_get(grades, 0), "rubric"));
     fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
     histogram(f, grades);
     common_bugs(f, grades, t);

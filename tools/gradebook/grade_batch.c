@@ -98,7 +98,7 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
 {
     return json_pack(
         "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}", "kind",
-        check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
+        rubric_check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
         c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
         "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
         result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
@@ -131,7 +131,7 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
     struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
     bool ok = (result != NULL || err_set(e, "out of memory")) &&
-              grading_all(r, job->answers, h, job->alpha, result, set, e);
+              grade_all_checks(r, job->answers, h, job->alpha, result, set, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;
@@ -180,13 +180,13 @@ static json_t *name_bug(const struct grade_job *job, const struct submission *s,
 {
     json_t *by_pictures =
         job->bugs != NULL
-            ? diagnosis_by_pictures(job->bugs, job->rubric, job->answers, h, set, job->alpha)
+            ? grade_diagnose_by_images(job->bugs, job->rubric, job->answers, h, set, job->alpha)
             : json_null();
     if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
         json_array_size(json_object_get(by_pictures, "named")) == 1)
         return by_pictures;
-    json_t *by_views =
-        diagnosis_of(job->diagnosis, job->sandbox, s, work, job->seed, job->threads, job->alpha);
+    json_t *by_views = grade_diagnose_of(job->diagnosis, job->sandbox, s, work, job->seed,
+                                         job->threads, job->alpha);
     size_t views = json_array_size(json_object_get(by_views, "named")),
            pictures = json_array_size(json_object_get(by_pictures, "named"));
     bool better = json_is_null(by_pictures) || (views > 0 && (pictures == 0 || views < pictures));
@@ -340,7 +340,7 @@ static bool check_ids(const struct grade_job *job, struct err *e)
     return true;
 }
 
-bool grade_all(const struct grade_job *job, json_t **grades, struct err *e)
+bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e)
 {
     enum { MOST_JOBS = 64 };
     pthread_t thread[MOST_JOBS];

@@ -14,7 +14,7 @@ struct grade_job {
     const char *stage;       /* submission_stage() */
     const char *out;         /* OUT/ID/grade.json and what else there is of it */
     const char *const *path; /* of the submissions */
-    const char *const *word; /* grade_words(), for "command" of a grade; NULL: not said */
+    const char *const *word; /* grade_options_words(), for "command" of a grade; NULL: not said */
     int num, jobs, threads;
     double alpha;                            /* of one check */
     const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the pictures */
@@ -46,13 +46,13 @@ struct grade_job {
 /* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
  * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
  * the order of path. */
-bool grade_all(const struct grade_job *job, json_t **grades, struct err *e)
+bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e)
     __attribute__((warn_unused_result));
 
 /* What is made of the grades, by itself and without the submissions: of the class, OUT/grades.csv, junit.xml, grades.tap and
  * index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, and index.html. The pages need no
  * other file to be read. Each of the lists ends with NULL. */
-extern const char *const grade_class_files[], *const grade_files[];
+extern const char *const grade_write_class[], *const grade_write_files[];
 
 /* All of these, and OUT/grades.json, the array. */
 bool grade_write(const char *out, const json_t *grades, struct err *e)

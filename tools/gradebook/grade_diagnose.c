@@ -40,8 +40,9 @@ static bool add_view(const struct view *v, const struct suite *suite, struct rub
     return true;
 }
 
-bool diagnosis_open(const struct rubric *r, const char *catalogue_dir, const struct suite *suite,
-                    const char *stage, struct grade_diagnosis *out, struct err *e)
+bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
+                         const struct suite *suite, const char *stage, struct grade_diagnosis *out,
+                         struct err *e)
 {
     *out = (struct grade_diagnosis){.suite = suite, .rubric = calloc(1, sizeof *out->rubric)};
     snprintf(out->stage, sizeof out->stage, "%s", stage);
@@ -58,11 +59,11 @@ bool diagnosis_open(const struct rubric *r, const char *catalogue_dir, const str
         ok = add_view(&out->catalogue.view[i], suite, out->rubric, e);
     ok = ok && submission_stage(out->rubric, stage, e);
     if (!ok)
-        diagnosis_close(out);
+        grade_diagnose_close(out);
     return ok;
 }
 
-void diagnosis_close(struct grade_diagnosis *d)
+void grade_diagnose_close(struct grade_diagnosis *d)
 {
     catalogue_free(&d->catalogue);
     free(d->rubric);
@@ -103,9 +104,9 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
                      named);
 }
 
-json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *r,
-                              const struct answer_key *a, const struct submitted_images *h, int set,
-                              double alpha)
+json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
+                                 const struct answer_key *a, const struct submitted_images *h,
+                                 int set, double alpha)
 {
     struct diagnosis found;
     struct err e;
@@ -123,9 +124,9 @@ json_t *diagnosis_by_pictures(const struct rubric_bugs *b, const struct rubric *
     return json;
 }
 
-json_t *diagnosis_of(const struct grade_diagnosis *d, const struct sandbox *box,
-                     const struct submission *s, const char *work, uint64_t seed, int threads,
-                     double alpha)
+json_t *grade_diagnose_of(const struct grade_diagnosis *d, const struct sandbox *box,
+                          const struct submission *s, const char *work, uint64_t seed, int threads,
+                          double alpha)
 {
     const struct catalogue *c = &d->catalogue;
     const struct diagnose_options opt = {.alpha = alpha};

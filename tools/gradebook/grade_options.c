@@ -55,7 +55,7 @@ static const struct cli_option options[] = {
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
-bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
+bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true;
@@ -100,7 +100,7 @@ bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
            err_set(e, "no submission given (see --help)");
 }
 
-char **grade_words(int argc, char **argv, const struct grade_settings *s, int *num)
+char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
 {
     static const struct option_words how[] = {
         {"-o", 1},      {"--out", 1}, {"-j", 1},      {"--jobs", 1},  {"--references", 1},
@@ -124,7 +124,7 @@ char **grade_words(int argc, char **argv, const struct grade_settings *s, int *n
     return word;
 }
 
-void grade_print_help(void)
+void grade_options_help(void)
 {
     puts(
         "usage: assay grade [options] RUBRIC SUBMISSION...\n"
@@ -137,7 +137,7 @@ void grade_print_help(void)
         "\nExit code: 0 all graded, 2 staff have to look at some, 3 could not grade (one line on stderr).");
 }
 
-struct grade_settings grade_defaults(int argc, struct grade_paths *at)
+struct grade_settings grade_options_default(int argc, struct grade_paths *at)
 {
     beside_program(at->pathtracer, sizeof at->pathtracer, "pathtracer");
     return (struct grade_settings){

@@ -21,14 +21,14 @@ struct grade_paths {
 };
 
 /* submission: NULL out of memory, else room for argc + 1, which the caller frees. */
-struct grade_settings grade_defaults(int argc, struct grade_paths *at);
+struct grade_settings grade_options_default(int argc, struct grade_paths *at);
 /* On top of the defaults. */
-bool grade_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
+bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
     __attribute__((warn_unused_result));
 /* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go and how many at a
  * time: a NULL-terminated array of num words, to free(). NULL out of memory. */
-char **grade_words(int argc, char **argv, const struct grade_settings *s, int *num)
+char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
     __attribute__((warn_unused_result));
-void grade_print_help(void);
+void grade_options_help(void);
 
 #endif

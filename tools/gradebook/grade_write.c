@@ -32,17 +32,17 @@ static bool is_full(const json_t *check)
 /* What a student reads of a check. */
 static void describe(const json_t *c, char *out, size_t size)
 {
-    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.", grade_text(c, "expected"),
-                                grade_text(c, "seen"));
-    if (grade_text(c, "accepted")[0] != '\0' && n < size)
+    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.",
+                                student_page_text(c, "expected"), student_page_text(c, "seen"));
+    if (student_page_text(c, "accepted")[0] != '\0' && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "\nExplained by what the starter code does (%s): no points lost for that.",
-            grade_text(c, "accepted"));
-    if (!is_full(c) && grade_text(c, "hint")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", grade_text(c, "hint"));
-    if (!is_full(c) && grade_text(c, "where")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", grade_text(c, "where"));
+            student_page_text(c, "accepted"));
+    if (!is_full(c) && student_page_text(c, "hint")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", student_page_text(c, "hint"));
+    if (!is_full(c) && student_page_text(c, "where")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", student_page_text(c, "where"));
     if (!is_judged(c) && n < size)
         snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
 }
@@ -51,11 +51,11 @@ static void describe(const json_t *c, char *out, size_t size)
 static void describe_whole(const json_t *grade, char *out, size_t size)
 {
     const json_t *diagnosis = json_object_get(grade, "diagnosis");
-    size_t n = (size_t)snprintf(out, size, "%s%s", grade_text(grade, "trouble"),
-                                grade_text(grade, "wrong")),
+    size_t n = (size_t)snprintf(out, size, "%s%s", student_page_text(grade, "trouble"),
+                                student_page_text(grade, "wrong")),
            i;
     json_t *b;
-    if (strcmp(grade_text(diagnosis, "finding"), "unknown") == 0 && n < size)
+    if (strcmp(student_page_text(diagnosis, "finding"), "unknown") == 0 && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "Different from the right pictures in a way that no known bug explains.");
@@ -63,8 +63,8 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
     {
         if (n < size)
             n += (size_t)snprintf(out + n, size - n, "%s%s (%s)",
-                                  i == 0 ? "This looks like: " : "\nor: ", grade_text(b, "bug"),
-                                  grade_text(b, "where"));
+                                  i == 0 ? "This looks like: " : "\nor: ",
+                                  student_page_text(b, "bug"), student_page_text(b, "where"));
     }
 }
 
@@ -79,14 +79,15 @@ static json_t *gradescope(const json_t *grade)
     {
         char output[4096], name[400], number[32];
         describe(c, output, sizeof output);
-        snprintf(name, sizeof name, "Part %s: %s", grade_text(c, "part"), grade_text(c, "title"));
-        snprintf(number, sizeof number, "%s.%zu", grade_text(c, "part"), i + 1);
-        json_array_append_new(tests,
-                              json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
-                                        rounded(member_number(c, "points")), "max_score",
-                                        member_number(c, "of"), "name", name, "number", number,
-                                        "output", output, "visibility", grade_text(c, "visibility"),
-                                        "status", is_full(c) ? "passed" : "failed"));
+        snprintf(name, sizeof name, "Part %s: %s", student_page_text(c, "part"),
+                 student_page_text(c, "title"));
+        snprintf(number, sizeof number, "%s.%zu", student_page_text(c, "part"), i + 1);
+        json_array_append_new(tests, json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
+                                               rounded(member_number(c, "points")), "max_score",
+                                               member_number(c, "of"), "name", name, "number",
+                                               number, "output", output, "visibility",
+                                               student_page_text(c, "visibility"), "status",
+                                               is_full(c) ? "passed" : "failed"));
     }
     char whole[2048];
     describe_whole(grade, whole, sizeof whole);
@@ -133,15 +134,15 @@ static void write_csv(FILE *f, const json_t *grades)
     json_array_foreach(json_object_get(first, "checks"), k, c)
     {
         fputc(',', f);
-        csv_text(f, grade_text(c, "name"));
+        csv_text(f, student_page_text(c, "name"));
     }
     fputs("\r\n", f);
     json_array_foreach(grades, i, g)
     {
-        csv_text(f, grade_text(g, "id"));
+        csv_text(f, student_page_text(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_text(f, grade_text(g, "trouble")[0] != '\0' ? grade_text(g, "trouble")
-                                                        : grade_text(g, "wrong"));
+        csv_text(f, student_page_text(g, "trouble")[0] != '\0' ? student_page_text(g, "trouble")
+                                                               : student_page_text(g, "wrong"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, ",%.2f", member_number(c, "points"));
@@ -172,18 +173,18 @@ static void write_tap(FILE *f, const json_t *grades)
     {
         if (json_array_size(json_object_get(g, "checks")) == 0) {
             fprintf(f, "not ok %zu - ", ++num);
-            tap_text(f, grade_text(g, "id"));
+            tap_text(f, student_page_text(g, "id"));
             fputs(": ", f);
-            tap_text(f, grade_text(g, "trouble"));
+            tap_text(f, student_page_text(g, "trouble"));
             fputc('\n', f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
-            tap_text(f, grade_text(g, "id"));
-            fprintf(f, " %s (%.2f of %g): ", grade_text(c, "name"), member_number(c, "points"),
-                    member_number(c, "of"));
-            tap_text(f, grade_text(c, "seen"));
+            tap_text(f, student_page_text(g, "id"));
+            fprintf(f, " %s (%.2f of %g): ", student_page_text(c, "name"),
+                    member_number(c, "points"), member_number(c, "of"));
+            tap_text(f, student_page_text(c, "seen"));
             fputc('\n', f);
         }
     }
@@ -205,7 +206,7 @@ static void write_junit(FILE *f, const json_t *grades)
           f);
     json_array_foreach(grades, i, g)
     {
-        size_t failures = 0, errors = grade_text(g, "trouble")[0] != '\0',
+        size_t failures = 0, errors = student_page_text(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
@@ -213,12 +214,12 @@ static void write_junit(FILE *f, const json_t *grades)
             errors += !is_judged(c);
         }
         fputs("<testsuite", f);
-        xml_pair(f, "name", grade_text(g, "id"));
+        xml_pair(f, "name", student_page_text(g, "id"));
         fprintf(f, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" time=\"%.2f\">\n",
                 checks + (checks == 0), failures, errors, member_number(g, "cpu_s"));
         if (checks == 0) {
             fputs("<testcase name=\"submission\"><error", f);
-            xml_pair(f, "message", grade_text(g, "trouble"));
+            xml_pair(f, "message", student_page_text(g, "trouble"));
             fputs("/></testcase>\n", f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
@@ -226,12 +227,12 @@ static void write_junit(FILE *f, const json_t *grades)
             char output[4096];
             describe(c, output, sizeof output);
             fputs("<testcase", f);
-            xml_pair(f, "classname", grade_text(c, "part"));
-            xml_pair(f, "name", grade_text(c, "name"));
+            xml_pair(f, "classname", student_page_text(c, "part"));
+            xml_pair(f, "name", student_page_text(c, "name"));
             fputc('>', f);
             if (!is_full(c)) {
                 fputs(is_judged(c) ? "<failure" : "<error", f);
-                xml_pair(f, "message", grade_text(c, "seen"));
+                xml_pair(f, "message", student_page_text(c, "seen"));
                 fputc('>', f);
                 html_text(f, output);
                 fputs(is_judged(c) ? "</failure>" : "</error>", f);
@@ -261,14 +262,14 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
         write_tap(f, grades);
     else {
         assert(strcmp(name, "index.html") == 0);
-        return grade_overview(f, grades, e);
+        return class_page(f, grades, e);
     }
     return true;
 }
 
-const char *const grade_class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
+const char *const grade_write_class[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
                                          NULL};
-const char *const grade_files[] = {"results.json", "index.html", NULL};
+const char *const grade_write_files[] = {"results.json", "index.html", NULL};
 
 bool grade_write_file(const char *dir, const json_t *grades, const char *name, const char *to,
                       struct err *e)
@@ -278,7 +279,8 @@ bool grade_write_file(const char *dir, const json_t *grades, const char *name, c
         return write_json(to, gradescope(grades), e);
     if (!make_parent_dirs(to, e) || !out_open(&o, to, e))
         return false;
-    if (json_is_array(grades) ? write_text(grades, name, o.f, e) : grade_page(o.f, dir, grades, e))
+    if (json_is_array(grades) ? write_text(grades, name, o.f, e)
+                              : student_page(o.f, dir, grades, e))
         return out_commit(&o, e);
     out_abandon(&o);
     return false;
@@ -292,16 +294,17 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
     bool ok = true;
     json_array_foreach(grades, i, g)
     {
-        for (int k = 0; ok && grade_files[k] != NULL; k++) {
-            snprintf(path, sizeof path, "%.4000s/%s/%s", out, grade_text(g, "id"), grade_files[k]);
-            ok = grade_write_file(out, g, grade_files[k], path, e);
+        for (int k = 0; ok && grade_write_files[k] != NULL; k++) {
+            snprintf(path, sizeof path, "%.4000s/%s/%s", out, student_page_text(g, "id"),
+                     grade_write_files[k]);
+            ok = grade_write_file(out, g, grade_write_files[k], path, e);
         }
     }
     snprintf(path, sizeof path, "%.4000s/grades.json", out);
     ok = ok && json_write(path, grades, e);
-    for (int k = 0; ok && grade_class_files[k] != NULL; k++) {
-        snprintf(path, sizeof path, "%.4000s/%s", out, grade_class_files[k]);
-        ok = grade_write_file(out, grades, grade_class_files[k], path, e);
+    for (int k = 0; ok && grade_write_class[k] != NULL; k++) {
+        snprintf(path, sizeof path, "%.4000s/%s", out, grade_write_class[k]);
+        ok = grade_write_file(out, grades, grade_write_class[k], path, e);
     }
     return ok;
 }

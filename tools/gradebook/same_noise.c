@@ -10,11 +10,11 @@
 static const double least_kappa = 0.25, clip_sd = 5;
 enum { GREEN = 1, DETAILS = 3 };
 
-void alike_noise_free(struct alike_noise *n)
+void same_noise_free(struct noise_print *n)
 {
     free(n->detail);
     free(n->shared);
-    *n = (struct alike_noise){0};
+    *n = (struct noise_print){0};
 }
 
 /* Is there noise in all four pixels that rounding and clipping leave as it is? */
@@ -31,17 +31,17 @@ static bool is_usable(const struct submitted_image *s, const struct moments *m,
     return true;
 }
 
-bool alike_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
-                    struct alike_noise *out, struct err *e)
+bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
+                   struct noise_print *out, struct err *e)
 {
     int columns = s->width / 2, rows = s->height / 2;
     double found = 0, expected = 0;
     size_t blocks = (size_t)columns * (size_t)rows;
-    *out = (struct alike_noise){.blocks = columns * rows,
+    *out = (struct noise_print){.blocks = columns * rows,
                                 .detail = calloc(blocks, DETAILS * sizeof(float)),
                                 .shared = calloc(blocks, sizeof(float))};
     if (out->detail == NULL || out->shared == NULL) {
-        alike_noise_free(out);
+        same_noise_free(out);
         return err_set(e, "out of memory");
     }
     for (int b = 0; b < out->blocks; b++) {
@@ -74,7 +74,7 @@ bool alike_noise_of(const struct submitted_image *s, const struct moments *m, do
     return true;
 }
 
-double alike_t(const struct alike_noise *a, const struct alike_noise *b)
+double same_noise_t(const struct noise_print *a, const struct noise_print *b)
 {
     double sum = 0, squares = 0;
     int used = 0;
@@ -89,10 +89,10 @@ double alike_t(const struct alike_noise *a, const struct alike_noise *b)
         squares += p * p;
         used++;
     }
-    return used >= ALIKE_FEWEST && squares > 0 ? sum / sqrt(squares) : NAN;
+    return used >= SAME_NOISE_FEWEST && squares > 0 ? sum / sqrt(squares) : NAN;
 }
 
-double alike_bound(double tests, double alpha)
+double same_noise_bound(double tests, double alpha)
 {
     return sqrt(2 * log(fmax(1, tests) / alpha));
 }
@@ -130,7 +130,7 @@ static bool is_right(const json_t *grade, const char *picture)
 
 /* Pictures that cannot be read any more are left out; for want of memory none is. */
 static bool read_noise(const char *out, const struct rubric *r, const struct answer_key *a, int i,
-                       const json_t *grade, struct alike_noise *noise, struct err *e)
+                       const json_t *grade, struct noise_print *noise, struct err *e)
 {
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
     const struct rubric_picture *p = &r->picture[i];
@@ -144,7 +144,7 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
         return true;
     if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
-    bool ok = alike_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
+    bool ok = same_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
     submitted_image_free(&s);
     return ok;
 }
@@ -166,12 +166,13 @@ static void add_like(json_t *grade, const json_t *other, const char *picture, do
         list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", picture, "t", t, "bound", bound));
 }
 
-bool grade_alike(const char *out, const struct rubric *r, const struct answer_key *a,
-                 json_t *grades, struct err *e)
+bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a, json_t *grades,
+                struct err *e)
 {
     size_t num = json_array_size(grades);
-    struct alike_noise *noise = calloc(num + 1, sizeof *noise);
-    double bound = alike_bound((double)num * ((double)num - 1) / 2 * r->num_pictures, ALIKE_ALPHA);
+    struct noise_print *noise = calloc(num + 1, sizeof *noise);
+    double bound =
+        same_noise_bound((double)num * ((double)num - 1) / 2 * r->num_pictures, SAME_NOISE_ALPHA);
     bool ok = noise != NULL || err_set(e, "out of memory");
     for (int i = 0; ok && i < r->num_pictures; i++) {
         for (size_t k = 0; ok && k < num; k++)
@@ -179,7 +180,7 @@ bool grade_alike(const char *out, const struct rubric *r, const struct answer_ke
                  read_noise(out, r, a, i, json_array_get(grades, k), &noise[k], e);
         for (size_t k = 0; ok && k < num; k++)
             for (size_t j = 0; noise[k].blocks > 0 && j < k; j++) {
-                double t = alike_t(&noise[k], &noise[j]); /* NAN: not told */
+                double t = same_noise_t(&noise[k], &noise[j]); /* NAN: not told */
                 json_t *x = json_array_get(grades, k), *y = json_array_get(grades, j);
                 if (t > bound) {
                     add_like(x, y, r->picture[i].name, t, bound);
@@ -187,7 +188,7 @@ bool grade_alike(const char *out, const struct rubric *r, const struct answer_ke
                 }
             }
         for (size_t k = 0; noise != NULL && k < num; k++)
-            alike_noise_free(&noise[k]);
+            same_noise_free(&noise[k]);
     }
     free(noise);
     return ok;

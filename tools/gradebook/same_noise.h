@@ -15,9 +15,9 @@
 
 #include <jansson.h>
 
-enum { ALIKE_FEWEST = 150 }; /* blocks that two pictures have to have in common */
+enum { SAME_NOISE_FEWEST = 150 }; /* blocks that two pictures have to have in common */
 
-struct alike_noise {
+struct noise_print {
     int blocks;
     float *detail; /* 3 per block; NAN: not used */
     float *shared; /* per block: what the reference's noise adds to P */
@@ -26,20 +26,20 @@ struct alike_noise {
 /* Of a picture of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
  * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the picture has less
  * than a quarter of the noise of ours, no block is. False: out of memory. The caller frees. */
-bool alike_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
-                    struct alike_noise *out, struct err *e) __attribute__((warn_unused_result));
-void alike_noise_free(struct alike_noise *n);
+bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
+                   struct noise_print *out, struct err *e) __attribute__((warn_unused_result));
+void same_noise_free(struct noise_print *n);
 
-/* T, NAN where fewer than ALIKE_FEWEST blocks are used in both. */
-double alike_t(const struct alike_noise *a, const struct alike_noise *b);
+/* T, NAN where fewer than SAME_NOISE_FEWEST blocks are used in both. */
+double same_noise_t(const struct noise_print *a, const struct noise_print *b);
 /* What T has to exceed for a chance of alpha over `tests` of them. */
-double alike_bound(double tests, double alpha);
+double same_noise_bound(double tests, double alpha);
 
 /* Compares every pair of a class by the pictures in out/ID that cost neither of them points in an `equal` check (a bug that both
  * have would not be noise), at most ALPHA false alarms in a class on average. Each grade that has a like gets
  * "alike": [{"id": , "picture": , "t": , "bound": }]. */
-#define ALIKE_ALPHA 1e-3
-bool grade_alike(const char *out, const struct rubric *r, const struct answer_key *a,
-                 json_t *grades, struct err *e) __attribute__((warn_unused_result));
+#define SAME_NOISE_ALPHA 1e-3
+bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a, json_t *grades,
+                struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -15,7 +15,7 @@
 
 enum { MAX_PATH = 4400 };
 
-const char grade_page_head[] =
+const char student_page_head[] =
     "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n"
     "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
@@ -26,7 +26,7 @@ const char grade_page_head[] =
     "figcaption{font-size:.85rem;color:#555}.lost{color:#a11}.full{color:#171}.where{color:#555}h2{margin-bottom:.2rem}\n"
     "</style>\n";
 
-const char *grade_text(const json_t *object, const char *key)
+const char *student_page_text(const json_t *object, const char *key)
 {
     const char *text = json_string_value(json_object_get(object, key));
     return text != NULL ? text : "";
@@ -133,7 +133,7 @@ static const json_t *picture_of(const json_t *grade, const char *name)
     json_t *p;
     json_array_foreach(json_object_get(grade, "pictures"), i, p)
     {
-        if (strcmp(grade_text(p, "name"), name) == 0)
+        if (strcmp(student_page_text(p, "name"), name) == 0)
             return p;
     }
     return NULL;
@@ -144,28 +144,27 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
 {
     bool full = member_number(c, "share") >= 1;
     fputs("<section><h3>", f);
-    html_text(f, grade_text(c, "title"));
+    html_text(f, student_page_text(c, "title"));
     fprintf(f, " <span class=\"%s\">%.2f of %g</span></h3>\n", full ? "full" : "lost",
             member_number(c, "points"), member_number(c, "of"));
-    paragraph(f, "Expected:", grade_text(c, "expected"), "");
-    paragraph(f, "Seen:", grade_text(c, "seen"), "");
-    paragraph(f,
-              "Explained by what you were given, no points lost for it:", grade_text(c, "accepted"),
-              "");
+    paragraph(f, "Expected:", student_page_text(c, "expected"), "");
+    paragraph(f, "Seen:", student_page_text(c, "seen"), "");
+    paragraph(f, "Explained by what you were given, no points lost for it:",
+              student_page_text(c, "accepted"), "");
     double share = member_number(c, "share");
     show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
-    const json_t *p = picture_of(grade, grade_text(c, "picture"));
+    const json_t *p = picture_of(grade, student_page_text(c, "picture"));
     bool ok = true;
     if (!full) {
-        paragraph(f, "Hint:", grade_text(c, "hint"), "");
-        paragraph(f, "Where:", grade_text(c, "where"), "where");
+        paragraph(f, "Hint:", student_page_text(c, "hint"), "");
+        paragraph(f, "Where:", student_page_text(c, "where"), "where");
         if (json_is_string(json_object_get(p, "sha256"))) {
             char path[MAX_PATH];
-            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir, grade_text(grade, "id"),
-                     grade_text(p, "file"));
-            ok = show_picture(f, path, grade_text(p, "name"), json_object_get(c, "tile"), e);
-            grade_show_difference(f, c, member_number(p, "width"), member_number(p, "height"));
-            grade_show_intervals(f, c);
+            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir,
+                     student_page_text(grade, "id"), student_page_text(p, "file"));
+            ok = show_picture(f, path, student_page_text(p, "name"), json_object_get(c, "tile"), e);
+            grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
+            grade_plot_intervals(f, c);
         }
     }
     fputs("</section>\n", f);
@@ -178,7 +177,7 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     const json_t *named = json_object_get(diagnosis, "named");
     size_t i;
     json_t *b;
-    const char *finding = grade_text(diagnosis, "finding");
+    const char *finding = student_page_text(diagnosis, "finding");
     if (strcmp(finding, "unknown") == 0)
         fputs(
             "<p>The pictures differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
@@ -190,47 +189,48 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     json_array_foreach(named, i, b)
     {
         fputs("<li>", f);
-        html_text(f, grade_text(b, "bug"));
+        html_text(f, student_page_text(b, "bug"));
         fputs(" <span class=\"where\">(", f);
-        html_text(f, grade_text(b, "where"));
+        html_text(f, student_page_text(b, "where"));
         fputs(")</span></li>\n", f);
     }
     fputs("</ul>\n", f);
 }
 
-bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
+bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
 {
     size_t i;
     json_t *p, *c;
     bool ok = true, left_out = false;
-    fputs(grade_page_head, f);
+    fputs(student_page_head, f);
     fputs("<meta name=\"generator\" content=\"" GRADE_ORIGIN "\">\n<title>", f);
-    html_text(f, grade_text(grade, "id"));
+    html_text(f, student_page_text(grade, "id"));
     fputs("</title>\n<h1>", f);
-    html_text(f, grade_text(grade, "id"));
+    html_text(f, student_page_text(grade, "id"));
     fprintf(f, ": %.2f of %g points</h1>\n<p>", member_number(grade, "points"),
             member_number(grade, "of"));
-    html_text(f, grade_text(grade, "rubric"));
+    html_text(f, student_page_text(grade, "rubric"));
     fputs("</p>\n", f);
-    if (grade_text(grade, "trouble")[0] == '\0' && strcmp(grade_text(grade, "kind"), "images") != 0)
+    if (student_page_text(grade, "trouble")[0] == '\0' &&
+        strcmp(student_page_text(grade, "kind"), "images") != 0)
         show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
-    paragraph(f, "Could not be graded:", grade_text(grade, "trouble"), "lost");
-    paragraph(f, "All of it:", grade_text(grade, "wrong"), "lost");
+    paragraph(f, "Could not be graded:", student_page_text(grade, "trouble"), "lost");
+    paragraph(f, "All of it:", student_page_text(grade, "wrong"), "lost");
     show_bug(f, json_object_get(grade, "diagnosis"));
     fputs("<table>\n", f);
     json_array_foreach(json_object_get(grade, "parts"), i, p)
     {
         fputs("<tr><td>", f);
-        html_text(f, grade_text(p, "number"));
+        html_text(f, student_page_text(p, "number"));
         fputs("</td><td>", f);
-        html_text(f, grade_text(p, "title"));
+        html_text(f, student_page_text(p, "title"));
         fprintf(f, "</td><td class=\"n\">%.2f</td><td>of %g</td></tr>\n",
                 member_number(p, "points"), member_number(p, "of"));
     }
     fputs("</table>\n", f);
     json_array_foreach(json_object_get(grade, "checks"), i, c)
     {
-        if (strcmp(grade_text(c, "visibility"), "visible") == 0)
+        if (strcmp(student_page_text(c, "visibility"), "visible") == 0)
             ok = ok && show_check(f, dir, grade, c, e);
         else
             left_out = true;

@@ -9,29 +9,28 @@
 
 enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
 
-extern const char grade_page_head[]; /* up to the title */
+extern const char student_page_head[]; /* up to the title */
 
 /* What files made of grades say of their origin; grades.json and grade.json say their commands, which may name paths of staff. */
 #define GRADE_CLASS_ORIGIN "made of grades.json, beside it, by assay grade"
 #define GRADE_ORIGIN       "made of grade.json, beside it, by assay grade"
 
 /* "" where there is none. */
-const char *grade_text(const json_t *object, const char *key);
+const char *student_page_text(const json_t *object, const char *key);
 
 /* Of one grade.json (grade_batch.h); its pictures are in dir/ID. */
-bool grade_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
+bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     __attribute__((warn_unused_result));
 
 /* A check's tiles. Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. Of `exact`: the share of
  * pixels that differ. width, height: of the picture. */
-void grade_show_difference(FILE *f, const json_t *check, double width, double height);
+void grade_plot_difference(FILE *f, const json_t *check, double width, double height);
 
 /* A check's intervals against its margins, each over that beyond which there are no points. Nothing where there are
  * none. */
-void grade_show_intervals(FILE *f, const json_t *check);
+void grade_plot_intervals(FILE *f, const json_t *check);
 
 /* Of the whole class, for staff. Fails only out of memory. */
-bool grade_overview(FILE *f, const json_t *grades, struct err *e)
-    __attribute__((warn_unused_result));
+bool class_page(FILE *f, const json_t *grades, struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -64,7 +64,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
 {
     char assay[4096], references[PLAN_PATH + 16];
     int num = 0;
-    char **words = grade_words(argc, argv, s, &num);
+    char **words = grade_options_words(argc, argv, s, &num);
     bool ok = words != NULL || err_set(e, "out of memory");
     beside_program(assay, sizeof assay, "assay");
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
@@ -85,10 +85,10 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
 bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
 {
     struct grade_paths at;
-    struct grade_settings s = grade_defaults(argc, &at);
+    struct grade_settings s = grade_options_default(argc, &at);
     (void)w; /* a job for each submission */
     bool ok = s.submission != NULL || err_set(e, "out of memory");
-    ok = ok && grade_parse(argc, argv, &s, e);
+    ok = ok && grade_options_parse(argc, argv, &s, e);
     if (ok && (s.help || s.only_check || s.prepare || s.again))
         ok = err_set(e, "--help, --check-rubric, --prepare and --again cannot be planned");
     ok = ok && plan_jobs(&s, argc, argv, p, e);
@@ -133,12 +133,12 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
 int grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct grade_paths at;
-    struct grade_settings s = grade_defaults(argc, &at);
+    struct grade_settings s = grade_options_default(argc, &at);
     char references[PLAN_PATH + 16];
     int num = 0;
     const char **words = calloc((size_t)argc + 4, sizeof *words);
     bool ok = (s.submission != NULL && words != NULL) || err_set(e, "out of memory");
-    ok = ok && grade_parse(argc, argv, &s, e) && make_dirs(s.out, e);
+    ok = ok && grade_options_parse(argc, argv, &s, e) && make_dirs(s.out, e);
     for (int k = 0; ok && k < p->num; k++)
         ok = place(p, k, s.out, s.submission[k], e);
     if (ok) {

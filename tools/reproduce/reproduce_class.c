@@ -22,8 +22,8 @@ static bool is_one(const char *path, const char *const *names, const char *grade
 
 static bool source_of(const char *path, char source[MAX_PATH])
 {
-    return strlen(path) < 4000 && (is_one(path, grade_class_files, "grades.json", source) ||
-                                   is_one(path, grade_files, "grade.json", source));
+    return strlen(path) < 4000 && (is_one(path, grade_write_class, "grades.json", source) ||
+                                   is_one(path, grade_write_files, "grade.json", source));
 }
 
 bool reproduce_is_of_class(const char *path)

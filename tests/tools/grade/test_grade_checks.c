@@ -165,7 +165,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
         if (asked != NULL)
             r->picture[i].spp = asked[i];
     }
-    if (!grading_check(r, &r->check[0], a, 0, h, alpha, &out, &e))
+    if (!grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e))
         fail_msg("%s", e.msg);
     for (int i = 0; i < num; i++)
         submitted_image_free(&h->picture[i]);
@@ -352,7 +352,7 @@ static void a_copy_of_the_reference_is_seen(void **state)
     assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
     h->picture[0] = read_back(path);
     a->of[0][0].m = a->of[0][0].noise = reference;
-    assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+    assert_true(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
     result_free(&out);
@@ -397,7 +397,7 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
         assert_non_null(h);
         write_picture("accepted", &cases[k].bug, SPP, path);
         h->picture[0] = read_back(path);
-        if (!grading_all(r, a, h, 1e-5, &out, &set, &e))
+        if (!grade_all_checks(r, a, h, 1e-5, &out, &set, &e))
             fail_msg("%s", e.msg);
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
@@ -436,7 +436,7 @@ static void a_watermark_is_masked(void **state)
             write_picture("mark", &cases[k].bug, SPP, path);
             h->picture[0] = read_back(path);
             a->of[0][0].m = a->of[0][0].noise = reference;
-            assert_true(grading_check(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+            assert_true(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
             if ((out.share == 1) != cases[k].all)
                 fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
             result_free(&out);
@@ -519,7 +519,7 @@ static void rates_are_whole_batches_or_not(void **state)
     (void)state;
     static uint8_t rgb8[3 * PIXELS];
     char path[128];
-    struct rates r;
+    struct rate_image r;
     struct err e;
     static double ours[PIXELS];
     snprintf(path, sizeof path, "%s/rate.png", dir);
@@ -529,7 +529,7 @@ static void rates_are_whole_batches_or_not(void **state)
         memcpy(rgb8 + 3 * p, p < 1024 ? quarter : p < 3000 ? all : odd, 3);
     }
     assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
-    assert_true(rates_read(path, WIDTH, HEIGHT, 64, 16, ours, &r, &e));
+    assert_true(rate_image_read(path, WIDTH, HEIGHT, 64, 16, ours, &r, &e));
     assert_true(r.odd == PIXELS - 3000);
     assert_true(r.early == 1024 + PIXELS - 3000);
     /* The odd ones (rate .118 of 64 is 7.5) are nearest to 16: 72 pixels have 48 too few. */
@@ -538,8 +538,8 @@ static void rates_are_whole_batches_or_not(void **state)
     assert_true(fabs(r.mean - mean) < 1e-9 && fabs(r.more - (mean / right - 1)) < 1e-9);
     assert_true(fabs(r.sd * right - 48 * sqrt(72.0 / PIXELS * (1 - 72.0 / PIXELS) / PIXELS)) <
                 1e-9);
-    assert_false(rates_read(path, 32, 32, 64, 16, ours, &r, &e));
-    assert_false(rates_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
+    assert_false(rate_image_read(path, 32, 32, 64, 16, ours, &r, &e));
+    assert_false(rate_image_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
 }
 
 /* Files that are no pictures, and one that says it is large: the header alone is read. */

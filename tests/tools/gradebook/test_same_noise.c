@@ -61,14 +61,14 @@ static void draw(double *factor, double spp)
 }
 
 /* What is known of a picture: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
-static struct alike_noise noise_of(const double *own, const double *other, double share,
+static struct noise_print noise_of(const double *own, const double *other, double share,
                                    double scale)
 {
     static double mean[3 * PIXELS], tolerance[3 * PIXELS];
     static unsigned char clipped[3 * PIXELS];
     struct submitted_image s = {
         .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
-    struct alike_noise out;
+    struct noise_print out;
     struct curve curve;
     struct err e;
     double lo, hi;
@@ -83,7 +83,7 @@ static struct alike_noise noise_of(const double *own, const double *other, doubl
         mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
         tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;
     }
-    if (!alike_noise_of(&s, &reference, SPP, &out, &e))
+    if (!same_noise_of(&s, &reference, SPP, &out, &e))
         fail_msg("%s", e.msg);
     return out;
 }
@@ -94,7 +94,7 @@ static struct alike_noise noise_of(const double *own, const double *other, doubl
 static void noise_of_their_own(void **state)
 {
     enum { CLASS = 60, PAIRS = CLASS * (CLASS - 1) / 2 };
-    static struct alike_noise noise[CLASS];
+    static struct noise_print noise[CLASS];
     static double factor[PIXELS];
     int tests = 0, high = 0;
     double most = -INFINITY;
@@ -103,7 +103,7 @@ static void noise_of_their_own(void **state)
         draw(factor, SPP);
         noise[k] = noise_of(factor, NULL, 0, 1.01);
         for (int j = 0; j < k; j++) {
-            double t = alike_t(&noise[k], &noise[j]);
+            double t = same_noise_t(&noise[k], &noise[j]);
             assert_true(isfinite(t));
             tests++;
             high += t > 2.33;
@@ -111,11 +111,11 @@ static void noise_of_their_own(void **state)
         }
     }
     printf("independent pairs: %d, T above 2.33: %d, largest %.2f, bound %.2f\n", tests, high, most,
-           alike_bound(PAIRS, 1e-3));
+           same_noise_bound(PAIRS, 1e-3));
     assert_int_equal(tests, PAIRS);
-    assert_true(high <= 40 && most < alike_bound(PAIRS, 1e-3));
+    assert_true(high <= 40 && most < same_noise_bound(PAIRS, 1e-3));
     for (int k = 0; k < CLASS; k++)
-        alike_noise_free(&noise[k]);
+        same_noise_free(&noise[k]);
 }
 
 /* Power, each of 20 times, over the pairs and pictures of a class of 300: the same noise, retouched to be 2 % brighter; half of
@@ -123,18 +123,18 @@ static void noise_of_their_own(void **state)
 static void noise_of_others(void **state)
 {
     static double one[PIXELS], two[PIXELS];
-    double bound = alike_bound(300 * 299 / 2 * 20.0, 1e-3), least = INFINITY, half = INFINITY;
+    double bound = same_noise_bound(300 * 299 / 2 * 20.0, 1e-3), least = INFINITY, half = INFINITY;
     (void)state;
     for (int k = 0; k < 20; k++) {
         draw(one, SPP);
         draw(two, SPP);
-        struct alike_noise a = noise_of(one, NULL, 0, 1), same = noise_of(one, NULL, 0, 1.02),
+        struct noise_print a = noise_of(one, NULL, 0, 1), same = noise_of(one, NULL, 0, 1.02),
                            mixed = noise_of(two, one, 0.5, 1);
-        least = fmin(least, alike_t(&a, &same));
-        half = fmin(half, alike_t(&a, &mixed));
-        alike_noise_free(&a);
-        alike_noise_free(&same);
-        alike_noise_free(&mixed);
+        least = fmin(least, same_noise_t(&a, &same));
+        half = fmin(half, same_noise_t(&a, &mixed));
+        same_noise_free(&a);
+        same_noise_free(&same);
+        same_noise_free(&mixed);
     }
     printf("the same noise: T at least %.1f; half of it: %.1f; bound %.1f\n", least, half, bound);
     assert_true(least > bound && half > bound);
@@ -147,10 +147,10 @@ static void too_fine_to_tell(void **state)
     (void)state;
     draw(one, 1e7);
     draw(two, 1e7);
-    struct alike_noise a = noise_of(one, NULL, 0, 1), b = noise_of(two, NULL, 0, 1);
-    assert_true(isnan(alike_t(&a, &b)));
-    alike_noise_free(&a);
-    alike_noise_free(&b);
+    struct noise_print a = noise_of(one, NULL, 0, 1), b = noise_of(two, NULL, 0, 1);
+    assert_true(isnan(same_noise_t(&a, &b)));
+    same_noise_free(&a);
+    same_noise_free(&b);
 }
 
 int main(void)
