@@ -27,7 +27,7 @@ enum { SIDE = 32, RENDERS = 4 };
 struct pair {
     struct moments a, b, a2, b2;
     struct compare_options opt;
-    struct comparison first; /* by gate_first() */
+    struct comparison first; /* by two_stage_first() */
     double sum;              /* of what came out with memory enough; 0: not known yet */
 };
 
@@ -71,14 +71,14 @@ static bool first_stage(void *ctx, struct err *e)
 {
     struct pair *p = ctx;
     struct comparison c = {0};
-    return finish_comparison(p, &c, gate_first(&p->a, &p->b, &p->opt, &c, e));
+    return finish_comparison(p, &c, two_stage_first(&p->a, &p->b, &p->opt, &c, e));
 }
 
 static bool second_stage(void *ctx, struct err *e)
 {
     struct pair *p = ctx;
     struct comparison c = {0};
-    return finish_comparison(p, &c, gate_confirm(&p->first, &p->a2, &p->b2, &p->opt, &c, e));
+    return finish_comparison(p, &c, two_stage_confirm(&p->first, &p->a2, &p->b2, &p->opt, &c, e));
 }
 
 static bool sums_of_regions(void *ctx, struct err *e)
@@ -115,7 +115,7 @@ static void comparisons(void **state)
     alloc_fail_each("compare_moments", ALLOC_ALL, compare, &p);
     p.sum = 0;
     alloc_fail_each("gate_first", ALLOC_ALL, first_stage, &p);
-    assert_true(gate_first(&p.a, &p.b, &p.opt, &p.first, &e));
+    assert_true(two_stage_first(&p.a, &p.b, &p.opt, &p.first, &e));
     assert_int_equal(p.first.verdict, VERDICT_DIFFERENT);
     p.sum = 0;
     alloc_fail_each("gate_confirm", ALLOC_ALL, second_stage, &p);

@@ -4,9 +4,10 @@
 
 static const double rounding = 1e-3;
 
-struct stop_rule stop_rule_check(const struct moments *m, int batch, double tolerance, int most)
+struct adaptive_stop adaptive_stop_check(const struct moments *m, int batch, double tolerance,
+                                         int most)
 {
-    struct stop_rule r = {0, 0};
+    struct adaptive_stop r = {0, 0};
     size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t p = 0; p < pixels; p++) {
         double n = m->n[p], mean = 0, m2 = 0;

@@ -14,11 +14,12 @@
 
 #include "renderer/image/moments.h"
 
-struct stop_rule {
+struct adaptive_stop {
     int too_early, too_late; /* pixels */
 };
 
 /* Of a render with at most `most` samples a pixel. A pixel without light stops at once. */
-struct stop_rule stop_rule_check(const struct moments *m, int batch, double tolerance, int most);
+struct adaptive_stop adaptive_stop_check(const struct moments *m, int batch, double tolerance,
+                                         int most);
 
 #endif

@@ -5,13 +5,13 @@
 #include <assert.h>
 #include <math.h>
 
-const struct sequence sequence_single = {{0, 0, 0, 0, 1, 0, 0, 0}};
-const struct sequence sequence_declared = {{.02, .04, .06, .08, .80, 0, 0, 0}};
-const struct sequence sequence_open = {{.02, .04, .06, .08, .60, .10, .05, .025}};
+const struct alpha_spending alpha_spending_single = {{0, 0, 0, 0, 1, 0, 0, 0}};
+const struct alpha_spending alpha_spending_declared = {{.02, .04, .06, .08, .80, 0, 0, 0}};
+const struct alpha_spending alpha_spending_open = {{.02, .04, .06, .08, .60, .10, .05, .025}};
 
 static const double size[NUM_LOOKS] = {1.0 / 64, 1.0 / 16, 1.0 / 4, 1.0 / 2, 1, 2, 4, 8};
 
-int sequence_count(int look, int declared, int least)
+int alpha_spending_count(int look, int declared, int least)
 {
     assert(look >= 0 && look < NUM_LOOKS && declared > 0);
     double n = floor(declared * size[look]);
@@ -27,13 +27,13 @@ static bool check_fresh(const struct moments *m, const struct moments *again, co
     size_t values = 3 * (size_t)m->width * (size_t)m->height;
     for (size_t i = 0; i < values; i++)
         if (m->m2[i] > 0)
-            return gate_check_fresh(m, again, e) || err_prefix(e, "%s", side);
+            return two_stage_check_fresh(m, again, e) || err_prefix(e, "%s", side);
     return true;
 }
 
-bool sequence_judge(const struct sequence *q, int look, int stages,
-                    const struct compare_options *opt, sequence_pair pair, void *ctx,
-                    struct comparison *out, int *stage, struct err *e)
+bool alpha_spending_judge(const struct alpha_spending *q, int look, int stages,
+                          const struct compare_options *opt, alpha_spending_pair pair, void *ctx,
+                          struct comparison *out, int *stage, struct err *e)
 {
     struct compare_options o = *opt;
     const struct moments *a, *b, *a2, *b2;
@@ -45,7 +45,7 @@ bool sequence_judge(const struct sequence *q, int look, int stages,
         return false;
     if (stages == 1)
         return compare_moments(a, b, &o, out, e);
-    if (!gate_first(a, b, &o, &first, e))
+    if (!two_stage_first(a, b, &o, &first, e))
         return false;
     if (first.verdict != VERDICT_DIFFERENT) {
         *out = first;
@@ -53,7 +53,7 @@ bool sequence_judge(const struct sequence *q, int look, int stages,
     }
     *stage = 1;
     bool ok = pair(ctx, 1, &a2, &b2, e) && check_fresh(a, a2, "A", e) &&
-              check_fresh(b, b2, "B", e) && gate_confirm(&first, a2, b2, &o, out, e);
+              check_fresh(b, b2, "B", e) && two_stage_confirm(&first, a2, b2, &o, out, e);
     comparison_free(&first);
     return ok;
 }

@@ -9,9 +9,9 @@
  * bound [Pocock77, LanDeMets83: spending; here without their joint law, which no heavy tail keeps].
  *
  *     size    1/64  1/16  1/4  1/2    1    2     4      8
- *     share    2 %   4 %  6 %  8 %  60 %  10 %   5 %  2.5 %   sequence_open: 97.5 %
- *              2 %   4 %  6 %  8 %  80 %                      sequence_declared
- *                                  100 %                      sequence_single
+ *     share    2 %   4 %  6 %  8 %  60 %  10 %   5 %  2.5 %   alpha_spending_open: 97.5 %
+ *              2 %   4 %  6 %  8 %  80 %                      alpha_spending_declared
+ *                                  100 %                      alpha_spending_single
  *
  * Most is spent at the declared size: that is what the scene's margins were planned for. The small
  * looks are for what is far off or was planned too long, the large ones for what was planned too short.
@@ -26,26 +26,27 @@
 
 enum { NUM_LOOKS = 8, LOOK_DECLARED = 4 };
 
-struct sequence {
+struct alpha_spending {
     double share[NUM_LOOKS]; /* 0: no look */
 };
-extern const struct sequence sequence_single, sequence_declared, sequence_open;
+extern const struct alpha_spending alpha_spending_single, alpha_spending_declared,
+    alpha_spending_open;
 
 /* Observations at a look of a side of which `declared` are declared; 0 if there would be fewer than
  * `least`, of which no error rate was measured. The declared number itself is always a look. */
-int sequence_count(int look, int declared, int least);
+int alpha_spending_count(int look, int declared, int least);
 
 /* The observations so far of A and B at this look: stage 0, or stage 1 of fresh seeds (exact sides are
  * the same). False with a line if there are none. */
-typedef bool (*sequence_pair)(void *ctx, int stage, const struct moments **a,
-                              const struct moments **b, struct err *e);
+typedef bool (*alpha_spending_pair)(void *ctx, int stage, const struct moments **a,
+                                    const struct moments **b, struct err *e);
 
 /* One look. opt->alpha is that of the whole claim; share[look] > 0; stages 1 or 2. *stage tells which
  * pair out is of. DIFFERENT and EQUIVALENT are final, INCONCLUSIVE is not. Fails as compare_moments()
  * and pair() do, and if the fresh pair is the first pair again. */
-bool sequence_judge(const struct sequence *q, int look, int stages,
-                    const struct compare_options *opt, sequence_pair pair, void *ctx,
-                    struct comparison *out, int *stage, struct err *e)
+bool alpha_spending_judge(const struct alpha_spending *q, int look, int stages,
+                          const struct compare_options *opt, alpha_spending_pair pair, void *ctx,
+                          struct comparison *out, int *stage, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

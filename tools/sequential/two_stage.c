@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-double gate_stage_alpha(double alpha)
+double two_stage_alpha(double alpha)
 {
     return sqrt(alpha);
 }
@@ -22,10 +22,10 @@ static struct compare_options with_alpha(const struct compare_options *opt, doub
     return o;
 }
 
-bool gate_first(const struct moments *a, const struct moments *b, const struct compare_options *opt,
-                struct comparison *out, struct err *e)
+bool two_stage_first(const struct moments *a, const struct moments *b,
+                     const struct compare_options *opt, struct comparison *out, struct err *e)
 {
-    struct compare_options stage = with_alpha(opt, gate_stage_alpha(opt->alpha));
+    struct compare_options stage = with_alpha(opt, two_stage_alpha(opt->alpha));
     struct compare_options half = with_alpha(opt, opt->alpha / 2);
     if (!compare_moments(a, b, &stage, out, e))
         return false;
@@ -81,12 +81,12 @@ static bool region_again(const struct region *found, const struct moments *a,
     return true;
 }
 
-bool gate_confirm(const struct comparison *first, const struct moments *a2,
-                  const struct moments *b2, const struct compare_options *opt,
-                  struct comparison *second, struct err *e)
+bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
+                       const struct moments *b2, const struct compare_options *opt,
+                       struct comparison *second, struct err *e)
 {
     assert(first->verdict == VERDICT_DIFFERENT);
-    double stage = gate_stage_alpha(opt->alpha);
+    double stage = two_stage_alpha(opt->alpha);
     struct compare_options half = with_alpha(opt, opt->alpha / 2);
     bool region =
         rejected(first, STATISTIC_IMAGE, stage) || rejected(first, STATISTIC_PYRAMID, stage);
@@ -146,7 +146,7 @@ bool gate_confirm(const struct comparison *first, const struct moments *a2,
     return true;
 }
 
-bool gate_check_fresh(const struct moments *first, const struct moments *again, struct err *e)
+bool two_stage_check_fresh(const struct moments *first, const struct moments *again, struct err *e)
 {
     if (first->width != again->width || first->height != again->height)
         return err_set(e, "is %d x %d pixels, its first render %d x %d", again->width,

@@ -8,9 +8,9 @@
  *
  * A wrong EQUIVALENT has the chance alpha over both stages together: each may say it at alpha/2.
  *
- *     gate_first(a, b, opt, &first, e)        DIFFERENT means: flagged; any other verdict is final
+ *     two_stage_first(a, b, opt, &first, e)        DIFFERENT means: flagged; any other verdict is final
  *     .. render A and B again, both with seeds never used before ..
- *     gate_confirm(&first, a2, b2, opt, &second, e)            second->verdict is the claim's
+ *     two_stage_confirm(&first, a2, b2, opt, &second, e)            second->verdict is the claim's
  */
 #ifndef ASSAY_TWO_STAGE_H
 #define ASSAY_TWO_STAGE_H
@@ -18,27 +18,29 @@
 #include "tools/compare/compare.h"
 
 /* sqrt(alpha): the level of one stage. */
-double gate_stage_alpha(double alpha);
+double two_stage_alpha(double alpha);
 
 /* Stage 1. opt->alpha is that of the whole claim. Where nothing is flagged, out is the comparison at
  * alpha/2, and its verdict EQUIVALENT or INCONCLUSIVE is final; else it is the one at sqrt(alpha),
  * and DIFFERENT. Its mdb is then no bound of what two stages miss; that of the unflagged one is
  * (for alpha up to 1e-2), as alpha/2 is stricter than two stages. Fails as compare_moments() does. */
-bool gate_first(const struct moments *a, const struct moments *b, const struct compare_options *opt,
-                struct comparison *out, struct err *e) __attribute__((warn_unused_result));
+bool two_stage_first(const struct moments *a, const struct moments *b,
+                     const struct compare_options *opt, struct comparison *out, struct err *e)
+    __attribute__((warn_unused_result));
 
-/* Stage 2, for a `first` that is DIFFERENT by gate_first() (same opt). Both a2 and b2 must have been
+/* Stage 2, for a `first` that is DIFFERENT by two_stage_first() (same opt). Both a2 and b2 must have been
  * observed afresh, unless exact: a stored reference used in both stages puts its own noise into
  * both. second: the comparison of the second pair at alpha/2 with the claim's verdict: DIFFERENT if
  * confirmed; else what the second pair says by itself, where DIFFERENT (at another place, which
  * needs another fresh pair) becomes INCONCLUSIVE. Its reason tells of both stages. */
-bool gate_confirm(const struct comparison *first, const struct moments *a2,
-                  const struct moments *b2, const struct compare_options *opt,
-                  struct comparison *second, struct err *e) __attribute__((warn_unused_result));
+bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
+                       const struct moments *b2, const struct compare_options *opt,
+                       struct comparison *second, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* Fails with a line if the second observation of a side has the very numbers of the first (the seed
  * was ignored, or the file is the same), other than exact ones, or another size or unit. */
-bool gate_check_fresh(const struct moments *first, const struct moments *again, struct err *e)
+bool two_stage_check_fresh(const struct moments *first, const struct moments *again, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -75,10 +75,10 @@ int side_count(const struct side *s, int look)
     case SIDE_OURS:
         if (is_whole(s->variant))
             return look == LOOK_DECLARED ? all : 0;
-        return sequence_count(look, all, LEAST_SAMPLES);
+        return alpha_spending_count(look, all, LEAST_SAMPLES);
     case SIDE_LIVE: {
         int least = all < LEAST_REPLICATES ? all : LEAST_REPLICATES,
-            n = sequence_count(look, all, 1);
+            n = alpha_spending_count(look, all, 1);
         return n > least ? n : least;
     }
     case SIDE_ENGINE: return look == LOOK_DECLARED;
@@ -122,7 +122,7 @@ static void file_of(const struct validation *v, const struct side *s, int stage,
                     const char *ending, char file[256])
 {
     char n[16] = "";
-    if (v->sequence != &sequence_single && side_grows(s))
+    if (v->sequence != &alpha_spending_single && side_grows(s))
         snprintf(n, sizeof n, "_%d", side_count(s, look));
     snprintf(file, 256, "data/%s/%s%s%s.%s", s->scene->name, s->name,
              stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n, ending);
@@ -143,7 +143,7 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                         int first, struct observed *out, struct err *e)
 {
     char file[256], path[MAX_PATH], log[MAX_PATH];
-    bool keep = first == 0 && v->sequence == &sequence_single;
+    bool keep = first == 0 && v->sequence == &alpha_spending_single;
     file_of(v, s, stage, look, "log", file);
     full_path(v, file, log);
     file_of(v, s, stage, look, keep ? "exr" : "part.exr", file);

@@ -67,7 +67,7 @@ static bool check_fresh(const char *const path[2], const struct moments first[2]
                         const struct pair *again, struct err *e)
 {
     for (int i = 0; i < 2; i++)
-        if (!gate_check_fresh(&first[i], &again->in[i].m, e))
+        if (!two_stage_check_fresh(&first[i], &again->in[i].m, e))
             return err_prefix(e, "%s", path[i]);
     return true;
 }
@@ -80,7 +80,7 @@ static bool second_stage(const struct compare_job *job, const struct compare_opt
     if (!pair_read(job, job->again, &again, &out->notes, e))
         return false;
     bool ok = check_fresh(job->again, out->m, &again, e) &&
-              gate_confirm(&first, &again.in[0].m, &again.in[1].m, opt, &second, e);
+              two_stage_confirm(&first, &again.in[0].m, &again.in[1].m, opt, &second, e);
     if (ok) {
         input_limit(&again.in[0], opt->tile, &second);
         comparison_free(&first);
@@ -102,7 +102,7 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
         opt.tile = default_tile(&p.in[1].m);
     out->tile = opt.tile;
     bool two = job->again[0] != NULL;
-    bool ok = two ? gate_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
+    bool ok = two ? two_stage_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
     if (ok && p.in[0].is_guessed && opt.margin_variance > 0)
         ok =
@@ -155,7 +155,7 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     struct renders r[2] = {{0}};
     struct compare_options opt = job->opt;
     bool two = job->again[0] != NULL;
-    struct permutation_options stage = {two ? gate_stage_alpha(opt.alpha) : opt.alpha,
+    struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha,
                                         job->min_side};
     bool ok = renders_read(job->path[0], &r[0], e) && renders_read(job->path[1], &r[1], e);
     for (int i = 0; ok && i < 2; i++) {

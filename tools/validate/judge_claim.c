@@ -24,7 +24,7 @@ static void rerun_command(const struct validation *v, const struct task *t, char
                  o->engine->file, o->engine_spp, o->engine_replicates);
     if (o->budget_s > 0)
         snprintf(how, sizeof how, " --budget %gs", o->budget_s);
-    else if (v->sequence != &sequence_single)
+    else if (v->sequence != &alpha_spending_single)
         snprintf(how, sizeof how, " --until-different");
     char name[CLAIM_NAME];
     task_name(t, name);
@@ -233,7 +233,7 @@ static void look(struct validation *v, struct task *t)
     struct err e = {""};
     int stage;
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
-    bool ok = sequence_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
+    bool ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
     t->cpu_a += t->a->cpu_s - before_a;
     t->cpu_b += t->b->cpu_s - before_b;
     if (!ok && p.no_time) {
@@ -257,7 +257,7 @@ static void look(struct validation *v, struct task *t)
     if (c.verdict != VERDICT_INCONCLUSIVE)
         finish(v, t, NULL);
     else if (t->next == NUM_LOOKS)
-        finish(v, t, t->looks == &sequence_single ? NULL : "all looks are taken");
+        finish(v, t, t->looks == &alpha_spending_single ? NULL : "all looks are taken");
     else if (t->look >= LOOK_DECLARED && t->b->kind == SIDE_GOLDEN &&
              noise_share(v, t) < least_noise_share)
         finish(v, t, "the noise left is that of the stored reference");

@@ -163,12 +163,12 @@ void task_settle(struct task *t)
 }
 
 /* v's looks, if the other side can follow at other sizes than the declared one. */
-static const struct sequence *looks_of(const struct validation *v, const struct side *a,
-                                       const struct side *b)
+static const struct alpha_spending *looks_of(const struct validation *v, const struct side *a,
+                                             const struct side *b)
 {
     bool grows = side_grows(a) || side_grows(b);
     return grows && side_is_at_any_look(a) && side_is_at_any_look(b) ? v->sequence
-                                                                     : &sequence_single;
+                                                                     : &alpha_spending_single;
 }
 
 static void add_task(struct validation *v, const struct suite_scene *s, struct side *a,
@@ -223,7 +223,7 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     }
     if (s->consistency.renders > 0)
         v->task[v->num_tasks++] =
-            (struct task){.scene = s, .looks = &sequence_single, .next = LOOK_DECLARED};
+            (struct task){.scene = s, .looks = &alpha_spending_single, .next = LOOK_DECLARED};
 }
 
 bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)

@@ -49,7 +49,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
 struct findings {
     struct consistency c;
     struct efficiency noise;
-    struct stop_rule stop;
+    struct adaptive_stop stop;
 };
 
 static bool judge_noise(const struct suite_scene *s, const struct moments *render, double alpha,
@@ -66,7 +66,7 @@ static bool judge_noise(const struct suite_scene *s, const struct moments *rende
 }
 
 static bool judge_stop(const struct validate_options *opt, const struct suite_scene *s,
-                       double deadline, struct stop_rule *out, double *seconds, struct err *e)
+                       double deadline, struct adaptive_stop *out, double *seconds, struct err *e)
 {
     char batch[16], tolerance[32];
     snprintf(batch, sizeof batch, "%d", s->consistency.batch);
@@ -76,7 +76,8 @@ static bool judge_stop(const struct validate_options *opt, const struct suite_sc
     if (!render_one(opt, s, s->consistency.renders, s->consistency.most, options, deadline, &m,
                     seconds, e))
         return false;
-    *out = stop_rule_check(&m, s->consistency.batch, s->consistency.tolerance, s->consistency.most);
+    *out = adaptive_stop_check(&m, s->consistency.batch, s->consistency.tolerance,
+                               s->consistency.most);
     moments_free(&m);
     return true;
 }

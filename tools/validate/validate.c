@@ -53,7 +53,7 @@ static double round_of(const struct validation *v, const struct task *t)
 {
     if (v->opt->until_different)
         return t->scene->expect == VERDICT_DIFFERENT;
-    if (t->looks == &sequence_single)
+    if (t->looks == &alpha_spending_single)
         return cost(t) > 0 ? 1.5 : 0.5;
     return (double)json_array_size(t->history);
 }
@@ -65,7 +65,7 @@ static struct task *choose(const struct validation *v)
         struct task *t = &v->task[i];
         if (t->result != NULL || t->stalled)
             continue;
-        if (v->sequence == &sequence_single)
+        if (v->sequence == &alpha_spending_single)
             return t;
         if (best == NULL || round_of(v, t) < round_of(v, best) ||
             (round_of(v, t) == round_of(v, best) && cost(t) < cost(best)))
@@ -77,7 +77,7 @@ static struct task *choose(const struct validation *v)
 static void tell_round(const struct validation *v, const struct task *t)
 {
     char note[160];
-    if (t->a == NULL || v->sequence == &sequence_single)
+    if (t->a == NULL || v->sequence == &alpha_spending_single)
         return;
     snprintf(note, sizeof note, "look %d of %d, %s against %s: %d samples; %d claims undecided",
              t->next + 1, NUM_LOOKS, t->a->name, t->ref.engine, side_count(t->a, t->next),
@@ -142,11 +142,11 @@ static bool take_looks(struct validation *v, const json_t *root, struct err *e)
 
 static const double small_alpha = 1e-5; /* of a run: below, no tail is known well enough */
 
-static const struct sequence *sequence_of(const struct validate_options *o)
+static const struct alpha_spending *sequence_of(const struct validate_options *o)
 {
     if (o->budget_s > 0)
-        return &sequence_open;
-    return o->until_different ? &sequence_declared : &sequence_single;
+        return &alpha_spending_open;
+    return o->until_different ? &alpha_spending_declared : &alpha_spending_single;
 }
 
 static int stages_of(const struct validate_options *o)

@@ -27,13 +27,13 @@ struct validate_options {
     int threads;
     double timeout_s; /* of one program */
     bool quiet;
-    /* Looks up to the declared samples (sequence_declared), the small ones of all scenes first, and stop
+    /* Looks up to the declared samples (alpha_spending_declared), the small ones of all scenes first, and stop
      * at the first claim that comes out DIFFERENT against expectation: to find out fast that a renderer
      * is wrong. alpha is still divided by all claims; those undecided by then are
      * INCONCLUSIVE, those not looked at are not in the results. */
     bool until_different;
     /* Wall time. Above 0: each claim is looked at again and again, with samples that double, until it is
-     * decided or the time is over (sequence_open), and alpha is spent over the looks (alpha_spending.h). 0: one
+     * decided or the time is over (alpha_spending_open), and alpha is spent over the looks (alpha_spending.h). 0: one
      * look, at the declared samples. */
     double budget_s;
     /* 2: what DIFFERENT flags at sqrt(alpha) is confirmed with fresh seeds at sqrt(alpha) (two_stage.h), where

@@ -55,7 +55,7 @@ struct task {
     struct side *a, *b;         /* NULL: the claim of consistency */
     struct suite_reference ref; /* b's name and class; the claim's margins */
     enum verdict expected;
-    const struct sequence *looks;
+    const struct alpha_spending *looks;
     int stages;   /* 1 or 2 */
     int next;     /* look; NUM_LOOKS: none is left */
     bool stalled; /* what is left of the budget is too short for it */
@@ -74,7 +74,7 @@ struct validation {
     struct scene_sides *sides; /* per scene */
     struct task *task;
     int num_tasks, done;
-    const struct sequence *sequence;
+    const struct alpha_spending *sequence;
     int stages;
     double start, deadline; /* of now_seconds(); deadline INFINITY: none */
     double shown;           /* when the last look so far was shown, or the start */

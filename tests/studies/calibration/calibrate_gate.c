@@ -23,13 +23,13 @@ static bool stages_pair(const struct stages_cell *cell, struct library *l, bool 
     library_renew(l, RENEWED);
     library_image(l, cell->n / l->n, is_grey, NULL, a);
     library_image(l, cell->n / l->n, is_grey, a, b);
-    if (!gate_first(a, b, &opt, &first, e))
+    if (!two_stage_first(a, b, &opt, &first, e))
         return false;
     bool flagged = first.verdict == VERDICT_DIFFERENT, ok = true;
     if (flagged) {
         library_image(l, cell->n / l->n, is_grey, NULL, a);
         library_image(l, cell->n / l->n, is_grey, a, b);
-        ok = gate_confirm(&first, a, b, &opt, &second, e);
+        ok = two_stage_confirm(&first, a, b, &opt, &second, e);
         if (ok) {
             count[1] += second.verdict == VERDICT_DIFFERENT;
             comparison_free(&second);
@@ -139,7 +139,7 @@ bool stages_run(struct work *w, const struct stages_cell *cell, size_t pairs, si
 
 bool stages_check(const struct stages_result *r, struct checks *c)
 {
-    bool flagged = check_at_most(c, r->flagged, r->pairs, gate_stage_alpha(r->alpha),
+    bool flagged = check_at_most(c, r->flagged, r->pairs, two_stage_alpha(r->alpha),
                                  "%s: flagged by the first of two stages at %g", r->name, r->alpha);
     return check_at_most(c, r->different, r->pairs, r->alpha, "%s: two stages at %g", r->name,
                          r->alpha) &&

@@ -102,7 +102,7 @@ static bool pair_of(void *ctx, int stage, const struct moments **a, const struct
 {
     struct claim *c = ctx;
     (void)e;
-    int n = sequence_count(c->look, DECLARED, BLOCK);
+    int n = alpha_spending_count(c->look, DECLARED, BLOCK);
     grow(&c->a[stage], n);
     grow(&c->b[stage], n);
     *a = &c->a[stage].m;
@@ -119,8 +119,8 @@ struct tally {
     double samples;                      /* of A, mean over claims, as multiple of the declared */
 };
 
-static struct tally run(const struct sequence *q, int stages, struct compare_options opt, bool grey,
-                        double bias, int claims, uint64_t seed, bool all_looks)
+static struct tally run(const struct alpha_spending *q, int stages, struct compare_options opt,
+                        bool grey, double bias, int claims, uint64_t seed, bool all_looks)
 {
     struct tally t = {.claims = claims};
     for (int i = 0; i < claims; i++) {
@@ -134,12 +134,12 @@ static struct tally run(const struct sequence *q, int stages, struct compare_opt
         bool decided = false, different = false, equivalent = false;
         int n = 0;
         for (c.look = 0; c.look < NUM_LOOKS && (all_looks || !decided); c.look++) {
-            int size = sequence_count(c.look, DECLARED, BLOCK), stage;
+            int size = alpha_spending_count(c.look, DECLARED, BLOCK), stage;
             struct comparison r;
             struct err e;
             if (q->share[c.look] == 0 || size == 0)
                 continue;
-            if (!sequence_judge(q, c.look, stages, &opt, pair_of, &c, &r, &stage, &e))
+            if (!alpha_spending_judge(q, c.look, stages, &opt, pair_of, &c, &r, &stage, &e))
                 fail_msg("%s", e.msg);
             different = different || r.verdict == VERDICT_DIFFERENT;
             equivalent = equivalent || r.verdict == VERDICT_EQUIVALENT;
@@ -173,14 +173,15 @@ static void print(const char *what, const struct tally *t)
     print_message(" %%; %.2f x declared\n", t->samples);
 }
 
-static const struct sequence every_look_at_alpha = {{1, 1, 1, 1, 1, 1, 1, 1}};
+static const struct alpha_spending every_look_at_alpha = {{1, 1, 1, 1, 1, 1, 1, 1}};
 static const double alpha = 0.05;
 
 /* By hand from the table in alpha_spending.h. */
 static void test_schedule(void **state)
 {
     (void)state;
-    const struct sequence *all[] = {&sequence_single, &sequence_declared, &sequence_open};
+    const struct alpha_spending *all[] = {&alpha_spending_single, &alpha_spending_declared,
+                                          &alpha_spending_open};
     const double sum[] = {1, 1, .975};
     for (int i = 0; i < 3; i++) {
         double s = 0;
@@ -192,11 +193,11 @@ static void test_schedule(void **state)
     const int of_64[NUM_LOOKS] = {0, 0, 16, 32, 64, 128, 256, 512};
     const int of_4096[NUM_LOOKS] = {64, 256, 1024, 2048, 4096, 8192, 16384, 32768};
     for (int l = 0; l < NUM_LOOKS; l++) {
-        assert_int_equal(sequence_count(l, 64, 16), of_64[l]);
-        assert_int_equal(sequence_count(l, 4096, 16), of_4096[l]);
+        assert_int_equal(alpha_spending_count(l, 64, 16), of_64[l]);
+        assert_int_equal(alpha_spending_count(l, 4096, 16), of_4096[l]);
     }
-    assert_int_equal(sequence_count(LOOK_DECLARED, 4, 16), 4);
-    assert_int_equal(sequence_count(LOOK_DECLARED - 1, 4, 16), 0);
+    assert_int_equal(alpha_spending_count(LOOK_DECLARED, 4, 16), 4);
+    assert_int_equal(alpha_spending_count(LOOK_DECLARED - 1, 4, 16), 0);
 }
 
 /* H0: equal means. DIFFERENT at any of the looks, had all been taken, at most alpha. (Margins 0, so
@@ -205,7 +206,7 @@ static void test_false_different(void **state)
 {
     (void)state;
     struct compare_options opt = {.alpha = alpha, .tile = SIDE};
-    struct tally t = run(&sequence_open, 1, opt, false, 0, CLAIMS, 1, true);
+    struct tally t = run(&alpha_spending_open, 1, opt, false, 0, CLAIMS, 1, true);
     struct tally naive = run(&every_look_at_alpha, 1, opt, false, 0, CLAIMS, 2, true);
     print_message("null, alpha 5 %%: DIFFERENT at any look %.2f %%; each look at alpha %.2f %%\n",
                   100.0 * t.ever_different / CLAIMS, 100.0 * naive.ever_different / CLAIMS);
@@ -221,7 +222,7 @@ static void test_false_equivalent(void **state)
     (void)state;
     struct compare_options opt = {
         .alpha = alpha, .margin_global = .03, .margin_tile = .25, .tile = 4};
-    struct tally t = run(&sequence_open, 1, opt, true, .03 * (1 + 1e-6), CLAIMS, 3, true);
+    struct tally t = run(&alpha_spending_open, 1, opt, true, .03 * (1 + 1e-6), CLAIMS, 3, true);
     struct tally naive = run(&every_look_at_alpha, 1, opt, true, .03 * (1 + 1e-6), CLAIMS, 4, true);
     print_message("bias at the margin, alpha 5 %%: EQUIVALENT at any look %.2f %%, DIFFERENT %.2f "
                   "%%; each look at alpha %.2f %%\n",
@@ -246,8 +247,9 @@ static void test_saving(void **state)
     const char *const name[] = {"equal", "bias 50 %", "bias 6 %, half the margin", "bias 20 %"};
     struct tally t[4], single[4];
     for (int i = 0; i < 4; i++) {
-        t[i] = run(&sequence_open, 1, opt, true, bias[i], RUNS, 10 + (uint64_t)i, false);
-        single[i] = run(&sequence_single, 1, opt, true, bias[i], RUNS, 10 + (uint64_t)i, false);
+        t[i] = run(&alpha_spending_open, 1, opt, true, bias[i], RUNS, 10 + (uint64_t)i, false);
+        single[i] =
+            run(&alpha_spending_single, 1, opt, true, bias[i], RUNS, 10 + (uint64_t)i, false);
         print(name[i], &t[i]);
         print("  one look", &single[i]);
         assert_true(t[i].different + t[i].equivalent >=
@@ -271,10 +273,10 @@ static void test_two_stages(void **state)
     (void)state;
     const double product = 0.01;
     struct compare_options opt = {.alpha = product, .tile = SIDE}, one = opt;
-    one.alpha = gate_stage_alpha(product);
+    one.alpha = two_stage_alpha(product);
     assert_true(fabs(one.alpha - .1) < 1e-12);
-    struct tally t = run(&sequence_single, 2, opt, false, 0, CLAIMS, 21, true);
-    struct tally first = run(&sequence_single, 1, one, false, 0, CLAIMS, 22, true);
+    struct tally t = run(&alpha_spending_single, 2, opt, false, 0, CLAIMS, 21, true);
+    struct tally first = run(&alpha_spending_single, 1, one, false, 0, CLAIMS, 22, true);
     int shared = 0;
     uint64_t seed = 23;
     for (int i = 0; i < CLAIMS; i++) {
@@ -286,10 +288,10 @@ static void test_two_stages(void **state)
         grow(&a, 512);
         grow(&a2, 512);
         grow(&b, 64);
-        if (!gate_first(&a.m, &b.m, &opt, &r, &e))
+        if (!two_stage_first(&a.m, &b.m, &opt, &r, &e))
             fail_msg("%s", e.msg);
         if (r.verdict == VERDICT_DIFFERENT) {
-            if (!gate_confirm(&r, &a2.m, &b.m, &opt, &r2, &e))
+            if (!two_stage_confirm(&r, &a2.m, &b.m, &opt, &r2, &e))
                 fail_msg("%s", e.msg);
             shared += r2.verdict == VERDICT_DIFFERENT;
             comparison_free(&r2);
@@ -316,8 +318,8 @@ static void test_two_stages_in_sequence(void **state)
     enum { RUNS = 100 };
     struct compare_options opt = {
         .alpha = 1e-9, .margin_global = .12, .margin_tile = .4, .tile = 4};
-    struct tally wrong = run(&sequence_open, 2, opt, true, .5, RUNS, 31, false);
-    struct tally equal = run(&sequence_open, 2, opt, true, 0, RUNS, 32, false);
+    struct tally wrong = run(&alpha_spending_open, 2, opt, true, .5, RUNS, 31, false);
+    struct tally equal = run(&alpha_spending_open, 2, opt, true, 0, RUNS, 32, false);
     print("alpha 1e-9, two stages, bias 50 %", &wrong);
     print("alpha 1e-9, two stages, equal", &equal);
     assert_int_equal(wrong.different, RUNS);
@@ -331,7 +333,8 @@ static void test_two_stages_in_sequence(void **state)
     struct comparison r;
     struct err e;
     int stage;
-    assert_false(sequence_judge(&sequence_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e));
+    assert_false(
+        alpha_spending_judge(&alpha_spending_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e));
     assert_non_null(strstr(e.msg, "fresh seeds"));
     for (int k = 0; k < 2; k++) {
         moments_free(&c.a[k].m);

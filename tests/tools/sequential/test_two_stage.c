@@ -36,13 +36,13 @@ static enum verdict run(const struct world *w, const struct compare_options *opt
 {
     struct comparison first, second;
     struct err e;
-    if (!gate_first(&w->a, &w->b, opt, &first, &e))
+    if (!two_stage_first(&w->a, &w->b, opt, &first, &e))
         fail_msg("%s", e.msg);
     enum verdict v = first.verdict;
     *flagged = v == VERDICT_DIFFERENT;
     if (*flagged) {
         const struct moments *a2 = first_only ? &w->a : &w->a2, *b2 = first_only ? &w->b : &w->b2;
-        if (!gate_confirm(&first, a2, b2, opt, &second, &e))
+        if (!two_stage_confirm(&first, a2, b2, opt, &second, &e))
             fail_msg("%s", e.msg);
         v = second.verdict;
         if (reason != NULL)
@@ -86,7 +86,7 @@ static void test_confirmed(void **state)
     paint(&w, 16, 1, 1.2, &seed);
     assert_int_not_equal(run(&w, &opt, false, &flagged, NULL), VERDICT_DIFFERENT);
     assert_false(flagged);
-    assert_true(fabs(gate_stage_alpha(1e-6) - 1e-3) < 1e-18);
+    assert_true(fabs(two_stage_alpha(1e-6) - 1e-3) < 1e-18);
     free_world(&w);
 }
 
@@ -150,14 +150,14 @@ static void test_check_fresh(void **state)
     struct err e;
     uint64_t seed = 4;
     paint(&w, 16, 1, 1, &seed);
-    assert_true(gate_check_fresh(&w.a, &w.a2, &e));
-    assert_false(gate_check_fresh(&w.a, &w.a, &e));
+    assert_true(two_stage_check_fresh(&w.a, &w.a2, &e));
+    assert_false(two_stage_check_fresh(&w.a, &w.a, &e));
     assert_non_null(strstr(e.msg, "fresh seeds"));
     strcpy(w.a.unit, "exact");
-    assert_true(gate_check_fresh(&w.a, &w.a, &e));
-    assert_false(gate_check_fresh(&w.a, &w.a2, &e));
+    assert_true(two_stage_check_fresh(&w.a, &w.a, &e));
+    assert_false(two_stage_check_fresh(&w.a, &w.a2, &e));
     struct moments small = new_moments(4, 4, "sample");
-    assert_false(gate_check_fresh(&w.b, &small, &e));
+    assert_false(two_stage_check_fresh(&w.b, &small, &e));
     assert_non_null(strstr(e.msg, "4 x 4"));
     moments_free(&small);
     free_world(&w);

@@ -176,7 +176,7 @@ static bool holds(enum rule rule, double s1, double s2, double n, double toleran
     return false;
 }
 
-static struct stop_rule adapt(enum rule rule)
+static struct adaptive_stop adapt(enum rule rule)
 {
     enum { BATCH = 16, MOST = 4096 };
     const double tolerance = 0.1;
@@ -195,7 +195,7 @@ static struct stop_rule adapt(enum rule rule)
                 break;
         }
     }
-    struct stop_rule r = stop_rule_check(&m, BATCH, tolerance, MOST);
+    struct adaptive_stop r = adaptive_stop_check(&m, BATCH, tolerance, MOST);
     moments_free(&m);
     return r;
 }
@@ -203,7 +203,7 @@ static struct stop_rule adapt(enum rule rule)
 static void stop_rules_are_told_apart(void **state)
 {
     (void)state;
-    struct stop_rule r = adapt(AS_ASKED);
+    struct adaptive_stop r = adapt(AS_ASKED);
     assert_int_equal(r.too_early, 0);
     assert_int_equal(r.too_late, 0);
     assert_true(adapt(ONE_SIGMA).too_early > PIXELS / 2);
