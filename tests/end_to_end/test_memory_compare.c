@@ -130,11 +130,11 @@ static void comparisons(void **state)
 static bool spatial(void *ctx, struct err *e)
 {
     struct pair *p = ctx;
-    struct spatial s;
+    struct noise_estimate s;
     alloc_fail_off();
     struct moments a = drawn(1, 1), b = drawn(1, 2);
     alloc_fail_on();
-    bool ok = spatial_variance(&a, &b, NULL, NULL, NULL, &s, e);
+    bool ok = noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, e);
     alloc_fail_off();
     if (ok)
         hold(&p->sum, a.m2[77] + s.factor[1]);

@@ -63,7 +63,7 @@ struct maker {
 };
 
 /* The correct renderer's batches, kept while a view's bugs are rendered. */
-struct base {
+struct error_modes_base {
     struct diagnose_job job;
     struct signature batch[BATCHES];
 };
@@ -130,8 +130,8 @@ static bool is_same_view(const struct view *a, const struct view *b)
            a->seed == b->seed;
 }
 
-static bool render(const struct base *base, const char *program, int batch, struct signature *out,
-                   struct err *e)
+static bool render(const struct error_modes_base *base, const char *program, int batch,
+                   struct signature *out, struct err *e)
 {
     struct diagnose_job job = base->job;
     job.program = program;
@@ -159,7 +159,7 @@ static int repeat(const struct signature *s, int times, struct signature *all)
     return times;
 }
 
-static bool make_batches(struct base *base, const char *program, struct err *e)
+static bool make_batches(struct error_modes_base *base, const char *program, struct err *e)
 {
     for (int k = 0; k < BATCHES; k++)
         if (!render(base, program, k, &base->batch[k], e))
@@ -168,7 +168,8 @@ static bool make_batches(struct base *base, const char *program, struct err *e)
 }
 
 /* A mean that depends on the number of samples asked for needs more renders instead of longer ones. */
-static bool make_correct(struct base *base, const char *program, struct view *v, struct err *e)
+static bool make_correct(struct error_modes_base *base, const char *program, struct view *v,
+                         struct err *e)
 {
     struct signature all[BATCHES + LONG_FACTOR * LONG], s;
     int num = BATCHES, times = v->fixed_spp ? 1 : LONG_FACTOR;
@@ -195,8 +196,8 @@ static bool make_correct(struct base *base, const char *program, struct view *v,
 }
 
 /* The mean difference and its variance. */
-static void set_effect(const struct base *base, const struct signature *bug, const struct view *v,
-                       struct effect *out)
+static void set_effect(const struct error_modes_base *base, const struct signature *bug,
+                       const struct view *v, struct effect *out)
 {
     int values = 3 * v->correct.columns * v->correct.rows;
     bool same = same_values(&bug[0], &bug[1]); /* the seed is ignored */
@@ -233,8 +234,8 @@ static void set_effect(const struct base *base, const struct signature *bug, con
     }
 }
 
-static bool make_effect(const struct maker *m, const struct base *base, struct view *v, int b,
-                        struct err *e)
+static bool make_effect(const struct maker *m, const struct error_modes_base *base, struct view *v,
+                        int b, struct err *e)
 {
     struct signature bug[BATCHES];
     char program[4400];
@@ -274,7 +275,7 @@ static void take_over(struct maker *m, struct view *v, bool *missing)
 /* Bugs of one view, rendered by several threads: each takes the next one that is missing. */
 struct crew {
     const struct maker *m;
-    const struct base *base;
+    const struct error_modes_base *base;
     struct view *view;
     const bool *missing;
     pthread_mutex_t lock;
@@ -302,7 +303,7 @@ static int next_bug(struct crew *c)
 static void *work(void *arg)
 {
     struct worker *w = arg;
-    struct base base = *w->crew->base;
+    struct error_modes_base base = *w->crew->base;
     struct err e = {""};
     base.job.work_dir = w->work;
     for (int b; (b = next_bug(w->crew)) >= 0;)
@@ -315,7 +316,7 @@ static void *work(void *arg)
     return NULL;
 }
 
-static bool make_effects(const struct maker *m, const struct base *base, struct view *v,
+static bool make_effects(const struct maker *m, const struct error_modes_base *base, struct view *v,
                          const bool *missing, struct err *e)
 {
     enum { MOST = 64 };
@@ -344,7 +345,7 @@ static bool make_effects(const struct maker *m, const struct base *base, struct 
 static bool make_view(struct maker *m, int i, struct err *e)
 {
     struct view *v = &m->made.view[m->made.num_views];
-    struct base *base = calloc(1, sizeof *base);
+    struct error_modes_base *base = calloc(1, sizeof *base);
     bool *missing = calloc((size_t)m->made.num_bugs, sizeof *missing), any = false;
     bool ok = (base != NULL && missing != NULL) || err_set(e, "out of memory");
     ok = ok && set_view(m, i, v, e);

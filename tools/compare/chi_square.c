@@ -68,7 +68,7 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
 
 /* From level `first` on. `part` has room for the regions of that level twice. */
 static void test(struct judge *j, const struct pyramid *p, int channel, int first,
-                 struct part *part, struct dense *d)
+                 struct part *part, struct chi_square *d)
 {
     size_t regions = (size_t)p->level[first].nx * (size_t)p->level[first].ny;
     struct part *from = part, *to = part + regions;
@@ -84,14 +84,14 @@ static void test(struct judge *j, const struct pyramid *p, int channel, int firs
     }
     if (from->num < 2) /* one square is what the pyramid tests */
         return;
-    j->num_tests[STATISTIC_DENSE]++;
+    j->num_tests[STATISTIC_CHI_SQUARE]++;
     double log10_p = fmax(region_smallest_log10_p, stats_chi2_log10_p(from->sum, from->num));
     if (log10_p < d->log10_p)
-        *d = (struct dense){log10_p, channel, p->level[first].side, from->num};
+        *d = (struct chi_square){log10_p, channel, p->level[first].side, from->num};
 }
 
-bool dense_scan(struct judge *j, const struct pyramid *p, int channel, struct dense *d,
-                struct err *e)
+bool chi_square_scan(struct judge *j, const struct pyramid *p, int channel, struct chi_square *d,
+                     struct err *e)
 {
     size_t pixels = (size_t)p->width * (size_t)p->height;
     struct part *part = malloc(2 * pixels * sizeof *part);

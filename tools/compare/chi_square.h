@@ -6,7 +6,7 @@
 #include "region.h"
 
 /* The smallest p of the tests so far; begin with log10_p = 0. */
-struct dense {
+struct chi_square {
     double log10_p;
     int channel;
     int side;    /* of the smallest regions allowed */
@@ -16,7 +16,7 @@ struct dense {
 /* Two tests in this channel: over the finest partition of the image into testable regions, and over
  * one whose regions are reporting tiles or larger. Counts them in j->num_tests. Fails only out of
  * memory. */
-bool dense_scan(struct judge *j, const struct pyramid *p, int channel, struct dense *d,
-                struct err *e) __attribute__((warn_unused_result));
+bool chi_square_scan(struct judge *j, const struct pyramid *p, int channel, struct chi_square *d,
+                     struct err *e) __attribute__((warn_unused_result));
 
 #endif

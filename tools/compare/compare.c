@@ -23,7 +23,7 @@ const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense",
 static void set_guards(struct judge *j, size_t regions)
 {
     double tests[NUM_STATISTICS] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1), 6,
-                                    NUM_DIRECTIONS, 1};
+                                    NUM_ERROR_MODES, 1};
     for (int s = 0; s < NUM_STATISTICS; s++)
         if (j->share[s] > 0)
             j->z_guard[s] = stats_normal_quantile(j->opt.alpha * j->share[s] / (2 * tests[s]));
@@ -153,22 +153,23 @@ static bool fill_statistic(const struct judge *j, int s, double log10_p, struct 
     return st->num_tests > 0;
 }
 
-static void fill_statistics(struct judge *j, const struct worst worst[2], const struct dense *dense,
-                            double directed, double noise, struct comparison *out)
+static void fill_statistics(struct judge *j, const struct worst worst[2],
+                            const struct chi_square *dense, double directed, double noise,
+                            struct comparison *out)
 {
     struct statistic *st = out->statistic;
     for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
         if (fill_statistic(j, s, worst[s].log10_p, out))
             region_name(j->width, j->height, worst[s].rect, worst[s].channel, st[s].what,
                         sizeof st[s].what);
-    if (fill_statistic(j, STATISTIC_DENSE, dense->log10_p, out))
-        snprintf(st[STATISTIC_DENSE].what, sizeof st->what,
+    if (fill_statistic(j, STATISTIC_CHI_SQUARE, dense->log10_p, out))
+        snprintf(st[STATISTIC_CHI_SQUARE].what, sizeof st->what,
                  "%d regions of %d x %d pixels or more (%s)", dense->regions, dense->side,
                  dense->side, channel_name[dense->channel]);
-    if (fill_statistic(j, STATISTIC_DIRECTED, directed, out))
-        snprintf(st[STATISTIC_DIRECTED].what, sizeof st->what, "%s", out->direction.name);
-    if (fill_statistic(j, STATISTIC_NOISE, noise, out))
-        snprintf(st[STATISTIC_NOISE].what, sizeof st->what, "variance of a path: %.3g times",
+    if (fill_statistic(j, STATISTIC_MATCHED_FILTER, directed, out))
+        snprintf(st[STATISTIC_MATCHED_FILTER].what, sizeof st->what, "%s", out->direction.name);
+    if (fill_statistic(j, STATISTIC_VARIANCE, noise, out))
+        snprintf(st[STATISTIC_VARIANCE].what, sizeof st->what, "variance of a path: %.3g times",
                  out->variance.ratio);
 }
 
@@ -178,10 +179,11 @@ static bool test_rest(const struct moments *a, const struct moments *b, struct j
 {
     bool testable;
     *directed = 0;
-    if (j->share[STATISTIC_DIRECTED] > 0 && !directed_test(a, b, j, &out->direction, directed, e))
+    if (j->share[STATISTIC_MATCHED_FILTER] > 0 &&
+        !matched_filter_test(a, b, j, &out->direction, directed, e))
         return false;
-    out->variance = noise_ratio(a, b, j, noise, &testable);
-    j->num_tests[STATISTIC_NOISE] = j->share[STATISTIC_NOISE] > 0 && testable;
+    out->variance = variance_ratio_test(a, b, j, noise, &testable);
+    j->num_tests[STATISTIC_VARIANCE] = j->share[STATISTIC_VARIANCE] > 0 && testable;
     return true;
 }
 
@@ -201,9 +203,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct region *tiles = NULL;
     struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
     struct cell image[NUM_CHANNELS];
-    struct dense dense = {0};
+    struct chi_square dense = {0};
     double squared = 0, mean = 0, directed, noise;
-    if (!hygiene_check(a, b, opt, &j, e))
+    if (!input_checks_run(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
     for (int c = 0; c < NUM_CHANNELS; c++) {
@@ -214,8 +216,8 @@ bool compare_moments(const struct moments *a, const struct moments *b,
             set_guards(&j, pyramid_regions(&p));
         image[c] = p.level[p.num_levels - 1].cell[0];
         scan(&j, &p, c, worst, out);
-        if (c < CHANNEL_LUMINANCE && j.share[STATISTIC_DENSE] > 0 &&
-            !dense_scan(&j, &p, c, &dense, e))
+        if (c < CHANNEL_LUMINANCE && j.share[STATISTIC_CHI_SQUARE] > 0 &&
+            !chi_square_scan(&j, &p, c, &dense, e))
             goto fail;
         if (c < CHANNEL_LUMINANCE)
             squared += luminance_weight[c] * squared_bias(&p);

@@ -18,11 +18,11 @@ struct compare_options {
 
 /* The claim's tests in groups, each with its own part of alpha. */
 enum {
-    STATISTIC_IMAGE,    /* the image's mean: R, G, B, luminance */
-    STATISTIC_PYRAMID,  /* every smaller region */
-    STATISTIC_DENSE,    /* many small differences together */
-    STATISTIC_DIRECTED, /* known kinds of error */
-    STATISTIC_NOISE,    /* the variance of one observation */
+    STATISTIC_IMAGE,          /* the image's mean: R, G, B, luminance */
+    STATISTIC_PYRAMID,        /* every smaller region */
+    STATISTIC_CHI_SQUARE,     /* many small differences together */
+    STATISTIC_MATCHED_FILTER, /* known kinds of error */
+    STATISTIC_VARIANCE,       /* the variance of one observation */
     NUM_STATISTICS
 };
 
@@ -35,7 +35,7 @@ struct statistic {
     char what[96];  /* which test that was: "shift by x", "16 x 16 pixels at 32,48 (red)" */
 };
 /* The known kind of error that looks most like A - B. */
-struct direction {
+struct error_mode {
     const char *name; /* "shift by x", static; NULL if none could be tested */
     double
         explained; /* share of the squared difference, noise removed, that lies in this direction,
@@ -76,7 +76,7 @@ struct comparison {
     char reason[256]; /* one sentence: what decided */
     int num_tests;    /* of all statistics together */
     struct statistic statistic[NUM_STATISTICS];
-    struct direction direction; /* of the smallest p of STATISTIC_DIRECTED */
+    struct error_mode direction; /* of the smallest p of STATISTIC_MATCHED_FILTER */
     struct variance_ratio variance;
     struct region global[4];  /* per channel and luminance */
     struct region worst;      /* of all regions, smallest p in units of the level it is held to */

@@ -8,25 +8,25 @@
 static const double smallest_variance =
     0.03; /* of the image's mean: noise-free pixels weigh finitely */
 
-const char *const direction_name[NUM_DIRECTIONS] = {
-    [DIRECTION_SCALE] = "scale",
-    [DIRECTION_OFFSET] = "offset",
-    [DIRECTION_GAMMA] = "gamma",
-    [DIRECTION_SHIFT_X] = "shift by x",
-    [DIRECTION_SHIFT_Y] = "shift by y",
-    [DIRECTION_FLIP_X] = "left and right exchanged",
-    [DIRECTION_FLIP_Y] = "top and bottom exchanged",
-    [DIRECTION_ROTATE] = "turned by 180 degrees",
-    [DIRECTION_TRANSPOSE] = "rows and columns exchanged",
-    [DIRECTION_SWAP_RB] = "red and blue exchanged",
-    [DIRECTION_SWAP_RG] = "red and green exchanged",
-    [DIRECTION_SWAP_GB] = "green and blue exchanged",
-    [DIRECTION_CLAMP] = "clamped at 1",
+const char *const error_mode_name[NUM_ERROR_MODES] = {
+    [ERROR_SCALE] = "scale",
+    [ERROR_OFFSET] = "offset",
+    [ERROR_GAMMA] = "gamma",
+    [ERROR_SHIFT_X] = "shift by x",
+    [ERROR_SHIFT_Y] = "shift by y",
+    [ERROR_FLIP_X] = "left and right exchanged",
+    [ERROR_FLIP_Y] = "top and bottom exchanged",
+    [ERROR_ROTATE] = "turned by 180 degrees",
+    [ERROR_TRANSPOSE] = "rows and columns exchanged",
+    [ERROR_SWAP_RB] = "red and blue exchanged",
+    [ERROR_SWAP_RG] = "red and green exchanged",
+    [ERROR_SWAP_GB] = "green and blue exchanged",
+    [ERROR_CLAMP] = "clamped at 1",
 };
 
-bool direction_has_amount(enum direction_kind kind)
+bool error_mode_has_amount(enum error_mode_kind kind)
 {
-    return kind <= DIRECTION_SHIFT_Y;
+    return kind <= ERROR_SHIFT_Y;
 }
 
 static void fill_side(const struct moments *m, double *sd, double *root)
@@ -75,11 +75,12 @@ static void around(int width, int height, const double *in, bool square, int rea
     }
 }
 
-bool base_build(const struct moments *a, const struct moments *b, struct base *out, struct err *e)
+bool error_modes_base_build(const struct moments *a, const struct moments *b,
+                            struct error_modes_base *out, struct err *e)
 {
     size_t n = 3 * (size_t)a->width * (size_t)a->height;
     assert(n > 3);
-    *out = (struct base){.width = a->width, .height = a->height, .a = a, .b = b};
+    *out = (struct error_modes_base){.width = a->width, .height = a->height, .a = a, .b = b};
     double **const part[] = {&out->sd[0],      &out->sd[1],     &out->root[0], &out->root[1],
                              &out->around[0],  &out->around[1], &out->weight,  &out->mix,
                              &out->mix_around, &out->b_around};
@@ -112,17 +113,17 @@ bool base_build(const struct moments *a, const struct moments *b, struct base *o
     return true;
 }
 
-void base_free(struct base *base)
+void error_modes_base_free(struct error_modes_base *base)
 {
     free(base->data);
-    *base = (struct base){0};
+    *base = (struct error_modes_base){0};
 }
 
-bool direction_applies(const struct base *base, enum direction_kind kind)
+bool error_mode_applies(const struct error_modes_base *base, enum error_mode_kind kind)
 {
-    if (kind == DIRECTION_SHIFT_X || kind == DIRECTION_SHIFT_Y)
+    if (kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y)
         return base->width > 2 && base->height > 2;
-    return kind != DIRECTION_TRANSPOSE || base->width == base->height;
+    return kind != ERROR_TRANSPOSE || base->width == base->height;
 }
 
 static double power(double x)
@@ -135,13 +136,13 @@ static double over(double x)
     return fmin(x, 1) - x;
 }
 
-static size_t at(const struct base *base, int x, int y)
+static size_t at(const struct error_modes_base *base, int x, int y)
 {
     return 3 * ((size_t)y * (size_t)base->width + (size_t)x);
 }
 
 /* Minus the central difference in row y, per pixel to the right (or, transposed, down). */
-static void slope(const struct base *base, int x, int y, bool down, double out[3])
+static void slope(const struct error_modes_base *base, int x, int y, bool down, double out[3])
 {
     size_t lo = down ? at(base, x, y - 1) : at(base, x - 1, y);
     size_t hi = down ? at(base, x, y + 1) : at(base, x + 1, y);
@@ -150,7 +151,8 @@ static void slope(const struct base *base, int x, int y, bool down, double out[3
 }
 
 /* d from the rows (columns) beside that of the pixel, `same` from its own: no pixel is in both. */
-static void shift(const struct base *base, bool down, int x, int y, struct error_change *out)
+static void shift(const struct error_modes_base *base, bool down, int x, int y,
+                  struct error_change *out)
 {
     double left[3], right[3];
     if (x < 1 || y < 1 || x >= base->width - 1 || y >= base->height - 1)
@@ -163,10 +165,10 @@ static void shift(const struct base *base, bool down, int x, int y, struct error
 }
 
 /* B of channel from[c] around the pixel (or, moved, of another pixel) less B around it. */
-static void exchange(const struct base *base, size_t own, size_t other, const int from[3],
-                     struct error_change *out)
+static void exchange(const struct error_modes_base *base, size_t own, size_t other,
+                     const int from[3], struct error_change *out)
 {
-    const struct base *s = base;
+    const struct error_modes_base *s = base;
     bool moved = own != other;
     double to_other = 0, to_own = 0, near = 0;
     for (size_t c = 0; c < 3; c++) {
@@ -183,7 +185,8 @@ static void exchange(const struct base *base, size_t own, size_t other, const in
     out->coupled = (moved ? to_other * to_own : 0) + near * near / 8;
 }
 
-struct error_change direction_at(const struct base *base, enum direction_kind kind, int x, int y)
+struct error_change error_mode_at(const struct error_modes_base *base, enum error_mode_kind kind,
+                                  int x, int y)
 {
     struct error_change out = {0};
     static const int same[3] = {0, 1, 2};
@@ -191,38 +194,38 @@ struct error_change direction_at(const struct base *base, enum direction_kind ki
     size_t own = at(base, x, y), other;
     const double *mix = base->mix + own, *near = base->mix_around + own;
     switch (kind) {
-    case DIRECTION_SCALE:
+    case ERROR_SCALE:
         for (size_t c = 0; c < 3; c++) {
             out.d[c] = near[c];
             out.same[c] = base->b->mean[own + c];
         }
         return out;
-    case DIRECTION_OFFSET:
+    case ERROR_OFFSET:
         for (int c = 0; c < 3; c++)
             out.d[c] = out.same[c] = 1;
         return out;
-    case DIRECTION_GAMMA:
+    case ERROR_GAMMA:
         for (int c = 0; c < 3; c++) {
             out.d[c] = power(near[c]);
             out.same[c] = power(mix[c]);
         }
         return out;
-    case DIRECTION_CLAMP:
+    case ERROR_CLAMP:
         for (int c = 0; c < 3; c++) {
             out.d[c] = over(near[c]);
             out.same[c] = over(mix[c]);
         }
         return out;
-    case DIRECTION_SHIFT_X:
-    case DIRECTION_SHIFT_Y: shift(base, kind == DIRECTION_SHIFT_Y, x, y, &out); return out;
-    case DIRECTION_SWAP_RB: exchange(base, own, own, (int[3]){2, 1, 0}, &out); return out;
-    case DIRECTION_SWAP_RG: exchange(base, own, own, (int[3]){1, 0, 2}, &out); return out;
-    case DIRECTION_SWAP_GB: exchange(base, own, own, (int[3]){0, 2, 1}, &out); return out;
-    case DIRECTION_FLIP_X: other = at(base, w - 1 - x, y); break;
-    case DIRECTION_FLIP_Y: other = at(base, x, h - 1 - y); break;
-    case DIRECTION_ROTATE: other = at(base, w - 1 - x, h - 1 - y); break;
-    case DIRECTION_TRANSPOSE: other = at(base, y, x); break;
-    case NUM_DIRECTIONS:
+    case ERROR_SHIFT_X:
+    case ERROR_SHIFT_Y: shift(base, kind == ERROR_SHIFT_Y, x, y, &out); return out;
+    case ERROR_SWAP_RB: exchange(base, own, own, (int[3]){2, 1, 0}, &out); return out;
+    case ERROR_SWAP_RG: exchange(base, own, own, (int[3]){1, 0, 2}, &out); return out;
+    case ERROR_SWAP_GB: exchange(base, own, own, (int[3]){0, 2, 1}, &out); return out;
+    case ERROR_FLIP_X: other = at(base, w - 1 - x, y); break;
+    case ERROR_FLIP_Y: other = at(base, x, h - 1 - y); break;
+    case ERROR_ROTATE: other = at(base, w - 1 - x, h - 1 - y); break;
+    case ERROR_TRANSPOSE: other = at(base, y, x); break;
+    case NUM_ERROR_MODES:
     default: assert(!"no direction"); return out;
     }
     if (other != own)

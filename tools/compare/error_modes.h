@@ -7,27 +7,27 @@
 
 #include "renderer/image/moments.h"
 
-enum direction_kind {
-    DIRECTION_SCALE,     /* all radiance times a factor */
-    DIRECTION_OFFSET,    /* a constant added */
-    DIRECTION_GAMMA,     /* a power of radiance */
-    DIRECTION_SHIFT_X,   /* moved to the right */
-    DIRECTION_SHIFT_Y,   /* moved down */
-    DIRECTION_FLIP_X,    /* left and right exchanged */
-    DIRECTION_FLIP_Y,    /* top and bottom exchanged */
-    DIRECTION_ROTATE,    /* both */
-    DIRECTION_TRANSPOSE, /* columns and rows exchanged; square images only */
-    DIRECTION_SWAP_RB,
-    DIRECTION_SWAP_RG,
-    DIRECTION_SWAP_GB,
-    DIRECTION_CLAMP, /* radiance above 1 cut off */
-    NUM_DIRECTIONS
+enum error_mode_kind {
+    ERROR_SCALE,     /* all radiance times a factor */
+    ERROR_OFFSET,    /* a constant added */
+    ERROR_GAMMA,     /* a power of radiance */
+    ERROR_SHIFT_X,   /* moved to the right */
+    ERROR_SHIFT_Y,   /* moved down */
+    ERROR_FLIP_X,    /* left and right exchanged */
+    ERROR_FLIP_Y,    /* top and bottom exchanged */
+    ERROR_ROTATE,    /* both */
+    ERROR_TRANSPOSE, /* columns and rows exchanged; square images only */
+    ERROR_SWAP_RB,
+    ERROR_SWAP_RG,
+    ERROR_SWAP_GB,
+    ERROR_CLAMP, /* radiance above 1 cut off */
+    NUM_ERROR_MODES
 };
 
-extern const char *const direction_name[NUM_DIRECTIONS];
+extern const char *const error_mode_name[NUM_ERROR_MODES];
 
 /* All 3 per pixel. */
-struct base {
+struct error_modes_base {
     int width, height;
     const struct moments *a, *b;
     double *sd[2];     /* of the means of A and B, 0 where exact */
@@ -44,13 +44,14 @@ struct base {
     double *data;       /* of all these */
 };
 
-/* At least 2 pixels. Fails only out of memory. Release with base_free(). */
-bool base_build(const struct moments *a, const struct moments *b, struct base *out, struct err *e)
+/* At least 2 pixels. Fails only out of memory. Release with error_modes_base_free(). */
+bool error_modes_base_build(const struct moments *a, const struct moments *b,
+                            struct error_modes_base *out, struct err *e)
     __attribute__((warn_unused_result));
-void base_free(struct base *base);
+void error_modes_base_free(struct error_modes_base *base);
 
 /* Whether the direction exists for this size of image. */
-bool direction_applies(const struct base *base, enum direction_kind kind);
+bool error_mode_applies(const struct error_modes_base *base, enum error_mode_kind kind);
 
 /* One direction in one pixel. */
 struct error_change {
@@ -63,9 +64,10 @@ struct error_change {
      * their product's mean does not vanish where d is B alone. */
     double coupled;
 };
-struct error_change direction_at(const struct base *base, enum direction_kind kind, int x, int y);
+struct error_change error_mode_at(const struct error_modes_base *base, enum error_mode_kind kind,
+                                  int x, int y);
 
 /* Whether a multiple of the direction means something: a shift by 0.3 pixels, but no flip by 0.3. */
-bool direction_has_amount(enum direction_kind kind);
+bool error_mode_has_amount(enum error_mode_kind kind);
 
 #endif

@@ -87,7 +87,7 @@ static bool check_shared(const struct moments *a, const struct moments *b, struc
 {
     if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_picture(a))
         return true;
-    size_t pixels = (size_t)a->width * (size_t)a->height, shared = noise_shared(a, b);
+    size_t pixels = (size_t)a->width * (size_t)a->height, shared = variance_ratio_shared(a, b);
     if (shared > 0)
         return err_set(
             e,
@@ -106,9 +106,9 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
     bool applies[NUM_STATISTICS] = {
         [STATISTIC_IMAGE] = true,
         [STATISTIC_PYRAMID] = pixels,
-        [STATISTIC_DENSE] = pixels && known && (noise_a || noise_b),
-        [STATISTIC_DIRECTED] = pixels && known && (noise_a || noise_b),
-        [STATISTIC_NOISE] = j->opt.margin_variance > 0 && known && noise_a && noise_b,
+        [STATISTIC_CHI_SQUARE] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_MATCHED_FILTER] = pixels && known && (noise_a || noise_b),
+        [STATISTIC_VARIANCE] = j->opt.margin_variance > 0 && known && noise_a && noise_b,
     };
     double sum = 0;
     for (int s = 0; s < NUM_STATISTICS; s++)
@@ -117,8 +117,8 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
         j->share[s] = applies[s] ? part[s] / sum : 0;
 }
 
-bool hygiene_check(const struct moments *a, const struct moments *b,
-                   const struct compare_options *opt, struct judge *j, struct err *e)
+bool input_checks_run(const struct moments *a, const struct moments *b,
+                      const struct compare_options *opt, struct judge *j, struct err *e)
 {
     if (a->width != b->width || a->height != b->height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,

@@ -14,11 +14,11 @@ struct sums {
     double same;      /* w same, less the noise of d */
 };
 
-/* A or B in one pixel, its channels weighted. Their correlation is unknown: see pixel_estimate(). Where
+/* A or B in one pixel, its channels weighted. Their correlation is unknown: see pyramid_pixel_estimate(). Where
  * weights have both signs the third cumulants of the channels are added all the same: that they cancel if
  * the channels are perfectly correlated is no permission. */
-static struct estimate weighted(const struct base *base, int side, size_t i, const double w[3],
-                                double n)
+static struct estimate weighted(const struct error_modes_base *base, int side, size_t i,
+                                const double w[3], double n)
 {
     const struct moments *m = side == 0 ? base->a : base->b;
     double mean = 0, deviation = 0, root = 0, sign = 0;
@@ -29,19 +29,20 @@ static struct estimate weighted(const struct base *base, int side, size_t i, con
         sign += w[c] * base->sd[side][i + c];
     }
     root = copysign(root, sign * root);
-    struct estimate est = estimate_from(mean, deviation * deviation, root * root * root, n);
+    struct estimate est = pyramid_estimate_from(mean, deviation * deviation, root * root * root, n);
     /* With weights of both signs the third cumulants of a skewed law can cancel in the sample and not in
      * truth, or the reverse; their own squares bound the variance of each if it is of rare events. */
     est.var_k3 = fmax(est.var_k3, est.k3 * est.k3);
     return est;
 }
 
-static struct sums sum_up(const struct judge *j, const struct base *base, enum direction_kind kind)
+static struct sums sum_up(const struct judge *j, const struct error_modes_base *base,
+                          enum error_mode_kind kind)
 {
     struct sums s = {0};
     for (int y = 0; y < base->height; y++)
         for (int x = 0; x < base->width; x++) {
-            struct error_change dif = direction_at(base, kind, x, y);
+            struct error_change dif = error_mode_at(base, kind, x, y);
             size_t p = (size_t)y * (size_t)base->width + (size_t)x, i = 3 * p;
             double w[3];
             for (size_t c = 0; c < 3; c++) {
@@ -54,13 +55,13 @@ static struct sums sum_up(const struct judge *j, const struct base *base, enum d
             struct estimate a = weighted(base, 0, i, w, base->a->n[p]);
             struct estimate b = weighted(base, 1, i, w, base->b->n[p]);
             b.v += dif.coupled;
-            cell_add_pixel(&s.cell, &a, &b);
+            pyramid_add_pixel(&s.cell, &a, &b);
         }
     return s;
 }
 
 /* sum (D^2 - v)/v: the squared bias that there is to be explained, in the metric of the weights */
-static double squared_bias(const struct base *base)
+static double squared_bias(const struct error_modes_base *base)
 {
     double sum = 0;
     size_t n = 3 * (size_t)base->width * (size_t)base->height;
@@ -72,23 +73,23 @@ static double squared_bias(const struct base *base)
     return sum;
 }
 
-static struct direction describe(const struct judge *j, enum direction_kind kind,
-                                 const struct sums *s, const struct measured *m, double squared)
+static struct error_mode describe(const struct judge *j, enum error_mode_kind kind,
+                                  const struct sums *s, const struct measured *m, double squared)
 {
-    struct direction found = {.name = direction_name[kind], .unit = ""};
+    struct error_mode found = {.name = error_mode_name[kind], .unit = ""};
     if (s->same > 0 && squared > 0)
         found.explained = fmin(1, m->d / s->same * (m->d / squared));
-    if (!direction_has_amount(kind) || !(s->same > 0))
+    if (!error_mode_has_amount(kind) || !(s->same > 0))
         return found;
     double scale = 1 / s->same;
     found.unit = "px";
-    if (kind == DIRECTION_SCALE) {
+    if (kind == ERROR_SCALE) {
         found.unit = "%";
         scale *= 100;
-    } else if (kind == DIRECTION_OFFSET) {
+    } else if (kind == ERROR_OFFSET) {
         found.unit = "% of the mean";
         scale *= 100 / j->mean_b;
-    } else if (kind == DIRECTION_GAMMA) {
+    } else if (kind == ERROR_GAMMA) {
         found.unit = "in the exponent";
     }
     double half = stats_t_quantile(j->opt.alpha, m->dof) * sqrt(m->v);
@@ -98,29 +99,29 @@ static struct direction describe(const struct judge *j, enum direction_kind kind
     return found;
 }
 
-bool directed_test(const struct moments *a, const struct moments *b, struct judge *j,
-                   struct direction *found, double *log10_p, struct err *e)
+bool matched_filter_test(const struct moments *a, const struct moments *b, struct judge *j,
+                         struct error_mode *found, double *log10_p, struct err *e)
 {
-    struct base base;
-    *found = (struct direction){.unit = ""};
+    struct error_modes_base base;
+    *found = (struct error_mode){.unit = ""};
     *log10_p = 0;
-    if (!base_build(a, b, &base, e))
+    if (!error_modes_base_build(a, b, &base, e))
         return false;
     double squared = squared_bias(&base);
-    for (int k = 0; k < NUM_DIRECTIONS; k++) {
-        if (!direction_applies(&base, k))
+    for (int k = 0; k < NUM_ERROR_MODES; k++) {
+        if (!error_mode_applies(&base, k))
             continue;
         struct sums s = sum_up(j, &base, k);
         struct measured m = region_measure_weighted(j, &s.cell, s.unit, s.size);
         if (m.noise_free || !region_testable(j, &m))
             continue;
-        j->num_tests[STATISTIC_DIRECTED]++;
+        j->num_tests[STATISTIC_MATCHED_FILTER]++;
         double p = region_log10_p(j, &m, CHANNEL_LUMINANCE);
         if (found->name == NULL || p < *log10_p) {
             *log10_p = p;
             *found = describe(j, k, &s, &m, squared);
         }
     }
-    base_free(&base);
+    error_modes_base_free(&base);
     return true;
 }

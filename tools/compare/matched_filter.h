@@ -7,8 +7,8 @@
 /* All directions that apply to this size of image. Counts its tests in j->num_tests. *found is the
  * direction of the smallest p, *log10_p (0 and name NULL if none could be tested). Fails only out of
  * memory. */
-bool directed_test(const struct moments *a, const struct moments *b, struct judge *j,
-                   struct direction *found, double *log10_p, struct err *e)
+bool matched_filter_test(const struct moments *a, const struct moments *b, struct judge *j,
+                         struct error_mode *found, double *log10_p, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

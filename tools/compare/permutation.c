@@ -41,7 +41,8 @@ int permutation_needed(double alpha, int sides)
 }
 
 /* The largest sum of z over the rows of A, either way or in the direction of sign; *where is its region (may be NULL). */
-static double largest_sum(const struct table *t, const int *row, double *sum, size_t *where)
+static double largest_sum(const struct permutation_table *t, const int *row, double *sum,
+                          size_t *where)
 {
     memcpy(sum, t->z + (size_t)row[0] * t->num, t->num * sizeof *sum);
     for (int i = 1; i < t->num_a; i++) {
@@ -103,15 +104,15 @@ static int upwards(const void *a, const void *b)
 
 /* t of a sum of standardised rows: difference of means s (1/na + 1/nb), within groups a sum of
  * squares of 1 - s^2 (1/na + 1/nb). */
-static double t_of_sum(const struct table *t, double s)
+static double t_of_sum(const struct permutation_table *t, double s)
 {
     double f = 1.0 / t->num_a + 1.0 / t->num_b, within = fmax(1e-18, 1 - s * s * f);
     return s * f / sqrt(within / (t->num_a + t->num_b - 2) * f);
 }
 
 /* Fills `largest` with the statistic of every labelling, the observed one first, and sorts it. */
-static bool run_labellings(const struct table *t, struct permutation *out, double **largest,
-                           size_t *where, double *observed, struct err *e)
+static bool run_labellings(const struct permutation_table *t, struct permutation *out,
+                           double **largest, size_t *where, double *observed, struct err *e)
 {
     int rows = t->num_a + t->num_b;
     double all = choose(rows, t->num_a);
@@ -159,7 +160,7 @@ static bool check(const struct renders *a, const struct renders *b, struct err *
     return true;
 }
 
-static void describe(const struct table *t, size_t r, struct permutation *out)
+static void describe(const struct permutation_table *t, size_t r, struct permutation *out)
 {
     out->x = t->rect[r].x;
     out->y = t->rect[r].y;
@@ -171,7 +172,7 @@ static void describe(const struct table *t, size_t r, struct permutation *out)
 }
 
 /* The difference of the image's luminance that exceeds the critical sum with about 95 %. */
-static double image_mdb(const struct table *t, double critical)
+static double image_mdb(const struct permutation_table *t, double critical)
 {
     size_t image = t->num - 1; /* coarsest of the last channel, luminance */
     double f = 1.0 / t->num_a + 1.0 / t->num_b, dof = t->num_a + t->num_b - 2;
@@ -236,10 +237,10 @@ bool permutation_test(const struct renders *a, const struct renders *b,
                       const struct permutation_options *opt, struct permutation *out, struct err *e)
 {
     *out = (struct permutation){.smallest_p = smallest_p(a->num, b->num, 2)};
-    struct table t = {0};
+    struct permutation_table t = {0};
     double *largest = NULL, observed = 0;
     size_t where = 0;
-    bool ok = check(a, b, e) && table_make(a, b, opt->min_side, &t, e) &&
+    bool ok = check(a, b, e) && permutation_table_make(a, b, opt->min_side, &t, e) &&
               run_labellings(&t, out, &largest, &where, &observed, e);
     size_t image = t.num - 1; /* the coarsest of the last channel */
     for (size_t r = 0; ok && r < t.num; r++)
@@ -259,7 +260,7 @@ bool permutation_test(const struct renders *a, const struct renders *b,
         decide(opt, a->num, b->num, a->width, a->height, out);
     }
     free(largest);
-    table_free(&t);
+    permutation_table_free(&t);
     return ok;
 }
 
@@ -270,10 +271,10 @@ bool permutation_confirm(const struct permutation *first, const struct renders *
     *out = (struct permutation){.smallest_p = smallest_p(a2->num, b2->num, 1), .num_regions = 1};
     if (!check(a2, b2, e))
         return false;
-    struct table t;
+    struct permutation_table t;
     struct rect rect = {first->x, first->y, first->width, first->height};
     double *largest = NULL, observed = 0;
-    bool ok = table_make_one(a2, b2, rect, first->channel, &t, e);
+    bool ok = permutation_table_make_one(a2, b2, rect, first->channel, &t, e);
     t.sign = copysign(1, first->difference);
     ok = ok && run_labellings(&t, out, &largest, NULL, &observed, e);
     if (ok) {
@@ -291,6 +292,6 @@ bool permutation_confirm(const struct permutation *first, const struct renders *
                  out->verdict == VERDICT_DIFFERENT ? "" : " (not confirmed)", opt->alpha);
     }
     free(largest);
-    table_free(&t);
+    permutation_table_free(&t);
     return ok;
 }

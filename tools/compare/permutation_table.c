@@ -5,7 +5,7 @@
 
 enum { MOST_REGIONS = 1024 };
 
-void table_free(struct table *t)
+void permutation_table_free(struct permutation_table *t)
 {
     free(t->z);
     free(t->mean[0]);
@@ -13,7 +13,7 @@ void table_free(struct table *t)
     free(t->spread);
     free(t->rect);
     free(t->channel);
-    *t = (struct table){0};
+    *t = (struct permutation_table){0};
 }
 
 static int default_side(int width, int height)
@@ -53,7 +53,7 @@ static double mean_in(const float *px, int width, struct rect r, int channel)
     return sum / ((double)r.width * r.height);
 }
 
-static bool table_alloc(struct table *t, size_t num, struct err *e)
+static bool table_alloc(struct permutation_table *t, size_t num, struct err *e)
 {
     size_t rows = (size_t)t->num_a + (size_t)t->num_b;
     t->num = num;
@@ -68,7 +68,7 @@ static bool table_alloc(struct table *t, size_t num, struct err *e)
            err_set(e, "out of memory for %zu regions of %zu pictures", num, rows);
 }
 
-static void standardise(struct table *t, size_t r)
+static void standardise(struct permutation_table *t, size_t r)
 {
     int rows = t->num_a + t->num_b;
     double centre = 0, squares = 0, largest = 0;
@@ -89,7 +89,8 @@ static void standardise(struct table *t, size_t r)
     }
 }
 
-static void table_fill(const struct renders *a, const struct renders *b, struct table *t)
+static void table_fill(const struct renders *a, const struct renders *b,
+                       struct permutation_table *t)
 {
     for (int k = 0; k < a->num + b->num; k++) {
         const float *px = k < a->num ? a->rgb[k] : b->rgb[k - a->num];
@@ -100,12 +101,12 @@ static void table_fill(const struct renders *a, const struct renders *b, struct 
         standardise(t, r);
 }
 
-bool table_make(const struct renders *a, const struct renders *b, int min_side, struct table *t,
-                struct err *e)
+bool permutation_table_make(const struct renders *a, const struct renders *b, int min_side,
+                            struct permutation_table *t, struct err *e)
 {
     if (min_side == 0)
         min_side = default_side(a->width, a->height);
-    *t = (struct table){.num_a = a->num, .num_b = b->num};
+    *t = (struct permutation_table){.num_a = a->num, .num_b = b->num};
     size_t num;
     list_rects(a->width, a->height, min_side, NULL, &num);
     if (!table_alloc(t, NUM_CHANNELS * num, e))
@@ -120,10 +121,10 @@ bool table_make(const struct renders *a, const struct renders *b, int min_side, 
     return true;
 }
 
-bool table_make_one(const struct renders *a, const struct renders *b, struct rect rect, int channel,
-                    struct table *t, struct err *e)
+bool permutation_table_make_one(const struct renders *a, const struct renders *b, struct rect rect,
+                                int channel, struct permutation_table *t, struct err *e)
 {
-    *t = (struct table){.num_a = a->num, .num_b = b->num};
+    *t = (struct permutation_table){.num_a = a->num, .num_b = b->num};
     if (!table_alloc(t, 1, e))
         return false;
     t->rect[0] = rect;

@@ -6,7 +6,7 @@
 #include "tools/images/replicate_dir.h"
 
 /* Means of all regions in all pictures. */
-struct table {
+struct permutation_table {
     int num_a, num_b;
     size_t num;      /* regions of all channels */
     double sign;     /* 0: of |sum|; else of sum times sign, one-sided */
@@ -19,12 +19,14 @@ struct table {
 
 /* All squares of sides min_side, 2 min_side, .. up to the image, in R, G, B and luminance; the last
  * is the luminance of the image. min_side 0: the smallest power of 2 that leaves at most 1024 squares
- * a channel. Release with table_free(), also after a failure. */
-bool table_make(const struct renders *a, const struct renders *b, int min_side, struct table *t,
-                struct err *e) __attribute__((warn_unused_result));
+ * a channel. Release with permutation_table_free(), also after a failure. */
+bool permutation_table_make(const struct renders *a, const struct renders *b, int min_side,
+                            struct permutation_table *t, struct err *e)
+    __attribute__((warn_unused_result));
 /* One region alone. */
-bool table_make_one(const struct renders *a, const struct renders *b, struct rect rect, int channel,
-                    struct table *t, struct err *e) __attribute__((warn_unused_result));
-void table_free(struct table *t);
+bool permutation_table_make_one(const struct renders *a, const struct renders *b, struct rect rect,
+                                int channel, struct permutation_table *t, struct err *e)
+    __attribute__((warn_unused_result));
+void permutation_table_free(struct permutation_table *t);
 
 #endif

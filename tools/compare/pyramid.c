@@ -8,7 +8,7 @@
 const double float_tolerance = 1e-5;
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-struct estimate estimate_from(double mean, double v, double k3, double n)
+struct estimate pyramid_estimate_from(double mean, double v, double k3, double n)
 {
     struct estimate est = {.mean = mean, .v = v, .k3 = k3};
     if (v > 0) {
@@ -19,7 +19,7 @@ struct estimate estimate_from(double mean, double v, double k3, double n)
     return est;
 }
 
-struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channel)
+struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
 {
     double n = m->n[pixel];
     bool exact = strcmp(m->unit, "exact") == 0;
@@ -30,7 +30,7 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
     const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
     if (channel < CHANNEL_LUMINANCE) {
         struct estimate est =
-            estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
+            pyramid_estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
         est.tolerance = tolerance[channel];
         return est;
     }
@@ -41,12 +41,12 @@ struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channe
         root += luminance_weight[c] * cbrt(m3[c] * k_scale);
         rounding += luminance_weight[c] * tolerance[c];
     }
-    struct estimate est = estimate_from(sum, deviation * deviation, root * root * root, n);
+    struct estimate est = pyramid_estimate_from(sum, deviation * deviation, root * root * root, n);
     est.tolerance = rounding;
     return est;
 }
 
-void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
+void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
 {
     dst->a += a->mean;
     dst->b += b->mean;
@@ -99,9 +99,10 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
 {
     size_t pixels = (size_t)level->nx * (size_t)level->ny;
     for (size_t p = 0; p < pixels; p++) {
-        struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
+        struct estimate ea = pyramid_pixel_estimate(a, p, channel),
+                        eb = pyramid_pixel_estimate(b, p, channel);
         level->cell[p] = (struct cell){0};
-        cell_add_pixel(&level->cell[p], &ea, &eb);
+        pyramid_add_pixel(&level->cell[p], &ea, &eb);
         if (one_value(a, p, channel) && one_value(b, p, channel))
             level->cell[p].log10_alike = fmin(log10_one_value_each(a->n[p], b->n[p]),
                                               log10_one_value_each(b->n[p], a->n[p]));

@@ -27,10 +27,10 @@ struct estimate {
 /* Channel 3 is luminance, whose variance the moments do not hold: the bound for any correlation of
  * the channels, v = (sum w_c sqrt v_c)^2, is used, and k3 = (sum w_c cbrt k3_c)^3. Both are exact
  * if the channels are perfectly correlated. n must be >= 3 unless exact. */
-struct estimate pixel_estimate(const struct moments *m, size_t pixel, int channel);
+struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel);
 
 /* From the moments of any sum of a pixel's channels. v = 0: no noise. */
-struct estimate estimate_from(double mean, double v, double k3, double n);
+struct estimate pyramid_estimate_from(double mean, double v, double k3, double n);
 
 /* Sums over the pixels of a region, or of their products with weights. */
 struct cell {
@@ -64,7 +64,7 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
 
-void cell_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);
+void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);
 
 /* Number of regions over all levels. */
 size_t pyramid_regions(const struct pyramid *p);

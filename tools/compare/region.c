@@ -62,7 +62,7 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
                                         double size)
 {
-    return measure(cell, unit, size, j->opt.margin_tile, STATISTIC_DIRECTED);
+    return measure(cell, unit, size, j->opt.margin_tile, STATISTIC_MATCHED_FILTER);
 }
 
 /* ln of the factor by which a tail probability at x may be off [Shao99]. */

@@ -90,8 +90,8 @@ static bool interval(const struct pixels *s, double x, struct variance_ratio *ou
     return true;
 }
 
-struct variance_ratio noise_ratio(const struct moments *a, const struct moments *b,
-                                  const struct judge *j, double *log10_p, bool *testable)
+struct variance_ratio variance_ratio_test(const struct moments *a, const struct moments *b,
+                                          const struct judge *j, double *log10_p, bool *testable)
 {
     struct variance_ratio out = {0};
     double paths_a = paths(a, b), paths_b = paths(b, a);
@@ -115,7 +115,7 @@ struct variance_ratio noise_ratio(const struct moments *a, const struct moments 
 
     double limit = 1 + j->opt.margin_variance;
     double r = out.ratio > limit ? limit : out.ratio < 1 / limit ? 1 / limit : out.ratio;
-    double guard = stats_t_of_z(j->z_guard[STATISTIC_NOISE], s.num - 1);
+    double guard = stats_t_of_z(j->z_guard[STATISTIC_VARIANCE], s.num - 1);
     *testable = g * guard * guard * guard / 3 <= skew_limit;
     double t = fmin(1e9, fabs(student(&s, r)));
     if (*testable)
@@ -130,7 +130,7 @@ static bool same_pixel(const struct moments *a, const struct moments *b, size_t 
            memcmp(&a->m2[i], &b->m2[i], size) == 0 && memcmp(&a->m3[i], &b->m3[i], size) == 0;
 }
 
-size_t noise_shared(const struct moments *a, const struct moments *b)
+size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height, noisy = 0, same = 0;
     for (size_t p = 0; p < pixels; p++)

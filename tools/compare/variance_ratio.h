@@ -7,11 +7,11 @@
 
 /* The ratio of variances, and log10 of the two-sided p of "within the factor 1 + margin_variance of 1
  * either way"; *testable is false where there is no ratio or it is too skewed for a p. */
-struct variance_ratio noise_ratio(const struct moments *a, const struct moments *b,
-                                  const struct judge *j, double *log10_p, bool *testable);
+struct variance_ratio variance_ratio_test(const struct moments *a, const struct moments *b,
+                                          const struct judge *j, double *log10_p, bool *testable);
 
 /* In how many pixels A and B hold the same observations (all moments agree bit by bit, and there is
  * noise), or 0 if that many can agree by chance. */
-size_t noise_shared(const struct moments *a, const struct moments *b);
+size_t variance_ratio_shared(const struct moments *a, const struct moments *b);
 
 #endif

@@ -107,7 +107,7 @@ static bool rejects(const struct comparison *c, const struct compare_options *op
 }
 
 /* "shift by x +0.48 px [0.46, 0.50]" */
-static void name_direction(const struct direction *d, char *text, size_t size)
+static void name_direction(const struct error_mode *d, char *text, size_t size)
 {
     if (d->unit[0] == '\0')
         snprintf(text, size, "%s", d->name);
@@ -120,7 +120,7 @@ static void judge_different(struct comparison *c, const struct compare_options *
 {
     char where[96], direction[128] = "";
     size_t size = sizeof c->reason;
-    bool directed = rejects(c, opt, STATISTIC_DIRECTED);
+    bool directed = rejects(c, opt, STATISTIC_MATCHED_FILTER);
     int first = -1;
     for (int s = 0; s < NUM_STATISTICS; s++)
         if (rejects(c, opt, s) &&
@@ -140,12 +140,12 @@ static void judge_different(struct comparison *c, const struct compare_options *
                  "%%, p = 10^%.1f",
                  where, 100 * c->worst.difference, 100 * c->worst.std_error, 100 * c->worst.margin,
                  c->worst.log10_p);
-    } else if (first == STATISTIC_DENSE) {
+    } else if (first == STATISTIC_CHI_SQUARE) {
         snprintf(c->reason, size,
                  "many differences, each too small to be found alone: %s are together beyond "
                  "their margins, p = 10^%.1f",
                  st->what, st->log10_p);
-    } else if (first == STATISTIC_DIRECTED) {
+    } else if (first == STATISTIC_MATCHED_FILTER) {
         snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, p = 10^%.1f",
                  direction, st->log10_p);
     } else {
@@ -158,7 +158,8 @@ static void judge_different(struct comparison *c, const struct compare_options *
     size_t used = strlen(c->reason);
     if (directed && c->direction.explained >= named_share)
         snprintf(c->reason + used, size - used, "; looks like %s, %.0f %% of it",
-                 first == STATISTIC_DIRECTED ? "that" : direction, 100 * c->direction.explained);
+                 first == STATISTIC_MATCHED_FILTER ? "that" : direction,
+                 100 * c->direction.explained);
 }
 
 void verdict_decide(struct comparison *c, const struct compare_options *opt,

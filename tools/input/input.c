@@ -161,11 +161,11 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
 
 static bool pair_pictures(struct input *a, struct input *b, struct notes *notes, struct err *e)
 {
-    struct spatial s;
+    struct noise_estimate s;
     if (a->kind != INPUT_PICTURE || b->kind != INPUT_PICTURE)
         notes_add(notes, "the variance that %c has is not used: the other side has none",
                   a->kind == INPUT_PICTURE ? 'B' : 'A');
-    if (!spatial_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
+    if (!noise_estimate_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
         return false;
     a->is_guessed = b->is_guessed = true;
     notes_add(notes,

@@ -44,7 +44,7 @@ static json_t *statistics_json(const struct comparison *r)
 /* Only what is known: a direction that could be tested, a variance ratio with an interval. */
 static bool add_findings(json_t *claim, const struct comparison *r)
 {
-    const struct direction *d = &r->direction;
+    const struct error_mode *d = &r->direction;
     const struct variance_ratio *v = &r->variance;
     bool ok = true;
     if (d->name != NULL)

@@ -55,8 +55,9 @@ static struct cell cell_of(const struct moments *a, const struct moments *b, str
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++) {
             size_t p = (size_t)y * (size_t)a->width + (size_t)x;
-            struct estimate ea = pixel_estimate(a, p, channel), eb = pixel_estimate(b, p, channel);
-            cell_add_pixel(&sum, &ea, &eb);
+            struct estimate ea = pyramid_pixel_estimate(a, p, channel),
+                            eb = pyramid_pixel_estimate(b, p, channel);
+            pyramid_add_pixel(&sum, &ea, &eb);
         }
     return sum;
 }
@@ -68,7 +69,7 @@ static bool region_again(const struct region *found, const struct moments *a,
                          double *log10_p, double *difference, struct err *e)
 {
     struct judge j;
-    if (!hygiene_check(a, b, opt, &j, e))
+    if (!input_checks_run(a, b, opt, &j, e))
         return false;
     j.z_guard[STATISTIC_IMAGE] = j.z_guard[STATISTIC_PYRAMID] = stats_normal_quantile(level);
     struct rect r = {found->x, found->y, found->width, found->height};

@@ -260,7 +260,7 @@ static void set_channel(struct moments *a, struct moments *b, int c, const struc
 
 static bool one_channel(struct moments *a, struct moments *b, int c, struct grid *d,
                         const double *more_a, const double *more_b, const unsigned char *censored,
-                        struct spatial *out, struct err *e)
+                        struct noise_estimate *out, struct err *e)
 {
     size_t pixels = (size_t)d->width * (size_t)d->height;
     for (size_t p = 0; p < pixels; p++) {
@@ -279,9 +279,9 @@ static bool one_channel(struct moments *a, struct moments *b, int c, struct grid
     return ok;
 }
 
-bool spatial_variance(struct moments *a, struct moments *b, const double *more_a,
-                      const double *more_b, const unsigned char *censored, struct spatial *out,
-                      struct err *e)
+bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
+                             const double *more_b, const unsigned char *censored,
+                             struct noise_estimate *out, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
     bool same = true;

@@ -23,7 +23,7 @@
 #include "renderer/image/moments.h"
 
 /* What was found, per channel. */
-struct spatial {
+struct noise_estimate {
     double factor[3];   /* variance of means of 4 x 4 pixels over what independent pixels have */
     double skewness[3]; /* of D in one pixel */
     double skew_error[3];
@@ -34,8 +34,9 @@ struct spatial {
  * the skewness above; n is no count of anything. `more` (3 per pixel and side, or NULL) is variance
  * that the side has besides. Pixels with censored[p] != 0 take no part and get no noise. Fails with a
  * line where the pictures are the same, smaller than 32 x 32, or too much is censored. */
-bool spatial_variance(struct moments *a, struct moments *b, const double *more_a,
-                      const double *more_b, const unsigned char *censored, struct spatial *out,
-                      struct err *e) __attribute__((warn_unused_result));
+bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
+                             const double *more_b, const unsigned char *censored,
+                             struct noise_estimate *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -125,7 +125,7 @@ static struct estimate pick_pixel(struct library *l, int merge)
     double n = (double)merge * l->n, shift = b.s1 / n;
     double v = fmax(0, b.s2 - b.s1 * shift) / (n * (n - 1));
     double k3 = (b.s3 - 3 * b.s2 * shift + 2 * b.s1 * shift * shift) / (n * (n - 1) * (n - 2));
-    return estimate_from(1 + shift, v, k3, n);
+    return pyramid_estimate_from(1 + shift, v, k3, n);
 }
 
 static bool tail_chunk_run(void *arg, int chunk, struct err *e)
@@ -157,7 +157,7 @@ static bool tail_chunk_run(void *arg, int chunk, struct err *e)
             struct estimate b = {.mean = library_mean(&library)};
             if (cell->n_b > 0)
                 b = pick_pixel(&library, cell->n_b / block);
-            cell_add_pixel(&sum, &a, &b);
+            pyramid_add_pixel(&sum, &a, &b);
         }
         struct measured m = region_measure(&judge, &sum, rect);
         if (m.noise_free || !region_testable(&judge, &m))

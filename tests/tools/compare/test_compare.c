@@ -138,8 +138,8 @@ static void test_pyramid_brute_force(void **state)
                     for (int y = r.y; y < r.y + r.height; y++)
                         for (int x = r.x; x < r.x + r.width; x++, covered++) {
                             size_t px = (size_t)y * (size_t)w + (size_t)x;
-                            struct estimate ea = pixel_estimate(&a, px, channel);
-                            struct estimate eb = pixel_estimate(&b, px, channel);
+                            struct estimate ea = pyramid_pixel_estimate(&a, px, channel);
+                            struct estimate eb = pyramid_pixel_estimate(&b, px, channel);
                             sa += ea.mean;
                             vb += eb.v;
                             k3 += ea.k3 - eb.k3;
@@ -170,7 +170,7 @@ static void test_estimate_by_hand(void **state)
     for (int channel = 0; channel < 4; channel++) {
         const double scales[4] = {1, 0.5, 0.25, 0.2126 + 0.7152 / 2 + 0.0722 / 4};
         double s = scales[channel], v = s * s * 14 / 6, k3 = s * s * s * 3;
-        struct estimate est = pixel_estimate(&m, 0, channel);
+        struct estimate est = pyramid_pixel_estimate(&m, 0, channel);
         assert_near(est.mean, 3 * s, 1e-12);
         assert_near(est.v, v, 1e-12);
         assert_near(est.k3, k3, 1e-12);
@@ -199,8 +199,8 @@ static void test_luminance_bound(void **state)
             moments_add(&m, p, x);
             moments_add(&lum, p, (double[3]){y, y, y});
         }
-        double upper = pixel_estimate(&m, p, CHANNEL_LUMINANCE).v;
-        double exact = pixel_estimate(&lum, p, 0).v;
+        double upper = pyramid_pixel_estimate(&m, p, CHANNEL_LUMINANCE).v;
+        double exact = pyramid_pixel_estimate(&lum, p, 0).v;
         assert_true(upper >= exact);
         bound += upper;
         truth += exact;

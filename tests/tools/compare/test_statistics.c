@@ -169,7 +169,7 @@ static void test_dense_power(void **state)
                 a.mean[p] += sign[p / 3] * size * se;
             struct comparison c =
                 compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 4});
-            const struct statistic *s = &c.statistic[STATISTIC_DENSE];
+            const struct statistic *s = &c.statistic[STATISTIC_CHI_SQUARE];
             level = 0.01 * s->share;
             assert_int_equal(s->num_tests, 6);
             if (off && s->log10_p <= -6)
@@ -221,7 +221,7 @@ static void test_dense_margin(void **state)
                 &a, &b,
                 (struct compare_options){
                     .alpha = 0.01, .tile = 4, .margin_global = margin, .margin_tile = margin});
-            const struct statistic *s = &c.statistic[STATISTIC_DENSE];
+            const struct statistic *s = &c.statistic[STATISTIC_CHI_SQUARE];
             found[narrow] += s->num_tests > 0 && s->log10_p <= -2;
             comparison_free(&c);
         }
@@ -346,7 +346,7 @@ static void test_amounts(void **state)
             }
             struct comparison c =
                 compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
-            const struct direction *d = &c.direction;
+            const struct error_mode *d = &c.direction;
             if (strcmp(d->name, name[kind]) == 0) {
                 named++;
                 sum += d->amount;
@@ -397,10 +397,10 @@ static void test_directed_power(void **state)
             render(&b, LAW_NORMAL, truth, N, true, &seed);
             struct comparison c =
                 compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
-            const struct statistic *d = &c.statistic[STATISTIC_DIRECTED];
+            const struct statistic *d = &c.statistic[STATISTIC_MATCHED_FILTER];
             share = d->share;
             tests = d->num_tests;
-            assert_int_equal(tests, NUM_DIRECTIONS);
+            assert_int_equal(tests, NUM_ERROR_MODES);
             found[off] += d->log10_p <= log10(0.01 * share);
             comparison_free(&c);
         }
@@ -437,7 +437,7 @@ static void test_directed_margin(void **state)
             render(&a, LAW_NORMAL, wrong, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
             struct comparison c = compare(&a, &b, opt);
-            found[twice] += c.statistic[STATISTIC_DIRECTED].log10_p <= -2;
+            found[twice] += c.statistic[STATISTIC_MATCHED_FILTER].log10_p <= -2;
             comparison_free(&c);
         }
     print_message("scale at the margin: found %d of %d, at twice %d\n", found[0], CLAIMS, found[1]);
@@ -474,8 +474,8 @@ static void test_variance_ratio(void **state)
         }
         struct compare_options opt = {.alpha = 0.01, .tile = 4};
         struct comparison c = compare(&a, &b, opt);
-        assert_true(c.statistic[STATISTIC_NOISE].share == 0);
-        assert_int_equal(c.statistic[STATISTIC_NOISE].num_tests, 0);
+        assert_true(c.statistic[STATISTIC_VARIANCE].share == 0);
+        assert_int_equal(c.statistic[STATISTIC_VARIANCE].num_tests, 0);
         double sum = 0;
         for (int s = 0; s < NUM_STATISTICS; s++)
             sum += c.statistic[s].share;
@@ -486,7 +486,7 @@ static void test_variance_ratio(void **state)
         for (int k = 0; k < 2; k++) {
             opt.margin_variance = k == 0 ? 1 : 0.5;
             c = compare(&a, &b, opt);
-            const struct statistic *s = &c.statistic[STATISTIC_NOISE];
+            const struct statistic *s = &c.statistic[STATISTIC_VARIANCE];
             assert_near(s->share, 0.1, 1e-12);
             *(k == 0 ? &edge : &found) += s->log10_p <= log10(0.01 * s->share);
             tested += k == 1 && s->num_tests > 0;
@@ -615,7 +615,7 @@ static void test_small_alpha(void **state)
     print_message("1000 standard errors: log10 p = %.0f, to leading order %.0f\n",
                   c.statistic[STATISTIC_IMAGE].log10_p, tail);
     assert_near(c.statistic[STATISTIC_IMAGE].log10_p / tail, 1, 0.03);
-    assert_true(c.statistic[STATISTIC_DENSE].log10_p < -1000);
+    assert_true(c.statistic[STATISTIC_CHI_SQUARE].log10_p < -1000);
     comparison_free(&c);
     moments_free(&a);
     moments_free(&b);

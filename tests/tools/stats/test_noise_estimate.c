@@ -69,11 +69,11 @@ static void test_independent(void **state)
     (void)state;
     struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 5;
-    struct spatial s;
+    struct noise_estimate s;
     struct err e;
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     struct cell c = image_cell(&a, &b);
     double n = 65536, v = c.va + c.vb;
     assert_between(v / (2 * noise_sd * noise_sd * n), 0.97, 1.35);
@@ -93,11 +93,11 @@ static void test_shared(void **state)
     (void)state;
     struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 6;
-    struct spatial s;
+    struct noise_estimate s;
     struct err e;
     paint(&a, SHARED, 1, &seed);
     paint(&b, SHARED, 1, &seed);
-    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     struct cell c = image_cell(&a, &b);
     double independent = 2 * noise_sd * noise_sd * 65536;
     assert_true(s.factor[0] > 2);
@@ -111,14 +111,14 @@ static void test_blind_to_sums(void **state)
 {
     (void)state;
     struct moments a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
-    struct spatial s;
+    struct noise_estimate s;
     struct err e;
     for (int i = 0; i < 32 * 32; i++)
         for (int c = 0; c < 3; c++) {
             b.mean[3 * i + c] = 8;
             a.mean[3 * i + c] = 8 + (i % 32 > 11 ? 3 : 0) + (i / 32) % 5;
         }
-    assert_true(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     for (int i = 0; i < 3 * 32 * 32; i++)
         assert_true(a.m2[i] == 0 && b.m2[i] == 0);
     moments_free(&a);
@@ -129,15 +129,15 @@ static void test_refused(void **state)
 {
     (void)state;
     struct moments a = new_moments(32, 31, "sample"), b = new_moments(32, 31, "sample");
-    struct spatial s;
+    struct noise_estimate s;
     struct err e;
     uint64_t seed = 1;
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    assert_false(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_false(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     assert_non_null(strstr(e.msg, "32 x 32"));
     memcpy(b.mean, a.mean, 3 * 32 * 31 * sizeof *a.mean);
-    assert_false(spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_false(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     assert_non_null(strstr(e.msg, "same picture"));
     moments_free(&a);
     moments_free(&b);
@@ -147,7 +147,7 @@ static void test_refused(void **state)
     memset(censored, 0, 40);
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    assert_false(spatial_variance(&a, &b, NULL, NULL, censored, &s, &e));
+    assert_false(noise_estimate_variance(&a, &b, NULL, NULL, censored, &s, &e));
     assert_non_null(strstr(e.msg, "saturated"));
     moments_free(&a);
     moments_free(&b);
@@ -162,12 +162,12 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
     struct compare_options opt = {.alpha = alpha, .tile = 16};
     int different = 0;
     for (int i = 0; i < runs; i++) {
-        struct spatial s;
+        struct noise_estimate s;
         struct comparison c;
         struct err e;
         paint(&a, kind, scale, &seed);
         paint(&b, kind, 1, &seed);
-        if (!spatial_variance(&a, &b, NULL, NULL, NULL, &s, &e))
+        if (!noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e))
             fail_msg("%s", e.msg);
         double f = 1.5 * s.factor[0];
         for (int k = 0; decree && k < 3 * 64 * 64; k++) {
