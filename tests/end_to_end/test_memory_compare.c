@@ -166,10 +166,10 @@ static bool permute(void *ctx, struct err *e)
 static bool judge_consistency(void *ctx, struct err *e)
 {
     struct replicates *r = ctx;
-    struct consistency c;
-    struct efficiency f;
-    bool ok = consistency_judge(r->render, RENDERS, 0.2, 1e-3, &c, e) &&
-              efficiency_judge(r->render, RENDERS, 16, r->variance, 0.2, 1e-3, &f, e);
+    struct stated_error c;
+    struct sample_efficiency f;
+    bool ok = stated_error_judge(r->render, RENDERS, 0.2, 1e-3, &c, e) &&
+              sample_efficiency_judge(r->render, RENDERS, 16, r->variance, 0.2, 1e-3, &f, e);
     alloc_fail_off();
     if (ok)
         hold(&r->sum, c.pixels + c.image + f.ratio);
@@ -202,7 +202,7 @@ static void replicates(void **state)
     alloc_fail_each("spatial_variance", ALLOC_ALL, spatial, &p);
     alloc_fail_each("permutation_test, permutation_confirm", ALLOC_ALL, permute, &r);
     r.sum = 0;
-    alloc_fail_each("consistency_judge, efficiency_judge", ALLOC_ALL, judge_consistency, &r);
+    alloc_fail_each("consistency_judge, sample_efficiency_judge", ALLOC_ALL, judge_consistency, &r);
     for (int k = 0; k < RENDERS; k++)
         moments_free(&r.render[k]);
     free(values);

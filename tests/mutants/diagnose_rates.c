@@ -270,7 +270,7 @@ static bool draw_consistent(const struct rate_image *r, const struct pool *p, ui
     const struct view *v = &r->c.view[p->consistent_view];
     struct moments chosen[MOST_RENDERS];
     struct signature s[MOST_RENDERS];
-    struct consistency c;
+    struct stated_error c;
     bool taken[POOL] = {false};
     for (int k = 0; k < v->renders; k++) {
         int i;
@@ -283,7 +283,7 @@ static bool draw_consistent(const struct rate_image *r, const struct pool *p, ui
             return false;
     }
     double share = alpha / (2 * r->c.num_views);
-    if (!consistency_judge(chosen, v->renders, 0.02, share, &c, e))
+    if (!stated_error_judge(chosen, v->renders, 0.02, share, &c, e))
         return false;
     *out = (struct observation){.view = v,
                                 .seen = signature_average(s, v->renders),

@@ -47,7 +47,7 @@ static bool print_markdown(FILE *f, const char *path, bool headline, struct err 
     }
     if (has_claims)
         results_print_table(f, results, true);
-    consistency_print(f, json_object_get(results, "consistency"), true);
+    stated_error_print(f, json_object_get(results, "consistency"), true);
     if (has_claims && convergence != NULL)
         putc('\n', f);
     if (convergence != NULL)

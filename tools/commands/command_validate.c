@@ -197,7 +197,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
         return false;
     if (json_array_size(json_object_get(results, "claims")) > 0)
         results_print_table(stdout, results, false);
-    consistency_print(stdout, json_object_get(results, "consistency"), false);
+    stated_error_print(stdout, json_object_get(results, "consistency"), false);
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
         puts("");
@@ -225,7 +225,7 @@ static void tell_not_judged(const json_t *results, struct err *e)
     json_t *consistency = json_object_get(results, "consistency");
     for (size_t i = 0; first == NULL && i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
-        if (consistency_outcome(c) == OUTCOME_NOT_JUDGED) {
+        if (stated_error_outcome(c) == OUTCOME_NOT_JUDGED) {
             err_set(e, "%s, its stated errors: %s", member_text(c, "scene"),
                     member_text(c, "error"));
             return;

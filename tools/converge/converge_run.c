@@ -84,7 +84,7 @@ static bool load_reference(const struct run *r, const struct suite_scene *s,
         if (!ok)
             return false;
     }
-    bool ok = converge_reference_init(out, &m, shrink, e);
+    bool ok = convergence_rate_reference_init(out, &m, shrink, e);
     moments_free(&m);
     return ok || err_prefix(e, "%s", s->name);
 }
@@ -114,7 +114,8 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
         ok = converge_render(
             job, (enum converge_engine)engine, i, o->ladder[i], images, &cpu_s, &out->version,
             &(struct converge_progress){&progress, done, o->ladder[i] + start, total}, &out->e);
-        if (ok && !converge_rung(images, o->replicates, o->ladder[i], ref, &out->rung[i], &out->e))
+        if (ok && !convergence_rate_rung(images, o->replicates, o->ladder[i], ref, &out->rung[i],
+                                         &out->e))
             ok = err_prefix(&out->e, "%s, %d samples", what, o->ladder[i]);
         out->rung[i].cpu_s = cpu_s;
         done += (o->ladder[i] + start) * o->replicates;
@@ -124,7 +125,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
     free(images);
     out->present = ok;
     if (ok)
-        out->cost = converge_cost(out->rung, o->num_rungs);
+        out->cost = convergence_rate_cost(out->rung, o->num_rungs);
 }
 
 static json_t *number(double v)
@@ -146,7 +147,7 @@ static json_t *exp_pair(struct estimate x, double alpha, double power)
 
 static json_t *rung_json(const struct rung *g, const struct cost *c, double alpha)
 {
-    struct estimate eff = converge_log_efficiency(g, c);
+    struct estimate eff = convergence_rate_log_efficiency(g, c);
     double bias = copysign(sqrt(fabs(g->bias2.value)), g->bias2.value);
     return json_pack("{s:f, s:f, s:o, s:f, s:o, s:f, s:f, s:o, s:o}", "spp", g->spp, "rmse",
                      exp(0.5 * g->log_mse.value), "rmse_ci", exp_pair(g->log_mse, alpha, 0.5),
@@ -161,10 +162,11 @@ static json_t *verdict_json(const struct run *r, int engine, const struct ladder
 {
     const struct converge_options *o = r->opt;
     const struct rung *top = &l->rung[o->num_rungs - 1];
-    struct estimate slope = converge_slope(l->rung, o->num_rungs);
-    struct interval si = estimate_interval(slope, r->alpha), fi = converge_floor(top, r->alpha);
-    enum verdict vs = converge_slope_verdict(slope, r->alpha, o->slope_margin);
-    enum verdict vf = converge_floor_verdict(top, o->margin, r->alpha);
+    struct estimate slope = convergence_rate_slope(l->rung, o->num_rungs);
+    struct interval si = estimate_interval(slope, r->alpha),
+                    fi = convergence_rate_floor(top, r->alpha);
+    enum verdict vs = convergence_rate_slope_verdict(slope, r->alpha, o->slope_margin);
+    enum verdict vf = convergence_rate_floor_verdict(top, o->margin, r->alpha);
     bool judge_slope = is_independent(engine), judged = is_judged(engine);
     bool different = vf == VERDICT_DIFFERENT || (judge_slope && vs == VERDICT_DIFFERENT);
     bool unclear = vf == VERDICT_INCONCLUSIVE || (judge_slope && vs == VERDICT_INCONCLUSIVE);
@@ -223,9 +225,9 @@ static json_t *ratio_json(const struct run *r, int a, const struct ladder *la, i
 {
     json_t *rungs = json_array();
     for (int i = 0; i < r->opt->num_rungs; i++) {
-        struct estimate v = converge_log_ratio(&la->rung[i], &lb->rung[i]);
-        struct estimate ea = converge_log_efficiency(&la->rung[i], &la->cost);
-        struct estimate eb = converge_log_efficiency(&lb->rung[i], &lb->cost);
+        struct estimate v = convergence_rate_log_ratio(&la->rung[i], &lb->rung[i]);
+        struct estimate ea = convergence_rate_log_efficiency(&la->rung[i], &la->cost);
+        struct estimate eb = convergence_rate_log_efficiency(&lb->rung[i], &lb->cost);
         double var = ea.se * ea.se + eb.se * eb.se;
         struct estimate eff = {ea.value - eb.value, sqrt(var), fmin(ea.dof, eb.dof)};
         json_array_append_new(
@@ -263,7 +265,7 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
     json_t *depths = NULL;
     struct err why;
     if (o->depth_spp > 0 &&
-        !depths_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
+        !depth_ladder_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
         depths = json_pack("{s:s}", "error", why.msg);
     struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
     json_t *engines = json_array(), *ratios = json_array();
@@ -286,7 +288,7 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
         json_object_set_new(j, "depths", depths);
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
         free(ladder[k].version);
-    converge_reference_free(&ref);
+    convergence_rate_reference_free(&ref);
     return (j != NULL && json_array_append_new(convergence, j) == 0) ||
            err_set(e, "out of memory for the results");
 }

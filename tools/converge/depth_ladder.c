@@ -46,8 +46,8 @@ static bool measure_one(const struct converge_job *job, const struct suite_refer
     return json_array_append_new(rungs, rung) == 0 || err_set(e, "out of memory for the results");
 }
 
-bool depths_measure(const struct converge_job *job, const struct suite_reference *truth, int spp,
-                    json_t **out, struct err *e)
+bool depth_ladder_measure(const struct converge_job *job, const struct suite_reference *truth,
+                          int spp, json_t **out, struct err *e)
 {
     json_t *rungs = json_array();
     int last = job->scene->depth;
@@ -65,7 +65,7 @@ bool depths_measure(const struct converge_job *job, const struct suite_reference
     return *out != NULL || err_set(e, "out of memory for the results");
 }
 
-bool depths_check(const json_t *depths, const char *where, struct err *e)
+bool depth_ladder_check(const json_t *depths, const char *where, struct err *e)
 {
     const json_t *rungs = json_object_get(depths, "rungs");
     if (json_is_string(json_object_get(depths, "error")))

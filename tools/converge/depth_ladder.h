@@ -12,11 +12,11 @@
  * mean over the picture; se: its standard error for channels that err together (an upper bound). truth: of the closed
  * form, where `truth` (may be NULL) holds at that depth. All pictures have the same seed, so that steps are less noisy
  * than the values. Fails where a picture cannot be rendered. */
-bool depths_measure(const struct converge_job *job, const struct suite_reference *truth, int spp,
-                    json_t **out, struct err *e) __attribute__((warn_unused_result));
+bool depth_ladder_measure(const struct converge_job *job, const struct suite_reference *truth,
+                          int spp, json_t **out, struct err *e) __attribute__((warn_unused_result));
 
 /* Checks that, or {"error": "one line"} of a ladder that could not be rendered; the line begins with `where`. */
-bool depths_check(const json_t *depths, const char *where, struct err *e)
+bool depth_ladder_check(const json_t *depths, const char *where, struct err *e)
     __attribute__((warn_unused_result));
 
 /* <figure> of it, or its error; nothing without any (NULL). */

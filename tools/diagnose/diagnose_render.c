@@ -51,8 +51,8 @@ static bool has_noise(const struct signature *s)
 static bool judge(const struct moments *m, const struct diagnose_job *job, double alpha,
                   struct signature *s, bool *consistent, struct err *e)
 {
-    struct consistency c;
-    if (!consistency_judge(m, job->renders, consistency_margin, alpha, &c, e))
+    struct stated_error c;
+    if (!stated_error_judge(m, job->renders, consistency_margin, alpha, &c, e))
         return false;
     signature_set_stated_error(s, c.pixels, c.pixels_lo, c.pixels_hi, c.image, job->renders, alpha);
     *consistent = c.verdict != VERDICT_DIFFERENT;

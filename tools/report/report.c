@@ -110,7 +110,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
         write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")));
-    report_consistency_headline(f, json_object_get(root, "consistency"));
+    report_stated_error_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
             "<p class=\"lede\">The chance that noise alone makes any claim of this page "
@@ -230,7 +230,7 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
     report_alike_table(p);
     if (!report_rays(f, json_object_get(root, "claims"), e))
         return false;
-    report_consistency(f, json_object_get(root, "consistency"));
+    report_stated_error(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
     fputs("</main>\n", f);

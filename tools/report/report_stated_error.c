@@ -7,11 +7,11 @@ static size_t count_good(const json_t *consistency)
 {
     size_t good = 0;
     for (size_t i = 0; i < json_array_size(consistency); i++)
-        good += consistency_outcome(json_array_get(consistency, i)) == OUTCOME_AS_EXPECTED;
+        good += stated_error_outcome(json_array_get(consistency, i)) == OUTCOME_AS_EXPECTED;
     return good;
 }
 
-void report_consistency_headline(FILE *f, const json_t *consistency)
+void report_stated_error_headline(FILE *f, const json_t *consistency)
 {
     size_t num = json_array_size(consistency), good = count_good(consistency);
     if (num == 0)
@@ -22,7 +22,7 @@ void report_consistency_headline(FILE *f, const json_t *consistency)
 
 static void write_row(FILE *f, const json_t *c)
 {
-    bool good = consistency_outcome(c) == OUTCOME_AS_EXPECTED;
+    bool good = stated_error_outcome(c) == OUTCOME_AS_EXPECTED;
     fprintf(f, "<tr%s><th scope=\"row\">", good ? "" : " class=\"bad\"");
     html_text(f, member_text(c, "scene"));
     if (member_text(c, "error") != NULL) {
@@ -53,7 +53,7 @@ static void write_row(FILE *f, const json_t *c)
     fputs("</tr>\n", f);
 }
 
-void report_consistency(FILE *f, const json_t *consistency)
+void report_stated_error(FILE *f, const json_t *consistency)
 {
     if (json_array_size(consistency) == 0)
         return;

@@ -5,11 +5,11 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* `consistency` as consistency_check() leaves it; nothing is written where it is NULL or empty. */
+/* `consistency` as stated_error_check() leaves it; nothing is written where it is NULL or empty. */
 
 /* How many renderers err as they state, in one line. */
-void report_consistency_headline(FILE *f, const json_t *consistency);
+void report_stated_error_headline(FILE *f, const json_t *consistency);
 /* The table. */
-void report_consistency(FILE *f, const json_t *consistency);
+void report_stated_error(FILE *f, const json_t *consistency);
 
 #endif

@@ -137,7 +137,7 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
             return false;
     }
     const json_t *depths = json_object_get(s, "depths");
-    return depths == NULL || depths_check(depths, where, e);
+    return depths == NULL || depth_ladder_check(depths, where, e);
 }
 
 bool convergence_check(const json_t *convergence, const char *path, struct err *e)

@@ -76,7 +76,7 @@ static struct tally tally_of(const json_t *results)
         count(&t, claim_outcome(c), claim_lacks_time(c));
     }
     for (size_t i = 0; i < json_array_size(consistency); i++)
-        count(&t, consistency_outcome(json_array_get(consistency, i)), false);
+        count(&t, stated_error_outcome(json_array_get(consistency, i)), false);
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
         for (size_t k = 0; k < json_array_size(engines); k++)
@@ -118,7 +118,7 @@ void annotations_print(FILE *f, const json_t *results)
         print_claim(f, json_array_get(claims, i));
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
-        print_other(f, "stated errors", c, consistency_outcome(c), member_text(c, "scene"));
+        print_other(f, "stated errors", c, stated_error_outcome(c), member_text(c, "scene"));
     }
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *scene = json_array_get(convergence, i),

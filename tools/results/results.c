@@ -294,7 +294,7 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
     if (convergence != NULL && !convergence_check(convergence, path, e))
         return false;
     const json_t *consistency = json_object_get(root, "consistency");
-    if (consistency != NULL && !consistency_check(consistency, path, e))
+    if (consistency != NULL && !stated_error_check(consistency, path, e))
         return false;
     if (!json_is_array(claims) ||
         (json_array_size(claims) == 0 && convergence == NULL && json_array_size(consistency) == 0))
@@ -395,7 +395,7 @@ int results_exit_code(const json_t *results)
     }
     const json_t *consistency = json_object_get(results, "consistency");
     for (size_t i = 0; i < json_array_size(consistency); i++)
-        count[consistency_outcome(json_array_get(consistency, i))]++;
+        count[stated_error_outcome(json_array_get(consistency, i))]++;
     if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) ==
             0 ||
         count[OUTCOME_NOT_JUDGED] > 0)

@@ -10,7 +10,7 @@
 /* The darkest unit, as a share of the reference's mean; as in compare.c. */
 #define DARK_SHARE 0.05
 
-void converge_reference_free(struct converge_reference *r)
+void convergence_rate_reference_free(struct converge_reference *r)
 {
     free(r->unit);
     free(r->mean);
@@ -39,8 +39,8 @@ static bool box_value(const struct moments *m, int shrink, int x, int y, int c, 
     return true;
 }
 
-bool converge_reference_init(struct converge_reference *r, const struct moments *m, int shrink,
-                             struct err *e)
+bool convergence_rate_reference_init(struct converge_reference *r, const struct moments *m,
+                                     int shrink, struct err *e)
 {
     assert(shrink > 0);
     if (m->width % shrink != 0 || m->height % shrink != 0)
@@ -86,7 +86,7 @@ bool converge_reference_init(struct converge_reference *r, const struct moments 
     return true;
 fail:
     free(n);
-    converge_reference_free(r);
+    convergence_rate_reference_free(r);
     return false;
 }
 
@@ -204,8 +204,8 @@ static bool estimate_rung(const struct sums *s, int count, const struct converge
     return true;
 }
 
-bool converge_rung(const float *images, int count, double spp, const struct converge_reference *ref,
-                   struct rung *out, struct err *e)
+bool convergence_rate_rung(const float *images, int count, double spp,
+                           const struct converge_reference *ref, struct rung *out, struct err *e)
 {
     assert(count >= 3);
     if (!check_distinct(images, count, ref->size, e))
@@ -222,7 +222,7 @@ bool converge_rung(const float *images, int count, double spp, const struct conv
     return ok;
 }
 
-struct estimate converge_slope(const struct rung *rung, int num)
+struct estimate convergence_rate_slope(const struct rung *rung, int num)
 {
     assert(num >= 2);
     double mean_v = 0, sw = 0, sx = 0, sxx = 0;
@@ -249,7 +249,7 @@ struct estimate converge_slope(const struct rung *rung, int num)
     return (struct estimate){slope, sqrt(v), dof};
 }
 
-enum verdict converge_slope_verdict(struct estimate slope, double alpha, double half_width)
+enum verdict convergence_rate_slope_verdict(struct estimate slope, double alpha, double half_width)
 {
     struct interval i = estimate_interval(slope, alpha);
     if (i.lo > -0.5 || i.hi < -0.5)
@@ -257,21 +257,21 @@ enum verdict converge_slope_verdict(struct estimate slope, double alpha, double 
     return (i.hi - i.lo) / 2 > half_width ? VERDICT_INCONCLUSIVE : VERDICT_EQUIVALENT;
 }
 
-struct interval converge_floor(const struct rung *r, double alpha)
+struct interval convergence_rate_floor(const struct rung *r, double alpha)
 {
     struct interval i = estimate_interval(r->bias2, 2 * alpha);
     return (struct interval){sqrt(fmax(0, i.lo)), sqrt(fmax(0, i.hi))};
 }
 
-enum verdict converge_floor_verdict(const struct rung *r, double margin, double alpha)
+enum verdict convergence_rate_floor_verdict(const struct rung *r, double margin, double alpha)
 {
-    struct interval i = converge_floor(r, alpha);
+    struct interval i = convergence_rate_floor(r, alpha);
     if (i.lo > margin)
         return VERDICT_DIFFERENT;
     return i.hi <= margin ? VERDICT_EQUIVALENT : VERDICT_INCONCLUSIVE;
 }
 
-struct estimate converge_log_ratio(const struct rung *a, const struct rung *b)
+struct estimate convergence_rate_log_ratio(const struct rung *a, const struct rung *b)
 {
     double va = a->log_variance.se * a->log_variance.se;
     double vb = b->log_variance.se * b->log_variance.se;
@@ -279,7 +279,7 @@ struct estimate converge_log_ratio(const struct rung *a, const struct rung *b)
                              stats_welch_dof(va, a->replicates, vb, b->replicates)};
 }
 
-struct cost converge_cost(const struct rung *rung, int num)
+struct cost convergence_rate_cost(const struct rung *rung, int num)
 {
     assert(num >= 2);
     double sw = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, rest = 0;
@@ -302,7 +302,7 @@ struct cost converge_cost(const struct rung *rung, int num)
     return (struct cost){a, {b, se, num > 2 ? num - 2 : 1}};
 }
 
-struct estimate converge_log_efficiency(const struct rung *r, const struct cost *c)
+struct estimate convergence_rate_log_efficiency(const struct rung *r, const struct cost *c)
 {
     double b = c->per_spp.value;
     if (!(b > 0))

@@ -30,9 +30,9 @@ struct converge_reference {
 /* The reference for pictures `shrink` times smaller on both sides: box averages, which with a box
  * filter of one pixel are the smaller picture exactly. Fails where shrink does not divide the size,
  * on stratified moments, on fewer than two observations, and on a black picture. */
-bool converge_reference_init(struct converge_reference *r, const struct moments *m, int shrink,
-                             struct err *e) __attribute__((warn_unused_result));
-void converge_reference_free(struct converge_reference *r);
+bool convergence_rate_reference_init(struct converge_reference *r, const struct moments *m,
+                                     int shrink, struct err *e) __attribute__((warn_unused_result));
+void convergence_rate_reference_free(struct converge_reference *r);
 
 /* An estimate with its standard error and the degrees of freedom of that. */
 struct estimate {
@@ -57,28 +57,29 @@ struct rung {
 /* Judges `count` >= 3 replicates, one after the other in `images`. Fails where two replicates are the
  * same (the seed has no effect), where there is no noise at all, and where the reference is so noisy
  * that MSE is not positive. */
-bool converge_rung(const float *images, int count, double spp, const struct converge_reference *ref,
-                   struct rung *out, struct err *e) __attribute__((warn_unused_result));
+bool convergence_rate_rung(const float *images, int count, double spp,
+                           const struct converge_reference *ref, struct rung *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* Slope of ln RMSE on ln spp over num >= 2 rungs with replicates of their own. Weighted least squares:
  * the weights are 1/(own + mean squared standard error), so that a rung whose few replicates happen to
  * agree does not rule the fit; the standard error holds for any weights, sum c_i^2 se_i^2. The degrees of
  * freedom are the smallest of any rung, not the larger number that their sum would have: squared errors are
  * skewed, and that makes up for it (tests/tools/stats/test_converge.c). */
-struct estimate converge_slope(const struct rung *rung, int num);
+struct estimate convergence_rate_slope(const struct rung *rung, int num);
 
 /* Is the slope -1/2, as of independent samples? DIFFERENT if the 1 - alpha interval does not contain it,
  * INCONCLUSIVE if it does but is wider than +-half_width, else EQUIVALENT. */
-enum verdict converge_slope_verdict(struct estimate slope, double alpha, double half_width);
+enum verdict convergence_rate_slope_verdict(struct estimate slope, double alpha, double half_width);
 
 /* The interval of the bias that is left at a rung: sqrt of the 1 - 2 alpha interval of B^2, cut at 0. */
-struct interval converge_floor(const struct rung *r, double alpha);
+struct interval convergence_rate_floor(const struct rung *r, double alpha);
 /* Two one-sided tests at alpha of "RMS bias <= margin": DIFFERENT if the interval lies above,
  * EQUIVALENT if it lies below, else INCONCLUSIVE. */
-enum verdict converge_floor_verdict(const struct rung *r, double margin, double alpha);
+enum verdict convergence_rate_floor_verdict(const struct rung *r, double margin, double alpha);
 
 /* ln(variance of a / variance of b); Welch's degrees of freedom. The replicates are independent. */
-struct estimate converge_log_ratio(const struct rung *a, const struct rung *b);
+struct estimate convergence_rate_log_ratio(const struct rung *a, const struct rung *b);
 
 /* CPU seconds of a replicate = start + per_spp x spp, by least squares of the relative residuals over num
  * >= 2 rungs: the start of the engine is not held against it. */
@@ -86,10 +87,10 @@ struct cost {
     double start_s;
     struct estimate per_spp; /* se is INFINITY with two rungs */
 };
-struct cost converge_cost(const struct rung *rung, int num);
+struct cost convergence_rate_cost(const struct rung *rung, int num);
 
 /* ln(1/(variance x CPU seconds)), in 1/s, of one replicate without the start. NAN where the cost is
  * not positive (too short to be timed). */
-struct estimate converge_log_efficiency(const struct rung *r, const struct cost *c);
+struct estimate convergence_rate_log_efficiency(const struct rung *r, const struct cost *c);
 
 #endif

@@ -25,8 +25,9 @@ static bool log_ratio(const struct moments *m, int spp, const double *variance, 
     return true;
 }
 
-bool efficiency_judge(const struct moments *render, int num, int spp, const double *variance,
-                      double margin, double alpha, struct efficiency *out, struct err *e)
+bool sample_efficiency_judge(const struct moments *render, int num, int spp, const double *variance,
+                             double margin, double alpha, struct sample_efficiency *out,
+                             struct err *e)
 {
     assert(num >= 4 && spp > 0 && margin > 0 && alpha > 0 && alpha < 0.5);
     double *x = calloc((size_t)num, sizeof *x), mean = 0, squares = 0;
@@ -41,7 +42,8 @@ bool efficiency_judge(const struct moments *render, int num, int spp, const doub
     if (!ok)
         return false;
     double half = stats_t_quantile(alpha / 2, num - 1) * sqrt(squares / (num - 1) / num);
-    *out = (struct efficiency){.ratio = exp(mean), .lo = exp(mean - half), .hi = exp(mean + half)};
+    *out = (struct sample_efficiency){
+        .ratio = exp(mean), .lo = exp(mean - half), .hi = exp(mean + half)};
     bool outside = out->hi < 1 / (1 + margin) || out->lo > 1 + margin;
     bool inside = out->lo >= 1 / (1 + margin) && out->hi <= 1 + margin;
     out->verdict = outside ? VERDICT_DIFFERENT : inside ? VERDICT_EQUIVALENT : VERDICT_INCONCLUSIVE;

@@ -12,7 +12,7 @@
 #include "reference/suite/suite.h"
 #include "renderer/image/moments.h"
 
-struct efficiency {
+struct sample_efficiency {
     enum verdict verdict;
     char reason[256];
     double ratio, lo, hi; /* 1 - alpha interval */
@@ -21,9 +21,9 @@ struct efficiency {
 /* Of num >= 4 independent renders of the same size with spp samples asked for; variance: 3 numbers a
  * pixel. The interval of ln ratio is Student's, from the spread between renders. DIFFERENT if it
  * lies outside [1/(1 + margin), 1 + margin], EQUIVALENT if inside, else INCONCLUSIVE. alpha as of
- * consistency_judge(). Fails where a pixel has less than two samples, and where nothing has noise. */
-bool efficiency_judge(const struct moments *render, int num, int spp, const double *variance,
-                      double margin, double alpha, struct efficiency *out, struct err *e)
-    __attribute__((warn_unused_result));
+ * stated_error_judge(). Fails where a pixel has less than two samples, and where nothing has noise. */
+bool sample_efficiency_judge(const struct moments *render, int num, int spp, const double *variance,
+                             double margin, double alpha, struct sample_efficiency *out,
+                             struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -80,7 +80,7 @@ static bool any_equal(const struct moments *render, int num)
 }
 
 static bool judge_pixels(const struct moments *render, const struct totals *t, int num,
-                         double alpha, struct consistency *out)
+                         double alpha, struct stated_error *out)
 {
     double all = log_ratio(render, t, num, num), mean = 0, squares = 0;
     double *without = malloc((size_t)num * sizeof *without);
@@ -99,7 +99,7 @@ static bool judge_pixels(const struct moments *render, const struct totals *t, i
 }
 
 /* Keeps the channel whose S is furthest out, by its p. */
-static void judge_image(const struct totals *t, int num, double alpha, struct consistency *out)
+static void judge_image(const struct totals *t, int num, double alpha, struct stated_error *out)
 {
     double smallest = 1;
     out->image = 1;
@@ -124,7 +124,7 @@ static void judge_image(const struct totals *t, int num, double alpha, struct co
     out->image_hi = gsl_cdf_chisq_Qinv(alpha / 6, num - 1) / (num - 1);
 }
 
-static void decide(struct consistency *c, double margin)
+static void decide(struct stated_error *c, double margin)
 {
     double lo = 1 / (1 + margin), hi = 1 + margin;
     if (c->pixels_hi < lo || c->pixels_lo > hi) {
@@ -152,11 +152,11 @@ static void decide(struct consistency *c, double margin)
     }
 }
 
-bool consistency_judge(const struct moments *render, int num, double margin, double alpha,
-                       struct consistency *out, struct err *e)
+bool stated_error_judge(const struct moments *render, int num, double margin, double alpha,
+                        struct stated_error *out, struct err *e)
 {
     assert(num >= 4 && margin > 0 && alpha > 0 && alpha < 0.5);
-    *out = (struct consistency){.renders = num};
+    *out = (struct stated_error){.renders = num};
     double stated = 0;
     struct totals *t = calloc((size_t)num, sizeof *t);
     if (t == NULL)

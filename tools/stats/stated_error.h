@@ -21,7 +21,7 @@
 #include "reference/suite/suite.h"
 #include "renderer/image/moments.h"
 
-struct consistency {
+struct stated_error {
     enum verdict verdict;
     char reason[256]; /* one sentence: what decided */
     int renders;
@@ -36,7 +36,8 @@ struct consistency {
  * else INCONCLUSIVE. alpha: the chance that independent samples come out DIFFERENT, and that an R
  * outside the margin comes out EQUIVALENT. Fails if sizes or n differ, if n < 2, or if there is no
  * noise in any render. */
-bool consistency_judge(const struct moments *render, int num, double margin, double alpha,
-                       struct consistency *out, struct err *e) __attribute__((warn_unused_result));
+bool stated_error_judge(const struct moments *render, int num, double margin, double alpha,
+                        struct stated_error *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

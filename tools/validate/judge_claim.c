@@ -270,14 +270,14 @@ void task_look(struct validation *v, struct task *t)
         return;
     }
     say(v, t->scene->name, "rendering with seeds of their own");
-    t->result = consistency_run(v->opt, t->scene, v->alpha, v->deadline);
+    t->result = stated_error_run(v->opt, t->scene, v->alpha, v->deadline);
     announce(v, t);
 }
 
 void task_give_up(struct validation *v, struct task *t, const char *why)
 {
     if (t->a == NULL)
-        t->result = consistency_run(v->opt, t->scene, v->alpha, 0);
+        t->result = stated_error_run(v->opt, t->scene, v->alpha, 0);
     if (t->a == NULL)
         announce(v, t);
     else if (t->seen)
@@ -291,7 +291,7 @@ bool task_differs(const struct task *t)
     if (t->result == NULL)
         return false;
     if (t->a == NULL)
-        return consistency_outcome(t->result) == OUTCOME_OPPOSITE;
+        return stated_error_outcome(t->result) == OUTCOME_OPPOSITE;
     const char *verdict = member_text(t->result, "verdict");
     return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
            claim_outcome(t->result) == OUTCOME_OPPOSITE;

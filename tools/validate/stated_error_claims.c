@@ -47,20 +47,20 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
 
 /* What the three questions came to; the later ones are asked of some scenes. */
 struct findings {
-    struct consistency c;
-    struct efficiency noise;
+    struct stated_error c;
+    struct sample_efficiency noise;
     struct adaptive_stop stop;
 };
 
 static bool judge_noise(const struct suite_scene *s, const struct moments *render, double alpha,
-                        struct efficiency *out, struct err *e)
+                        struct sample_efficiency *out, struct err *e)
 {
     double *variance;
     const struct suite_reference *truth = suite_reference_of(s, "truth");
     if (!truth_noise(s, truth, &variance, e))
         return false;
-    bool ok = efficiency_judge(render, s->consistency.renders, s->consistency.spp, variance,
-                               s->consistency.noise_margin, alpha, out, e);
+    bool ok = sample_efficiency_judge(render, s->consistency.renders, s->consistency.spp, variance,
+                                      s->consistency.noise_margin, alpha, out, e);
     free(variance);
     return ok;
 }
@@ -103,7 +103,7 @@ static json_t *judged(const struct suite_scene *s, double alpha, const struct fi
                       double seconds)
 {
     char reason[256];
-    const struct consistency *c = &f->c;
+    const struct stated_error *c = &f->c;
     enum verdict v = overall(s, f, reason);
     json_t *j =
         json_pack("{ss,ss,si,si,sf,sf,ss,sb,ss,sf,s[ff],sf,s[ff],sf}", "scene", s->name, "engine",
@@ -123,8 +123,8 @@ static json_t *judged(const struct suite_scene *s, double alpha, const struct fi
     return j;
 }
 
-json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
-                        double alpha, double deadline)
+json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline)
 {
     int num = s->consistency.renders, done = 0;
     bool asks_noise = s->consistency.noise_margin > 0;
@@ -137,7 +137,7 @@ json_t *consistency_run(const struct validate_options *opt, const struct suite_s
     for (; ok && done < num; done += ok)
         ok = render_one(opt, s, done, s->consistency.spp, NULL, deadline, &render[done], &seconds,
                         &e);
-    ok = ok && consistency_judge(render, num, s->consistency.margin, each, &f.c, &e) &&
+    ok = ok && stated_error_judge(render, num, s->consistency.margin, each, &f.c, &e) &&
          (!asks_noise || judge_noise(s, render, each, &f.noise, &e)) &&
          (s->consistency.batch == 0 || judge_stop(opt, s, deadline, &f.stop, &seconds, &e));
     for (int k = 0; k < done; k++)
@@ -195,7 +195,7 @@ static bool check_one(const json_t *c, const char *where, struct err *e)
            err_set(e, "%s: 'passed' contradicts 'verdict'", where);
 }
 
-bool consistency_check(const json_t *consistency, const char *path, struct err *e)
+bool stated_error_check(const json_t *consistency, const char *path, struct err *e)
 {
     if (!json_is_array(consistency))
         return err_set(e, "%s: 'consistency' is not an array", path);
@@ -208,7 +208,7 @@ bool consistency_check(const json_t *consistency, const char *path, struct err *
     return true;
 }
 
-enum outcome consistency_outcome(const json_t *claim)
+enum outcome stated_error_outcome(const json_t *claim)
 {
     enum verdict v;
     if (member_text(claim, "verdict") == NULL || !verdict_parse(member_text(claim, "verdict"), &v))
@@ -238,7 +238,7 @@ static void print_more(FILE *f, const json_t *c, const char *before)
         fprintf(f, "%.0f + %.0f", member_number(c, "too_early"), member_number(c, "too_late"));
 }
 
-void consistency_print(FILE *f, const json_t *consistency, bool markdown)
+void stated_error_print(FILE *f, const json_t *consistency, bool markdown)
 {
     if (json_array_size(consistency) == 0)
         return;

@@ -23,16 +23,16 @@
 /* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
  * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
  * an "error" that says so. */
-json_t *consistency_run(const struct validate_options *opt, const struct suite_scene *s,
-                        double alpha, double deadline);
+json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline);
 
 /* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
-bool consistency_check(const json_t *consistency, const char *path, struct err *e)
+bool stated_error_check(const json_t *consistency, const char *path, struct err *e)
     __attribute__((warn_unused_result));
 
-enum outcome consistency_outcome(const json_t *claim);
+enum outcome stated_error_outcome(const json_t *claim);
 
 /* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
-void consistency_print(FILE *f, const json_t *consistency, bool markdown);
+void stated_error_print(FILE *f, const json_t *consistency, bool markdown);
 
 #endif

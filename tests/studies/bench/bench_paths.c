@@ -173,20 +173,20 @@ static bool judge(const struct bench_options *o, const struct bench_view *v,
 {
     struct converge_reference ref;
     double cost[MAX_ROUNDS], log_cost = 0, log_cost2 = 0, var, our_var, var_se = 0;
-    if (!converge_reference_init(&ref, units, r->shrink, e))
+    if (!convergence_rate_reference_init(&ref, units, r->shrink, e))
         return false;
     use_relmse_units(&ref);
     bool ok = true;
     for (int k = 0; ok && k < NUM_RUNGS; k++) {
         struct rung rung;
-        ok = converge_rung(r->images[k], r->count[k], r->spp[k], &ref, &rung, e);
+        ok = convergence_rate_rung(r->images[k], r->count[k], r->spp[k], &ref, &rung, e);
         r->relmse[k] = ok ? exp(rung.log_variance.value) : NAN;
         var_se = ok ? rung.log_variance.se : NAN;
     }
     double mean = mean_of(r->images[MANY], r->count[MANY], ref.size, &var);
     double our_mean = mean_of(ours->images[MANY], ours->count[MANY],
                               3 * (size_t)units->width * (size_t)units->height, &our_var);
-    converge_reference_free(&ref);
+    convergence_rate_reference_free(&ref);
     memcpy(cost, r->cost, sizeof cost);
     double seconds = bench_median(cost, o->rounds);
     r->mpaths = v->camera.width * v->camera.height / seconds * 1e-6;

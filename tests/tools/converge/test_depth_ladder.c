@@ -52,9 +52,9 @@ static void furnace(void **state)
                                      .threads = 1,
                                      .timeout_s = 60};
     json_t *depths;
-    if (!depths_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e))
+    if (!depth_ladder_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e))
         fail_msg("%s", e.msg);
-    assert_true(depths_check(depths, "x", &e));
+    assert_true(depth_ladder_check(depths, "x", &e));
     const json_t *rungs = json_object_get(depths, "rungs");
     assert_int_equal(json_array_size(rungs), 6);
     /* Emission 0.5, 1, 2 and albedo 0.8, 0.5, 0.2 (11_furnace.json). */
@@ -80,7 +80,7 @@ static void furnace(void **state)
 
     struct converge_job none = job;
     none.pathtracer = "/nonexistent";
-    assert_false(depths_measure(&none, NULL, 16, &depths, &e));
+    assert_false(depth_ladder_measure(&none, NULL, 16, &depths, &e));
     assert_true(remove_tree(dir, &e));
     suite_free(&suite);
 }
@@ -93,7 +93,7 @@ static htmlDocPtr page_of(const char *json)
     struct err e = {""};
     FILE *f = open_memstream(&text, &size);
     assert_non_null(depths);
-    assert_true(depths_check(depths, "x", &e));
+    assert_true(depth_ladder_check(depths, "x", &e));
     report_depths(f, depths);
     fclose(f);
     htmlDocPtr doc =
@@ -161,7 +161,7 @@ static void bad_ladders(void **state)
         struct err e = {""};
         json_t *j = json_loads(bad[i], 0, NULL);
         assert_non_null(j);
-        assert_false(depths_check(j, "file: scene", &e));
+        assert_false(depth_ladder_check(j, "file: scene", &e));
         assert_non_null(strstr(e.msg, "file: scene: 'depths'"));
         json_decref(j);
     }

@@ -101,7 +101,7 @@ static struct converge_reference make_reference(gsl_rng *rng, const struct engin
         m.mean[i] = truth(i);
         m.n[i / 3] = 1;
     }
-    if (!converge_reference_init(&r, &m, 1, &e))
+    if (!convergence_rate_reference_init(&r, &m, 1, &e))
         fail_msg("%s", e.msg);
     free(image);
     moments_free(&m);
@@ -115,7 +115,7 @@ static void climb(gsl_rng *rng, const struct engine *g, const struct converge_re
     float *images = malloc((size_t)count * SIZE * sizeof *images);
     for (int i = 0; i < RUNGS; i++) {
         render(rng, g, ladder[i], count, images);
-        if (!converge_rung(images, count, ladder[i], ref, &rung[i], &e))
+        if (!convergence_rate_rung(images, count, ladder[i], ref, &rung[i], &e))
             fail_msg("%s", e.msg);
         rung[i].cpu_s = 1;
     }
@@ -152,7 +152,7 @@ static void estimates_are_their_definitions(void **state)
     struct rung all, without;
     struct err e;
     render(rng, &g, 4, COUNT, images);
-    assert_true(converge_rung(images, COUNT, 4, &ref, &all, &e));
+    assert_true(convergence_rate_rung(images, COUNT, 4, &ref, &all, &e));
     double mse = 0, pairs = 0, variance = 0;
     for (size_t i = 0; i < SIZE; i++) {
         double mean = 0;
@@ -179,7 +179,7 @@ static void estimates_are_their_definitions(void **state)
             if (j != k)
                 memcpy(fewer + SIZE * (size_t)at++, images + SIZE * (size_t)j,
                        SIZE * sizeof *images);
-        assert_true(converge_rung(fewer, COUNT - 1, 4, &ref, &without, &e));
+        assert_true(convergence_rate_rung(fewer, COUNT - 1, 4, &ref, &without, &e));
         value[0][k] = without.log_mse.value;
         value[1][k] = without.log_variance.value;
         value[2][k] = without.bias2.value;
@@ -196,7 +196,7 @@ static void estimates_are_their_definitions(void **state)
     assert_near(all.log_variance.se, se[1], 1e-9);
     assert_near(all.bias2.se, se[2], 1e-12);
     assert_near(all.bias2.dof, COUNT - 1, 1e-9);
-    converge_reference_free(&ref);
+    convergence_rate_reference_free(&ref);
     gsl_rng_free(rng);
 }
 
@@ -218,7 +218,7 @@ static void slope_is_least_squares(void **state)
         w[i] = 1 / (rung[i].log_mse.se * rung[i].log_mse.se + mean);
     }
     gsl_fit_wlinear(x, 1, w, 1, y, 1, RUNGS, &c0, &c1, &cov[0], &cov[1], &cov[2], &chi2);
-    struct estimate slope = converge_slope(rung, RUNGS);
+    struct estimate slope = convergence_rate_slope(rung, RUNGS);
     assert_near(slope.value, c1, 1e-12);
     /* A slope is linear in the y: its variance from what it moves by when each y moves. */
     double var = 0;
@@ -244,19 +244,19 @@ static void cost_is_a_line_without_the_start(void **state)
         w[i] = 1 / (y[i] * y[i]);
     }
     gsl_fit_wlinear(x, 1, w, 1, y, 1, RUNGS, &c0, &c1, &cov[0], &cov[1], &cov[2], &chi2);
-    struct cost c = converge_cost(rung, RUNGS);
+    struct cost c = convergence_rate_cost(rung, RUNGS);
     assert_near(c.start_s, c0, 1e-12);
     assert_near(c.per_spp.value, c1, 1e-12);
     /* GSL's covariance takes the weights as known; ours scales by the residuals. */
     assert_near(c.per_spp.se, sqrt(cov[2] * chi2 / (RUNGS - 2)), 1e-12);
     rung[0].log_variance = (struct estimate){log(0.5), 0.1, 15};
-    struct estimate eff = converge_log_efficiency(&rung[0], &c);
+    struct estimate eff = convergence_rate_log_efficiency(&rung[0], &c);
     assert_near(exp(eff.value), 1 / (0.5 * c1 * 1), 1e-9);
     assert_near(eff.se, sqrt(0.01 + pow(c.per_spp.se / c1, 2)), 1e-12);
     for (int i = 0; i < RUNGS; i++)
         rung[i].cpu_s = 1;
-    c = converge_cost(rung, RUNGS); /* too short to be timed */
-    assert_true(isnan(converge_log_efficiency(&rung[0], &c).value));
+    c = convergence_rate_cost(rung, RUNGS); /* too short to be timed */
+    assert_true(isnan(convergence_rate_log_efficiency(&rung[0], &c).value));
 }
 
 static void a_smaller_reference_is_a_box_average(void **state)
@@ -273,7 +273,7 @@ static void a_smaller_reference_is_a_box_average(void **state)
             image[i] = (float)(10 + i + k * (1 + i % 2));
         moments_add_image(&m, image);
     }
-    assert_true(converge_reference_init(&r, &m, 2, &e));
+    assert_true(convergence_rate_reference_init(&r, &m, 2, &e));
     assert_int_equal(r.size, 6);
     /* Second pixel, green: pixels 2, 3, 6, 7, values 3p+1 = 7, 10, 19, 22, each 10 + i + (1 + i%2) on
      * average, with M2 = 2 (1 + i%2)^2 of three, so a variance of the mean of (1 + i%2)^2 / 3. */
@@ -282,15 +282,15 @@ static void a_smaller_reference_is_a_box_average(void **state)
     assert_near(r.unit[4], mean, 1e-9);
     assert_near(r.mean[4], 1, 1e-12);
     assert_near(r.var[4], var / (mean * mean), 1e-12);
-    converge_reference_free(&r);
-    assert_false(converge_reference_init(&r, &m, 3, &e));
+    convergence_rate_reference_free(&r);
+    assert_false(convergence_rate_reference_init(&r, &m, 3, &e));
     assert_non_null(strstr(e.msg, "3 times smaller"));
     strcpy(m.unit, "stratified");
-    assert_false(converge_reference_init(&r, &m, 1, &e));
+    assert_false(convergence_rate_reference_init(&r, &m, 1, &e));
     assert_non_null(strstr(e.msg, "its own noise"));
     strcpy(m.unit, "exact");
     memset(m.mean, 0, 24 * sizeof *m.mean);
-    assert_false(converge_reference_init(&r, &m, 1, &e));
+    assert_false(convergence_rate_reference_init(&r, &m, 1, &e));
     assert_non_null(strstr(e.msg, "black"));
     moments_free(&m);
 }
@@ -314,10 +314,10 @@ static void slope_interval_covers(void **state)
             struct converge_reference ref = make_reference(rng, &g, 1024, 16);
             struct rung rung[RUNGS];
             climb(rng, &g, &ref, K, rung);
-            struct estimate slope = converge_slope(rung, RUNGS);
-            miss += converge_slope_verdict(slope, 0.05, 1e9) == VERDICT_DIFFERENT;
-            far += converge_slope_verdict(slope, 1e-3, 1e9) == VERDICT_DIFFERENT;
-            converge_reference_free(&ref);
+            struct estimate slope = convergence_rate_slope(rung, RUNGS);
+            miss += convergence_rate_slope_verdict(slope, 0.05, 1e9) == VERDICT_DIFFERENT;
+            far += convergence_rate_slope_verdict(slope, 1e-3, 1e9) == VERDICT_DIFFERENT;
+            convergence_rate_reference_free(&ref);
         }
         char what[64];
         snprintf(what, sizeof what, "slope, %s", name[law]);
@@ -348,9 +348,9 @@ static void wrong_slopes_are_found(void **state)
             struct converge_reference ref = make_reference(rng, &control[c].engine, 1024, 16);
             struct rung rung[RUNGS];
             climb(rng, &control[c].engine, &ref, K, rung);
-            found +=
-                converge_slope_verdict(converge_slope(rung, RUNGS), 1e-3, 0.1) == VERDICT_DIFFERENT;
-            converge_reference_free(&ref);
+            found += convergence_rate_slope_verdict(convergence_rate_slope(rung, RUNGS), 1e-3,
+                                                    0.1) == VERDICT_DIFFERENT;
+            convergence_rate_reference_free(&ref);
         }
         printf("%s: found %d of 200\n", control[c].name, found);
         assert_int_equal(found, 200);
@@ -367,9 +367,9 @@ static void a_vague_slope_is_inconclusive(void **state)
         rung[i].spp = ladder[i];
         rung[i].log_mse = (struct estimate){-log(ladder[i]), 0.4, 3};
     }
-    struct estimate slope = converge_slope(rung, RUNGS);
-    assert_int_equal(converge_slope_verdict(slope, 1e-3, 0.1), VERDICT_INCONCLUSIVE);
-    assert_int_equal(converge_slope_verdict(slope, 1e-3, 10), VERDICT_EQUIVALENT);
+    struct estimate slope = convergence_rate_slope(rung, RUNGS);
+    assert_int_equal(convergence_rate_slope_verdict(slope, 1e-3, 0.1), VERDICT_INCONCLUSIVE);
+    assert_int_equal(convergence_rate_slope_verdict(slope, 1e-3, 10), VERDICT_EQUIVALENT);
 }
 
 /* Bias just at the margin of 3 %: DIFFERENT and EQUIVALENT are both wrong, each in at most alpha of all
@@ -393,10 +393,10 @@ static void floor_keeps_its_error_rates(void **state)
                 struct rung top;
                 struct err e;
                 render(rng, &g, 1024, K, images);
-                if (!converge_rung(images, K, 1024, &ref, &top, &e))
+                if (!convergence_rate_rung(images, K, 1024, &ref, &top, &e))
                     fail_msg("%s", e.msg);
-                v[b] = converge_floor_verdict(&top, 0.03, 0.05);
-                converge_reference_free(&ref);
+                v[b] = convergence_rate_floor_verdict(&top, 0.03, 0.05);
+                convergence_rate_reference_free(&ref);
             }
             above += v[0] == VERDICT_DIFFERENT;
             below += v[0] == VERDICT_EQUIVALENT;
@@ -428,8 +428,8 @@ static void a_floor_under_a_good_slope_is_found(void **state)
         struct converge_reference ref = make_reference(rng, &g, 4096, 16);
         struct rung rung[RUNGS];
         climb(rng, &g, &ref, K, rung);
-        found += converge_floor_verdict(&rung[RUNGS - 1], 0.01, 1e-3) == VERDICT_DIFFERENT;
-        converge_reference_free(&ref);
+        found += convergence_rate_floor_verdict(&rung[RUNGS - 1], 0.01, 1e-3) == VERDICT_DIFFERENT;
+        convergence_rate_reference_free(&ref);
     }
     assert_int_equal(found, 200);
     gsl_rng_free(rng);
@@ -454,10 +454,10 @@ static void variance_ratio_covers(void **state)
             struct rung ra, rb;
             struct err e;
             render(rng, &a, 64, K, images);
-            assert_true(converge_rung(images, K, 64, &ref, &ra, &e));
+            assert_true(convergence_rate_rung(images, K, 64, &ref, &ra, &e));
             render(rng, &b, 64, MORE, images);
-            assert_true(converge_rung(images, MORE, 64, &ref, &rb, &e));
-            struct interval i = estimate_interval(converge_log_ratio(&ra, &rb), 0.05);
+            assert_true(convergence_rate_rung(images, MORE, 64, &ref, &rb, &e));
+            struct interval i = estimate_interval(convergence_rate_log_ratio(&ra, &rb), 0.05);
             double expected = log(1.69 * of_law);
             miss += i.lo > expected || i.hi < expected;
             one += i.lo > 0 || i.hi < 0;
@@ -466,7 +466,7 @@ static void variance_ratio_covers(void **state)
         /* Shared noise: the same limit as of the slope. */
         assert_rate("variance ratio", miss, RUNS, law == SHARED ? 0.1 : 0.05);
         assert_true(law == SHARED || one > 0.95 * RUNS);
-        converge_reference_free(&ref);
+        convergence_rate_reference_free(&ref);
         gsl_rng_free(rng);
     }
 }
@@ -482,16 +482,16 @@ static void bad_rungs_are_refused(void **state)
     struct err e;
     render(rng, &g, 16, 4, images);
     memcpy(images + 3 * SIZE, images + SIZE, SIZE * sizeof *images);
-    assert_false(converge_rung(images, 4, 16, &ref, &r, &e));
+    assert_false(convergence_rate_rung(images, 4, 16, &ref, &r, &e));
     assert_non_null(strstr(e.msg, "replicates 1 and 3 are the same"));
     /* 4 observations of 1 sample cannot tell the error of 4096. */
     render(rng, &g, 4096, 4, images);
     memset(ref.mean, 0, SIZE * sizeof *ref.mean);
     for (size_t i = 0; i < SIZE; i++)
         ref.mean[i] = truth(i) / ref.unit[i];
-    assert_false(converge_rung(images, 4, 4096, &ref, &r, &e));
+    assert_false(convergence_rate_rung(images, 4, 4096, &ref, &r, &e));
     assert_non_null(strstr(e.msg, "reference is noisier"));
-    converge_reference_free(&ref);
+    convergence_rate_reference_free(&ref);
     gsl_rng_free(rng);
 }
 

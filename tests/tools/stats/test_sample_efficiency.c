@@ -119,17 +119,17 @@ static struct moments render(int k, int asked, int every)
     return m;
 }
 
-static struct efficiency judge(int every, double margin)
+static struct sample_efficiency judge(int every, double margin)
 {
     struct moments m[RENDERS];
     double variance[3 * PIXELS];
-    struct efficiency f;
+    struct sample_efficiency f;
     struct err e;
     for (int k = 0; k < RENDERS; k++)
         m[k] = render(k, 256, every);
     for (size_t i = 0; i < COUNT(variance); i++)
         variance[i] = 1;
-    if (!efficiency_judge(m, RENDERS, 256, variance, margin, 1e-4, &f, &e))
+    if (!sample_efficiency_judge(m, RENDERS, 256, variance, margin, 1e-4, &f, &e))
         fail_msg("%s", e.msg);
     for (int k = 0; k < RENDERS; k++)
         moments_free(&m[k]);
@@ -141,7 +141,7 @@ static struct efficiency judge(int every, double margin)
 static void wasted_samples_are_found(void **state)
 {
     (void)state;
-    struct efficiency f = judge(1, 0.2);
+    struct sample_efficiency f = judge(1, 0.2);
     assert_int_equal(f.verdict, VERDICT_EQUIVALENT);
     assert_true(f.lo < 1 && f.hi > 1);
     f = judge(2, 0.2);
@@ -153,7 +153,7 @@ static void wasted_samples_are_found(void **state)
     struct err e;
     for (int k = 0; k < 4; k++)
         assert_true(moments_alloc(&none[k], 2, 2, &e));
-    assert_false(efficiency_judge(none, 4, 16, variance, 0.1, 0.01, &f, &e));
+    assert_false(sample_efficiency_judge(none, 4, 16, variance, 0.1, 0.01, &f, &e));
     for (int k = 0; k < 4; k++)
         moments_free(&none[k]);
 }

@@ -51,14 +51,14 @@ static struct moments render(enum fault fault, uint64_t seed)
     return m;
 }
 
-static struct consistency judge(enum fault fault, uint64_t trial, double margin, double alpha)
+static struct stated_error judge(enum fault fault, uint64_t trial, double margin, double alpha)
 {
     struct moments m[RENDERS];
-    struct consistency c;
+    struct stated_error c;
     struct err e;
     for (int k = 0; k < RENDERS; k++)
         m[k] = render(fault, 1000 * trial + (uint64_t)k);
-    if (!consistency_judge(m, RENDERS, margin, alpha, &c, &e))
+    if (!stated_error_judge(m, RENDERS, margin, alpha, &c, &e))
         fail_msg("%s", e.msg);
     for (int k = 0; k < RENDERS; k++)
         moments_free(&m[k]);
@@ -75,7 +75,7 @@ static void independent_samples_pass(void **state)
     int wrong = 0, outside = 0;
     double sum = 0;
     for (uint64_t trial = 0; trial < 200; trial++) {
-        struct consistency c = judge(RIGHT, trial, 0.5, 0.05);
+        struct stated_error c = judge(RIGHT, trial, 0.5, 0.05);
         wrong += c.verdict == VERDICT_DIFFERENT;
         outside += c.pixels_lo > 1 || c.pixels_hi < 1;
         sum += c.pixels / 200;
@@ -94,7 +94,7 @@ static void independent_samples_pass(void **state)
 static void faults_are_found(void **state)
 {
     (void)state;
-    struct consistency c = judge(SAMPLES_REPEAT, 301, 0.1, 1e-3);
+    struct stated_error c = judge(SAMPLES_REPEAT, 301, 0.1, 1e-3);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.pixels_lo < 2 * 31. / 30 && c.pixels_hi > 2 * 31. / 30);
     c = judge(VARIANCE_HALVED, 302, 0.1, 1e-3);
@@ -125,20 +125,20 @@ static void bad_input_is_named(void **state)
 {
     (void)state;
     struct moments m[4];
-    struct consistency c;
+    struct stated_error c;
     struct err e;
     for (int k = 0; k < 4; k++)
         assert_true(moments_alloc(&m[k], 2, 2, &e));
-    assert_false(consistency_judge(m, 4, 0.1, 0.01, &c, &e));
+    assert_false(stated_error_judge(m, 4, 0.1, 0.01, &c, &e));
     assert_non_null(strstr(e.msg, "pixel 0 has 0 samples"));
     for (int k = 0; k < 4; k++)
         for (size_t p = 0; p < 4; p++)
             for (int s = 0; s < 3; s++)
                 moments_add(&m[k], p, (const double[]){1, 1, 1});
-    assert_false(consistency_judge(m, 4, 0.1, 0.01, &c, &e));
+    assert_false(stated_error_judge(m, 4, 0.1, 0.01, &c, &e));
     assert_string_equal(e.msg, "no render has any noise");
     strcpy(m[2].unit, "replicate");
-    assert_false(consistency_judge(m, 4, 0.1, 0.01, &c, &e));
+    assert_false(stated_error_judge(m, 4, 0.1, 0.01, &c, &e));
     assert_non_null(strstr(e.msg, "not over its samples"));
     for (int k = 0; k < 4; k++)
         moments_free(&m[k]);
@@ -178,7 +178,7 @@ static void records_are_checked(void **state)
                  at + strlen(cases[i][0]));
         json_t *c = json_loads(text, 0, NULL);
         assert_non_null(c);
-        bool ok = consistency_check(c, "results", &e);
+        bool ok = stated_error_check(c, "results", &e);
         if (ok != (cases[i][2] == NULL) || (!ok && strstr(e.msg, cases[i][2]) == NULL))
             fail_msg("case %zu: %s", i, e.msg);
         json_decref(c);
@@ -190,16 +190,16 @@ static void records_are_shown(void **state)
 {
     (void)state;
     json_t *c = json_loads(record, 0, NULL);
-    assert_int_equal(consistency_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
-    assert_int_equal(consistency_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
+    assert_int_equal(stated_error_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
+    assert_int_equal(stated_error_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
     char *text;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
-    consistency_print(f, c, false);
-    consistency_print(f, c, true);
-    report_consistency_headline(f, c);
-    report_consistency(f, c);
+    stated_error_print(f, c, false);
+    stated_error_print(f, c, true);
+    report_stated_error_headline(f, c);
+    report_stated_error(f, c);
     fclose(f);
     assert_non_null(strstr(text, "8 x 32 spp  0.980 [0.800, 1.200]  0.50  EQUIVALENT"));
     assert_non_null(strstr(text, "41  NOT JUDGED: no <file>"));
