@@ -329,16 +329,16 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     scene.width = v->width;
     scene.height = v->height;
     for (int k = 0; k < POOL; k++) {
-        const struct ours_job job = {.program = program,
-                                     .scene = &scene,
-                                     .spp = v->spp,
-                                     .seed = 900000 + (uint64_t)k,
-                                     .threads = 1,
-                                     .timeout_s = 600,
-                                     .picture = picture,
-                                     .log = log};
+        const struct pathtracer_job job = {.program = program,
+                                           .scene = &scene,
+                                           .spp = v->spp,
+                                           .seed = 900000 + (uint64_t)k,
+                                           .threads = 1,
+                                           .timeout_s = 600,
+                                           .picture = picture,
+                                           .log = log};
         double cpu_s;
-        if (!ours_render(&job, &p->single[k], &cpu_s, NULL, e))
+        if (!run_pathtracer(&job, &p->single[k], &cpu_s, NULL, e))
             return false;
     }
     return true;

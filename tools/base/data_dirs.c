@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-const char *find_dir(char *path, size_t size, const char *checkout, const char *installed)
+const char *data_dir(char *path, size_t size, const char *checkout, const char *installed)
 {
     if (access("reference/scenes", R_OK) == 0)
         return checkout;

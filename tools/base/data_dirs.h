@@ -5,6 +5,6 @@
 #include <stddef.h>
 
 /* `checkout` if the current directory is a checkout, else `installed` beside the program ("../share/assay/..."), in path. */
-const char *find_dir(char *path, size_t size, const char *checkout, const char *installed);
+const char *data_dir(char *path, size_t size, const char *checkout, const char *installed);
 
 #endif

@@ -29,7 +29,7 @@ static bool hash_entry(const char *path, char *kind, char hex[65], struct err *e
         return err_set(e, "%s: %s", path, strerror(errno));
     *kind = S_ISDIR(st.st_mode) ? 'd' : S_ISLNK(st.st_mode) ? 'l' : S_ISREG(st.st_mode) ? 'f' : 'o';
     if (*kind == 'd')
-        return tree_hash(path, NULL, hex, e);
+        return hash_tree(path, NULL, hex, e);
     if (*kind == 'f')
         return sha256_file(path, hex, e);
     target[0] = '\0';
@@ -72,7 +72,7 @@ static bool hash_list(const char *path, struct dirent **list, int num, const cha
     return true;
 }
 
-bool tree_hash(const char *path, const char *except, char hex[65], struct err *e)
+bool hash_tree(const char *path, const char *except, char hex[65], struct err *e)
 {
     struct stat st;
     struct dirent **list;

@@ -195,9 +195,9 @@ int verb_converge(int argc, char **argv, struct err *e)
         .margin = 0.01,
         .slope_margin = 0.1,
         .timeout_s = 3600,
-        .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = find_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
+        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
+        .golden_dir = data_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
+        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
     bool done = false;
     json_t *results = NULL;
     if (!parse(argc, argv, &o, &done, e))

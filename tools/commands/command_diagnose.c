@@ -182,8 +182,8 @@ int verb_diagnose(int argc, char **argv, struct err *e)
         .diagnose = {.alpha = 1e-6},
         .seed = 1,
         .timeout_s = 600,
-        .suite_dir = find_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .catalogue_dir = find_dir(catalogue, sizeof catalogue, "golden/diagnose",
+        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
+        .catalogue_dir = data_dir(catalogue, sizeof catalogue, "golden/diagnose",
                                   "../share/assay/golden/diagnose")};
     struct catalogue c;
     int code = EXIT_NOT_JUDGED;

@@ -259,9 +259,9 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
         .seed = 1,
         .timeout_s = 3600,
         .suite_dir =
-            find_dir(c->suite, sizeof c->suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = find_dir(c->golden, sizeof c->golden, "golden", "../share/assay/golden"),
-        .share_dir = find_dir(c->share, sizeof c->share, "reference", "../share/assay"),
+            data_dir(c->suite, sizeof c->suite, "reference/scenes", "../share/assay/scenes"),
+        .golden_dir = data_dir(c->golden, sizeof c->golden, "golden", "../share/assay/golden"),
+        .share_dir = data_dir(c->share, sizeof c->share, "reference", "../share/assay"),
         .show = write_page_so_far};
     if (!parse(argc, argv, &c->opt, c, &engine, e))
         return false;

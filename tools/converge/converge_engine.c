@@ -34,16 +34,16 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
     const char *const options[] = {"--sampler", sampler, NULL};
     snprintf(path, sizeof path, "%.4096s/pathtracer.exr", job->dir);
     snprintf(log, sizeof log, "%.4096s/pathtracer.log", job->dir);
-    const struct ours_job ours = {.program = job->pathtracer,
-                                  .scene = job->scene,
-                                  .spp = spp,
-                                  .seed = seed,
-                                  .options = options,
-                                  .threads = job->threads,
-                                  .timeout_s = job->timeout_s,
-                                  .picture = path,
-                                  .log = log};
-    bool ok = ours_render(&ours, out, cpu_s, NULL, e);
+    const struct pathtracer_job ours = {.program = job->pathtracer,
+                                        .scene = job->scene,
+                                        .spp = spp,
+                                        .seed = seed,
+                                        .options = options,
+                                        .threads = job->threads,
+                                        .timeout_s = job->timeout_s,
+                                        .picture = path,
+                                        .log = log};
+    bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
     unlink(path);
     unlink(log);
     return ok;

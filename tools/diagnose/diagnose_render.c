@@ -21,19 +21,19 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
     scene.height = job->height;
     snprintf(picture, sizeof picture, "%s/diagnose.exr", job->work_dir);
     snprintf(log, sizeof log, "%s/diagnose.log", job->work_dir);
-    const struct ours_job ours = {.program = job->program,
-                                  .scene = &scene,
-                                  .spp = job->spp,
-                                  .seed = replicate_seed((uint32_t)job->seed, k),
-                                  .options = job->options != NULL   ? job->options
-                                             : job->variant != NULL ? job->variant->options
-                                                                    : NULL,
-                                  .threads = job->threads,
-                                  .timeout_s = job->timeout_s,
-                                  .picture = picture,
-                                  .log = log};
+    const struct pathtracer_job ours = {.program = job->program,
+                                        .scene = &scene,
+                                        .spp = job->spp,
+                                        .seed = replicate_seed((uint32_t)job->seed, k),
+                                        .options = job->options != NULL   ? job->options
+                                                   : job->variant != NULL ? job->variant->options
+                                                                          : NULL,
+                                        .threads = job->threads,
+                                        .timeout_s = job->timeout_s,
+                                        .picture = picture,
+                                        .log = log};
     double cpu_s;
-    bool ok = ours_render(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
+    bool ok = run_pathtracer(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
     unlink(picture);
     unlink(log);
     return ok;

@@ -147,9 +147,9 @@ struct grade_settings grade_options_default(int argc, struct grade_paths *at)
         .threads = 1,
         .seed = 1,
         .alpha = 1e-5,
-        .suite = find_dir(at->suite, sizeof at->suite, "reference/scenes", "../share/assay/scenes"),
-        .golden = find_dir(at->golden, sizeof at->golden, "golden", "../share/assay/golden"),
-        .catalogue = find_dir(at->catalogue, sizeof at->catalogue, "golden/diagnose",
+        .suite = data_dir(at->suite, sizeof at->suite, "reference/scenes", "../share/assay/scenes"),
+        .golden = data_dir(at->golden, sizeof at->golden, "golden", "../share/assay/golden"),
+        .catalogue = data_dir(at->catalogue, sizeof at->catalogue, "golden/diagnose",
                               "../share/assay/golden/diagnose"),
         .submission = calloc((size_t)argc + 1, sizeof(const char *))};
 }

@@ -53,7 +53,7 @@ bool plan_verify(const struct plan *p, int k, struct err *e)
     const char *sha256 = json_string_value(json_object_get(receipt, "sha256"));
     bool ok = sha256 != NULL || err_set(e, "job %d: %s is not there", k, path);
     plan_artefact(p, k, NULL, path);
-    ok = ok && tree_hash(path, RECEIPT, hex, e);
+    ok = ok && hash_tree(path, RECEIPT, hex, e);
     if (ok && strcmp(hex, sha256) != 0)
         ok = err_set(e, "job %d: %s is not what the job wrote", k, path);
     json_decref(receipt);
@@ -67,7 +67,7 @@ static bool check_inputs(json_t *inputs, struct err *e)
     char hex[65];
     json_object_foreach(inputs, path, planned)
     {
-        if (!tree_hash(path, NULL, hex, e))
+        if (!hash_tree(path, NULL, hex, e))
             return err_prefix(e, "an input");
         if (json_string_value(planned) == NULL || strcmp(hex, json_string_value(planned)) != 0)
             return err_set(e,
@@ -132,7 +132,7 @@ static bool make(const struct plan *p, int k, const json_t *job, const char *key
     if (!ok || access(path, R_OK) != 0)
         return err_set(e, "job %d: %s", k, why.msg[0] != '\0' ? why.msg : "it left no artefact");
     gethostname(host, sizeof host - 1);
-    if (!tree_hash(out, RECEIPT, hex, e))
+    if (!hash_tree(out, RECEIPT, hex, e))
         return false;
     json_t *receipt =
         json_pack("{ss, ss, ss, si, sf, sf}", "key", key, "sha256", hex, "host", host, "exit",

@@ -70,7 +70,7 @@ static bool add_words(json_t *array, const char *const *word, int num, struct er
 static bool add_input(json_t *inputs, const char *path, struct err *e)
 {
     char hex[65];
-    if (!tree_hash(path, NULL, hex, e))
+    if (!hash_tree(path, NULL, hex, e))
         return false;
     return json_object_set_new(inputs, path, json_string(hex)) == 0 || refuse(path, e);
 }

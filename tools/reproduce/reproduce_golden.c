@@ -71,7 +71,7 @@ static bool render(const struct suite_scene *scene, const struct suite_reference
         .threads = opt->threads == 0 ? cli_processors() : opt->threads,
         .timeout_s = 7200,
         .work_dir = dir,
-        .share_dir = find_dir(share, sizeof share, "reference", "../share/assay")};
+        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
     snprintf(seed, sizeof seed, "%u", (unsigned)how.seed);
     snprintf(again, sizeof again, "%.3000s/%.200s/%.200s.exr", dir, scene->name, ref->engine);
     bool ok = set_command(out, scene->name, ref->engine, seed, e);
@@ -100,7 +100,7 @@ bool reproduce_golden(const char *path, const struct image *im, const struct rep
     if (opt->scene != NULL || opt->pathtracer != NULL)
         return err_set(e, "%s: --scene and --pathtracer are for pictures of pathtracer", path);
     const char *from =
-        find_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes");
+        data_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes");
     if (!directory_of(path, name, engine, golden_dir, e) || !suite_load(from, &suite, e))
         return false;
     const struct suite_scene *scene = suite_find(&suite, name);

@@ -148,17 +148,17 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
     full_path(v, file, log);
     file_of(v, s, stage, look, keep ? "exr" : "part.exr", file);
     full_path(v, file, path);
-    const struct ours_job job = {.program = v->opt->pathtracer,
-                                 .scene = s->scene,
-                                 .first = first,
-                                 .spp = side_count(s, look),
-                                 .seed = stage > 0 ? v->opt->seed ^ fresh_seed : v->opt->seed,
-                                 .options = s->variant != NULL ? s->variant->options : NULL,
-                                 .threads = v->opt->threads,
-                                 .timeout_s = program_time(v),
-                                 .picture = path,
-                                 .log = log};
-    if (!make_parent_dirs(path, e) || !ours_render(&job, &out->m, &out->seconds, &out->rays, e))
+    const struct pathtracer_job job = {.program = v->opt->pathtracer,
+                                       .scene = s->scene,
+                                       .first = first,
+                                       .spp = side_count(s, look),
+                                       .seed = stage > 0 ? v->opt->seed ^ fresh_seed : v->opt->seed,
+                                       .options = s->variant != NULL ? s->variant->options : NULL,
+                                       .threads = v->opt->threads,
+                                       .timeout_s = program_time(v),
+                                       .picture = path,
+                                       .log = log};
+    if (!make_parent_dirs(path, e) || !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))
         return false;
     out->written = keep;
     if (!keep) {

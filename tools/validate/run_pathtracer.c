@@ -7,18 +7,18 @@
 enum { MAX_ARGUMENTS = 64 };
 
 /* As renderer/pathtracer/output.c writes it. */
-static struct ours_rays read_rays(const struct image *im)
+static struct pathtracer_rays read_rays(const struct image *im)
 {
-    struct ours_rays r;
+    struct pathtracer_rays r;
     const char *text = image_get_attr(im, "assay:rays");
     if (text != NULL && sscanf(text, "%lf rays, %lf box tests, %lf primitive tests", &r.rays,
                                &r.box_tests, &r.primitive_tests) == 3)
         return r;
-    return (struct ours_rays){0};
+    return (struct pathtracer_rays){0};
 }
 
-bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
-                 struct ours_rays *rays, struct err *e)
+bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
+                    struct pathtracer_rays *rays, struct err *e)
 {
     const struct suite_scene *s = job->scene;
     char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];

@@ -5,7 +5,7 @@
 #include "reference/suite/suite.h"
 #include "renderer/image/moments.h"
 
-struct ours_job {
+struct pathtracer_job {
     const char *program; /* pathtracer, or what stands in for it */
     const struct suite_scene *scene;
     int first, spp; /* samples first .. spp-1 of each pixel; 0 and spp: one render */
@@ -18,13 +18,14 @@ struct ours_job {
 
 /* What tracing took, as the picture says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
  * leaves, of up to eight boxes or triangles each (renderer/bvh/bvh.h). */
-struct ours_rays {
+struct pathtracer_rays {
     double rays, box_tests, primitive_tests;
 };
 
 /* The picture's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
  * fails, and on a picture of another size. */
-bool ours_render(const struct ours_job *job, struct moments *out, double *cpu_s,
-                 struct ours_rays *rays, struct err *e) __attribute__((warn_unused_result));
+bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
+                    struct pathtracer_rays *rays, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -27,17 +27,17 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     char picture[PATH_SIZE], log[PATH_SIZE];
     snprintf(picture, sizeof picture, "%s/data/%s/consistency.exr", opt->out_dir, s->name);
     snprintf(log, sizeof log, "%s/data/%s/consistency.log", opt->out_dir, s->name);
-    const struct ours_job job = {.program = opt->pathtracer,
-                                 .scene = s,
-                                 .spp = spp,
-                                 .options = options,
-                                 .seed = replicate_seed((uint32_t)opt->seed, k),
-                                 .threads = opt->threads,
-                                 .timeout_s = fmin(left, opt->timeout_s),
-                                 .picture = picture,
-                                 .log = log};
+    const struct pathtracer_job job = {.program = opt->pathtracer,
+                                       .scene = s,
+                                       .spp = spp,
+                                       .options = options,
+                                       .seed = replicate_seed((uint32_t)opt->seed, k),
+                                       .threads = opt->threads,
+                                       .timeout_s = fmin(left, opt->timeout_s),
+                                       .picture = picture,
+                                       .log = log};
     double cpu_s;
-    if (!make_parent_dirs(picture, e) || !ours_render(&job, out, &cpu_s, NULL, e))
+    if (!make_parent_dirs(picture, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
     unlink(picture);

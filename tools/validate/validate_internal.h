@@ -24,9 +24,9 @@ enum side_kind {
 struct observed {
     bool present, written;
     struct moments m;
-    json_t *manifest;      /* of a reference; NULL for ours */
-    double seconds;        /* CPU time that it took to make, whenever that was */
-    struct ours_rays rays; /* of ours; 0: not known */
+    json_t *manifest;            /* of a reference; NULL for ours */
+    double seconds;              /* CPU time that it took to make, whenever that was */
+    struct pathtracer_rays rays; /* of ours; 0: not known */
 };
 
 /* One side of a claim, in two streams of samples of different seeds. Image l of a stream holds that of
