@@ -36,7 +36,7 @@ static char *canonical_command(const struct output *o, enum picture_kind kind)
     return command;
 }
 
-static void say(struct picture_texts *t, const char *name, const char *value)
+static void validate_log(struct picture_texts *t, const char *name, const char *value)
 {
     t->attr[t->num++] = (struct image_attr){name, value};
 }
@@ -47,24 +47,24 @@ bool picture_texts_make(const struct output *o, enum picture_kind kind, uint32_t
     *t = (struct picture_texts){.command = canonical_command(o, kind)};
     if (t->command == NULL)
         return false;
-    say(t, "assay:version", assay_version);
-    say(t, "assay:picture", picture_kind_names[kind]);
-    say(t, "assay:command", t->command);
-    say(t, "assay:scene", o->id->scene);
-    say(t, "assay:settings", o->id->settings);
-    say(t, "assay:cell", o->id->cell);
+    validate_log(t, "assay:version", assay_version);
+    validate_log(t, "assay:picture", picture_kind_names[kind]);
+    validate_log(t, "assay:command", t->command);
+    validate_log(t, "assay:scene", o->id->scene);
+    validate_log(t, "assay:settings", o->id->settings);
+    validate_log(t, "assay:cell", o->id->cell);
     if (kind == PICTURE_HEATMAP)
         return true;
     snprintf(t->samples, sizeof t->samples, "%d:%lld", o->opt->first,
              (long long)o->opt->first + num_samples);
-    say(t, "assay:adaptive", o->id->adaptive);
-    say(t, "assay:seed", o->id->seed);
-    say(t, "assay:samples", t->samples);
+    validate_log(t, "assay:adaptive", o->id->adaptive);
+    validate_log(t, "assay:seed", o->id->seed);
+    validate_log(t, "assay:samples", t->samples);
     if (kind == PICTURE_RATES) {
         snprintf(t->most, sizeof t->most, "%d", o->opt->last - o->opt->first);
-        say(t, "assay:most", t->most);
+        validate_log(t, "assay:most", t->most);
     } else if (o->ranges != NULL) {
-        say(t, "assay:ranges", o->ranges);
+        validate_log(t, "assay:ranges", o->ranges);
     }
     return true;
 }

@@ -119,7 +119,7 @@ static bool read_rubric(void *ctx, struct err *e)
 static bool hash_a_tree(void *ctx, struct err *e)
 {
     char hex[65], *right = ctx;
-    bool ok = hash_tree(file(0, "scenes"), NULL, hex, e);
+    bool ok = hash_a_tree(file(0, "scenes"), NULL, hex, e);
     alloc_fail_off();
     if (ok && right[0] == '\0')
         strcpy(right, hex);
@@ -182,11 +182,11 @@ static bool compare_files(void *ctx, struct err *e)
         .path = {file(0, "a.exr"), file(1, "b.exr")},
         .opt = {.alpha = 1e-3, .margin_global = 0.2, .margin_tile = 0.9, .tile = SIDE}};
     struct compared c = {0};
-    bool ok = compared_run(&job, &c, e);
-    ok =
-        ok && compared_write_json(&job, &c, VERDICT_EQUIVALENT, file(2, "json/c.json"), 3, argv, e);
+    bool ok = compare_job_run(&job, &c, e);
+    ok = ok &&
+         compare_job_write_json(&job, &c, VERDICT_EQUIVALENT, file(2, "json/c.json"), 3, argv, e);
     alloc_fail_off();
-    compared_free(&c);
+    compare_job_free(&c);
     unlink(file(3, "json/c.json.z.exr"));
     unlink(file(3, "json/c.json.relative.exr"));
     if (ok) {
@@ -236,16 +236,16 @@ static void comparisons_and_reports(void **state)
     assert_true(make_parent_dirs(file(0, "json/x"), &e) && make_parent_dirs(file(0, "page/x"), &e));
     snprintf(json_output, sizeof json_output, "%s", file(0, "json/c.json"));
     alloc_json(ALLOC_JSON_ENDS, json_output);
-    alloc_fail_each("compared_run, compared_write_json", ALLOC_ALL, compare_files, NULL);
+    alloc_fail_each("compared_run, compare_job_write_json", ALLOC_ALL, compare_files, NULL);
     alloc_json(ALLOC_JSON_ENDS, NULL);
     struct compare_job job = {
         .path = {file(0, "a.exr"), file(1, "b.exr")},
         .opt = {.alpha = 1e-3, .margin_global = 0.2, .margin_tile = 0.9, .tile = SIDE}};
     struct compared c;
-    assert_true(
-        compared_run(&job, &c, &e) &&
-        compared_write_json(&job, &c, VERDICT_EQUIVALENT, file(2, "report/c.json"), 3, argv, &e));
-    compared_free(&c);
+    assert_true(compare_job_run(&job, &c, &e) &&
+                compare_job_write_json(&job, &c, VERDICT_EQUIVALENT, file(2, "report/c.json"), 3,
+                                       argv, &e));
+    compare_job_free(&c);
     snprintf(json_output, sizeof json_output, "%s", file(0, "page/index.html"));
     alloc_json(ALLOC_JSON_ENDS, json_output);
     alloc_fail_each("report_write", ALLOC_ALL, write_report, &size);

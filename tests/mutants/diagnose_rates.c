@@ -65,7 +65,7 @@ static bool look_at(const struct rate_image *r, const struct look *look, const c
 
 /* ---- many looks by several threads */
 
-struct task {
+struct claim_run {
     struct look look;
     char program[4400];
     struct observation *clue;
@@ -75,7 +75,7 @@ struct task {
 
 struct crew {
     const struct rate_image *r;
-    struct task *task;
+    struct claim_run *task;
     int num, next;
     pthread_mutex_t lock;
 };
@@ -95,13 +95,13 @@ static void *work(void *arg)
         pthread_mutex_unlock(&w->crew->lock);
         if (i < 0)
             return NULL;
-        struct task *t = &w->crew->task[i];
+        struct claim_run *t = &w->crew->task[i];
         t->clue = calloc((size_t)w->crew->r->c.num_views, sizeof *t->clue);
         t->ok = t->clue != NULL && look_at(w->crew->r, &t->look, w->work, t->clue, &t->e);
     }
 }
 
-static bool look_at_all(const struct rate_image *r, struct task *task, int num, struct err *e)
+static bool look_at_all(const struct rate_image *r, struct claim_run *task, int num, struct err *e)
 {
     static struct worker worker[MOST_THREADS];
     struct crew crew = {.r = r, .task = task, .num = num};
@@ -126,7 +126,7 @@ static bool look_at_all(const struct rate_image *r, struct task *task, int num, 
     return started > 0 || err_set(e, "no thread could be started");
 }
 
-static void free_tasks(struct task *task, int num)
+static void free_tasks(struct claim_run *task, int num)
 {
     for (int i = 0; i < num; i++)
         free(task[i].clue);
@@ -150,8 +150,8 @@ struct score {
     int first, group, unknown, missed, wrong;
 };
 
-static bool judge_bug(const struct rate_image *r, const struct task *t, int bug, struct score *s,
-                      struct score *without, struct err *e)
+static bool judge_bug(const struct rate_image *r, const struct claim_run *t, int bug,
+                      struct score *s, struct score *without, struct err *e)
 {
     struct diagnose_options opt = {.alpha = alpha};
     struct diagnosis d;
@@ -192,7 +192,7 @@ static bool rate_bugs(const struct rate_image *r, int scale_percent, int spp_per
                       struct err *e)
 {
     int num = r->c.num_bugs;
-    struct task *task = calloc((size_t)num, sizeof *task);
+    struct claim_run *task = calloc((size_t)num, sizeof *task);
     if (task == NULL)
         return err_set(e, "out of memory");
     for (int b = 0; b < num; b++) {
@@ -233,7 +233,7 @@ static double normal(uint64_t *state)
 
 /* Means of the pool, per view. */
 struct pool {
-    const struct task *task;
+    const struct claim_run *task;
     double (*mean)[SIGNATURE_VALUES];
     struct moments *single; /* POOL of the view that asks for consistency */
     int consistent_view;    /* -1: none */
@@ -381,7 +381,7 @@ static bool rate_synthetic(const struct rate_image *r, struct pool *p, struct er
 static bool rate_correct(const struct rate_image *r, struct err *e)
 {
     char program[4400];
-    struct task *task = calloc(POOL, sizeof *task);
+    struct claim_run *task = calloc(POOL, sizeof *task);
     struct pool p = {.task = task};
     struct diagnose_options opt = {.alpha = alpha};
     int accused = 0;

@@ -193,7 +193,7 @@ static bool write_report(const struct settings *s, const struct compared *c, int
     if (!temp_dir_open(&dir, "compare", e))
         return false;
     snprintf(results, sizeof results, "%s/results.json", dir.path);
-    bool ok = compared_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
+    bool ok = compare_job_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
               report_write(results, s->report, e);
     struct err ignored = {0};
     return temp_dir_close(&dir, ok ? e : &ignored) && ok;
@@ -207,7 +207,7 @@ int verb_compare(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     if (s.done)
         return 0;
-    if (!compared_run(&s.job, &c, e))
+    if (!compare_job_run(&s.job, &c, e))
         return EXIT_NOT_JUDGED;
     int code = EXIT_DIFFERENT;
     if (c.r.verdict == s.expect)
@@ -216,10 +216,10 @@ int verb_compare(int argc, char **argv, struct err *e)
         code = EXIT_INCONCLUSIVE;
     if (!s.quiet)
         print_result(&c, s.job.exchangeable);
-    if (s.json != NULL && !compared_write_json(&s.job, &c, s.expect, s.json, argc, argv, e))
+    if (s.json != NULL && !compare_job_write_json(&s.job, &c, s.expect, s.json, argc, argv, e))
         code = EXIT_NOT_JUDGED;
     if (s.report != NULL && !write_report(&s, &c, argc, argv, e))
         code = EXIT_NOT_JUDGED;
-    compared_free(&c);
+    compare_job_free(&c);
     return code;
 }

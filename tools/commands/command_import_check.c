@@ -71,10 +71,10 @@ int verb_import_check(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     int code = EXIT_NOT_JUDGED;
     json_t *reports;
-    if (import_check_suite(&suite, s.only, s.num_only, &s.opt, &reports, e)) {
-        import_print(stdout, reports);
+    if (import_result_check_suite(&suite, s.only, s.num_only, &s.opt, &reports, e)) {
+        import_result_print(stdout, reports);
         if (s.json == NULL || json_write(s.json, reports, e))
-            code = import_exit_code(reports);
+            code = import_result_exit_code(reports);
         if (code == EXIT_NOT_JUDGED && e->msg[0] == '\0')
             err_set(e, "Blender's importer: a scene could not be judged, see above");
         json_decref(reports);

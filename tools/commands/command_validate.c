@@ -201,7 +201,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
         puts("");
-        import_print(stdout, loader);
+        import_result_print(stdout, loader);
     }
     print_not_expressible(results);
     if (!quiet)
@@ -239,7 +239,7 @@ static void tell_not_judged(const json_t *results, struct err *e)
 /* Not judged counts most, then a difference, then an inconclusive claim. */
 static int with_loader(int code, const json_t *results, struct err *e)
 {
-    int loader = import_exit_code(json_object_get(results, "loader"));
+    int loader = import_result_exit_code(json_object_get(results, "loader"));
     if (loader == EXIT_NOT_JUDGED && code != EXIT_NOT_JUDGED)
         err_set(e, "Blender's importer: a scene could not be judged, see above");
     return loader == EXIT_NOT_JUDGED || (loader == EXIT_DIFFERENT && code != EXIT_NOT_JUDGED)

@@ -20,11 +20,11 @@ enum { LEAST_SAMPLES = 16, LEAST_REPLICATES = 8 };
 static const uint64_t fresh_seed = 0xd1b54a32d192ed03u;
 enum { FRESH_REPLICATE = 1 << 24 };
 
-static void observed_free(struct observed *o)
+static void observed_free(struct side_image *o)
 {
     moments_free(&o->m);
     json_decref(o->manifest);
-    *o = (struct observed){0};
+    *o = (struct side_image){0};
 }
 
 void side_free(struct side *s)
@@ -135,12 +135,12 @@ static void full_path(const struct validation *v, const char *file, char path[MA
 
 static double program_time(const struct validation *v)
 {
-    return fmin(v->opt->timeout_s, time_left(v));
+    return fmin(v->opt->timeout_s, validate_time_left(v));
 }
 
 /* Samples first .. last-1. The only look of a run leaves the renderer's own file. */
 static bool render_ours(const struct validation *v, const struct side *s, int stage, int look,
-                        int first, struct observed *out, struct err *e)
+                        int first, struct side_image *out, struct err *e)
 {
     char file[256], path[MAX_PATH], log[MAX_PATH];
     bool keep = first == 0 && v->sequence == &alpha_spending_single;
@@ -169,7 +169,7 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
 }
 
 static bool render_live(const struct validation *v, const struct side *s, int stage, int look,
-                        int first, struct observed *out, struct err *e)
+                        int first, struct side_image *out, struct err *e)
 {
     const struct validate_options *o = v->opt;
     struct suite_reference ref = *s->ref;
@@ -184,7 +184,7 @@ static bool render_live(const struct validation *v, const struct side *s, int st
 }
 
 static bool render_engine(const struct validation *v, const struct side *s, int stage,
-                          struct observed *out, struct err *e)
+                          struct side_image *out, struct err *e)
 {
     const struct validate_options *o = v->opt;
     const struct engine_options eo = {.spp = o->engine_spp,
@@ -215,7 +215,7 @@ static bool copy(const struct moments *m, struct moments *out, struct err *e)
     return true;
 }
 
-static bool copy_observed(const struct observed *o, struct observed *out, struct err *e)
+static bool copy_observed(const struct side_image *o, struct side_image *out, struct err *e)
 {
     if (!copy(&o->m, &out->m, e))
         return false;
@@ -226,7 +226,7 @@ static bool copy_observed(const struct observed *o, struct observed *out, struct
 }
 
 /* `more` becomes what was there before and it. The manifest is the first one's, with all seeds. */
-static bool add_before(const struct observed *before, struct observed *more, struct err *e)
+static bool add_before(const struct side_image *before, struct side_image *more, struct err *e)
 {
     struct moments sum;
     if (!copy(&before->m, &sum, e))
@@ -252,11 +252,11 @@ static bool add_before(const struct observed *before, struct observed *more, str
     return manifest != NULL || err_set(e, "out of memory");
 }
 
-static bool make(struct validation *v, struct side *s, int stage, int look, struct observed *out)
+static bool make(struct validation *v, struct side *s, int stage, int look, struct side_image *out)
 {
     int l = below(s, stage, look);
     int first = l >= 0 ? side_count(s, l) : 0;
-    const struct observed *before = l >= 0 ? &s->at[stage][l] : NULL;
+    const struct side_image *before = l >= 0 ? &s->at[stage][l] : NULL;
     /* An engine without noise has no more to say. */
     if (before != NULL && (first == side_count(s, look) || strcmp(before->m.unit, "exact") == 0))
         return copy_observed(before, out, &s->e);
@@ -279,45 +279,46 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     return before == NULL || add_before(before, out, &s->e);
 }
 
-enum got side_at(struct validation *v, struct side *s, int stage, int look, struct observed **out)
+enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,
+                          struct side_image **out)
 {
-    struct observed *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
+    struct side_image *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
     assert(stage == 0 || side_can_be_fresh(s));
     *out = o;
     if (o->present)
-        return GOT;
+        return FETCH_OK;
     if (s->failed)
-        return GOT_NOTHING;
+        return FETCH_FAILED;
     int l = below(s, stage, look);
     double more = side_count(s, look) - (l >= 0 ? side_count(s, l) : 0);
     double predicted = s->units > 0 ? s->wall_s / s->units * more : 0;
-    if (time_left(v) <= predicted)
-        return GOT_NO_TIME;
+    if (validate_time_left(v) <= predicted)
+        return FETCH_NO_TIME;
     if (s->kind != SIDE_TRUTH && s->kind != SIDE_GOLDEN) {
         char note[160];
         snprintf(note, sizeof note, "rendering with %s%s", s->name,
                  stage > 0 ? ", fresh seeds" : "");
-        say(v, s->scene->name, note);
+        validate_log(v, s->scene->name, note);
     }
     double begun = now_seconds();
     if (!make(v, s, stage, look, o)) {
         observed_free(o);
         /* A program that was stopped because the time is over has done nothing wrong. */
-        if (time_left(v) <= 0)
-            return GOT_NO_TIME;
+        if (validate_time_left(v) <= 0)
+            return FETCH_NO_TIME;
         s->failed = true;
-        return GOT_NOTHING;
+        return FETCH_FAILED;
     }
     s->wall_s += now_seconds() - begun;
     s->units += more;
     o->present = true;
-    return GOT;
+    return FETCH_OK;
 }
 
 bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
                 struct err *e)
 {
-    struct observed *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
+    struct side_image *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
     char path[MAX_PATH];
     assert(o->present);
     file_of(v, s, stage, look, "exr", file);

@@ -186,16 +186,16 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     return ok;
 }
 
-bool compared_run(const struct compare_job *job, struct compared *out, struct err *e)
+bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
 {
     *out = (struct compared){0};
     bool ok = job->exchangeable ? run_exchangeable(job, out, e) : run_moments(job, out, e);
     if (!ok)
-        compared_free(out);
+        compare_job_free(out);
     return ok;
 }
 
-void compared_free(struct compared *c)
+void compare_job_free(struct compared *c)
 {
     comparison_free(&c->r);
     moments_free(&c->m[0]);
@@ -235,9 +235,9 @@ static bool side_file(const struct compared *c, int side, const char *json, char
     return ok;
 }
 
-bool compared_write_json(const struct compare_job *job, const struct compared *c,
-                         enum verdict expected, const char *path, int argc, char **argv,
-                         struct err *e)
+bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
+                            enum verdict expected, const char *path, int argc, char **argv,
+                            struct err *e)
 {
     struct claim_context context = {
         .a = job->path[0], .b = job->path[1], .expected = expected, .opt = job->opt};

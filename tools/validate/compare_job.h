@@ -25,16 +25,16 @@ struct compared {
     int tile;
 };
 
-/* Reads, compares, and, with a second pair, confirms. The caller frees with compared_free(). */
-bool compared_run(const struct compare_job *job, struct compared *out, struct err *e)
+/* Reads, compares, and, with a second pair, confirms. The caller frees with compare_job_free(). */
+bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
     __attribute__((warn_unused_result));
-void compared_free(struct compared *c);
+void compare_job_free(struct compared *c);
 
 /* results.json at `path` with one claim, and beside it what the report shows: PATH.z.exr,
  * PATH.relative.exr and, for sides that are no moments EXR, PATH.a.exr and PATH.b.exr. argc, argv:
  * the command line. */
-bool compared_write_json(const struct compare_job *job, const struct compared *c,
-                         enum verdict expected, const char *path, int argc, char **argv,
-                         struct err *e) __attribute__((warn_unused_result));
+bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
+                            enum verdict expected, const char *path, int argc, char **argv,
+                            struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool import_check_suite(const struct suite *suite, const char *const *only, int num_only,
-                        const struct import_options *opt, json_t **reports, struct err *e)
+bool import_result_check_suite(const struct suite *suite, const char *const *only, int num_only,
+                               const struct import_options *opt, json_t **reports, struct err *e)
 {
     int num = num_only > 0 ? num_only : suite->num_scenes;
     /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
@@ -36,7 +36,7 @@ static void add_unread(char *text, size_t size, const json_t *report, const char
                  what);
 }
 
-void import_print(FILE *f, const json_t *reports)
+void import_result_print(FILE *f, const json_t *reports)
 {
     static const char *const unread[][2] = {{"unread_cameras", "camera by lookat"},
                                             {"unread_spheres", "spheres"},
@@ -71,7 +71,7 @@ void import_print(FILE *f, const json_t *reports)
             triangles);
 }
 
-int import_exit_code(const json_t *reports)
+int import_result_exit_code(const json_t *reports)
 {
     int code = EXIT_EQUIVALENT;
     size_t i;

@@ -8,12 +8,12 @@
 #include <stdio.h>
 
 /* Of the scenes named; of all if none is. *reports: as import_check(). Fails on an unknown name. */
-bool import_check_suite(const struct suite *suite, const char *const *only, int num_only,
-                        const struct import_options *opt, json_t **reports, struct err *e)
+bool import_result_check_suite(const struct suite *suite, const char *const *only, int num_only,
+                               const struct import_options *opt, json_t **reports, struct err *e)
     __attribute__((warn_unused_result));
 /* One line per scene, then the sum. */
-void import_print(FILE *f, const json_t *reports);
+void import_result_print(FILE *f, const json_t *reports);
 /* 0: all agree; else 3 if any could not be judged, else 1. */
-int import_exit_code(const json_t *reports);
+int import_result_exit_code(const json_t *reports);
 
 #endif

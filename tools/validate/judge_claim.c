@@ -11,7 +11,8 @@
 #include <string.h>
 
 /* The command that judges this claim alone, and yet with the same alpha. */
-static void rerun_command(const struct validation *v, const struct task *t, char *out, size_t size)
+static void rerun_command(const struct validation *v, const struct claim_run *t, char *out,
+                          size_t size)
 {
     char live[64] = "", engine[4200] = "", how[96] = "";
     const struct validate_options *o = v->opt;
@@ -27,13 +28,13 @@ static void rerun_command(const struct validation *v, const struct task *t, char
     else if (v->sequence != &alpha_spending_single)
         snprintf(how, sizeof how, " --until-different");
     char name[CLAIM_NAME];
-    task_name(t, name);
+    claim_run_name(t, name);
     /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
     snprintf(out, size, "assay validate --only %s --alpha %.6g --stages %d --seed %llu%s%s%s", name,
              v->alpha, v->stages, (unsigned long long)o->seed, live, engine, how);
 }
 
-static struct claim_context context(const struct validation *v, const struct task *t,
+static struct claim_context context(const struct validation *v, const struct claim_run *t,
                                     const char *rerun)
 {
     double share = t->looks->share[t->seen ? t->look : LOOK_DECLARED];
@@ -49,7 +50,7 @@ static struct claim_context context(const struct validation *v, const struct tas
                                           .tile = t->scene->tile}};
 }
 
-static bool write_maps(const struct validation *v, const struct task *t, json_t *files,
+static bool write_maps(const struct validation *v, const struct claim_run *t, json_t *files,
                        struct err *e)
 {
     static const char *const kind[2] = {"z", "rel"};
@@ -66,12 +67,12 @@ static bool write_maps(const struct validation *v, const struct task *t, json_t 
     return true;
 }
 
-static void add_provenance(json_t *claim, struct validation *v, const struct task *t)
+static void add_provenance(json_t *claim, struct validation *v, const struct claim_run *t)
 {
-    struct observed *a, *b;
-    enum got had_a = side_at(v, t->a, t->stage, t->look, &a);
-    enum got had_b = side_at(v, t->b, t->stage, t->look, &b);
-    assert(had_a == GOT && had_b == GOT);
+    struct side_image *a, *b;
+    enum fetch_result had_a = side_at(v, t->a, t->stage, t->look, &a);
+    enum fetch_result had_b = side_at(v, t->b, t->stage, t->look, &b);
+    assert(had_a == FETCH_OK && had_b == FETCH_OK);
     (void)had_a, (void)had_b;
     claim_add_observations(claim, "a", &a->m);
     claim_add_observations(claim, "b", &b->m);
@@ -92,7 +93,7 @@ static void add_provenance(json_t *claim, struct validation *v, const struct tas
         json_object_set(claim, "seeds_b", seeds);
 }
 
-static json_t *files_of(const struct validation *v, const struct task *t, struct err *e)
+static json_t *files_of(const struct validation *v, const struct claim_run *t, struct err *e)
 {
     char a[256], b[256];
     if (!side_write(v, t->a, t->stage, t->look, a, e) ||
@@ -113,7 +114,7 @@ static void release(struct side *s)
 }
 
 /* How it was looked at, at what cost. */
-static void add_looks(json_t *claim, const struct validation *v, const struct task *t)
+static void add_looks(json_t *claim, const struct validation *v, const struct claim_run *t)
 {
     double spent = 0;
     for (size_t i = 0; i < json_array_size(t->history); i++)
@@ -125,12 +126,12 @@ static void add_looks(json_t *claim, const struct validation *v, const struct ta
     json_object_set_new(claim, "cost_s", json_pack("{sf,sf}", "a", t->cpu_a, "b", t->cpu_b));
 }
 
-static void announce(struct validation *v, struct task *t)
+static void announce(struct validation *v, struct claim_run *t)
 {
     const char *verdict = member_text(t->result, "verdict"),
                *error = member_text(t->result, "error");
     v->done++;
-    say(v, t->scene->name, error != NULL ? error : verdict);
+    validate_log(v, t->scene->name, error != NULL ? error : verdict);
     if (t->a != NULL) {
         release(t->a);
         release(t->b);
@@ -138,7 +139,7 @@ static void announce(struct validation *v, struct task *t)
 }
 
 /* The claim is what the last look said; why, if not NULL, comes before its reason. */
-static void finish(struct validation *v, struct task *t, const char *why)
+static void finish(struct validation *v, struct claim_run *t, const char *why)
 {
     char rerun[8192], reason[512];
     struct err e = {""};
@@ -162,7 +163,8 @@ static void finish(struct validation *v, struct task *t, const char *why)
     announce(v, t);
 }
 
-static void finish_unseen(struct validation *v, struct task *t, const char *error, bool no_time)
+static void finish_unseen(struct validation *v, struct claim_run *t, const char *error,
+                          bool no_time)
 {
     char rerun[8192];
     rerun_command(v, t, rerun, sizeof rerun);
@@ -176,7 +178,7 @@ static void finish_unseen(struct validation *v, struct task *t, const char *erro
 
 struct pair {
     struct validation *v;
-    struct task *t;
+    struct claim_run *t;
     bool no_time;
     double n_a, n_b;
 };
@@ -184,11 +186,11 @@ struct pair {
 static bool one_of(struct pair *p, struct side *s, int stage, const struct moments **m,
                    struct err *e)
 {
-    struct observed *o;
+    struct side_image *o;
     switch (side_at(p->v, s, stage, p->t->next, &o)) {
-    case GOT: *m = &o->m; return true;
-    case GOT_NOTHING: *e = s->e; return false;
-    case GOT_NO_TIME: p->no_time = true; break;
+    case FETCH_OK: *m = &o->m; return true;
+    case FETCH_FAILED: *e = s->e; return false;
+    case FETCH_NO_TIME: p->no_time = true; break;
     }
     return err_set(e, "the budget is spent");
 }
@@ -205,12 +207,12 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
 }
 
 /* The share of a in the variance of the difference, all pixels and channels together. */
-static double noise_share(struct validation *v, const struct task *t)
+static double noise_share(struct validation *v, const struct claim_run *t)
 {
-    struct observed *o[2];
+    struct side_image *o[2];
     double sum[2] = {0, 0};
-    if (side_at(v, t->a, t->stage, t->look, &o[0]) != GOT ||
-        side_at(v, t->b, t->stage, t->look, &o[1]) != GOT)
+    if (side_at(v, t->a, t->stage, t->look, &o[0]) != FETCH_OK ||
+        side_at(v, t->b, t->stage, t->look, &o[1]) != FETCH_OK)
         return 1;
     for (int k = 0; k < 2; k++)
         for (size_t p = 0; p < (size_t)o[k]->m.width * (size_t)o[k]->m.height; p++)
@@ -222,7 +224,7 @@ static double noise_share(struct validation *v, const struct task *t)
 /* Below this, more samples of ours are lost on a reference that stays as it is. */
 static const double least_noise_share = 0.1;
 
-static void look(struct validation *v, struct task *t)
+static void look(struct validation *v, struct claim_run *t)
 {
     struct pair p = {.v = v, .t = t};
     struct compare_options opt = {.alpha = v->alpha,
@@ -253,7 +255,7 @@ static void look(struct validation *v, struct task *t)
                           json_pack("{sf,sf,sf,si,ss}", "n_a", p.n_a, "n_b", p.n_b, "alpha",
                                     v->alpha * t->looks->share[t->look], "stage", stage + 1,
                                     "verdict", verdict_name(c.verdict)));
-    task_settle(t);
+    claim_next_look(t);
     if (c.verdict != VERDICT_INCONCLUSIVE)
         finish(v, t, NULL);
     else if (t->next == NUM_LOOKS)
@@ -263,18 +265,18 @@ static void look(struct validation *v, struct task *t)
         finish(v, t, "the noise left is that of the stored reference");
 }
 
-void task_look(struct validation *v, struct task *t)
+void claim_run_look(struct validation *v, struct claim_run *t)
 {
     if (t->a != NULL) {
         look(v, t);
         return;
     }
-    say(v, t->scene->name, "rendering with seeds of their own");
+    validate_log(v, t->scene->name, "rendering with seeds of their own");
     t->result = stated_error_run(v->opt, t->scene, v->alpha, v->deadline);
     announce(v, t);
 }
 
-void task_give_up(struct validation *v, struct task *t, const char *why)
+void claim_run_give_up(struct validation *v, struct claim_run *t, const char *why)
 {
     if (t->a == NULL)
         t->result = stated_error_run(v->opt, t->scene, v->alpha, 0);
@@ -286,7 +288,7 @@ void task_give_up(struct validation *v, struct task *t, const char *why)
         finish_unseen(v, t, BUDGET_SPENT " before a first look was possible", true);
 }
 
-bool task_differs(const struct task *t)
+bool claim_run_differs(const struct claim_run *t)
 {
     if (t->result == NULL)
         return false;
@@ -297,7 +299,7 @@ bool task_differs(const struct task *t)
            claim_outcome(t->result) == OUTCOME_OPPOSITE;
 }
 
-void task_free(struct task *t)
+void claim_run_free(struct claim_run *t)
 {
     comparison_free(&t->c);
     json_decref(t->history);

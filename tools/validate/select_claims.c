@@ -28,7 +28,7 @@ bool scene_is_selected_whole(const struct validate_options *o, const char *name)
     return o->num_only == 0;
 }
 
-void task_name(const struct task *t, char name[CLAIM_NAME])
+void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME])
 {
     if (t->a == NULL)
         snprintf(name, CLAIM_NAME, "%s/consistency", t->scene->name);
@@ -63,7 +63,7 @@ static bool check_claims(const struct validation *v, struct err *e)
         for (int k = 0; k < v->num_tasks && !found; k++) {
             if (!is_of_scene(only, v->task[k].scene->name))
                 continue;
-            task_name(&v->task[k], name);
+            claim_run_name(&v->task[k], name);
             found = strcmp(name, only) == 0;
             n += (size_t)snprintf(names + n, sizeof names - n, "%s%s", n > 0 ? ", " : "",
                                   strchr(name, '/') + 1);
@@ -80,10 +80,10 @@ static void keep_selected(struct validation *v)
 {
     int kept = 0;
     for (int k = 0; k < v->num_tasks; k++) {
-        struct task *t = &v->task[k];
+        struct claim_run *t = &v->task[k];
         char name[CLAIM_NAME];
         bool keep = scene_is_selected_whole(v->opt, t->scene->name);
-        task_name(t, name);
+        claim_run_name(t, name);
         for (int i = 0; i < v->opt->num_only && !keep; i++)
             keep = strcmp(v->opt->only[i], name) == 0;
         if (keep) {
@@ -94,7 +94,7 @@ static void keep_selected(struct validation *v)
             t->a->users--;
             t->b->users--;
         }
-        task_free(t);
+        claim_run_free(t);
     }
     v->num_tasks = kept;
 }
@@ -150,7 +150,7 @@ static void init_sides(struct validation *v)
 }
 
 /* Counts are by the scene file and the options alone, so which looks there are is fixed beforehand. */
-void task_settle(struct task *t)
+void claim_next_look(struct claim_run *t)
 {
     for (; t->next < NUM_LOOKS; t->next++) {
         if (t->looks->share[t->next] == 0)
@@ -174,19 +174,19 @@ static const struct alpha_spending *looks_of(const struct validation *v, const s
 static void add_task(struct validation *v, const struct suite_scene *s, struct side *a,
                      struct side *b, const struct suite_reference *ref, enum verdict expected)
 {
-    struct task *t = &v->task[v->num_tasks++];
+    struct claim_run *t = &v->task[v->num_tasks++];
     bool can_be_fresh = side_can_be_fresh(a) && side_can_be_fresh(b);
-    *t = (struct task){.scene = s,
-                       .a = a,
-                       .b = b,
-                       .ref = *ref,
-                       .expected = expected,
-                       .looks = looks_of(v, a, b),
-                       .stages = can_be_fresh ? v->stages : 1,
-                       .history = json_array()};
+    *t = (struct claim_run){.scene = s,
+                            .a = a,
+                            .b = b,
+                            .ref = *ref,
+                            .expected = expected,
+                            .looks = looks_of(v, a, b),
+                            .stages = can_be_fresh ? v->stages : 1,
+                            .history = json_array()};
     a->users++;
     b->users++;
-    task_settle(t);
+    claim_next_look(t);
 }
 
 /* In the order of the results: ours against each reference; each engine against the closed form, where
@@ -223,10 +223,10 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     }
     if (s->consistency.renders > 0)
         v->task[v->num_tasks++] =
-            (struct task){.scene = s, .looks = &alpha_spending_single, .next = LOOK_DECLARED};
+            (struct claim_run){.scene = s, .looks = &alpha_spending_single, .next = LOOK_DECLARED};
 }
 
-bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
+bool select_claims(struct validation *v, json_t *cannot, struct err *e)
 {
     size_t num = (size_t)v->suite.num_scenes;
     if (!check_scenes(v, e))

@@ -13,18 +13,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-double time_left(const struct validation *v)
+double validate_time_left(const struct validation *v)
 {
     return v->deadline - now_seconds();
 }
 
-void say(const struct validation *v, const char *scene, const char *what)
+void validate_log(const struct validation *v, const char *scene, const char *what)
 {
     if (v->opt->quiet)
         return;
     fprintf(stderr, "[%2d/%d", v->done, v->num_tasks);
     if (isfinite(v->deadline))
-        fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, time_left(v)), v->opt->budget_s);
+        fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, validate_time_left(v)),
+                v->opt->budget_s);
     fprintf(stderr, "] %s: %s\n", scene, what);
 }
 
@@ -32,7 +33,7 @@ void say(const struct validation *v, const char *scene, const char *what)
 static const double start_cost = 3e5;
 
 /* About what the next look of a claim costs, in vertices of paths. */
-static double cost(const struct task *t)
+static double cost(const struct claim_run *t)
 {
     const struct suite_scene *s = t->scene;
     double samples, starts = 1;
@@ -49,7 +50,7 @@ static double cost(const struct task *t)
  * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
  * look of others, comes before that round, or after the first if nothing is rendered for it. --until-different
  * goes by cost alone; a scene that must differ cannot be what it waits for, and comes last. */
-static double round_of(const struct validation *v, const struct task *t)
+static double round_of(const struct validation *v, const struct claim_run *t)
 {
     if (v->opt->until_different)
         return t->scene->expect == VERDICT_DIFFERENT;
@@ -58,11 +59,11 @@ static double round_of(const struct validation *v, const struct task *t)
     return (double)json_array_size(t->history);
 }
 
-static struct task *choose(const struct validation *v)
+static struct claim_run *choose(const struct validation *v)
 {
-    struct task *best = NULL;
+    struct claim_run *best = NULL;
     for (int i = 0; i < v->num_tasks; i++) {
-        struct task *t = &v->task[i];
+        struct claim_run *t = &v->task[i];
         if (t->result != NULL || t->stalled)
             continue;
         if (v->sequence == &alpha_spending_single)
@@ -74,7 +75,7 @@ static struct task *choose(const struct validation *v)
     return best;
 }
 
-static void tell_round(const struct validation *v, const struct task *t)
+static void tell_round(const struct validation *v, const struct claim_run *t)
 {
     char note[160];
     if (t->a == NULL || v->sequence == &alpha_spending_single)
@@ -82,7 +83,7 @@ static void tell_round(const struct validation *v, const struct task *t)
     snprintf(note, sizeof note, "look %d of %d, %s against %s: %d samples; %d claims undecided",
              t->next + 1, NUM_LOOKS, t->a->name, t->ref.engine, side_count(t->a, t->next),
              v->num_tasks - v->done);
-    say(v, t->scene->name, note);
+    validate_log(v, t->scene->name, note);
 }
 
 /* Claims that --until-different did not look at are not in the results. */
@@ -126,16 +127,18 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
 static bool take_looks(struct validation *v, const json_t *root, struct err *e)
 {
     bool found = false, ok = true;
-    for (struct task *t; ok && !found && (t = choose(v)) != NULL && time_left(v) > 0;) {
+    for (struct claim_run *t;
+         ok && !found && (t = choose(v)) != NULL && validate_time_left(v) > 0;) {
         tell_round(v, t);
-        task_look(v, t);
-        found = v->opt->until_different && task_differs(t);
+        claim_run_look(v, t);
+        found = v->opt->until_different && claim_run_differs(t);
         ok = show_so_far(v, root, e);
     }
     for (int i = 0; i < v->num_tasks; i++) {
-        struct task *t = &v->task[i];
+        struct claim_run *t = &v->task[i];
         if (t->result == NULL && (t->seen || !found))
-            task_give_up(v, t, found ? "stopped at the difference of another claim" : BUDGET_SPENT);
+            claim_run_give_up(v, t,
+                              found ? "stopped at the difference of another claim" : BUDGET_SPENT);
     }
     return ok;
 }
@@ -173,7 +176,7 @@ bool validate_start(const struct validate_options *o, int argc, char **argv, jso
 static void validation_free(struct validation *v)
 {
     for (int i = 0; i < v->num_tasks; i++)
-        task_free(&v->task[i]);
+        claim_run_free(&v->task[i]);
     for (int i = 0; v->sides != NULL && i < v->suite.num_scenes; i++) {
         struct scene_sides *s = &v->sides[i];
         side_free(&s->ours);
@@ -198,7 +201,7 @@ static bool check_loader(const struct validation *v, const struct import_options
         if (scene_is_selected(v->opt, v->suite.scene[i].name))
             scene[num++] = v->suite.scene[i].name;
     bool ok = scene != NULL || err_set(e, "out of memory");
-    ok = ok && import_check_suite(&v->suite, scene, num, io, loader, e);
+    ok = ok && import_result_check_suite(&v->suite, scene, num, io, loader, e);
     free(scene);
     return ok;
 }
@@ -215,7 +218,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         json_decref(cannot);
         return false;
     }
-    bool ok = make_dirs(opt->out_dir, e) && plan_tasks(&v, cannot, e);
+    bool ok = make_dirs(opt->out_dir, e) && select_claims(&v, cannot, e);
     if (!ok)
         goto done;
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
@@ -260,7 +263,7 @@ static bool call_part(const struct validation *v, int first, int last, bool by_c
         only[p.num_only++] = p.scene->name;
     else
         for (int i = first; i < last; i++, p.num_only++) {
-            task_name(&v->task[i], name[p.num_only]);
+            claim_run_name(&v->task[i], name[p.num_only]);
             only[p.num_only] = name[p.num_only];
         }
     return part(ctx, &p, e);
@@ -273,7 +276,7 @@ bool validate_parts(const struct validate_options *opt, bool by_claim,
     struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
     json_t *cannot = json_array();
     bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
-              plan_tasks(&v, cannot, e);
+              select_claims(&v, cannot, e);
     for (int i = 0, end; ok && i < v.num_tasks; i = end) {
         for (end = i + 1; !by_claim && end < v.num_tasks && v.task[end].scene == v.task[i].scene;)
             end++;

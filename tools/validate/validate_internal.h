@@ -21,7 +21,7 @@ enum side_kind {
 };
 
 /* An image as it was at one look. */
-struct observed {
+struct side_image {
     bool present, written;
     struct moments m;
     json_t *manifest;            /* of a reference; NULL for ours */
@@ -38,7 +38,7 @@ struct side {
     const struct suite_variant *variant; /* SIDE_OURS; NULL: pathtracer itself */
     const struct suite_reference *ref;   /* SIDE_TRUTH to SIDE_LIVE */
     int users;                           /* claims that may want another look */
-    struct observed at[NUM_STAGES][NUM_LOOKS];
+    struct side_image at[NUM_STAGES][NUM_LOOKS];
     double wall_s, units; /* of what was rendered in this run: time and observations */
     double cpu_s;
     bool failed;
@@ -50,7 +50,7 @@ struct scene_sides {
 };
 
 /* One claim on its way. */
-struct task {
+struct claim_run {
     const struct suite_scene *scene;
     struct side *a, *b;         /* NULL: the claim of consistency */
     struct suite_reference ref; /* b's name and class; the claim's margins */
@@ -72,7 +72,7 @@ struct validation {
     const struct validate_options *opt;
     struct suite suite;
     struct scene_sides *sides; /* per scene */
-    struct task *task;
+    struct claim_run *task;
     int num_tasks, done;
     const struct alpha_spending *sequence;
     int stages;
@@ -82,11 +82,11 @@ struct validation {
 };
 
 /* A line of progress. */
-void say(const struct validation *v, const char *scene, const char *what);
+void validate_log(const struct validation *v, const char *scene, const char *what);
 /* Wall time that is left, INFINITY without a budget. */
-double time_left(const struct validation *v);
+double validate_time_left(const struct validation *v);
 
-enum got { GOT, GOT_NOTHING /* the side's e says why */, GOT_NO_TIME };
+enum fetch_result { FETCH_OK, FETCH_FAILED /* the side's e says why */, FETCH_NO_TIME };
 
 /* Can it have more samples, and can it be had again with fresh seeds? Adaptive variants cannot grow,
  * as their samples depend on each other, nor can the further engine. */
@@ -98,7 +98,8 @@ int side_count(const struct side *s, int look);
 /* About what the missing part of a look costs, in path samples; 0 where it is there. */
 double side_cost(const struct side *s, int look);
 /* The image of a stream at a look, rendered as far as it is missing. */
-enum got side_at(struct validation *v, struct side *s, int stage, int look, struct observed **out);
+enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,
+                          struct side_image **out);
 /* Writes it for the report, once; file, relative to out_dir, has 256 characters. */
 bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
                 struct err *e) __attribute__((warn_unused_result));
@@ -108,20 +109,20 @@ void side_free(struct side *s);
 bool scene_is_selected(const struct validate_options *o, const char *name);
 bool scene_is_selected_whole(const struct validate_options *o, const char *name);
 /* SCENE/CLAIM, as --only takes it: see validate.h. */
-void task_name(const struct task *t, char name[CLAIM_NAME]);
+void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME]);
 /* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
  * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
-bool plan_tasks(struct validation *v, json_t *cannot, struct err *e)
+bool select_claims(struct validation *v, json_t *cannot, struct err *e)
     __attribute__((warn_unused_result));
 /* Whether t->next is a look at which anything is new; else moves on to the next that is, or to
  * NUM_LOOKS. */
-void task_settle(struct task *t);
+void claim_next_look(struct claim_run *t);
 /* Takes one look, of which t->result is set if it decides or was the last. */
-void task_look(struct validation *v, struct task *t);
+void claim_run_look(struct validation *v, struct claim_run *t);
 /* Ends it, INCONCLUSIVE; why: what comes before the last look's reason. Without a look the time is over. */
-void task_give_up(struct validation *v, struct task *t, const char *why);
+void claim_run_give_up(struct validation *v, struct claim_run *t, const char *why);
 /* DIFFERENT where EQUIVALENT should be. */
-bool task_differs(const struct task *t);
-void task_free(struct task *t);
+bool claim_run_differs(const struct claim_run *t);
+void claim_run_free(struct claim_run *t);
 
 #endif

@@ -277,12 +277,12 @@ static void what_cannot_be_compared_is_no_agreement(void **state)
     assert_false(import_compare(&f.s, &f.c, f.dump, &r, &e));
     free_all(&f);
     json_t *reports = json_pack("[{s:s, s:b}]", "scene", "x", "agrees", 1);
-    assert_int_equal(import_exit_code(reports), 0);
+    assert_int_equal(import_result_exit_code(reports), 0);
     json_array_append_new(reports,
                           json_pack("{s:s, s:b, s:s}", "scene", "y", "agrees", 0, "what", "z"));
-    assert_int_equal(import_exit_code(reports), 1);
+    assert_int_equal(import_result_exit_code(reports), 1);
     json_array_append_new(reports, json_pack("{s:s, s:s}", "scene", "z", "error", "why"));
-    assert_int_equal(import_exit_code(reports), 3);
+    assert_int_equal(import_result_exit_code(reports), 3);
     json_decref(reports);
 }
 
