@@ -279,8 +279,8 @@ static bool export_scene(void *ctx, struct err *e)
 {
     const char *out = ctx;
     char *argv[] = {"export", "-o", ctx, "reference/scenes/12_point_plane.dae", NULL};
-    struct exporting s;
-    bool ok = exporting_parse(4, argv, &s, e) && exporting_run(&s, e);
+    struct export_job s;
+    bool ok = export_job_parse(4, argv, &s, e) && export_job_run(&s, e);
     alloc_fail_off();
     xmlResetLastError();
     alloc_fail_output(out, ok);
@@ -318,8 +318,8 @@ static void exports(void **state)
     for (int i = 0; i < 3; i++) {
         char *argv[] = {"export", "-o", (char *)file(0, name[i]),
                         "reference/scenes/12_point_plane.dae", NULL};
-        struct exporting s;
-        assert_true(exporting_parse(4, argv, &s, &e) && exporting_run(&s, &e));
+        struct export_job s;
+        assert_true(export_job_parse(4, argv, &s, &e) && export_job_run(&s, &e));
         /* libxml2's writer loses blocks where its lists fail. */
         alloc_fail_each("reproduce_export", i == 2 ? ALLOC_LOSSY : ALLOC_ALL, make_again,
                         (void *)file(0, name[i]));

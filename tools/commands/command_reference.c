@@ -16,15 +16,15 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
     struct moments m;
     json_t *manifest;
     double start = now_seconds();
-    if (!reference_command_state(c, scene, ref, &state, e))
+    if (!reference_options_state(c, scene, ref, &state, e))
         return false;
     if (state.there != NULL)
-        return reference_command_keep(c, scene, ref, &state, e);
+        return reference_options_keep(c, scene, ref, &state, e);
     fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
     if (!reference_render(scene, ref, &state.opt, &m, &manifest, e))
         return false;
     bool ok =
-        reference_command_write(c, scene, ref, state.key, &m, manifest, now_seconds() - start, e);
+        reference_options_write(c, scene, ref, state.key, &m, manifest, now_seconds() - start, e);
     moments_free(&m);
     json_decref(manifest);
     return ok;
@@ -49,7 +49,7 @@ static bool choose(void *ctx, const struct suite_scene *scene, const struct suit
 static bool make_pictures(const struct reference_command *c, struct err *e)
 {
     struct chosen one = {NULL, NULL};
-    return reference_command_each(c, choose, &one, e) && make_dirs(c->out, e) &&
+    return reference_options_each(c, choose, &one, e) && make_dirs(c->out, e) &&
            reference_render_part(one.scene, one.ref, &c->opt, c->first, c->last, c->out, e);
 }
 
@@ -73,12 +73,12 @@ int verb_reference(int argc, char **argv, struct err *e)
 {
     struct reference_command c;
     int code = EXIT_NOT_JUDGED;
-    bool ok = reference_command_read(argc, argv, &c, e);
+    bool ok = reference_options_read(argc, argv, &c, e);
     if (ok && c.slurm && !c.help)
         code = on_slurm(argc, argv, e);
     else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
-                                          : reference_command_each(&c, make_one, &c, e))))
+                                          : reference_options_each(&c, make_one, &c, e))))
         code = 0;
-    reference_command_free(&c);
+    reference_options_free(&c);
     return code;
 }

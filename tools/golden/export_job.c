@@ -42,23 +42,20 @@ static const struct cli_option options[] = {
 static const char *const engine_names[] = {"cycles", "povray", "mitsuba", "pbrt", NULL};
 static const char *const endings[] = {".json", ".pov", ".xml", ".pbrt", NULL};
 
-static void engine_of_ending(struct exporting *s)
+static void engine_of_ending(struct export_job *s)
 {
     const char *dot = s->out != NULL ? strrchr(s->out, '.') : NULL;
-    for (int i = 0; s->engine == EXPORTING_UNKNOWN && dot != NULL && endings[i] != NULL; i++)
+    for (int i = 0; s->engine == EXPORT_UNKNOWN && dot != NULL && endings[i] != NULL; i++)
         if (strcmp(dot, endings[i]) == 0)
             s->engine = i;
 }
 
-bool exporting_parse(int argc, char **argv, struct exporting *s, struct err *e)
+bool export_job_parse(int argc, char **argv, struct export_job *s, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true;
-    *s = (struct exporting){.engine = EXPORTING_UNKNOWN,
-                            .width = 480,
-                            .height = 360,
-                            .depth = 5,
-                            .focal_distance = 4.7};
+    *s = (struct export_job){
+        .engine = EXPORT_UNKNOWN, .width = 480, .height = 360, .depth = 5, .focal_distance = 4.7};
     for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
         if (i == CLI_ERROR)
             return false;
@@ -107,7 +104,7 @@ static const char *shortest(double x, char text[NUMBER])
     return text;
 }
 
-char *exporting_command(const struct exporting *s, const char *name)
+char *export_job_command(const struct export_job *s, const char *name)
 {
     char width[NUMBER], height[NUMBER], depth[NUMBER], lens[NUMBER], focus[NUMBER];
     const char *word[24] = {"assay", "export", "--engine", engine_names[s->engine],
@@ -136,12 +133,12 @@ char *exporting_command(const struct exporting *s, const char *name)
     return ascii;
 }
 
-static bool write_text(const struct exporting *s, const struct export_origin *origin,
+static bool write_text(const struct export_job *s, const struct export_origin *origin,
                        const struct scene *scene, const struct camera *camera, struct err *e)
 {
     struct out_file out;
     struct povray_variant plain = povray_variant_plain();
-    bool povray = s->engine == EXPORTING_POVRAY;
+    bool povray = s->engine == EXPORT_POVRAY;
     if (!out_open(&out, s->out, e))
         return false;
     export_origin_write(out.f, povray ? COMMENT_POVRAY : COMMENT_PBRT, origin, false);
@@ -153,24 +150,24 @@ static bool write_text(const struct exporting *s, const struct export_origin *or
     return out_commit(&out, e);
 }
 
-static bool write_scene(const struct exporting *s, const struct export_origin *origin,
+static bool write_scene(const struct export_job *s, const struct export_origin *origin,
                         const struct scene *scene, const struct camera *camera, struct err *e)
 {
-    if (s->engine == EXPORTING_CYCLES)
+    if (s->engine == EXPORT_CYCLES)
         return export_cycles(scene, camera, s->depth, origin, s->out, e);
-    if (s->engine == EXPORTING_MITSUBA)
+    if (s->engine == EXPORT_MITSUBA)
         return export_mitsuba(scene, camera, s->depth, origin, s->out, e);
     return write_text(s, origin, scene, camera, e);
 }
 
-static bool with_origin(const struct exporting *s, const struct scene *scene,
+static bool with_origin(const struct export_job *s, const struct scene *scene,
                         const struct camera *camera, struct err *e)
 {
     char hash[65], environment[65];
     if (!sha256_file(s->scene, hash, e) ||
         (s->environment != NULL && !sha256_file(s->environment, environment, e)))
         return false;
-    char *command = exporting_command(s, NULL), *named = exporting_command(s, base_of(s->out));
+    char *command = export_job_command(s, NULL), *named = export_job_command(s, base_of(s->out));
     const struct export_origin origin = {.version = s->version != NULL ? s->version : assay_version,
                                          .command = s->command != NULL ? s->command : command,
                                          .named = s->command != NULL ? s->command : named,
@@ -184,7 +181,7 @@ static bool with_origin(const struct exporting *s, const struct scene *scene,
     return ok;
 }
 
-bool exporting_run(const struct exporting *s, struct err *e)
+bool export_job_run(const struct export_job *s, struct err *e)
 {
     struct scene scene = {0};
     struct camera camera;

@@ -4,16 +4,10 @@
 
 #include "renderer/base/err.h"
 
-enum exporting_engine {
-    EXPORTING_CYCLES,
-    EXPORTING_POVRAY,
-    EXPORTING_MITSUBA,
-    EXPORTING_PBRT,
-    EXPORTING_UNKNOWN
-};
+enum export_engine { EXPORT_CYCLES, EXPORT_POVRAY, EXPORT_MITSUBA, EXPORT_PBRT, EXPORT_UNKNOWN };
 
 /* Texts are those of the command line. */
-struct exporting {
+struct export_job {
     const char *scene;
     const char *environment; /* NULL: none */
     const char *out;         /* NULL: not said */
@@ -26,18 +20,18 @@ struct exporting {
 };
 
 /* argv[0] is the verb. False with a line on anything but options and one scene. */
-bool exporting_parse(int argc, char **argv, struct exporting *s, struct err *e)
+bool export_job_parse(int argc, char **argv, struct export_job *s, struct err *e)
     __attribute__((warn_unused_result));
 
 /* "assay export ..." by which the same is made, every setting said, in one line of printable ASCII that a shell reads
  * (shell_quote.h); name: for --out, NULL: left out. To free(); NULL if out of memory. */
-char *exporting_command(const struct exporting *s, const char *name)
+char *export_job_command(const struct export_job *s, const char *name)
     __attribute__((warn_unused_result));
 
 /* Writes s->out, for an engine that is known, and makes the directories above it; files that it names lie beside it and were
  * there before it. The same settings of the same files give the same bytes, whatever `out` is, unless there are such files: they
  * are called after it, and then the file says --out, without directories. False with one line: a file that cannot be read or
  * written, or what the engine cannot express. */
-bool exporting_run(const struct exporting *s, struct err *e) __attribute__((warn_unused_result));
+bool export_job_run(const struct export_job *s, struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -103,7 +103,7 @@ static bool parse(int argc, char **argv, struct reference_command *c, struct err
     return ok;
 }
 
-bool reference_command_read(int argc, char **argv, struct reference_command *c, struct err *e)
+bool reference_options_read(int argc, char **argv, struct reference_command *c, struct err *e)
 {
     *c =
         (struct reference_command){.out = "build/golden-candidate",
@@ -127,7 +127,7 @@ bool reference_command_read(int argc, char **argv, struct reference_command *c, 
     return true;
 }
 
-void reference_command_free(struct reference_command *c)
+void reference_options_free(struct reference_command *c)
 {
     suite_free(&c->suite);
 }
@@ -142,7 +142,7 @@ static bool is_selected(const struct reference_command *c, const struct suite_sc
     return c->num_only == 0;
 }
 
-bool reference_command_each(const struct reference_command *c,
+bool reference_options_each(const struct reference_command *c,
                             bool (*one)(void *ctx, const struct suite_scene *scene,
                                         const struct suite_reference *ref, struct err *e),
                             void *ctx, struct err *e)
@@ -186,7 +186,7 @@ static uint32_t stored_seed(const struct reference_command *c, const struct suit
     return n >= 0 && n <= UINT32_MAX ? (uint32_t)n : c->opt.seed;
 }
 
-bool reference_command_state(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_state(const struct reference_command *c, const struct suite_scene *scene,
                              const struct suite_reference *ref, struct reference_state *out,
                              struct err *e)
 {
@@ -202,7 +202,7 @@ bool reference_command_state(const struct reference_command *c, const struct sui
     return true;
 }
 
-bool reference_command_keep(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_keep(const struct reference_command *c, const struct suite_scene *scene,
                             const struct suite_reference *ref, const struct reference_state *state,
                             struct err *e)
 {
@@ -214,7 +214,7 @@ bool reference_command_keep(const struct reference_command *c, const struct suit
     return true;
 }
 
-bool reference_command_write(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_write(const struct reference_command *c, const struct suite_scene *scene,
                              const struct suite_reference *ref, const char *key,
                              const struct moments *m, json_t *manifest, double seconds,
                              struct err *e)

@@ -17,14 +17,14 @@ struct reference_command {
 };
 
 /* Reads the words and the suite, and makes the directory for temporary files. help: it was printed, and no more was
- * done. The caller calls reference_command_free(), also after a failure. */
-bool reference_command_read(int argc, char **argv, struct reference_command *c, struct err *e)
+ * done. The caller calls reference_options_free(), also after a failure. */
+bool reference_options_read(int argc, char **argv, struct reference_command *c, struct err *e)
     __attribute__((warn_unused_result));
-void reference_command_free(struct reference_command *c);
+void reference_options_free(struct reference_command *c);
 
 /* Calls one() for each reference that is asked for, in the order of the suite, as long as it returns true. Fails if there is
  * none. */
-bool reference_command_each(const struct reference_command *c,
+bool reference_options_each(const struct reference_command *c,
                             bool (*one)(void *ctx, const struct suite_scene *scene,
                                         const struct suite_reference *ref, struct err *e),
                             void *ctx, struct err *e) __attribute__((warn_unused_result));
@@ -35,15 +35,15 @@ struct reference_state {
     char key[65];                 /* reference_key() */
     const char *there;            /* --golden or --out; NULL: to be rendered */
 };
-bool reference_command_state(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_state(const struct reference_command *c, const struct suite_scene *scene,
                              const struct suite_reference *ref, struct reference_state *out,
                              struct err *e) __attribute__((warn_unused_result));
 /* Says that it is up to date; a candidate that is older than what is stored is removed. */
-bool reference_command_keep(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_keep(const struct reference_command *c, const struct suite_scene *scene,
                             const struct suite_reference *ref, const struct reference_state *state,
                             struct err *e) __attribute__((warn_unused_result));
 /* Writes it to --out with the key in its manifest, and says so. */
-bool reference_command_write(const struct reference_command *c, const struct suite_scene *scene,
+bool reference_options_write(const struct reference_command *c, const struct suite_scene *scene,
                              const struct suite_reference *ref, const char *key,
                              const struct moments *m, json_t *manifest, double seconds,
                              struct err *e) __attribute__((warn_unused_result));

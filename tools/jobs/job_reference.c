@@ -84,7 +84,7 @@ static bool look_at_one(void *ctx, const struct suite_scene *scene,
 {
     struct planning *g = ctx;
     struct wanted w = {.scene = scene, .ref = ref};
-    if (!reference_command_state(g->c, scene, ref, &w.state, e))
+    if (!reference_options_state(g->c, scene, ref, &w.state, e))
         return false;
     if (w.state.there != NULL)
         return true;
@@ -141,7 +141,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     if (c->last > 0)
         return err_set(e, "--pictures: these are a job already");
     bool ok = plan_begin(p, c->out, "part.json", threads, e) &&
-              reference_command_each(c, look_at_one, g, e) && add_words(p, argc, argv, threads, e);
+              reference_options_each(c, look_at_one, g, e) && add_words(p, argc, argv, threads, e);
     for (int k = 0; ok && k < 2; k++)
         for (int i = 0; ok && binary[k] == NULL && i < g->num; i++)
             if (strcmp(g->wanted[i].ref->engine, engines[k]) == 0)
@@ -160,12 +160,12 @@ bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct p
 {
     struct reference_command c;
     struct planning g = {.c = &c};
-    bool ok = reference_command_read(argc, argv, &c, e);
+    bool ok = reference_options_read(argc, argv, &c, e);
     if (ok)
         ok = c.help ? err_set(e, "--help cannot be planned")
                     : plan_jobs(&g, argc, argv, w->parts > 0 ? w->parts : PLAN_PARTS, p, e);
     free(g.wanted);
-    reference_command_free(&c);
+    reference_options_free(&c);
     return ok;
 }
 
@@ -233,7 +233,7 @@ static bool gather_one(const struct gathering *g, const json_t *entry,
     if (strcmp(member_text(manifest, "binary_sha256"), member_text(entry, "binary_sha256")) != 0)
         ok = err_set(e, "%s, %s: rendered by another program than was planned with", scene->name,
                      ref->engine);
-    ok = ok && reference_command_write(g->c, scene, ref, member_text(entry, "key"), &m, manifest,
+    ok = ok && reference_options_write(g->c, scene, ref, member_text(entry, "key"), &m, manifest,
                                        member_number(manifest, "wall_s"), e);
     moments_free(&m);
     json_decref(manifest);
@@ -250,10 +250,10 @@ static bool settle_one(void *ctx, const struct suite_scene *scene,
         g->used++;
         return gather_one(g, entry, scene, ref, e);
     }
-    if (!reference_command_state(g->c, scene, ref, &state, e))
+    if (!reference_options_state(g->c, scene, ref, &state, e))
         return false;
     return state.there != NULL
-               ? reference_command_keep(g->c, scene, ref, &state, e)
+               ? reference_options_keep(g->c, scene, ref, &state, e)
                : err_set(e, "%s, %s: was up to date when this was planned, and is not now",
                          scene->name, ref->engine);
 }
@@ -264,9 +264,9 @@ int reference_gather(const struct plan *p, int argc, char **argv, struct err *e)
     struct reference_command c;
     struct gathering g = {.p = p, .c = &c};
     bool ok =
-        reference_command_read(argc, argv, &c, e) && reference_command_each(&c, settle_one, &g, e);
+        reference_options_read(argc, argv, &c, e) && reference_options_each(&c, settle_one, &g, e);
     if (ok && g.used != json_array_size(json_object_get(p->head, "references")))
         ok = err_set(e, "%s: has references that the suite no longer has", p->dir);
-    reference_command_free(&c);
+    reference_options_free(&c);
     return ok ? 0 : EXIT_NOT_JUDGED;
 }

@@ -34,13 +34,13 @@ static bool check_input(const char *path, const char *what, const char *file, co
 
 static bool settings_of(const char *path, const struct export_said *said,
                         const struct reproduce_options *opt, int num, char **word,
-                        struct exporting *s, struct err *e)
+                        struct export_job *s, struct err *e)
 {
     struct err why = {""};
     if (num < 2 || strcmp(word[0], "assay") != 0 || strcmp(word[1], "export") != 0 ||
-        !exporting_parse(num - 1, word + 1, s, &why))
+        !export_job_parse(num - 1, word + 1, s, &why))
         return err_set(e, "%s: its command is no export: %s", path, why.msg);
-    if (s->help || s->scene == NULL || s->engine == EXPORTING_UNKNOWN)
+    if (s->help || s->scene == NULL || s->engine == EXPORT_UNKNOWN)
         return err_set(e, "%s: its command names no scene and engine", path);
     /* It is written below our own directory. */
     if (s->out != NULL && (s->out[0] == '\0' || strchr(s->out, '/') != NULL ||
@@ -97,30 +97,30 @@ static bool compare_all(const char *path, const char *made, const char *name,
 }
 
 static bool remake(const char *path, const struct export_said *said,
-                   const struct reproduce_options *opt, const char *dir, struct exporting *s,
+                   const struct reproduce_options *opt, const char *dir, struct export_job *s,
                    struct reproduced *out, struct err *e)
 {
     char made[MAX_PATH], to[MAX_PATH];
     const char *name = s->out != NULL ? s->out : "again";
-    out->command = exporting_command(s, s->out);
+    out->command = export_job_command(s, s->out);
     s->out = to;
     s->version = said->version;
     s->command = said->command;
     bool ok = (out->command != NULL || err_set(e, "out of memory")) &&
               join(made, dir, "again", e) && join(to, made, name, e) &&
-              (exporting_run(s, e) || err_prefix(e, "%s: made again", path)) &&
+              (export_job_run(s, e) || err_prefix(e, "%s: made again", path)) &&
               compare_all(path, made, name, out, e);
     err_hide_controls(out->first);
     s->version = s->command = NULL;
     s->out = opt->keep;
-    return ok && (opt->keep == NULL || exporting_run(s, e));
+    return ok && (opt->keep == NULL || export_job_run(s, e));
 }
 
 bool reproduce_export(const char *path, const struct reproduce_options *opt, const char *dir,
                       struct reproduced *out, struct err *e)
 {
     struct export_said said;
-    struct exporting s;
+    struct export_job s;
     char **word = NULL;
     int num = 0;
     bool ok = export_origin_read(path, &said, e);
