@@ -76,27 +76,28 @@ static bool is_constant(const float *pixels_rgb, size_t pixels)
 /* All replicates into *out. Two that are the same betray a seed that was ignored. The exception is
  * light without noise: every pixel has random numbers of its own, so if all pixels of all
  * replicates agree to the bit, no random number matters, and the answer is exact. */
-static bool fold_replicates(const struct reference_job *job, const struct pictures *pictures,
-                            struct moments *out, json_t *manifest, struct err *e)
+static bool fold_replicates(const struct reference_job *job,
+                            const struct replicate_images *pictures, struct moments *out,
+                            json_t *manifest, struct err *e)
 {
     int width = job->suite->width, height = job->suite->height;
     int count = job->ref->replicates, num_constant = 0, num_first = 0, same = -1;
     size_t pixels = (size_t)width * (size_t)height;
     struct moments m = {0};
     struct replicates all = {0};
-    struct repeats repeats = {0};
-    bool ok = repeats_alloc(&repeats, count, e) && moments_alloc(&m, width, height, e) &&
+    struct replicate_repeats repeats = {0};
+    bool ok = replicate_repeats_alloc(&repeats, count, e) && moments_alloc(&m, width, height, e) &&
               replicates_alloc(&all, width, height, count, e);
     strcpy(m.unit, "replicate");
     m.spp = job->ref->spp;
     for (int k = 0; ok && k < count; k++) {
-        char path[PICTURE_PATH];
+        char path[REPLICATE_IMAGE_PATH];
         pictures->path_of(pictures->ctx, k, path);
-        float *px = pictures_read(path, width, height, false, e);
+        float *px = replicate_images_read(path, width, height, false, e);
         ok = px != NULL;
         if (!ok)
             break;
-        int first = repeats_add(&repeats, px, 3 * pixels);
+        int first = replicate_repeats_add(&repeats, px, 3 * pixels);
         same = first < k ? k : same;
         num_first += first == 0;
         num_constant += is_constant(px, pixels);
@@ -118,7 +119,7 @@ static bool fold_replicates(const struct reference_job *job, const struct pictur
         ok = independence_check(&all, manifest, e) || err_prefix(e, "Cycles");
     }
     replicates_free(&all);
-    repeats_free(&repeats);
+    replicate_repeats_free(&repeats);
     if (ok)
         *out = m;
     else
@@ -126,7 +127,7 @@ static bool fold_replicates(const struct reference_job *job, const struct pictur
     return ok;
 }
 
-static bool fold(const struct reference_job *job, const struct pictures *pictures,
+static bool fold(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
     static const char *const told[] = {"version", "settings", "binary_sha256", "command"};

@@ -45,7 +45,7 @@ static bool check_log(const char *path, struct err *e)
 }
 
 /* out += sign x the box-averaged picture / scale. */
-static bool add_picture(const struct crew *w, const struct povray_picture *p, const char *path,
+static bool add_picture(const struct crew *w, const struct povray_image *p, const char *path,
                         float sign, float *out, struct err *e)
 {
     int width = w->job->suite->width, height = w->job->suite->height, k = p->grid;
@@ -93,7 +93,7 @@ static bool run_engine(const struct process *run, struct err *e)
     }
 }
 
-static bool render_one(struct crew *w, const struct povray_picture *p, float sign, float *out,
+static bool render_one(struct crew *w, const struct povray_image *p, float sign, float *out,
                        struct err *e)
 {
     char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
@@ -124,24 +124,24 @@ static bool render_one(struct crew *w, const struct povray_picture *p, float sig
 /* Adds its passes up, box-averaged to the job's size, into a file. */
 static bool run_task(struct crew *w, int t, struct err *e)
 {
-    char path[PICTURE_PATH];
+    char path[REPLICATE_IMAGE_PATH];
     float *out = calloc(w->set->size, sizeof *out);
     bool ok = out != NULL || err_set(e, "a picture: out of memory");
     for (int pass = 0; ok && pass < w->set->plan.num_passes; pass++) {
         if (t < POVRAY_WINDOWS) {
-            struct povray_picture fine = povray_set_window(w->set, t, pass);
+            struct povray_image fine = povray_set_window(w->set, t, pass);
             ok = render_one(w, &fine, 1, out, e);
         } else if (w->set->plan.pass[pass].recursion > 0) {
-            struct povray_picture indirect =
+            struct povray_image indirect =
                 povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, true);
-            struct povray_picture direct =
+            struct povray_image direct =
                 povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, false);
             ok = render_one(w, &indirect, 1, out, e) && render_one(w, &direct, -1, out, e);
         }
     }
     if (ok) {
-        pictures_path(w->job->dir, povray_driver.prefix, t - w->first, path);
-        ok = pictures_write(path, w->job->suite->width, w->job->suite->height, out, e);
+        replicate_images_path(w->job->dir, povray_driver.prefix, t - w->first, path);
+        ok = replicate_images_write(path, w->job->suite->width, w->job->suite->height, out, e);
     }
     free(out);
     return ok;

@@ -25,7 +25,7 @@ static int reverse5(int i)
 }
 
 /* By (u, v) - 1/2 sub-pixels. */
-static void set_shift(struct povray_picture *p, int width, int height, double u, double v)
+static void set_shift(struct povray_image *p, int width, int height, double u, double v)
 {
     p->variant.shift_x = (u - 0.5) / (p->grid * width);
     p->variant.shift_y = (v - 0.5) / (p->grid * height);
@@ -44,12 +44,12 @@ static int cells(const struct povray_plan *plan, const int *choice, int most)
     return *choice;
 }
 
-struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j,
-                                    int pass)
+struct povray_image povray_window(const struct povray_plan *plan, int width, int height, int j,
+                                  int pass)
 {
     assert(j >= 0 && j < POVRAY_WINDOWS);
     static_assert(POVRAY_WINDOWS == 32, "reverse5() is for 32");
-    struct povray_picture p = {
+    struct povray_image p = {
         .grid = POVRAY_WINDOW_GRID, .block = 32, .variant = povray_variant_plain()};
     snprintf(p.name, sizeof p.name, "fine_%02d_%d", j, pass);
     p.variant.pass = pass;
@@ -66,13 +66,13 @@ struct povray_picture povray_window(const struct povray_plan *plan, int width, i
     return p;
 }
 
-struct povray_picture povray_replicate(const struct povray_plan *plan, int width, int height,
-                                       int grid, int i, uint32_t seed, int pass, bool indirect)
+struct povray_image povray_replicate(const struct povray_plan *plan, int width, int height,
+                                     int grid, int i, uint32_t seed, int pass, bool indirect)
 {
     assert(grid > 0 && i >= 0);
     struct sample4 a = sampler_get(seed, 0, 0, 0, PURPOSE_CAMERA);
     struct sample4 b = sampler_get(seed, 0, 1, 0, PURPOSE_CAMERA);
-    struct povray_picture p = {
+    struct povray_image p = {
         .grid = grid,
         .block = 4 + (int)(17 * (long)i % 61), /* all of 4 .. 64 in turn */
         .variant = {.pass = pass,

@@ -30,7 +30,7 @@ enum {
  * 65504. */
 #define POVRAY_TOP_VALUE 16.0
 
-struct povray_picture {
+struct povray_image {
     char name[32]; /* "fine_07_0", "indirect_012_0", "direct_012_0"; the last number is the pass */
     int grid;      /* rendered grid times as wide and high, then averaged */
     int block;     /* 4 .. 64 pixels */
@@ -40,10 +40,10 @@ struct povray_picture {
 /* Both are of pass `pass` of the plan.
  * Window j, 0 <= j < POVRAY_WINDOWS, of a picture of width x height. The shifts are a Hammersley set
  * over one sub-pixel. */
-struct povray_picture povray_window(const struct povray_plan *plan, int width, int height, int j,
-                                    int pass);
+struct povray_image povray_window(const struct povray_plan *plan, int width, int height, int j,
+                                  int pass);
 /* One of the two pictures of replicate i, of which everything random follows from seed. */
-struct povray_picture povray_replicate(const struct povray_plan *plan, int width, int height,
-                                       int grid, int i, uint32_t seed, int pass, bool indirect);
+struct povray_image povray_replicate(const struct povray_plan *plan, int width, int height,
+                                     int grid, int i, uint32_t seed, int pass, bool indirect);
 
 #endif

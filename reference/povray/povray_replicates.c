@@ -21,13 +21,12 @@ bool povray_set(const struct reference_job *job, struct povray_set *out, struct 
     return true;
 }
 
-struct povray_picture povray_set_window(const struct povray_set *s, int j, int pass)
+struct povray_image povray_set_window(const struct povray_set *s, int j, int pass)
 {
     return povray_window(&s->plan, s->job->suite->width, s->job->suite->height, j, pass);
 }
 
-struct povray_picture povray_set_replicate(const struct povray_set *s, int i, int pass,
-                                           bool indirect)
+struct povray_image povray_set_replicate(const struct povray_set *s, int i, int pass, bool indirect)
 {
     i += s->job->opt->first_replicate;
     return povray_replicate(&s->plan, s->job->suite->width, s->job->suite->height,
@@ -36,7 +35,7 @@ struct povray_picture povray_set_replicate(const struct povray_set *s, int i, in
 }
 
 void povray_command_line(const struct povray_set *s, const char *program,
-                         const struct povray_picture *p, char text[4][32],
+                         const struct povray_image *p, char text[4][32],
                          const char *argv[POVRAY_ARGS])
 {
     snprintf(text[0], sizeof text[0], "+W%d", p->grid * s->job->suite->width);
@@ -55,7 +54,7 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
     char text[4][32], command[512] = "povray";
     const char *argv[POVRAY_ARGS];
     int replicates = s->replicates;
-    struct povray_picture first =
+    struct povray_image first =
         replicates > 0 ? povray_set_replicate(s, 0, 0, true) : povray_set_window(s, 0, 0);
     povray_command_line(s, "povray", &first, text, argv);
     for (int i = 1; argv[i] != NULL; i++)
@@ -75,7 +74,7 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
                               pass->glow, "recursion_limit", pass->recursion, "max_trace_level",
                               pass->levels, "max_trace_level_indirect", pass->levels_indirect));
     }
-    struct povray_picture fine = povray_set_window(s, 0, 0);
+    struct povray_image fine = povray_set_window(s, 0, 0);
     json_t *settings =
         json_pack("{s:o, s:[f,f], s:{s:i, s:i, s:i, s:s}}", "passes", passes, "scale", top, 2 * top,
                   "fine", "windows", (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
@@ -101,13 +100,14 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
 }
 
 /* The mean of the windows. */
-static bool mean_window(const struct povray_set *s, const struct pictures *pictures, double *fine,
-                        struct err *e)
+static bool mean_window(const struct povray_set *s, const struct replicate_images *pictures,
+                        double *fine, struct err *e)
 {
     for (int t = 0; t < POVRAY_WINDOWS; t++) {
-        char path[PICTURE_PATH];
+        char path[REPLICATE_IMAGE_PATH];
         pictures->path_of(pictures->ctx, t, path);
-        float *px = pictures_read(path, s->job->suite->width, s->job->suite->height, true, e);
+        float *px =
+            replicate_images_read(path, s->job->suite->width, s->job->suite->height, true, e);
         if (px == NULL)
             return false;
         for (size_t i = 0; i < s->size; i++)
@@ -118,16 +118,16 @@ static bool mean_window(const struct povray_set *s, const struct pictures *pictu
 }
 
 /* fine + the difference of replicate k, into the moments. */
-static bool add_replicate(const struct povray_set *s, const struct pictures *pictures, int k,
-                          const double *fine, struct repeats *repeats, struct replicates *all,
-                          struct moments *m, struct err *e)
+static bool add_replicate(const struct povray_set *s, const struct replicate_images *pictures,
+                          int k, const double *fine, struct replicate_repeats *repeats,
+                          struct replicates *all, struct moments *m, struct err *e)
 {
-    char path[PICTURE_PATH];
+    char path[REPLICATE_IMAGE_PATH];
     pictures->path_of(pictures->ctx, POVRAY_WINDOWS + k, path);
-    float *px = pictures_read(path, m->width, m->height, true, e);
+    float *px = replicate_images_read(path, m->width, m->height, true, e);
     if (px == NULL)
         return false;
-    int first = repeats_add(repeats, px, s->size);
+    int first = replicate_repeats_add(repeats, px, s->size);
     if (first < k) {
         free(px);
         return err_set(e, "POV-Ray: replicates %d and %d are the same", first, k);
@@ -143,19 +143,19 @@ static bool add_replicate(const struct povray_set *s, const struct pictures *pic
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
-static bool fold_pictures(const struct povray_set *s, const struct pictures *pictures,
+static bool fold_pictures(const struct povray_set *s, const struct replicate_images *pictures,
                           struct moments *out, json_t *manifest, struct err *e)
 {
     const struct suite_scene *suite = s->job->suite;
     int replicates = s->replicates;
     struct moments m = {0};
     struct replicates all = {0};
-    struct repeats repeats = {0};
+    struct replicate_repeats repeats = {0};
     double *fine = calloc(s->size, sizeof *fine);
     bool ok = fine != NULL || err_set(e, "POV-Ray pictures: out of memory");
     ok = ok && moments_alloc(&m, suite->width, suite->height, e) &&
          (replicates == 0 || (replicates_alloc(&all, m.width, m.height, replicates, e) &&
-                              repeats_alloc(&repeats, replicates, e))) &&
+                              replicate_repeats_alloc(&repeats, replicates, e))) &&
          mean_window(s, pictures, fine, e);
     strcpy(m.unit, replicates == 0 ? "exact" : "replicate");
     m.spp = replicates == 0 ? 0 : s->job->ref->subgrid * s->job->ref->subgrid;
@@ -169,7 +169,7 @@ static bool fold_pictures(const struct povray_set *s, const struct pictures *pic
     }
     free(fine);
     replicates_free(&all);
-    repeats_free(&repeats);
+    replicate_repeats_free(&repeats);
     if (ok)
         *out = m;
     else
@@ -177,7 +177,7 @@ static bool fold_pictures(const struct povray_set *s, const struct pictures *pic
     return ok;
 }
 
-bool povray_fold(const struct reference_job *job, const struct pictures *pictures,
+bool povray_fold(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
     struct povray_set s;

@@ -16,18 +16,18 @@ struct povray_set {
 /* Fails where povray_plan() does. */
 bool povray_set(const struct reference_job *job, struct povray_set *out, struct err *e)
     __attribute__((warn_unused_result));
-struct povray_picture povray_set_window(const struct povray_set *s, int j, int pass);
-struct povray_picture povray_set_replicate(const struct povray_set *s, int i, int pass,
-                                           bool indirect);
+struct povray_image povray_set_window(const struct povray_set *s, int j, int pass);
+struct povray_image povray_set_replicate(const struct povray_set *s, int i, int pass,
+                                         bool indirect);
 
 enum { POVRAY_ARGS = 16 /* of the engine's command line, NULL included */ };
 /* In text that belongs to the caller. */
 void povray_command_line(const struct povray_set *s, const char *program,
-                         const struct povray_picture *p, char text[4][32],
+                         const struct povray_image *p, char text[4][32],
                          const char *argv[POVRAY_ARGS]);
 
 /* As struct driver has it. */
-bool povray_fold(const struct reference_job *job, const struct pictures *pictures,
+bool povray_fold(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
 

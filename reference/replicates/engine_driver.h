@@ -22,7 +22,7 @@ uint32_t replicate_seed(uint32_t seed, int k);
  * machines. Each fails with one line if the engine cannot express the scene at all. */
 struct driver {
     const char *engine;
-    const char *prefix; /* of a picture's file, pictures_path() */
+    const char *prefix; /* of a picture's file, replicate_images_path() */
     bool below_zero;    /* pictures are differences */
     /* How many pictures the fold takes. */
     bool (*count)(const struct reference_job *job, int *num, struct err *e);
@@ -33,7 +33,7 @@ struct driver {
     /* All pictures, in their order, into *out (unit "replicate", or "exact" where the engine's answer has no noise); adds to the
      * manifest "version", "binary_sha256", "command", "settings" (object), "seeds" (array), and "independence".
      * Calls opt->on_replicate. */
-    bool (*fold)(const struct reference_job *job, const struct pictures *pictures,
+    bool (*fold)(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
 };
 extern const struct driver cycles_driver, povray_driver;

@@ -11,13 +11,15 @@
 
 static const char *const names[] = {"R", "G", "B"};
 
-void pictures_path(const char *dir, const char *prefix, int number, char path[PICTURE_PATH])
+void replicate_images_path(const char *dir, const char *prefix, int number,
+                           char path[REPLICATE_IMAGE_PATH])
 {
-    assert(strlen(dir) + strlen(prefix) + 32 < PICTURE_PATH);
-    snprintf(path, PICTURE_PATH, "%s/%s_%04d.exr", dir, prefix, number);
+    assert(strlen(dir) + strlen(prefix) + 32 < REPLICATE_IMAGE_PATH);
+    snprintf(path, REPLICATE_IMAGE_PATH, "%s/%s_%04d.exr", dir, prefix, number);
 }
 
-float *pictures_read(const char *path, int width, int height, bool below_zero, struct err *e)
+float *replicate_images_read(const char *path, int width, int height, bool below_zero,
+                             struct err *e)
 {
     struct image im = {0};
     bool half;
@@ -58,7 +60,8 @@ out:
     return rgb_out;
 }
 
-bool pictures_write(const char *path, int width, int height, const float *pixels_rgb, struct err *e)
+bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,
+                            struct err *e)
 {
     struct image im;
     if (!image_alloc(&im, width, height, 3, names, e))
@@ -69,14 +72,14 @@ bool pictures_write(const char *path, int width, int height, const float *pixels
     return ok;
 }
 
-bool repeats_alloc(struct repeats *r, int capacity, struct err *e)
+bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
 {
-    *r = (struct repeats){.capacity = capacity};
+    *r = (struct replicate_repeats){.capacity = capacity};
     r->digest = malloc((size_t)capacity * sizeof *r->digest);
     return r->digest != NULL || err_set(e, "hashes of pictures: out of memory");
 }
 
-int repeats_add(struct repeats *r, const float *pixels, size_t size)
+int replicate_repeats_add(struct replicate_repeats *r, const float *pixels, size_t size)
 {
     struct sha256_ctx ctx;
     int k = 0;
@@ -91,8 +94,8 @@ int repeats_add(struct repeats *r, const float *pixels, size_t size)
     return k;
 }
 
-void repeats_free(struct repeats *r)
+void replicate_repeats_free(struct replicate_repeats *r)
 {
     free(r->digest);
-    *r = (struct repeats){0};
+    *r = (struct replicate_repeats){0};
 }

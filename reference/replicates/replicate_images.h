@@ -9,33 +9,34 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { PICTURE_PATH = 4096 + 64 };
+enum { REPLICATE_IMAGE_PATH = 4096 + 64 };
 
 /* Where each of them is. */
-struct pictures {
-    void (*path_of)(const void *ctx, int k, char path[PICTURE_PATH]);
+struct replicate_images {
+    void (*path_of)(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH]);
     const void *ctx;
 };
 
 /* "DIR/PREFIX_0007.exr" */
-void pictures_path(const char *dir, const char *prefix, int number, char path[PICTURE_PATH]);
+void replicate_images_path(const char *dir, const char *prefix, int number,
+                           char path[REPLICATE_IMAGE_PATH]);
 /* Packed RGB of width x height; the caller frees. NULL with a line on another size, on half floats, and on values that are
  * not finite or, without `below_zero`, negative. */
-float *pictures_read(const char *path, int width, int height, bool below_zero, struct err *e)
-    __attribute__((warn_unused_result));
+float *replicate_images_read(const char *path, int width, int height, bool below_zero,
+                             struct err *e) __attribute__((warn_unused_result));
 /* The same bits as a file, which appears whole. */
-bool pictures_write(const char *path, int width, int height, const float *pixels_rgb, struct err *e)
-    __attribute__((warn_unused_result));
+bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,
+                            struct err *e) __attribute__((warn_unused_result));
 
 /* Pictures that repeat betray a seed without effect, and would make a standard error that is too small. */
-struct repeats {
+struct replicate_repeats {
     int num, capacity;
     uint8_t (*digest)[32];
 };
-bool repeats_alloc(struct repeats *r, int capacity, struct err *e)
+bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
     __attribute__((warn_unused_result));
 /* Takes the next picture, `size` floats; the number of the first that was the same, its own if there is none. */
-int repeats_add(struct repeats *r, const float *pixels, size_t size);
-void repeats_free(struct repeats *r);
+int replicate_repeats_add(struct replicate_repeats *r, const float *pixels, size_t size);
+void replicate_repeats_free(struct replicate_repeats *r);
 
 #endif

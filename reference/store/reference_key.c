@@ -58,7 +58,7 @@ static bool hash_povray(const struct reference_job *job, const char *path, char 
         return err_set(e, "%s: cannot write: %s", path, strerror(errno));
     bool ok = true;
     for (int i = 0; ok && i < 3 * plan.num_passes; i++) {
-        struct povray_picture p =
+        struct povray_image p =
             i % 3 == 0 ? povray_window(&plan, s->width, s->height, 0, i / 3)
                        : povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed,
                                           i / 3, i % 3 == 1);

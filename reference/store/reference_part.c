@@ -31,11 +31,11 @@ static json_t *identity_of(const struct suite_scene *scene, const struct suite_r
                      "first_replicate", opt->first_replicate);
 }
 
-static bool part_path(const char *dir, char path[PICTURE_PATH], struct err *e)
+static bool part_path(const char *dir, char path[REPLICATE_IMAGE_PATH], struct err *e)
 {
-    if (strlen(dir) + 64 > PICTURE_PATH)
+    if (strlen(dir) + 64 > REPLICATE_IMAGE_PATH)
         return err_set(e, "%.64s...: path too long", dir);
-    snprintf(path, PICTURE_PATH, "%s/" PART, dir);
+    snprintf(path, REPLICATE_IMAGE_PATH, "%s/" PART, dir);
     return true;
 }
 
@@ -73,12 +73,12 @@ static bool render_range(const struct reference_job *job, void *ctx, struct err 
     const struct driver *driver = driver_of(job->ref->engine);
     bool ok = driver->render(job, r->first, r->last, r->said, e);
     for (int k = r->first; ok && k < r->last; k++) {
-        char from[PICTURE_PATH], to[PICTURE_PATH];
-        pictures_path(job->dir, driver->prefix, k - r->first, from);
-        pictures_path(r->dir, PREFIX, k, to);
-        float *px =
-            pictures_read(from, job->suite->width, job->suite->height, driver->below_zero, e);
-        ok = px != NULL && pictures_write(to, job->suite->width, job->suite->height, px, e);
+        char from[REPLICATE_IMAGE_PATH], to[REPLICATE_IMAGE_PATH];
+        replicate_images_path(job->dir, driver->prefix, k - r->first, from);
+        replicate_images_path(r->dir, PREFIX, k, to);
+        float *px = replicate_images_read(from, job->suite->width, job->suite->height,
+                                          driver->below_zero, e);
+        ok = px != NULL && replicate_images_write(to, job->suite->width, job->suite->height, px, e);
         free(px);
     }
     return ok;
@@ -88,7 +88,7 @@ bool reference_render_part(const struct suite_scene *scene, const struct suite_r
                            const struct reference_options *opt, int first, int last,
                            const char *dir, struct err *e)
 {
-    char path[PICTURE_PATH];
+    char path[REPLICATE_IMAGE_PATH];
     int num;
     struct timing t = timing_start();
     struct range r = {.first = first, .last = last, .dir = dir, .said = json_object()};
@@ -116,17 +116,17 @@ struct gathered {
     double cpu_s, wall_s;
 };
 
-static void path_of(const void *ctx, int k, char path[PICTURE_PATH])
+static void path_of(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH])
 {
     const struct gathered *g = ctx;
-    pictures_path(g->dir[k], PREFIX, k, path);
+    replicate_images_path(g->dir[k], PREFIX, k, path);
 }
 
 /* The next part, whose pictures have to follow those that are there: *next. */
 static bool add_part(struct gathered *g, const json_t *identity, const char *dir, int *next,
                      struct err *e)
 {
-    char path[PICTURE_PATH];
+    char path[REPLICATE_IMAGE_PATH];
     json_error_t je;
     if (!part_path(dir, path, e))
         return false;
@@ -185,7 +185,7 @@ static bool fold(const struct suite_scene *scene, const struct suite_reference *
 {
     struct scene s = {0};
     struct camera camera;
-    const struct pictures pictures = {path_of, g};
+    const struct replicate_images pictures = {path_of, g};
     const struct reference_job job = {
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
     if (!suite_open(scene, &s, &camera, e))

@@ -84,17 +84,17 @@ struct here {
     const char *dir;
 };
 
-static void path_here(const void *ctx, int k, char path[PICTURE_PATH])
+static void path_here(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH])
 {
     const struct here *h = ctx;
-    pictures_path(h->dir, h->driver->prefix, k, path);
+    replicate_images_path(h->dir, h->driver->prefix, k, path);
 }
 
 bool driver_render(const struct driver *driver, const struct reference_job *job,
                    struct moments *out, json_t *manifest, struct err *e)
 {
     const struct here here = {driver, job->dir};
-    const struct pictures pictures = {path_here, &here};
+    const struct replicate_images pictures = {path_here, &here};
     int num;
     json_t *said = json_object();
     bool ok = driver->count(job, &num, e) && driver->render(job, 0, num, said, e) &&

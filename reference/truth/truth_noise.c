@@ -55,14 +55,14 @@ void truth_sample_moments(const struct truth_lamp *lamp, double x, double z, int
 }
 
 /* What both rules are applied to. */
-struct picture {
+struct image_file {
     struct truth_lamp lamp;
     double foot_x[2], foot_z[2];
     int width, height;
 };
 
 /* Variance of a sample of each pixel, albedo and radiance 1. */
-static bool by_orders(const struct picture *p, size_t in_pixel, size_t in_lamp, double *variance)
+static bool by_orders(const struct image_file *p, size_t in_pixel, size_t in_lamp, double *variance)
 {
     gsl_integration_glfixed_table *place = gsl_integration_glfixed_table_alloc(in_pixel);
     gsl_integration_glfixed_table *rule = gsl_integration_glfixed_table_alloc(in_lamp);
@@ -91,7 +91,7 @@ bool truth_noise(const struct suite_scene *scene, const struct suite_reference *
                  double **variance, struct err *e)
 {
     double radiance[3], albedo[3];
-    struct picture p = {.width = scene->width, .height = scene->height};
+    struct image_file p = {.width = scene->width, .height = scene->height};
     json_error_t why;
     if (!truth_noise_has(ref->kind))
         return err_set(e, "%s: the noise of '%s' has no closed form", scene->name, ref->kind);

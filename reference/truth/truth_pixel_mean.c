@@ -71,7 +71,7 @@ bool truth_view_filled(const struct truth_view *view, const double centre[3], do
     return true;
 }
 
-struct picture {
+struct image_file {
     const struct truth_view *view;
     truth_shade *shade;
     const void *form;
@@ -82,7 +82,7 @@ struct picture {
     bool converged;
 };
 
-static int look(const struct picture *p, double u, double v, double light[3])
+static int look(const struct image_file *p, double u, double v, double light[3])
 {
     double d[3];
     truth_view_direction(p->view, u, v, d);
@@ -90,7 +90,7 @@ static int look(const struct picture *p, double u, double v, double light[3])
 }
 
 /* The piece that the whole pixel's border lies in and its middle, or false. */
-static bool is_one_piece(const struct picture *p, double u, double v)
+static bool is_one_piece(const struct image_file *p, double u, double v)
 {
     double light[3], w = p->width;
     int id = look(p, u + w / 2, v + w / 2, light);
@@ -103,7 +103,7 @@ static bool is_one_piece(const struct picture *p, double u, double v)
     return true;
 }
 
-static void product_rule(const struct picture *p, const gsl_integration_glfixed_table *rule,
+static void product_rule(const struct image_file *p, const gsl_integration_glfixed_table *rule,
                          double u0, double v0, double mean[3])
 {
     for (int c = 0; c < 3; c++)
@@ -119,9 +119,9 @@ static void product_rule(const struct picture *p, const gsl_integration_glfixed_
         }
 }
 
-typedef void line_function(struct picture *p, double t, double light[3]);
+typedef void line_function(struct image_file *p, double t, double light[3]);
 
-static void rule_on(struct picture *p, line_function *f, double a, double b, double sum[3])
+static void rule_on(struct image_file *p, line_function *f, double a, double b, double sum[3])
 {
     sum[0] = sum[1] = sum[2] = 0;
     for (size_t i = 0; i < p->rule->n; i++) {
@@ -136,8 +136,9 @@ static void rule_on(struct picture *p, line_function *f, double a, double b, dou
 /* Adds the integral of f over [a,b], of which `whole` is the rule's estimate, to sum. The tolerance
  * is absolute and shared out by length, but for parts that hold a jump, which no halving smooths: they
  * may be off by `most`. */
-static void refine(struct picture *p, line_function *f, double a, double b, const double whole[3],
-                   double tolerance, double most, int halvings, double sum[3])
+static void refine(struct image_file *p, line_function *f, double a, double b,
+                   const double whole[3], double tolerance, double most, int halvings,
+                   double sum[3])
 {
     double m = 0.5 * (a + b), left[3], right[3], worst = 0;
     rule_on(p, f, a, m, left);
@@ -155,7 +156,7 @@ static void refine(struct picture *p, line_function *f, double a, double b, cons
     }
 }
 
-static void integrate(struct picture *p, line_function *f, double a, double b, double tolerance,
+static void integrate(struct image_file *p, line_function *f, double a, double b, double tolerance,
                       double sum[3])
 {
     double whole[3];
@@ -163,13 +164,13 @@ static void integrate(struct picture *p, line_function *f, double a, double b, d
     refine(p, f, a, b, whole, tolerance, 0.01 * tolerance, 0, sum);
 }
 
-static void at_point(struct picture *p, double u, double light[3])
+static void at_point(struct image_file *p, double u, double light[3])
 {
     look(p, u, p->v, light);
 }
 
 /* Integral along the scan line at v from a to b, piece by piece. */
-static void along_line(struct picture *p, double a, double b, double sum[3])
+static void along_line(struct image_file *p, double a, double b, double sum[3])
 {
     double tolerance = 0.1 * edge_tolerance * p->scale * (b - a), start = a, light[3];
     int id = look(p, a, p->v, light);
@@ -195,18 +196,18 @@ static void along_line(struct picture *p, double a, double b, double sum[3])
 }
 
 struct column {
-    struct picture p; /* first, so that a line_function finds it */
+    struct image_file p; /* first, so that a line_function finds it */
     double u;
 };
 
-static void at_line(struct picture *p, double v, double light[3])
+static void at_line(struct image_file *p, double v, double light[3])
 {
     struct column *c = (struct column *)p;
     p->v = v;
     along_line(p, c->u, c->u + p->width, light);
 }
 
-static bool edge_pixel(struct picture *p, double u, double v, double mean[3], struct err *e)
+static bool edge_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
 {
     struct column c = {.p = *p, .u = u};
     double area = p->width * p->width, sum[3] = {0};
@@ -221,7 +222,7 @@ static bool edge_pixel(struct picture *p, double u, double v, double mean[3], st
     return c.p.converged || err_set(e, "quadrature not converged at an edge");
 }
 
-static bool smooth_pixel(const struct picture *p, double u, double v, double mean[3])
+static bool smooth_pixel(const struct image_file *p, double u, double v, double mean[3])
 {
     double coarse[3];
     product_rule(p, p->rule, u, v, coarse);
@@ -237,12 +238,12 @@ bool truth_view_render(const struct truth_view *view, truth_shade *shade, const 
 {
     if (out->width != out->height)
         return err_set(e, "the picture is %d x %d, not square", out->width, out->height);
-    struct picture p = {.view = view,
-                        .shade = shade,
-                        .form = form,
-                        .rule = gsl_integration_glfixed_table_alloc(ORDER),
-                        .check = gsl_integration_glfixed_table_alloc(2 * ORDER),
-                        .width = 2.0 / out->width};
+    struct image_file p = {.view = view,
+                           .shade = shade,
+                           .form = form,
+                           .rule = gsl_integration_glfixed_table_alloc(ORDER),
+                           .check = gsl_integration_glfixed_table_alloc(2 * ORDER),
+                           .width = 2.0 / out->width};
     bool ok = p.rule != NULL && p.check != NULL;
     if (!ok)
         err_set(e, "out of memory for a quadrature rule");

@@ -144,7 +144,7 @@ static bool spatial(void *ctx, struct err *e)
 }
 
 struct replicates {
-    struct renders a, b;
+    struct replicate_dir a, b;
     struct moments render[RENDERS];
     double variance[3 * SIDE * SIDE];
     double sum;
@@ -197,8 +197,8 @@ static void replicates(void **state)
     }
     for (int i = 0; i < 3 * SIDE * SIDE; i++)
         r.variance[i] = 1;
-    r.a = (struct renders){RENDERS, SIDE, SIDE, pictures, name};
-    r.b = (struct renders){RENDERS, SIDE, SIDE, more, name};
+    r.a = (struct replicate_dir){RENDERS, SIDE, SIDE, pictures, name};
+    r.b = (struct replicate_dir){RENDERS, SIDE, SIDE, more, name};
     alloc_fail_each("spatial_variance", ALLOC_ALL, spatial, &p);
     alloc_fail_each("permutation_test, permutation_confirm", ALLOC_ALL, permute, &r);
     r.sum = 0;

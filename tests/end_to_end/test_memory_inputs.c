@@ -93,13 +93,13 @@ static bool pair_sides(void *ctx, struct err *e)
 static bool read_renders(void *ctx, struct err *e)
 {
     double *right = ctx;
-    struct renders r = {0};
+    struct replicate_dir r = {0};
     struct moments m = {0};
-    bool ok = renders_read(file(0, "replicates"), &r, e) && renders_moments(&r, &m, e);
+    bool ok = replicate_dir_read(file(0, "replicates"), &r, e) && replicate_dir_moments(&r, &m, e);
     alloc_fail_off();
     if (ok)
         hold(right, m.mean[5] + m.m2[6] + r.num);
-    renders_free(&r);
+    replicate_dir_free(&r);
     moments_free(&m);
     return ok;
 }
@@ -141,7 +141,7 @@ static void inputs(void **state)
     struct side pair = {.sum = 0};
     alloc_fail_each("input_pair", ALLOC_OURS, pair_sides, &pair);
     double right = 0;
-    alloc_fail_each("renders_read, renders_moments", ALLOC_OURS, read_renders, &right);
+    alloc_fail_each("renders_read, replicate_dir_moments", ALLOC_OURS, read_renders, &right);
 }
 
 static void write_share(const char *path, const char *cell, const char *samples, uint64_t seed)

@@ -144,7 +144,7 @@ static bool run_labellings(const struct permutation_table *t, struct permutation
     return ok;
 }
 
-static bool check(const struct renders *a, const struct renders *b, struct err *e)
+static bool check(const struct replicate_dir *a, const struct replicate_dir *b, struct err *e)
 {
     if (a->width != b->width || a->height != b->height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
@@ -233,7 +233,7 @@ static int count_reaching(const double *largest, int num, double observed)
     return above;
 }
 
-bool permutation_test(const struct renders *a, const struct renders *b,
+bool permutation_test(const struct replicate_dir *a, const struct replicate_dir *b,
                       const struct permutation_options *opt, struct permutation *out, struct err *e)
 {
     *out = (struct permutation){.smallest_p = smallest_p(a->num, b->num, 2)};
@@ -264,8 +264,8 @@ bool permutation_test(const struct renders *a, const struct renders *b,
     return ok;
 }
 
-bool permutation_confirm(const struct permutation *first, const struct renders *a2,
-                         const struct renders *b2, const struct permutation_options *opt,
+bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
+                         const struct replicate_dir *b2, const struct permutation_options *opt,
                          struct permutation *out, struct err *e)
 {
     *out = (struct permutation){.smallest_p = smallest_p(a2->num, b2->num, 1), .num_regions = 1};

@@ -38,14 +38,14 @@ struct permutation {
 };
 
 /* Fails with a line if sizes differ, a picture is in both, none varies, or B is black. */
-bool permutation_test(const struct renders *a, const struct renders *b,
+bool permutation_test(const struct replicate_dir *a, const struct replicate_dir *b,
                       const struct permutation_options *opt, struct permutation *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* A second stage on fresh replicates: the region of `first` alone, in its direction, at opt->alpha.
  * Everything in out but mdb (0) and min_side is of that one test. */
-bool permutation_confirm(const struct permutation *first, const struct renders *a2,
-                         const struct renders *b2, const struct permutation_options *opt,
+bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
+                         const struct replicate_dir *b2, const struct permutation_options *opt,
                          struct permutation *out, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -89,7 +89,7 @@ static void standardise(struct permutation_table *t, size_t r)
     }
 }
 
-static void table_fill(const struct renders *a, const struct renders *b,
+static void table_fill(const struct replicate_dir *a, const struct replicate_dir *b,
                        struct permutation_table *t)
 {
     for (int k = 0; k < a->num + b->num; k++) {
@@ -101,8 +101,8 @@ static void table_fill(const struct renders *a, const struct renders *b,
         standardise(t, r);
 }
 
-bool permutation_table_make(const struct renders *a, const struct renders *b, int min_side,
-                            struct permutation_table *t, struct err *e)
+bool permutation_table_make(const struct replicate_dir *a, const struct replicate_dir *b,
+                            int min_side, struct permutation_table *t, struct err *e)
 {
     if (min_side == 0)
         min_side = default_side(a->width, a->height);
@@ -121,8 +121,9 @@ bool permutation_table_make(const struct renders *a, const struct renders *b, in
     return true;
 }
 
-bool permutation_table_make_one(const struct renders *a, const struct renders *b, struct rect rect,
-                                int channel, struct permutation_table *t, struct err *e)
+bool permutation_table_make_one(const struct replicate_dir *a, const struct replicate_dir *b,
+                                struct rect rect, int channel, struct permutation_table *t,
+                                struct err *e)
 {
     *t = (struct permutation_table){.num_a = a->num, .num_b = b->num};
     if (!table_alloc(t, 1, e))

@@ -20,7 +20,7 @@ static double distance(const float *px, const uint8_t code[3])
 bool rate_image_read(const char *path, int width, int height, int most, int batch,
                      const double *expected, struct rate_image *out, struct err *e)
 {
-    struct picture pic;
+    struct image_file pic;
     struct image_info info;
     double ours = 0, squares = 0;
     *out = (struct rate_image){0};
@@ -31,7 +31,7 @@ bool rate_image_read(const char *path, int width, int height, int most, int batc
     if (info.width != width || info.height != height)
         return err_set(e, "it is %d x %d pixels, not %d x %d", info.width, info.height, width,
                        height);
-    if (!picture_read_inspected(path, &info, &pic, e))
+    if (!image_file_read_inspected(path, &info, &pic, e))
         return false;
     for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
         int nearest = 0;
@@ -58,6 +58,6 @@ bool rate_image_read(const char *path, int width, int height, int most, int batc
     out->sd = sqrt(fmax(0, squares / out->pixels - difference * difference) / out->pixels) *
               out->pixels / ours;
     out->mean /= out->pixels;
-    picture_free(&pic);
+    image_file_free(&pic);
     return true;
 }

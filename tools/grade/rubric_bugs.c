@@ -120,9 +120,9 @@ static double clip_of(const struct rubric *r)
     struct curve curve;
     struct err ignored;
     double lo, hi;
-    if (!curve_parse(r->curve, &curve, &ignored)) /* looked at with the rubric */
+    if (!tone_curve_parse(r->curve, &curve, &ignored)) /* looked at with the rubric */
         return INFINITY;
-    curve_bin(&curve, 255, 255, &lo, &hi);
+    tone_curve_bin(&curve, 255, 255, &lo, &hi);
     return lo;
 }
 

@@ -56,7 +56,7 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     set_default(r->curve, sizeof r->curve, "cgl");
     set_default(r->output, sizeof r->output, "out.png");
     set_default(r->program, sizeof r->program, "pathtracer");
-    if (!curve_parse(r->curve, &curve, &e))
+    if (!tone_curve_parse(r->curve, &curve, &e))
         rubric_mistake(m, LINE_WHOLE, "curve '%s' is none of: srgb, linear, gamma=G, cgl",
                        r->curve);
     const char *dot = strrchr(r->output, '.');

@@ -42,7 +42,7 @@ static void set_code(struct submitted_image *s, size_t i, const struct curve *cu
                      int steps)
 {
     double lo, hi;
-    curve_bin(curve, k, steps, &lo, &hi);
+    tone_curve_bin(curve, k, steps, &lo, &hi);
     s->clipped[i] = k == steps;
     s->mean[i] = k == steps ? s->clip : (lo + hi) / 2;
     s->tolerance[i] = k == steps ? 0 : (hi - lo) / 2;
@@ -50,7 +50,7 @@ static void set_code(struct submitted_image *s, size_t i, const struct curve *cu
 }
 
 /* Half floats are rounded, RGBE may be cut off. */
-static double float_step(const struct picture *pic, float v, const float *px)
+static double float_step(const struct image_file *pic, float v, const float *px)
 {
     if (pic->info.type == IMAGE_HALF)
         return fmax(ldexp(fabs((double)v), -10), 0x1p-24);
@@ -60,7 +60,7 @@ static double float_step(const struct picture *pic, float v, const float *px)
     return strcmp(pic->info.format, "hdr") == 0 && brightest > 0 ? 2 * ldexp(1, exponent - 8) : 0;
 }
 
-static bool fill(struct submitted_image *s, const struct picture *pic, const struct curve *curve,
+static bool fill(struct submitted_image *s, const struct image_file *pic, const struct curve *curve,
                  struct err *e)
 {
     size_t n = 3 * (size_t)s->width * (size_t)s->height;
@@ -68,7 +68,7 @@ static bool fill(struct submitted_image *s, const struct picture *pic, const str
     double lo, hi;
     s->clip = INFINITY;
     if (steps > 0) {
-        curve_bin(curve, steps, steps, &lo, &hi);
+        tone_curve_bin(curve, steps, steps, &lo, &hi);
         s->clip = lo;
     }
     for (size_t i = 0; i < n; i++) {
@@ -90,15 +90,15 @@ static bool fill(struct submitted_image *s, const struct picture *pic, const str
 bool submitted_image_read(const char *path, const char *curve, int width, int height,
                           struct submitted_image *out, struct err *e)
 {
-    struct picture pic;
+    struct image_file pic;
     struct image_info info;
     struct curve c;
     *out = (struct submitted_image){.width = width, .height = height};
-    if (!check_header(path, width, height, &info, e) || !curve_parse(curve, &c, e) ||
-        !picture_read_inspected(path, &info, &pic, e))
+    if (!check_header(path, width, height, &info, e) || !tone_curve_parse(curve, &c, e) ||
+        !image_file_read_inspected(path, &info, &pic, e))
         return false;
     bool ok = allocate(out, e) && fill(out, &pic, &c, e) && sha256_file(path, out->sha256, e);
-    picture_free(&pic);
+    image_file_free(&pic);
     if (!ok)
         submitted_image_free(out);
     return ok;

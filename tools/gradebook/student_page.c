@@ -42,7 +42,7 @@ static void paragraph(FILE *f, const char *label, const char *text, const char *
 }
 
 /* Codes as they are, floats by sRGB. */
-static uint8_t *codes(const struct picture *pic)
+static uint8_t *codes(const struct image_file *pic)
 {
     size_t n = 3 * (size_t)pic->width * (size_t)pic->height;
     uint8_t *rgb8 = malloc(n);
@@ -66,7 +66,7 @@ static bool write_png(FILE *f, int width, int height, const uint8_t *rgb8, struc
 }
 
 /* The tile with its neighbours, enlarged: three by three of them, fewer at the rim. Moves rows of rgb8 to its front. */
-static bool show_crop(FILE *f, const struct picture *pic, uint8_t *rgb8, const json_t *tile,
+static bool show_crop(FILE *f, const struct image_file *pic, uint8_t *rgb8, const json_t *tile,
                       struct err *e)
 {
     if (json_array_size(tile) != 2)
@@ -95,9 +95,9 @@ static bool show_crop(FILE *f, const struct picture *pic, uint8_t *rgb8, const j
 static bool show_picture(FILE *f, const char *path, const char *name, const json_t *tile,
                          struct err *e)
 {
-    struct picture pic;
+    struct image_file pic;
     struct err why;
-    if (!picture_read(path, &pic, &why)) /* what is wrong with it has been said */
+    if (!image_file_read(path, &pic, &why)) /* what is wrong with it has been said */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     uint8_t *rgb8 = codes(&pic);
     bool ok = rgb8 != NULL || err_set(e, "out of memory");
@@ -108,7 +108,7 @@ static bool show_picture(FILE *f, const char *path, const char *name, const json
     fputs(", yours</figcaption></figure>\n", f);
     ok = ok && show_crop(f, &pic, rgb8, tile, e);
     free(rgb8);
-    picture_free(&pic);
+    image_file_free(&pic);
     return ok;
 }
 

@@ -51,11 +51,11 @@ static bool channels_of(const char *path, const struct image *im, int at[3], int
                    im->names[0], im->channels);
 }
 
-bool picture_from_image(const char *path, const struct image *im, const struct image_info *info,
-                        struct picture *out, struct err *e)
+bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
+                           struct image_file *out, struct err *e)
 {
     int at[3], alpha;
-    *out = (struct picture){.width = im->width, .height = im->height, .info = *info};
+    *out = (struct image_file){.width = im->width, .height = im->height, .info = *info};
     if (!check_file(path, info, e) || !channels_of(path, im, at, &alpha, e))
         return false;
     out->num_other = im->channels - (at[0] == at[1] ? 1 : 3) - (alpha >= 0);
@@ -78,32 +78,32 @@ bool picture_from_image(const char *path, const struct image *im, const struct i
             out->rgb[3 * p + c] = v;
         }
         if (!ok) {
-            picture_free(out);
+            image_file_free(out);
             return false;
         }
     }
     return true;
 }
 
-bool picture_read(const char *path, struct picture *out, struct err *e)
+bool image_file_read(const char *path, struct image_file *out, struct err *e)
 {
     struct image_info info;
-    return image_inspect(path, &info, e) && picture_read_inspected(path, &info, out, e);
+    return image_inspect(path, &info, e) && image_file_read_inspected(path, &info, out, e);
 }
 
-bool picture_read_inspected(const char *path, const struct image_info *info, struct picture *out,
-                            struct err *e)
+bool image_file_read_inspected(const char *path, const struct image_info *info,
+                               struct image_file *out, struct err *e)
 {
     struct image im = {0};
     if (!check_file(path, info, e) || !image_read(path, &im, NULL, e))
         return false;
-    bool ok = picture_from_image(path, &im, info, out, e);
+    bool ok = image_file_from_image(path, &im, info, out, e);
     image_free(&im);
     return ok;
 }
 
-void picture_free(struct picture *p)
+void image_file_free(struct image_file *p)
 {
     free(p->rgb);
-    *p = (struct picture){0};
+    *p = (struct image_file){0};
 }

@@ -175,8 +175,8 @@ static bool encode(struct coder *c, uint8_t *raw, bool slope, bool uniform_n, ui
     return pack(raw, (size_t)(c->plane - raw), bytes, size, e);
 }
 
-bool layer_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *uniform_n,
-                  struct err *e)
+bool pixel_codec_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *uniform_n,
+                        struct err *e)
 {
     struct coder c = {.m = m, .pixels = (size_t)m->width * (size_t)m->height};
     uint8_t *raw = malloc(1 + 22 * c.pixels), *other = NULL;
@@ -208,8 +208,8 @@ bool layer_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *
     return ok;
 }
 
-bool layer_encode_map(const float *map, int width, int height, uint8_t **bytes, size_t *size,
-                      struct err *e)
+bool pixel_codec_encode_map(const float *map, int width, int height, uint8_t **bytes, size_t *size,
+                            struct err *e)
 {
     size_t w = (size_t)width, pixels = w * (size_t)height;
     uint8_t *raw = malloc(pixels), left = 0;

@@ -13,7 +13,7 @@ static int by_name(const void *a, const void *b)
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-static bool list_names(const char *dir, struct renders *r, struct err *e)
+static bool list_names(const char *dir, struct replicate_dir *r, struct err *e)
 {
     DIR *d = opendir(dir);
     if (d == NULL)
@@ -39,12 +39,12 @@ static bool list_names(const char *dir, struct renders *r, struct err *e)
     return true;
 }
 
-static bool read_one(const char *dir, struct renders *r, int k, struct err *e)
+static bool read_one(const char *dir, struct replicate_dir *r, int k, struct err *e)
 {
     char path[4096];
-    struct picture p;
+    struct image_file p;
     snprintf(path, sizeof path, "%s/%s", dir, r->name[k]);
-    if (!picture_read(path, &p, e))
+    if (!image_file_read(path, &p, e))
         return false;
     bool ok = true;
     if (p.info.type != IMAGE_FLOAT || strcmp(p.info.format, "hdr") == 0)
@@ -53,7 +53,7 @@ static bool read_one(const char *dir, struct renders *r, int k, struct err *e)
         ok = err_set(e, "%s: is %d x %d pixels, %s is %d x %d", path, p.width, p.height, r->name[0],
                      r->width, r->height);
     if (!ok) {
-        picture_free(&p);
+        image_file_free(&p);
         return false;
     }
     r->width = p.width;
@@ -67,9 +67,9 @@ static bool read_one(const char *dir, struct renders *r, int k, struct err *e)
     return true;
 }
 
-bool renders_read(const char *dir, struct renders *out, struct err *e)
+bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e)
 {
-    *out = (struct renders){0};
+    *out = (struct replicate_dir){0};
     bool ok = list_names(dir, out, e);
     if (ok) {
         out->rgb = calloc((size_t)out->num, sizeof *out->rgb);
@@ -78,11 +78,11 @@ bool renders_read(const char *dir, struct renders *out, struct err *e)
     for (int k = 0; ok && k < out->num; k++)
         ok = read_one(dir, out, k, e);
     if (!ok)
-        renders_free(out);
+        replicate_dir_free(out);
     return ok;
 }
 
-void renders_free(struct renders *r)
+void replicate_dir_free(struct replicate_dir *r)
 {
     for (int k = 0; k < r->num; k++) {
         free(r->name[k]);
@@ -91,10 +91,10 @@ void renders_free(struct renders *r)
     }
     free(r->name);
     free(r->rgb);
-    *r = (struct renders){0};
+    *r = (struct replicate_dir){0};
 }
 
-bool renders_moments(const struct renders *r, struct moments *out, struct err *e)
+bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out, struct err *e)
 {
     if (!moments_alloc(out, r->width, r->height, e))
         return false;

@@ -4,7 +4,7 @@
 
 #include "renderer/image/moments.h"
 
-struct renders {
+struct replicate_dir {
     int num, width, height;
     float **rgb; /* num pictures: 3 floats a pixel */
     char **name; /* their file names, sorted */
@@ -12,13 +12,13 @@ struct renders {
 
 /* Reads every file of the directory (but hidden ones) in the order of their names. Fails with a line
  * unless all are pictures of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
- * same ("the seed was ignored"). The caller frees with renders_free(). */
-bool renders_read(const char *dir, struct renders *out, struct err *e)
+ * same ("the seed was ignored"). The caller frees with replicate_dir_free(). */
+bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e)
     __attribute__((warn_unused_result));
-void renders_free(struct renders *r);
+void replicate_dir_free(struct replicate_dir *r);
 
 /* Their moments, unit "replicate", spp 0 (not known). */
-bool renders_moments(const struct renders *r, struct moments *out, struct err *e)
+bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-bool curve_parse(const char *text, struct curve *out, struct err *e)
+bool tone_curve_parse(const char *text, struct curve *out, struct err *e)
 {
     *out = (struct curve){.kind = CURVE_LINEAR, .gamma = 1};
     if (strcmp(text, "linear") == 0)
@@ -22,7 +22,7 @@ bool curve_parse(const char *text, struct curve *out, struct err *e)
            cli_double("--curve gamma", text + 6, 0.2, 5, &out->gamma, e);
 }
 
-double curve_decode(const struct curve *c, double code)
+double tone_curve_decode(const struct curve *c, double code)
 {
     switch (c->kind) {
     case CURVE_LINEAR: return code;
@@ -33,9 +33,9 @@ double curve_decode(const struct curve *c, double code)
     return NAN;
 }
 
-void curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi)
+void tone_curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi)
 {
     double below = c->kind == CURVE_CGL ? 0 : 0.5, above = 1 - below;
-    *lo = curve_decode(c, fmax(0, (k - below) / steps));
-    *hi = curve_decode(c, fmin(1, (k + above) / steps));
+    *lo = tone_curve_decode(c, fmax(0, (k - below) / steps));
+    *hi = tone_curve_decode(c, fmin(1, (k + above) / steps));
 }

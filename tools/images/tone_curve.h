@@ -11,13 +11,13 @@ struct curve {
 
 /* "linear", "srgb" (IEC 61966-2-1), "gamma=2.2" (in [0.2, 5]) or "cgl" (the assignment's: (sqrt(2)
  * L)^(1/2.2), cut off to the step below). The others are taken to be rounded to the nearest step. */
-bool curve_parse(const char *text, struct curve *out, struct err *e)
+bool tone_curve_parse(const char *text, struct curve *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* Radiance of a code of 0 .. 1. Rises strictly. */
-double curve_decode(const struct curve *c, double code);
+double tone_curve_decode(const struct curve *c, double code);
 
 /* What code `k` of 0 .. steps can stand for, dithering none: all from *lo to *hi, as if evenly. */
-void curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi);
+void tone_curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi);
 
 #endif

@@ -14,7 +14,7 @@
 static const double most_censored = 0.05;     /* of the picture, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
 
-void notes_add(struct notes *notes, const char *format, ...)
+void input_notes_add(struct notes *notes, const char *format, ...)
 {
     int most = (int)(sizeof notes->line / sizeof notes->line[0]);
     if (notes->num == most)
@@ -32,14 +32,14 @@ void notes_add(struct notes *notes, const char *format, ...)
 
 static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
 {
-    struct renders r;
-    if (!renders_read(path, &r, e))
+    struct replicate_dir r;
+    if (!replicate_dir_read(path, &r, e))
         return false;
     out->kind = INPUT_REPLICATES;
-    bool ok = renders_moments(&r, &out->m, e);
-    notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own", path,
-              r.num);
-    renders_free(&r);
+    bool ok = replicate_dir_moments(&r, &out->m, e);
+    input_notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own",
+                    path, r.num);
+    replicate_dir_free(&r);
     return ok;
 }
 
@@ -87,14 +87,14 @@ static bool read_file(const char *path, char side, const struct input_options *o
     if (!image_inspect(path, &info, e))
         return false;
     if (strcmp(info.format, "openexr") != 0)
-        return input_picture(path, side, opt, out, notes, e);
+        return plain_image_input(path, side, opt, out, notes, e);
     if (!image_read(path, &im, NULL, e))
         return false;
     bool ok = is_moments(&im) ? read_moments(path, side, opt, out, e)
                               : input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
     bool done = !ok || is_moments(&im) || mitsuba;
     image_free(&im);
-    return done ? ok : input_picture(path, side, opt, out, notes, e);
+    return done ? ok : plain_image_input(path, side, opt, out, notes, e);
 }
 
 bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,
@@ -151,11 +151,12 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
     a->num_censored = b->num_censored = num;
     if (num == pixels)
         return err_set(e, "every pixel is saturated in one of the pictures");
-    notes_add(notes,
-              "saturated: %zu of %zu pixels (%.2g %%) have the darkest or brightest code in a "
-              "picture; they are in no sum and nothing is said of them. Regions around them are "
-              "measured by what is left",
-              num, pixels, 100 * (double)num / (double)pixels);
+    input_notes_add(
+        notes,
+        "saturated: %zu of %zu pixels (%.2g %%) have the darkest or brightest code in a "
+        "picture; they are in no sum and nothing is said of them. Regions around them are "
+        "measured by what is left",
+        num, pixels, 100 * (double)num / (double)pixels);
     return true;
 }
 
@@ -163,25 +164,27 @@ static bool pair_pictures(struct input *a, struct input *b, struct notes *notes,
 {
     struct noise_estimate s;
     if (a->kind != INPUT_PICTURE || b->kind != INPUT_PICTURE)
-        notes_add(notes, "the variance that %c has is not used: the other side has none",
-                  a->kind == INPUT_PICTURE ? 'B' : 'A');
+        input_notes_add(notes, "the variance that %c has is not used: the other side has none",
+                        a->kind == INPUT_PICTURE ? 'B' : 'A');
     if (!noise_estimate_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
         return false;
     a->is_guessed = b->is_guessed = true;
-    notes_add(notes,
-              "approximate: without moments, the noise is taken from second differences of A - B "
-              "in blocks of 8 x 8 pixels (1/6 degree of freedom a pixel); an error as fine as a "
-              "pixel or two counts as noise and is missed");
-    notes_add(notes,
-              "neighbouring pixels share noise: means of 4 x 4 have %.2f, %.2f, %.2f times the "
-              "variance (R, G, B) of independent pixels; this is allowed for, noise shared more "
-              "widely (a denoiser's) is not",
-              s.factor[0], s.factor[1], s.factor[2]);
-    notes_add(notes,
-              "skewness of A - B in one pixel: %+.2f, %+.2f, %+.2f (+-%.2f, %.2f, %.2f); unequal "
-              "sample counts or fireflies keep small regions, or all, from being tested",
-              s.skewness[0], s.skewness[1], s.skewness[2], s.skew_error[0], s.skew_error[1],
-              s.skew_error[2]);
+    input_notes_add(
+        notes, "approximate: without moments, the noise is taken from second differences of A - B "
+               "in blocks of 8 x 8 pixels (1/6 degree of freedom a pixel); an error as fine as a "
+               "pixel or two counts as noise and is missed");
+    input_notes_add(
+        notes,
+        "neighbouring pixels share noise: means of 4 x 4 have %.2f, %.2f, %.2f times the "
+        "variance (R, G, B) of independent pixels; this is allowed for, noise shared more "
+        "widely (a denoiser's) is not",
+        s.factor[0], s.factor[1], s.factor[2]);
+    input_notes_add(
+        notes,
+        "skewness of A - B in one pixel: %+.2f, %+.2f, %+.2f (+-%.2f, %.2f, %.2f); unequal "
+        "sample counts or fireflies keep small regions, or all, from being tested",
+        s.skewness[0], s.skewness[1], s.skewness[2], s.skew_error[0], s.skew_error[1],
+        s.skew_error[2]);
     return true;
 }
 
@@ -193,9 +196,9 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
     if (a->is_xyz || b->is_xyz) {
         input_to_xyz(a);
         input_to_xyz(b);
-        notes_add(notes,
-                  "compared as CIE X, Y, Z, in which one side has its variance: red, green "
-                  "and blue stand for X, Y and Z, luminance for .2126 X + .7152 Y + .0722 Z");
+        input_notes_add(notes,
+                        "compared as CIE X, Y, Z, in which one side has its variance: red, green "
+                        "and blue stand for X, Y and Z, luminance for .2126 X + .7152 Y + .0722 Z");
     }
     if (!censor(a, b, notes, e))
         return false;

@@ -13,7 +13,8 @@ struct notes {
     char line[16][320];
 };
 /* One more note; the same text twice is one note. */
-void notes_add(struct notes *notes, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void input_notes_add(struct notes *notes, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
 
 enum input_kind {
     INPUT_MOMENTS,    /* all there */

@@ -17,7 +17,8 @@ void input_to_xyz(struct input *in);
 void input_bound_skewness(struct moments *m, double sign);
 
 /* Pictures without moments (plain_image.c). */
-bool input_picture(const char *path, char side, const struct input_options *opt, struct input *out,
-                   struct notes *notes, struct err *e) __attribute__((warn_unused_result));
+bool plain_image_input(const char *path, char side, const struct input_options *opt,
+                       struct input *out, struct notes *notes, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -147,8 +147,8 @@ static bool read_pair(const char *path, const char *var_path, const struct image
                       const struct image_info *info, const struct input_options *opt,
                       struct moments *m, struct err *e)
 {
-    struct picture mean = {0}, var = {0};
-    bool ok = picture_from_image(path, im, info, &mean, e) && picture_read(var_path, &var, e);
+    struct image_file mean = {0}, var = {0};
+    bool ok = image_file_from_image(path, im, info, &mean, e) && image_file_read(var_path, &var, e);
     if (ok && (mean.width != var.width || mean.height != var.height))
         ok = err_set(e, "%s: is %d x %d pixels, %s is %d x %d", var_path, var.width, var.height,
                      path, mean.width, mean.height);
@@ -167,8 +167,8 @@ static bool read_pair(const char *path, const char *var_path, const struct image
             scale[c] = xyz[1][0] + xyz[1][1] + xyz[1][2];
         ok = set_pixel(var_path, m, p, xyz[0], xyz[1], scale, opt->spp, e);
     }
-    picture_free(&mean);
-    picture_free(&var);
+    image_file_free(&mean);
+    image_file_free(&var);
     return ok;
 }
 
@@ -208,13 +208,14 @@ bool input_mitsuba(const char *path, char side, const struct image *im,
         return false;
     out->kind = INPUT_VARIANCE;
     out->is_xyz = true;
-    notes_add(notes,
-              "%s: Mitsuba's variance%s%s, that of one sample with n below it, n = %g as told; its "
-              "film must have a box filter of one pixel and its sampler independent samples",
-              path, pair ? " in " : "", pair ? beside : "", opt->spp);
-    notes_add(notes,
-              "%s: has no skewness; taken as that of a log-normal law of the same mean and "
-              "variance, in the direction that hurts",
-              path);
+    input_notes_add(
+        notes,
+        "%s: Mitsuba's variance%s%s, that of one sample with n below it, n = %g as told; its "
+        "film must have a box filter of one pixel and its sampler independent samples",
+        path, pair ? " in " : "", pair ? beside : "", opt->spp);
+    input_notes_add(notes,
+                    "%s: has no skewness; taken as that of a log-normal law of the same mean and "
+                    "variance, in the direction that hurts",
+                    path);
     return true;
 }

@@ -24,7 +24,7 @@ static double rgbe_step(const float *px)
     return brightest > 0 ? ldexp(1, exponent - 8) : 0;
 }
 
-static struct bin bin_of(const struct picture *pic, const struct curve *curve, const float *px,
+static struct bin bin_of(const struct image_file *pic, const struct curve *curve, const float *px,
                          float v)
 {
     struct bin b = {.mean = v};
@@ -33,7 +33,7 @@ static struct bin bin_of(const struct picture *pic, const struct curve *curve, c
     case IMAGE_INT16: {
         int steps = pic->info.type == IMAGE_INT8 ? 255 : 65535, k = (int)lround((double)v * steps);
         double lo, hi;
-        curve_bin(curve, k, steps, &lo, &hi);
+        tone_curve_bin(curve, k, steps, &lo, &hi);
         b = (struct bin){(lo + hi) / 2, hi - lo, (hi - lo) / 2, k == 0 || k == steps};
         break;
     }
@@ -50,30 +50,30 @@ static struct bin bin_of(const struct picture *pic, const struct curve *curve, c
     return b;
 }
 
-static bool is_coded(const struct picture *pic)
+static bool is_coded(const struct image_file *pic)
 {
     return pic->info.type == IMAGE_INT8 || pic->info.type == IMAGE_INT16;
 }
 
-static void tell(const char *path, const struct picture *pic, const char *curve,
+static void tell(const char *path, const struct image_file *pic, const char *curve,
                  struct notes *notes)
 {
     if (is_coded(pic))
-        notes_add(notes,
-                  "%s: %d bits by the curve %s; within a code any radiance is taken to be as "
-                  "likely, and half a code is allowed for everywhere",
-                  path, pic->info.type == IMAGE_INT8 ? 8 : 16, curve);
+        input_notes_add(notes,
+                        "%s: %d bits by the curve %s; within a code any radiance is taken to be as "
+                        "likely, and half a code is allowed for everywhere",
+                        path, pic->info.type == IMAGE_INT8 ? 8 : 16, curve);
     else if (pic->info.type == IMAGE_HALF)
-        notes_add(notes, "%s: half floats; their rounding, 0.05 %%, is allowed for", path);
+        input_notes_add(notes, "%s: half floats; their rounding, 0.05 %%, is allowed for", path);
     else if (strcmp(pic->info.format, "hdr") == 0)
-        notes_add(notes,
-                  "%s: RGBE; its rounding, 0.4 to 0.8 %% of the brightest channel, is allowed for",
-                  path);
+        input_notes_add(
+            notes, "%s: RGBE; its rounding, 0.4 to 0.8 %% of the brightest channel, is allowed for",
+            path);
     if (pic->num_other > 0)
-        notes_add(notes, "%s: %d more channels are not looked at", path, pic->num_other);
+        input_notes_add(notes, "%s: %d more channels are not looked at", path, pic->num_other);
 }
 
-static bool check_options(const char *path, char side, const struct picture *pic,
+static bool check_options(const char *path, char side, const struct image_file *pic,
                           const struct input_options *opt, struct err *e)
 {
     if (opt->spp > 0)
@@ -87,17 +87,17 @@ static bool check_options(const char *path, char side, const struct picture *pic
     return true;
 }
 
-bool input_picture(const char *path, char side, const struct input_options *opt, struct input *out,
-                   struct notes *notes, struct err *e)
+bool plain_image_input(const char *path, char side, const struct input_options *opt,
+                       struct input *out, struct notes *notes, struct err *e)
 {
-    struct picture pic;
+    struct image_file pic;
     struct curve curve = {.kind = CURVE_LINEAR};
-    if (!picture_read(path, &pic, e))
+    if (!image_file_read(path, &pic, e))
         return false;
     size_t pixels = (size_t)pic.width * (size_t)pic.height;
     bool rounded = pic.info.type != IMAGE_FLOAT || strcmp(pic.info.format, "hdr") == 0;
     bool ok = check_options(path, side, &pic, opt, e);
-    ok = ok && (!is_coded(&pic) || curve_parse(opt->curve, &curve, e));
+    ok = ok && (!is_coded(&pic) || tone_curve_parse(opt->curve, &curve, e));
     ok = ok && moments_alloc(&out->m, pic.width, pic.height, e);
     if (ok && rounded) {
         out->m.tolerance = calloc(3 * pixels, sizeof *out->m.tolerance);
@@ -120,6 +120,6 @@ bool input_picture(const char *path, char side, const struct input_options *opt,
     out->kind = INPUT_PICTURE;
     if (ok)
         tell(path, &pic, opt->curve, notes);
-    picture_free(&pic);
+    image_file_free(&pic);
     return ok;
 }

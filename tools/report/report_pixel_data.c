@@ -27,7 +27,7 @@ bool page_add_layer(struct page *p, const char *path, const struct moments *m, s
     if (l->path == NULL)
         return err_set(e, "out of memory for the report");
     memcpy(l->unit, m->unit, sizeof l->unit);
-    if (!layer_encode(m, &l->bytes, &l->size, &uniform, e)) {
+    if (!pixel_codec_encode(m, &l->bytes, &l->size, &uniform, e)) {
         free(l->path);
         return false;
     }

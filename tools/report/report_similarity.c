@@ -104,7 +104,8 @@ bool report_alike(struct page *p, const struct claim_ref *claim, const struct mo
                                  .ldr = l.has_flip ? l.ldr : NAN,
                                  .idiff_percent = l.idiff_percent,
                                  .idiff_differs = l.idiff_differs};
-        ok = !l.has_flip || layer_encode_map(map, a->width, a->height, &n->bytes, &n->size, e);
+        ok =
+            !l.has_flip || pixel_codec_encode_map(map, a->width, a->height, &n->bytes, &n->size, e);
         p->num_alike += ok;
     }
     if (ok)

@@ -111,13 +111,13 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
         input_limit(&p.in[0], opt.tile, &out->r);
     keep_pair(job->path, &p, out);
     if (ok && two && out->r.verdict != VERDICT_DIFFERENT)
-        notes_add(&out->notes, "nothing was flagged: %s and %s were not needed", job->again[0],
-                  job->again[1]);
+        input_notes_add(&out->notes, "nothing was flagged: %s and %s were not needed",
+                        job->again[0], job->again[1]);
     return ok && (!two || out->r.verdict != VERDICT_DIFFERENT || second_stage(job, &opt, out, e));
 }
 
-static bool same_picture(const struct renders *r, const struct renders *s, const char *dir,
-                         struct err *e)
+static bool same_picture(const struct replicate_dir *r, const struct replicate_dir *s,
+                         const char *dir, struct err *e)
 {
     if (r->width != s->width || r->height != s->height)
         return err_set(e, "%s: is %d x %d pixels, the first render %d x %d", dir, s->width,
@@ -133,33 +133,34 @@ static bool same_picture(const struct renders *r, const struct renders *s, const
     return true;
 }
 
-static bool permute_again(const struct compare_job *job, const struct renders first[2],
+static bool permute_again(const struct compare_job *job, const struct replicate_dir first[2],
                           const struct permutation_options *stage, struct compared *out,
                           struct err *e)
 {
-    struct renders again[2] = {{0}};
+    struct replicate_dir again[2] = {{0}};
     struct permutation found = out->perm;
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
-        ok = renders_read(job->again[i], &again[i], e) &&
+        ok = replicate_dir_read(job->again[i], &again[i], e) &&
              same_picture(&first[i], &again[i], job->again[i], e);
     ok = ok && permutation_confirm(&found, &again[0], &again[1], stage, &out->perm, e);
-    renders_free(&again[0]);
-    renders_free(&again[1]);
+    replicate_dir_free(&again[0]);
+    replicate_dir_free(&again[1]);
     return ok;
 }
 
 /* The moments give the maps and intervals, the permutation decides. */
 static bool run_exchangeable(const struct compare_job *job, struct compared *out, struct err *e)
 {
-    struct renders r[2] = {{0}};
+    struct replicate_dir r[2] = {{0}};
     struct compare_options opt = job->opt;
     bool two = job->again[0] != NULL;
     struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha,
                                         job->min_side};
-    bool ok = renders_read(job->path[0], &r[0], e) && renders_read(job->path[1], &r[1], e);
+    bool ok =
+        replicate_dir_read(job->path[0], &r[0], e) && replicate_dir_read(job->path[1], &r[1], e);
     for (int i = 0; ok && i < 2; i++) {
-        ok = renders_moments(&r[i], &out->m[i], e);
+        ok = replicate_dir_moments(&r[i], &out->m[i], e);
         out->path[i] = job->path[i];
     }
     ok = ok && permutation_test(&r[0], &r[1], &stage, &out->perm, e);
@@ -175,14 +176,15 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
         out->r.extra_factor = 1;
         out->r.mdb_global = mdb;
         snprintf(out->r.reason, sizeof out->r.reason, "%s", out->perm.reason);
-        notes_add(&out->notes,
-                  "judged by permutation of %d and %d replicates, smallest p possible %.2g: exact "
-                  "if equal renderers make them from independent seeds; intervals and the MDB of a "
-                  "tile are those of the moments",
-                  r[0].num, r[1].num, out->perm.smallest_p);
+        input_notes_add(
+            &out->notes,
+            "judged by permutation of %d and %d replicates, smallest p possible %.2g: exact "
+            "if equal renderers make them from independent seeds; intervals and the MDB of a "
+            "tile are those of the moments",
+            r[0].num, r[1].num, out->perm.smallest_p);
     }
-    renders_free(&r[0]);
-    renders_free(&r[1]);
+    replicate_dir_free(&r[0]);
+    replicate_dir_free(&r[1]);
     return ok;
 }
 

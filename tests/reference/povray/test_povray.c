@@ -46,9 +46,9 @@ static void test_replicate_pair(void **state)
     bool seen[65] = {false};
     for (int i = 0; i < 61; i++) {
         uint32_t seed = replicate_seed(3, i);
-        struct povray_picture a = povray_replicate(&bright, 128, 64, 4, i, seed, 0, true);
-        struct povray_picture b = povray_replicate(&bright, 128, 64, 4, i, seed, 0, false);
-        struct povray_picture c =
+        struct povray_image a = povray_replicate(&bright, 128, 64, 4, i, seed, 0, true);
+        struct povray_image b = povray_replicate(&bright, 128, 64, 4, i, seed, 0, false);
+        struct povray_image c =
             povray_replicate(&bright, 128, 64, 4, i + 1, replicate_seed(3, i + 1), 0, true);
         assert_true(a.variant.indirect && !b.variant.indirect);
         assert_true(same_variant(&a.variant, &b.variant));
@@ -83,7 +83,7 @@ static void test_windows(void **state)
     bool column[32] = {false}, row[32] = {false};
     double sum_x = 0, sum_y = 0;
     for (int j = 0; j < POVRAY_WINDOWS; j++) {
-        struct povray_picture p = povray_window(&bright, 100, 50, j, 0);
+        struct povray_image p = povray_window(&bright, 100, 50, j, 0);
         double x = p.variant.shift_x * p.grid * 100 + .5, y = p.variant.shift_y * p.grid * 50 + .5;
         assert_true(x > 0 && x < 1 && y > 0 && y < 1);
         assert_false(column[(int)(32 * x)] || row[(int)(32 * y)]);
@@ -102,7 +102,7 @@ static double sum_of_component(int n, int row, int column, double power)
 {
     double sum = 0;
     for (int i = 0; i < n; i++) {
-        struct povray_picture p =
+        struct povray_image p =
             povray_replicate(&bright, 8, 8, 1, i, replicate_seed(20261121, i), 0, true);
         sum += pow(p.variant.rotation[row][column], power);
     }

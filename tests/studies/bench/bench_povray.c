@@ -15,7 +15,7 @@
 enum { LAMP_CELLS = 4 };
 
 /* image += the picture, averaged over grid x grid sub-pixels. */
-static bool add_picture(const char *path, const struct povray_picture *p, const struct camera *c,
+static bool add_picture(const char *path, const struct povray_image *p, const struct camera *c,
                         float *image, struct err *e)
 {
     struct image im;
@@ -51,7 +51,7 @@ bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, co
     if (!povray_plan(&v->scene, c, v->depth, &plan, e) || !make_dirs(dir, e))
         return false;
     for (int pass = 0; pass < plan.num_passes; pass++) {
-        struct povray_picture p =
+        struct povray_image p =
             povray_replicate(&plan, c->width, c->height, grid, i, seed, pass, true);
         p.variant.rule = POVRAY_GAUSS;
         p.variant.lamp_cells = LAMP_CELLS;

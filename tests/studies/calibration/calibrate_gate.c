@@ -84,9 +84,9 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
         picture[k] = pixels[k];
         names[k] = name[k];
     }
-    struct renders a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture, names};
-    struct renders b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture + REPLICATES,
-                        names + REPLICATES};
+    struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture, names};
+    struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture + REPLICATES,
+                              names + REPLICATES};
     struct permutation_options opt = {.alpha = permutation_level[0], .min_side = 2};
     size_t end = (size_t)(chunk + 1) * CHUNK;
     for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {

@@ -11,9 +11,9 @@
 #include <gsl/gsl_cdf.h>
 #include <string.h>
 
-static struct renders new_renders(int num, int width, int height)
+static struct replicate_dir new_renders(int num, int width, int height)
 {
-    struct renders r = {.num = num, .width = width, .height = height};
+    struct replicate_dir r = {.num = num, .width = width, .height = height};
     r.rgb = calloc((size_t)num, sizeof *r.rgb);
     r.name = calloc((size_t)num, sizeof *r.name);
     for (int k = 0; k < num; k++) {
@@ -31,7 +31,7 @@ enum law_of_pictures {
     NUM_LAWS
 };
 
-static void paint(struct renders *r, enum law_of_pictures law, double scale, uint64_t *state)
+static void paint(struct replicate_dir *r, enum law_of_pictures law, double scale, uint64_t *state)
 {
     for (int k = 0; k < r->num; k++) {
         double shared = draw(LAW_NORMAL, state) - 1;
@@ -47,7 +47,7 @@ static void paint(struct renders *r, enum law_of_pictures law, double scale, uin
     }
 }
 
-static struct permutation test_pair(const struct renders *a, const struct renders *b,
+static struct permutation test_pair(const struct replicate_dir *a, const struct replicate_dir *b,
                                     struct permutation_options opt)
 {
     struct permutation p;
@@ -81,7 +81,7 @@ static void test_by_enumeration(void **state)
     (void)state;
     uint64_t seed = 3;
     for (int run = 0; run < 20; run++) {
-        struct renders a = new_renders(3, 2, 2), b = new_renders(3, 2, 2);
+        struct replicate_dir a = new_renders(3, 2, 2), b = new_renders(3, 2, 2);
         double v[6][4];
         paint(&a, NORMAL, 1, &seed);
         paint(&b, NORMAL, run % 2 ? 1 : 2, &seed);
@@ -102,8 +102,8 @@ static void test_by_enumeration(void **state)
         assert_true(fabs(p.smallest_p - 0.1) < 1e-12); /* 2/C(6,3) */
         assert_true(fabs(fabs(p.t) - observed) < 1e-4 * observed);
         assert_int_equal(p.num_regions, 4 * 5);
-        renders_free(&a);
-        renders_free(&b);
+        replicate_dir_free(&a);
+        replicate_dir_free(&b);
     }
 }
 
@@ -120,7 +120,7 @@ static void test_smallest(void **state)
     assert_int_equal(permutation_needed(5e-6, 2), 11);
     assert_int_equal(permutation_needed(1e-6, 2), 0);
     uint64_t seed = 9;
-    struct renders a = new_renders(4, 4, 4), b = new_renders(4, 4, 4);
+    struct replicate_dir a = new_renders(4, 4, 4), b = new_renders(4, 4, 4);
     paint(&a, NORMAL, 1, &seed);
     paint(&b, NORMAL, 5, &seed);
     struct permutation p = test_pair(&a, &b, (struct permutation_options){1e-3, 0});
@@ -131,15 +131,15 @@ static void test_smallest(void **state)
     assert_non_null(strstr(p.reason, "--again"));
     p = test_pair(&a, &b, (struct permutation_options){0.03, 0});
     assert_int_equal(p.verdict, VERDICT_DIFFERENT);
-    renders_free(&a);
-    renders_free(&b);
+    replicate_dir_free(&a);
+    replicate_dir_free(&b);
 }
 
 /* p <= alpha in how many of `runs` pairs from one law. */
 static int count_rejected(enum law_of_pictures law, double scale, double alpha, int runs,
                           uint64_t seed)
 {
-    struct renders a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
+    struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
     int rejected = 0;
     for (int i = 0; i < runs; i++) {
         paint(&a, law, scale, &seed);
@@ -147,8 +147,8 @@ static int count_rejected(enum law_of_pictures law, double scale, double alpha, 
         struct permutation p = test_pair(&a, &b, (struct permutation_options){alpha, 2});
         rejected += p.p <= alpha;
     }
-    renders_free(&a);
-    renders_free(&b);
+    replicate_dir_free(&a);
+    replicate_dir_free(&b);
     return rejected;
 }
 
@@ -173,7 +173,7 @@ static void test_confirm(void **state)
 {
     (void)state;
     uint64_t seed = 60;
-    struct renders a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
+    struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
     struct permutation_options opt = {0.01, 2};
     struct permutation first, second;
     struct err e;
@@ -198,8 +198,8 @@ static void test_confirm(void **state)
     paint(&b, NORMAL, 1, &seed);
     assert_true(permutation_confirm(&first, &a, &b, &opt, &second, &e));
     assert_int_equal(second.verdict, VERDICT_INCONCLUSIVE);
-    renders_free(&a);
-    renders_free(&b);
+    replicate_dir_free(&a);
+    replicate_dir_free(&b);
 }
 
 /* 10 a side are 184 756 labellings, 11 are 705 432 and drawn at random. Both must agree on what is far out,
@@ -208,7 +208,7 @@ static void test_random_labellings(void **state)
 {
     (void)state;
     uint64_t seed = 70;
-    struct renders a = new_renders(11, 2, 2), b = new_renders(11, 2, 2);
+    struct replicate_dir a = new_renders(11, 2, 2), b = new_renders(11, 2, 2);
     paint(&a, NORMAL, 1, &seed);
     paint(&b, NORMAL, 1.5, &seed);
     struct permutation p = test_pair(&a, &b, (struct permutation_options){1e-3, 2});
@@ -218,15 +218,16 @@ static void test_random_labellings(void **state)
     assert_true(fabs(steps - round(steps)) < 1e-6 && steps >= 1);
     assert_true(fabs(p.smallest_p - 1.0 / 200001) < 1e-15);
     assert_int_equal(p.verdict, VERDICT_DIFFERENT);
-    renders_free(&a);
-    renders_free(&b);
+    replicate_dir_free(&a);
+    replicate_dir_free(&b);
 }
 
 static void test_refused(void **state)
 {
     (void)state;
     uint64_t seed = 80;
-    struct renders a = new_renders(3, 4, 4), b = new_renders(3, 4, 4), c = new_renders(3, 2, 2);
+    struct replicate_dir a = new_renders(3, 4, 4), b = new_renders(3, 4, 4),
+                         c = new_renders(3, 2, 2);
     struct permutation p;
     struct permutation_options opt = {0.1, 0};
     struct err e;
@@ -238,9 +239,9 @@ static void test_refused(void **state)
     memcpy(b.rgb[1], a.rgb[2], 48 * sizeof **a.rgb);
     assert_false(permutation_test(&a, &b, &opt, &p, &e));
     assert_non_null(strstr(e.msg, "2.exr of A and 1.exr of B are the same picture"));
-    renders_free(&a);
-    renders_free(&b);
-    renders_free(&c);
+    replicate_dir_free(&a);
+    replicate_dir_free(&b);
+    replicate_dir_free(&c);
 }
 
 int main(void)

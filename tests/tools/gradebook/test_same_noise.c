@@ -72,13 +72,13 @@ static struct noise_print noise_of(const double *own, const double *other, doubl
     struct curve curve;
     struct err e;
     double lo, hi;
-    assert_true(curve_parse("cgl", &curve, &e));
-    curve_bin(&curve, 255, 255, &lo, &hi);
+    assert_true(tone_curve_parse("cgl", &curve, &e));
+    tone_curve_bin(&curve, 255, 255, &lo, &hi);
     s.clip = lo;
     for (size_t i = 0; i < 3 * PIXELS; i++) {
         double factor = share * (other != NULL ? other[i / 3] : 0) + (1 - share) * own[i / 3];
         int code = tone_map(TONE_CGL, scale * truth(i / 3) * factor);
-        curve_bin(&curve, code, 255, &lo, &hi);
+        tone_curve_bin(&curve, code, 255, &lo, &hi);
         clipped[i] = code == 255;
         mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
         tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;

@@ -1,4 +1,4 @@
-/* Reads what layer_encode() packs, from the format's description in tools/images/pixel_codec.h alone. */
+/* Reads what pixel_codec_encode() packs, from the format's description in tools/images/pixel_codec.h alone. */
 #ifndef ASSAY_LAYER_READER_H
 #define ASSAY_LAYER_READER_H
 

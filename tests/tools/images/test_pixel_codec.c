@@ -47,7 +47,7 @@ static size_t assert_round_trip(const struct moments *m)
     uint8_t *bytes;
     size_t size;
     bool uniform;
-    if (!layer_encode(m, &bytes, &size, &uniform, &e))
+    if (!pixel_codec_encode(m, &bytes, &size, &uniform, &e))
         fail_msg("%s", e.msg);
     struct layer_numbers l = layer_read(bytes, size, m->width, m->height);
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -177,7 +177,7 @@ static void map_round_trip(void **state)
     map[40] = NAN;
     uint8_t *bytes;
     size_t size;
-    assert_true(layer_encode_map(map, WIDTH, HEIGHT, &bytes, &size, &e));
+    assert_true(pixel_codec_encode_map(map, WIDTH, HEIGHT, &bytes, &size, &e));
     uLongf length = PIXELS;
     assert_int_equal(uncompress(raw, &length, bytes, size), Z_OK);
     assert_int_equal(length, PIXELS);

@@ -243,24 +243,24 @@ static void test_curves(void **state)
     struct curve c;
     struct err e;
     double lo, hi;
-    assert_true(curve_parse("srgb", &c, &e));
-    assert_near(curve_decode(&c, 0.5), 0.21404114, 1e-8);
-    assert_near(curve_decode(&c, 0.04), 0.04 / 12.92, 1e-15);
-    assert_near(curve_decode(&c, 1), 1, 1e-15);
-    assert_true(curve_parse("linear", &c, &e));
-    curve_bin(&c, 100, 255, &lo, &hi);
+    assert_true(tone_curve_parse("srgb", &c, &e));
+    assert_near(tone_curve_decode(&c, 0.5), 0.21404114, 1e-8);
+    assert_near(tone_curve_decode(&c, 0.04), 0.04 / 12.92, 1e-15);
+    assert_near(tone_curve_decode(&c, 1), 1, 1e-15);
+    assert_true(tone_curve_parse("linear", &c, &e));
+    tone_curve_bin(&c, 100, 255, &lo, &hi);
     assert_near(lo, 99.5 / 255, 1e-15);
     assert_near(hi, 100.5 / 255, 1e-15);
-    assert_true(curve_parse("gamma=2", &c, &e));
-    curve_bin(&c, 10, 65535, &lo, &hi);
+    assert_true(tone_curve_parse("gamma=2", &c, &e));
+    tone_curve_bin(&c, 10, 65535, &lo, &hi);
     assert_near(hi - lo, (10.5 * 10.5 - 9.5 * 9.5) / 65535.0 / 65535.0, 1e-18);
-    assert_true(curve_parse("cgl", &c, &e)); /* cut off: code 51 is all of (51..52)/255 */
-    curve_bin(&c, 51, 255, &lo, &hi);
+    assert_true(tone_curve_parse("cgl", &c, &e)); /* cut off: code 51 is all of (51..52)/255 */
+    tone_curve_bin(&c, 51, 255, &lo, &hi);
     assert_near(lo, pow(0.2, 2.2) / sqrt(2), 1e-15);
     assert_near(hi, pow(52.0 / 255, 2.2) / sqrt(2), 1e-15);
     static const char *const bad[] = {"", "rec709", "gamma", "gamma=", "gamma=0", "gamma=x"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        assert_false(curve_parse(bad[i], &c, &e));
+        assert_false(tone_curve_parse(bad[i], &c, &e));
 }
 
 /* Linear, 16 bits, code 1000: mean 1000/65535, +- half a step, step^2/12. A grey PNG is all three. */
