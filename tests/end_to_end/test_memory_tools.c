@@ -260,7 +260,7 @@ static bool read_history(void *ctx, struct err *e)
     alloc_fail_off();
     assert_true(!ok || (h.num_runs == 2 && h.num_series == 2));
     alloc_fail_on();
-    ok = ok && history_write_page(&h, file(1, "page/history.html"), e);
+    ok = ok && report_history(&h, file(1, "page/history.html"), e);
     alloc_fail_off();
     alloc_fail_output(file(1, "page/history.html"), ok);
     history_free(&h);
@@ -272,7 +272,7 @@ static void histories(void **state)
     (void)state;
     copy(RESULTS, file(0, "history/one/results.json"));
     copy(RESULTS, file(0, "history/two/results.json"));
-    alloc_fail_each("history_read, history_write_page", ALLOC_ALL, read_history, NULL);
+    alloc_fail_each("history_read, report_history", ALLOC_ALL, read_history, NULL);
 }
 
 static bool export_scene(void *ctx, struct err *e)

@@ -107,7 +107,7 @@ static int write_history(const char *dir, const char *out, struct err *e)
         return EXIT_NOT_JUDGED;
     int code = h.moved > 0 ? EXIT_DIFFERENT : EXIT_EQUIVALENT;
     out = out != NULL ? out : path;
-    if (history_write_page(&h, out, e))
+    if (report_history(&h, out, e))
         printf("%zu of %zu claims moved in the last of %zu runs: %s\n", h.moved, h.num_series,
                h.num_runs, out);
     else

@@ -20,6 +20,6 @@ bool depth_ladder_check(const json_t *depths, const char *where, struct err *e)
     __attribute__((warn_unused_result));
 
 /* <figure> of it, or its error; nothing without any (NULL). */
-void report_depths(FILE *f, const json_t *depths);
+void plot_depths(FILE *f, const json_t *depths);
 
 #endif

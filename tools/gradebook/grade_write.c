@@ -107,7 +107,7 @@ static json_t *gradescope(const json_t *grade)
 }
 
 /* RFC 4180; a leading = + - @ would be a formula to a spreadsheet. */
-static void csv_text(FILE *f, const char *text)
+static void csv_link_text(FILE *f, const char *text)
 {
     fputc('"', f);
     if (text[0] != '\0' && strchr("=+-@\t", text[0]) != NULL)
@@ -134,15 +134,16 @@ static void write_csv(FILE *f, const json_t *grades)
     json_array_foreach(json_object_get(first, "checks"), k, c)
     {
         fputc(',', f);
-        csv_text(f, student_page_text(c, "name"));
+        csv_link_text(f, student_page_text(c, "name"));
     }
     fputs("\r\n", f);
     json_array_foreach(grades, i, g)
     {
-        csv_text(f, student_page_text(g, "id"));
+        csv_link_text(f, student_page_text(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_text(f, student_page_text(g, "trouble")[0] != '\0' ? student_page_text(g, "trouble")
-                                                               : student_page_text(g, "wrong"));
+        csv_link_text(f, student_page_text(g, "trouble")[0] != '\0'
+                             ? student_page_text(g, "trouble")
+                             : student_page_text(g, "wrong"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, ",%.2f", member_number(c, "points"));

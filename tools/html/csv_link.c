@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-struct csv csv_open(FILE *f, const char *name, const char *header)
+struct csv csv_link_open(FILE *f, const char *name, const char *header)
 {
     fprintf(f,
             "<a class=\"csv\" download=\"%s\" aria-label=\"%s\" "
@@ -20,7 +20,7 @@ static void separate(struct csv *c)
     c->in_line = true;
 }
 
-void csv_text(struct csv *c, const char *s)
+void csv_link_text(struct csv *c, const char *s)
 {
     separate(c);
     fputs("%22", c->f);
@@ -38,28 +38,28 @@ void csv_text(struct csv *c, const char *s)
     fputs("%22", c->f);
 }
 
-void csv_number(struct csv *c, double v)
+void csv_link_number(struct csv *c, double v)
 {
     separate(c);
     if (isfinite(v))
         fprintf(c->f, "%.6g", v);
 }
 
-void csv_interval(struct csv *c, const json_t *object, const char *name)
+void csv_link_interval(struct csv *c, const json_t *object, const char *name)
 {
     const json_t *ends = json_object_get(object, name);
     for (size_t n = 0; n < 2; n++)
-        csv_number(c,
-                   json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n)) : NAN);
+        csv_link_number(c, json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n))
+                                                      : NAN);
 }
 
-void csv_line(struct csv *c)
+void csv_link_line(struct csv *c)
 {
     fputs("%0D%0A", c->f);
     c->in_line = false;
 }
 
-void csv_close(struct csv *c)
+void csv_link_close(struct csv *c)
 {
     fputs("\">CSV</a>", c->f);
 }

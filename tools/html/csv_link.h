@@ -12,15 +12,15 @@ struct csv {
 };
 
 /* "<a download=name ..>" up to its data; `name` and `header` are ours: letters, digits, "._-," only. */
-struct csv csv_open(FILE *f, const char *name, const char *header);
+struct csv csv_link_open(FILE *f, const char *name, const char *header);
 /* Fields of a line in their order, then its end. Text is quoted; where a spreadsheet would take it for a
  * formula it gets an apostrophe before it. What is not finite is an empty field. */
-void csv_text(struct csv *c, const char *s);
-void csv_number(struct csv *c, double v);
+void csv_link_text(struct csv *c, const char *s);
+void csv_link_number(struct csv *c, double v);
 /* The two numbers of the member `name`, or two empty fields. */
-void csv_interval(struct csv *c, const json_t *object, const char *name);
-void csv_line(struct csv *c);
+void csv_link_interval(struct csv *c, const json_t *object, const char *name);
+void csv_link_line(struct csv *c);
 /* The link's text: "CSV". */
-void csv_close(struct csv *c);
+void csv_link_close(struct csv *c);
 
 #endif

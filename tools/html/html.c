@@ -46,14 +46,14 @@ static struct number_text with_sign(const char *text)
     return out;
 }
 
-struct number_text percent_column(double fraction)
+struct number_text html_percent_column(double fraction)
 {
     char text[64];
     snprintf(text, sizeof text, fabs(fraction) < 1e4 ? "%+.3f" : "%+.3g", 100 * fraction);
     return with_sign(text);
 }
 
-struct number_text percent_prose(double fraction)
+struct number_text html_percent_prose(double fraction)
 {
     char text[64];
     snprintf(text, sizeof text, "%+.3g", 100 * fraction);
@@ -62,21 +62,21 @@ struct number_text percent_prose(double fraction)
     return out;
 }
 
-struct number_text percent_plain(double fraction)
+struct number_text html_percent_plain(double fraction)
 {
-    struct number_text out = plain_number(100 * fraction);
+    struct number_text out = html_number(100 * fraction);
     strcat(out.s, "\u00a0%");
     return out;
 }
 
-struct number_text plain_number(double v)
+struct number_text html_number(double v)
 {
     char text[64];
     snprintf(text, sizeof text, "%.3g", v);
     return with_sign(text);
 }
 
-struct number_text duration_text(double seconds)
+struct number_text html_duration(double seconds)
 {
     struct number_text out;
     double minutes = floor(seconds / 60);
@@ -105,7 +105,7 @@ void html_base64(FILE *f, const void *bytes, size_t size)
     }
 }
 
-struct number_text script_hash(const char *script)
+struct number_text html_script_hash(const char *script)
 {
     struct sha256_ctx ctx;
     uint8_t digest[SHA256_DIGEST_SIZE];

@@ -21,19 +21,19 @@ void html_name(FILE *f, const char *s);
 
 /* 0.0123 -> "+1.230": always three decimals and no percent sign, for a column. The minus sign is
  * U+2212. What rounds to zero has no sign. */
-struct number_text percent_column(double fraction);
+struct number_text html_percent_column(double fraction);
 /* 0.0123 -> "+1.23 %": three digits and a no-break space. */
-struct number_text percent_prose(double fraction);
+struct number_text html_percent_prose(double fraction);
 /* 0.0123 -> "1.23 %". */
-struct number_text percent_plain(double fraction);
+struct number_text html_percent_plain(double fraction);
 /* Three significant digits with U+2212. */
-struct number_text plain_number(double v);
+struct number_text html_number(double v);
 /* "0.5 s", "12 s", "3 min 5 s", "2 h 3 min". */
-struct number_text duration_text(double seconds);
+struct number_text html_duration(double seconds);
 
 void html_base64(FILE *f, const void *bytes, size_t size);
 
 /* "sha256-<base64>" of a script's text, as a Content-Security-Policy wants it. */
-struct number_text script_hash(const char *script);
+struct number_text html_script_hash(const char *script);
 
 #endif

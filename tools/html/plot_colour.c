@@ -24,7 +24,7 @@ double percentile(double *value, size_t n, double fraction)
     return value[(size_t)ceil(fraction * (double)n) - 1];
 }
 
-double display_white(double *luminances, size_t n, bool *capped)
+double plot_display_white(double *luminances, size_t n, bool *capped)
 {
     *capped = false;
     if (n == 0)
@@ -82,7 +82,7 @@ static void along(const double (*point)[3], size_t n, double u, uint8_t rgb[3])
     rgb8_of_lab(lab, rgb);
 }
 
-void diverging_rgb8(double t, uint8_t rgb[3])
+void plot_diverging_rgb8(double t, uint8_t rgb[3])
 {
     /* L*, a*, b* at |t| = 0, 1/2, 1; each leg is 46.0 units long and stays inside sRGB. */
     static const double anchor[2][3][3] = {{{97, 0, 0}, {64, -8, -31}, {31, 17, -51}},
@@ -93,7 +93,7 @@ void diverging_rgb8(double t, uint8_t rgb[3])
         along(anchor[t > 0], 3, fmin(fabs(t), 1), rgb);
 }
 
-void sequential_rgb8(double t, uint8_t rgb[3])
+void plot_sequential_rgb8(double t, uint8_t rgb[3])
 {
     /* Every eighth of matplotlib's viridis (CC0) in L*a*b*. */
     static const double anchor[9][3] = {

@@ -18,16 +18,16 @@ double percentile(double *value, size_t n, double fraction);
  * white. Where a lamp fills so much of the picture that this would leave all else black (it is over
  * 6 times the median of the positive luminances), 6 times that median takes its place and *capped is
  * true. 1 if no luminance is positive. Sorts `luminances`. */
-double display_white(double *luminances, size_t n, bool *capped);
+double plot_display_white(double *luminances, size_t n, bool *capped);
 
 /* Blue - white - red for t in [-1, 1] (clamped); grey where t is not a number. Piecewise linear in
  * CIE L*a*b* (D65) with the same L* and the same speed (2.9 units for 1/32) on both sides, so that
  * equal steps look equal, and blue against red so that the colour blind can tell the signs apart.
  */
-void diverging_rgb8(double t, uint8_t rgb[3]);
+void plot_diverging_rgb8(double t, uint8_t rgb[3]);
 
 /* Dark violet - green - yellow for t in [0, 1] (clamped); grey where t is not a number. L* rises all the
  * way, so that it can be read without colours, and equal steps are equally far apart in L*a*b*. */
-void sequential_rgb8(double t, uint8_t rgb[3]);
+void plot_sequential_rgb8(double t, uint8_t rgb[3]);
 
 #endif

@@ -171,23 +171,24 @@ static void write_legend(FILE *f, const json_t *engines)
 static void write_plot_csv(FILE *f, const json_t *engines, bool against_time)
 {
     struct csv csv =
-        against_time ? csv_open(f, "error_time.csv", "engine,cpu_seconds,rmse,rmse_low,rmse_high")
-                     : csv_open(f, "error_samples.csv", "engine,samples,rmse,rmse_low,rmse_high");
+        against_time
+            ? csv_link_open(f, "error_time.csv", "engine,cpu_seconds,rmse,rmse_low,rmse_high")
+            : csv_link_open(f, "error_samples.csv", "engine,samples,rmse,rmse_low,rmse_high");
     for (size_t k = 0; k < json_array_size(engines); k++) {
         const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
         for (size_t i = 0; i < json_array_size(rungs); i++) {
             const json_t *g = json_array_get(rungs, i);
-            csv_text(&csv, member_text(j, "engine"));
-            csv_number(&csv, rung_x(j, g, against_time));
-            csv_number(&csv, member_number(g, "rmse"));
-            csv_interval(&csv, g, "rmse_ci");
-            csv_line(&csv);
+            csv_link_text(&csv, member_text(j, "engine"));
+            csv_link_number(&csv, rung_x(j, g, against_time));
+            csv_link_number(&csv, member_number(g, "rmse"));
+            csv_link_interval(&csv, g, "rmse_ci");
+            csv_link_line(&csv);
         }
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
-void report_convergence_plot(FILE *f, const json_t *scene, bool against_time)
+void plot_convergence(FILE *f, const json_t *scene, bool against_time)
 {
     struct axes a = axes_of(scene, against_time);
     if (!(a.x1 > a.x0))

@@ -7,6 +7,6 @@
 #include <stdio.h>
 
 /* <figure> of one element of "convergence" (convergence_results.h), both axes logarithmic; nothing without two different x. */
-void report_convergence_plot(FILE *f, const json_t *scene, bool against_time);
+void plot_convergence(FILE *f, const json_t *scene, bool against_time);
 
 #endif

@@ -115,20 +115,21 @@ static void write_caption(FILE *f, const json_t *depths)
             "Dashed: the closed form, known at %zu of %zu depths, at most %.2g standard errors away. It is "
             "shown, not judged. ",
             known, json_array_size(rungs), largest);
-    struct csv csv = csv_open(f, "depths.csv", "depth,mean,standard_error,closed_form");
+    struct csv csv = csv_link_open(f, "depths.csv", "depth,mean,standard_error,closed_form");
     for (size_t i = 0; i < json_array_size(rungs); i++) {
         const json_t *g = json_array_get(rungs, i);
-        csv_number(&csv, member_number(g, "depth"));
-        csv_number(&csv, member_number(g, "mean"));
-        csv_number(&csv, member_number(g, "se"));
-        csv_number(&csv, json_object_get(g, "truth") != NULL ? member_number(g, "truth") : NAN);
-        csv_line(&csv);
+        csv_link_number(&csv, member_number(g, "depth"));
+        csv_link_number(&csv, member_number(g, "mean"));
+        csv_link_number(&csv, member_number(g, "se"));
+        csv_link_number(&csv,
+                        json_object_get(g, "truth") != NULL ? member_number(g, "truth") : NAN);
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
     fputs("</figcaption>", f);
 }
 
-void report_depths(FILE *f, const json_t *depths)
+void plot_depths(FILE *f, const json_t *depths)
 {
     const json_t *rungs = json_object_get(depths, "rungs");
     const char *error = member_text(depths, "error");

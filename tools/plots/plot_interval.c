@@ -28,8 +28,8 @@ void plot_interval(FILE *f, const json_t *claim)
     fprintf(f,
             "<svg class=\"interval\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" role=\"img\" "
             "aria-label=\"difference %s, interval from %s to %s, margin %s\">",
-            WIDTH, HEIGHT, WIDTH, HEIGHT, percent_prose(d).s, percent_prose(lo).s,
-            percent_prose(hi).s, percent_plain(margin).s);
+            WIDTH, HEIGHT, WIDTH, HEIGHT, html_percent_prose(d).s, html_percent_prose(lo).s,
+            html_percent_prose(hi).s, html_percent_plain(margin).s);
     if (margin > 0)
         fprintf(f, "<rect class=\"margin\" x=\"%.1f\" y=\"1\" width=\"%.1f\" height=\"%d\"/>",
                 MIDDLE - scale * margin, 2 * scale * margin, HEIGHT - 2);
@@ -59,7 +59,7 @@ static int binomial_quantile(double q, int n, double p)
     return k;
 }
 
-struct p_histogram p_histogram_of(const json_t *claim, int count[20])
+struct p_histogram plot_p_histogram(const json_t *claim, int count[20])
 {
     struct p_histogram h = {0};
     const json_t *log10_p = json_object_get(claim, "tile_log10_p");

@@ -19,7 +19,7 @@ struct p_histogram {
 };
 
 /* Counts the claim's tile_log10_p into equal bins of p (num_tiles may be 0: then the rest is 0). */
-struct p_histogram p_histogram_of(const json_t *claim, int count[20]);
+struct p_histogram plot_p_histogram(const json_t *claim, int count[20]);
 void plot_p_values(FILE *f, const struct p_histogram *h, const int count[20]);
 
 #endif

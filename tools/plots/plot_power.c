@@ -105,19 +105,19 @@ static void write_tile_csv(FILE *f, const json_t *claim)
     const json_t *p = json_object_get(claim, "tile_log10_p"), *t = json_object_get(claim, "tile_t");
     size_t columns = (size_t)member_number(claim, "tiles_x");
     double side = member_number(claim, "tile");
-    struct csv csv = csv_open(f, "tiles.csv", "x,y,t,log10_p");
+    struct csv csv = csv_link_open(f, "tiles.csv", "x,y,t,log10_p");
     for (size_t i = 0; columns > 0 && i < json_array_size(p); i++) {
         const json_t *one = json_array_get(p, i);
-        csv_number(&csv, side * (double)(i % columns));
-        csv_number(&csv, side * (double)(i / columns));
-        csv_number(&csv, json_is_number(one) ? json_number_value(json_array_get(t, i)) : NAN);
-        csv_number(&csv, json_is_number(one) ? json_number_value(one) : NAN);
-        csv_line(&csv);
+        csv_link_number(&csv, side * (double)(i % columns));
+        csv_link_number(&csv, side * (double)(i / columns));
+        csv_link_number(&csv, json_is_number(one) ? json_number_value(json_array_get(t, i)) : NAN);
+        csv_link_number(&csv, json_is_number(one) ? json_number_value(one) : NAN);
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
-bool report_qq(FILE *f, const json_t *claim, struct err *e)
+bool plot_qq(FILE *f, const json_t *claim, struct err *e)
 {
     const json_t *list = json_object_get(claim, "tile_log10_p");
     double *v = calloc(json_array_size(list) + 1, sizeof *v);
@@ -215,7 +215,7 @@ static int curve_points(const struct power *p, double top, double bias[POINTS])
     return num;
 }
 
-void report_power(FILE *f, const json_t *claim)
+void plot_power(FILE *f, const json_t *claim)
 {
     struct power p = power_of(claim);
     double mdb = member_number(claim, "mdb_global"), top = 1.3 * mdb, bias[POINTS];
@@ -243,19 +243,19 @@ void report_power(FILE *f, const json_t *claim)
     for (int i = 0; i * tick(100 * top) <= 100 * top; i++)
         fprintf(f, "<text x=\"%.0f\" y=\"%d\">%s</text>",
                 LEFT + WIDTH * (i * tick(100 * top)) / (100 * top), BOTTOM + 16,
-                plain_number(i * tick(100 * top)).s);
+                html_number(i * tick(100 * top)).s);
     fprintf(
         f,
         "</svg><figcaption><b>What this claim could have found.</b> How likely a true bias of that size makes "
         "the image's mean DIFFERENT: hardly ever inside the margin (shaded), where it would be wrong, and 95\u00a0%% "
         "of the time at the MDB, %s. ",
-        percent_plain(mdb).s);
-    struct csv csv = csv_open(f, "power.csv", "bias,power");
+        html_percent_plain(mdb).s);
+    struct csv csv = csv_link_open(f, "power.csv", "bias,power");
     for (int i = 0; i < num; i++) {
-        csv_number(&csv, bias[i]);
-        csv_number(&csv, power_at(&p, bias[i]));
-        csv_line(&csv);
+        csv_link_number(&csv, bias[i]);
+        csv_link_number(&csv, power_at(&p, bias[i]));
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
     fputs("</figcaption></figure>\n", f);
 }

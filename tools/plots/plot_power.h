@@ -13,7 +13,7 @@ void qq_band(int i, int n, double *low, double *high);
 
 /* <figure> of the tiles' p-values against those that uniform ones would have, with its band; nothing for
  * fewer than 4 tiles with noise. Fails only out of memory. */
-bool report_qq(FILE *f, const json_t *claim, struct err *e) __attribute__((warn_unused_result));
+bool plot_qq(FILE *f, const json_t *claim, struct err *e) __attribute__((warn_unused_result));
 
 /* The chance that a bias of the image's mean (relative) comes out DIFFERENT, by the statistic of the image
  * alone: Phi((bias - margin)/SE - c), c the normal quantile at the level of its tests, SE from the MDB, which
@@ -25,6 +25,6 @@ struct power power_of(const json_t *claim);
 double power_at(const struct power *p, double bias);
 
 /* <figure> of that curve with margin and MDB marked; nothing where it is not known. */
-void report_power(FILE *f, const json_t *claim);
+void plot_power(FILE *f, const json_t *claim);
 
 #endif

@@ -77,7 +77,7 @@ static void write_plot(FILE *f, const struct bar *bar, size_t num)
             "width=\"%.1f\" height=\"%d\"/></g><text x=\"%.1f\" y=\"%.0f\">%s</text>",
             bar[i].rays, bar[i].boxes, bar[i].primitives, LEFT, y + 3, boxes, ROW - 6, LEFT + boxes,
             y + 3, primitives, ROW - 6, LEFT + boxes + primitives + 5, y + 13,
-            plain_number(bar[i].boxes + bar[i].primitives).s);
+            html_number(bar[i].boxes + bar[i].primitives).s);
     }
     fprintf(f,
             "<path class=\"axis\" d=\"M%d %dV%dH%d\"/><text x=\"%d\" y=\"%d\" "
@@ -85,7 +85,7 @@ static void write_plot(FILE *f, const struct bar *bar, size_t num)
             LEFT, TOP, bottom, LEFT + WIDTH, LEFT + WIDTH / 2, bottom + 34);
 }
 
-bool report_rays(FILE *f, const json_t *claims, struct err *e)
+bool plot_rays(FILE *f, const json_t *claims, struct err *e)
 {
     struct bar *bar = calloc(json_array_size(claims) + 1, sizeof *bar);
     if (bar == NULL)
@@ -103,15 +103,15 @@ bool report_rays(FILE *f, const json_t *claims, struct err *e)
             "that the hierarchy no longer saves. Unlike times these counts do not depend on how busy the machine was. ",
             f);
         struct csv csv =
-            csv_open(f, "rays.csv", "scene,rays,box_tests_per_ray,primitive_tests_per_ray");
+            csv_link_open(f, "rays.csv", "scene,rays,box_tests_per_ray,primitive_tests_per_ray");
         for (size_t i = 0; i < num; i++) {
-            csv_text(&csv, bar[i].scene);
-            csv_number(&csv, bar[i].rays);
-            csv_number(&csv, bar[i].boxes);
-            csv_number(&csv, bar[i].primitives);
-            csv_line(&csv);
+            csv_link_text(&csv, bar[i].scene);
+            csv_link_number(&csv, bar[i].rays);
+            csv_link_number(&csv, bar[i].boxes);
+            csv_link_number(&csv, bar[i].primitives);
+            csv_link_line(&csv);
         }
-        csv_close(&csv);
+        csv_link_close(&csv);
         fputs("</figcaption></figure>\n</section>\n", f);
     }
     free(bar);

@@ -122,7 +122,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     write_fact(f, "Version", member_text(root, "version"));
     write_fact(f, "Machine", member_text(root, "machine"));
     if (json_object_get(root, "seconds") != NULL)
-        write_fact(f, "Time", duration_text(member_number(root, "seconds")).s);
+        write_fact(f, "Time", html_duration(member_number(root, "seconds")).s);
     const char *mode = member_text(root, "mode");
     if (mode != NULL && strcmp(mode, "golden") == 0)
         mode = "golden: against stored references";
@@ -210,7 +210,7 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
             "style-src 'unsafe-inline'; script-src '%s'\">\n"
             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
             "<meta name=\"color-scheme\" content=\"light dark\">\n",
-            script_hash(page_js).s);
+            html_script_hash(page_js).s);
     write_origin(f, root, converge);
     fputs("<title>Assay report, ", f);
     html_text(f, member_text(root, "date"));
@@ -227,14 +227,14 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
         done += of_scene;
         p->num_scenes++;
     }
-    report_alike_table(p);
-    if (!report_rays(f, json_object_get(root, "claims"), e))
+    report_similarity_table(p);
+    if (!plot_rays(f, json_object_get(root, "claims"), e))
         return false;
     report_stated_error(f, json_object_get(root, "consistency"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
     fputs("</main>\n", f);
-    page_write_layers(p);
+    report_pixel_data_write(p);
     fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
     return true;
 }
@@ -301,7 +301,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     else
         out_abandon(&out);
 done:
-    page_free_layers(&page);
+    report_pixel_data_free(&page);
     free(claim);
     json_decref(root);
     return ok;

@@ -63,7 +63,7 @@ void report_claim_error(struct page *p, const struct claim_ref *claim)
 static void write_histogram(FILE *f, const json_t *claim)
 {
     int count[20];
-    struct p_histogram h = p_histogram_of(claim, count);
+    struct p_histogram h = plot_p_histogram(claim, count);
     fputs("<figure class=\"map\">", f);
     if (h.num_tiles == 0) {
         fputs("<figcaption><b>No p-values.</b> No tile has any noise, so there is nothing to test; "
@@ -78,14 +78,14 @@ static void write_histogram(FILE *f, const json_t *claim)
         "(%.3g tiles), each in the band 99 times of 100; a pile at the left is a real difference. Here %d tiles are "
         "below 0.05, where chance alone would put %.1f. ",
         h.num_tiles, h.expected, h.below_5_percent, 0.05 * h.num_tiles);
-    struct csv csv = csv_open(f, "p_values.csv", "p_from,p_to,tiles");
+    struct csv csv = csv_link_open(f, "p_values.csv", "p_from,p_to,tiles");
     for (int b = 0; b < h.bins; b++) {
-        csv_number(&csv, (double)b / h.bins);
-        csv_number(&csv, (double)(b + 1) / h.bins);
-        csv_number(&csv, count[b]);
-        csv_line(&csv);
+        csv_link_number(&csv, (double)b / h.bins);
+        csv_link_number(&csv, (double)(b + 1) / h.bins);
+        csv_link_number(&csv, count[b]);
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
     fputs("</figcaption></figure>\n", f);
 }
 
@@ -153,16 +153,16 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
     html_text(f, member_text(json, "reason"));
     fputs("</span></summary>\n", f);
     write_notes(f, json);
-    if (!report_alike(p, claim, a->m, b->m, white, e))
+    if (!report_similarity(p, claim, a->m, b->m, white, e))
         return false;
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
-    if (!report_qq(f, json, e))
+    if (!plot_qq(f, json, e))
         return false;
-    report_power(f, json);
+    plot_power(f, json);
     fputs("</div>\n", f);
     report_tiles(f, json);
-    report_doubt(f, json, !expected);
+    report_evidence(f, json, !expected);
     fputs("</details>\n</article>\n", f);
     return true;
 }

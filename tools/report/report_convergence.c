@@ -42,7 +42,7 @@ static void write_number(FILE *f, const json_t *object, const char *name, double
     const json_t *v = json_object_get(object, name);
     fputs("<td class=\"num\">", f);
     if (json_is_number(v))
-        fputs(plain_number(factor * json_number_value(v)).s, f);
+        fputs(html_number(factor * json_number_value(v)).s, f);
     fputs("</td>", f);
 }
 
@@ -50,22 +50,22 @@ static void write_csv(FILE *f, const json_t *engines)
 {
     static const char *const number[] = {"spp", "rmse", "variance", "bias", "cpu_s", "efficiency"};
     struct csv csv =
-        csv_open(f, "convergence.csv",
-                 "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
+        csv_link_open(f, "convergence.csv",
+                      "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
     for (size_t k = 0; k < json_array_size(engines); k++) {
         const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
         for (size_t i = 0; i < json_array_size(rungs); i++) {
             const json_t *g = json_array_get(rungs, i);
-            csv_text(&csv, member_text(j, "engine"));
+            csv_link_text(&csv, member_text(j, "engine"));
             for (size_t n = 0; n < sizeof number / sizeof *number; n++)
-                csv_number(&csv, json_is_number(json_object_get(g, number[n]))
-                                     ? member_number(g, number[n])
-                                     : NAN);
-            csv_interval(&csv, g, "rmse_ci");
-            csv_line(&csv);
+                csv_link_number(&csv, json_is_number(json_object_get(g, number[n]))
+                                          ? member_number(g, number[n])
+                                          : NAN);
+            csv_link_interval(&csv, g, "rmse_ci");
+            csv_link_line(&csv);
         }
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
 static void write_rungs(FILE *f, const json_t *scene)
@@ -118,12 +118,12 @@ static void write_scene(FILE *f, const json_t *scene)
             member_number(scene, "depth"), member_number(scene, "replicates"));
     html_text(f, member_text(scene, "reference"));
     fprintf(f, " (RMS noise %s). Each interval has the level %.6g\u00a0%%.</p>\n",
-            percent_plain(member_number(scene, "reference_noise")).s,
+            html_percent_plain(member_number(scene, "reference_noise")).s,
             100 * (1 - member_number(scene, "alpha")));
     fputs("<div class=\"maps\">\n", f);
-    report_convergence_plot(f, scene, false);
-    report_convergence_plot(f, scene, true);
-    report_depths(f, json_object_get(scene, "depths"));
+    plot_convergence(f, scene, false);
+    plot_convergence(f, scene, true);
+    plot_depths(f, json_object_get(scene, "depths"));
     fputs("</div>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of "
           "quantities\">\n<table><thead><tr><th scope=\"col\">Engine</th><th "
           "scope=\"col\">Quantity</th><th scope=\"col\" class=\"num\">Value and interval</th><th "

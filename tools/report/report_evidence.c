@@ -29,31 +29,32 @@ static void write_numbers(FILE *f, const json_t *claim)
     double alpha = member_number(claim, "alpha");
     fact_open(f, "Difference of the image mean");
     fprintf(f, "%s, %.6g\u00a0%% interval %s to %s",
-            percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
-            percent_prose(interval_end(claim, 0)).s, percent_prose(interval_end(claim, 1)).s);
+            html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
+            html_percent_prose(interval_end(claim, 0)).s,
+            html_percent_prose(interval_end(claim, 1)).s);
     fact_close(f);
     const json_t *channels = json_object_get(claim, "channel_difference");
     fact_open(f, "In red, green, blue");
-    fprintf(f, "%s, %s, %s", percent_prose(json_number_value(json_array_get(channels, 0))).s,
-            percent_prose(json_number_value(json_array_get(channels, 1))).s,
-            percent_prose(json_number_value(json_array_get(channels, 2))).s);
+    fprintf(f, "%s, %s, %s", html_percent_prose(json_number_value(json_array_get(channels, 0))).s,
+            html_percent_prose(json_number_value(json_array_get(channels, 1))).s,
+            html_percent_prose(json_number_value(json_array_get(channels, 2))).s);
     fact_close(f);
     fact_open(f, "Margin (counts as equal)");
     fprintf(f, "±%s for the image, ±%s for a tile",
-            percent_plain(member_number(claim, "margin_global")).s,
-            percent_plain(member_number(claim, "margin_tile")).s);
+            html_percent_plain(member_number(claim, "margin_global")).s,
+            html_percent_plain(member_number(claim, "margin_tile")).s);
     fact_close(f);
     fact_open(f, "Smallest bias this run would find");
     fprintf(f, "%s of the image mean, %s of a tile",
-            percent_plain(member_number(claim, "mdb_global")).s,
-            percent_plain(member_number(claim, "mdb_tile")).s);
+            html_percent_plain(member_number(claim, "mdb_global")).s,
+            html_percent_plain(member_number(claim, "mdb_tile")).s);
     fact_close(f);
     double log10_p = member_number(claim, "log10_p");
     fact_open(f, "p of “no difference beyond the margin”");
     if (log10_p > -4)
         fprintf(f, "%.3g", pow(10, log10_p));
     else
-        fprintf(f, "10<sup>%s</sup>", plain_number(log10_p).s);
+        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
     fact_close(f);
     fact_open(f, "Error rate (alpha)");
     fprintf(f, "%.3g for this claim, divided over %.0f tests", alpha,
@@ -61,7 +62,7 @@ static void write_numbers(FILE *f, const json_t *claim)
     fact_close(f);
     fact_open(f, "Error of single pixels, noise removed");
     fprintf(f, "%s of the mean radiance (root mean square)",
-            percent_plain(member_number(claim, "rms_bias")).s);
+            html_percent_plain(member_number(claim, "rms_bias")).s);
     fact_close(f);
 }
 
@@ -73,16 +74,16 @@ static void write_regions(FILE *f, const json_t *claim)
     fact_open(f, "Tile that reaches furthest out");
     fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
             member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
-            member_number(claim, "tile"), percent_prose(member_number(tile, "difference")).s,
-            percent_prose(interval_end(tile, 0)).s, percent_prose(interval_end(tile, 1)).s,
-            plain_number(member_number(tile, "t")).s);
+            member_number(claim, "tile"), html_percent_prose(member_number(tile, "difference")).s,
+            html_percent_prose(interval_end(tile, 0)).s,
+            html_percent_prose(interval_end(tile, 1)).s, html_number(member_number(tile, "t")).s);
     fact_close(f);
     fact_open(f, "Smallest p of all regions");
     fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels in %s: %s, t = %s", member_number(worst, "x"),
             member_number(worst, "y"), member_number(worst, "width"),
             member_number(worst, "height"), channel[(size_t)member_number(worst, "channel")],
-            percent_prose(member_number(worst, "difference")).s,
-            plain_number(member_number(worst, "t")).s);
+            html_percent_prose(member_number(worst, "difference")).s,
+            html_number(member_number(worst, "t")).s);
     fact_close(f);
     fact_open(f, "Very skewed regions");
     fputs(json_is_true(json_object_get(claim, "skew_limited"))
@@ -92,7 +93,7 @@ static void write_regions(FILE *f, const json_t *claim)
     fact_close(f);
     if (member_number(claim, "extra_factor") > 1) {
         fact_open(f, "Samples that would decide");
-        fprintf(f, "about %s times as many", plain_number(member_number(claim, "extra_factor")).s);
+        fprintf(f, "about %s times as many", html_number(member_number(claim, "extra_factor")).s);
         fact_close(f);
     }
 }
@@ -139,13 +140,13 @@ static void write_provenance(FILE *f, const json_t *claim)
     write_side(f, claim, "a");
     write_optional_number(f, claim, "seed_a", ", seed %.0f");
     if (member_number(claim, "seconds_a") > 0)
-        fprintf(f, ", %s", duration_text(member_number(claim, "seconds_a")).s);
+        fprintf(f, ", %s", html_duration(member_number(claim, "seconds_a")).s);
     fact_close(f);
 
     fact_open(f, "Reference (B)");
     write_side(f, claim, "b");
     if (member_number(claim, "seconds_b") > 0)
-        fprintf(f, ", %s when it was made", duration_text(member_number(claim, "seconds_b")).s);
+        fprintf(f, ", %s when it was made", html_duration(member_number(claim, "seconds_b")).s);
     const char *fidelity = member_text(claim, "class");
     if (fidelity != NULL) {
         fputs(", class ", f);
@@ -192,7 +193,7 @@ static void write_approval(FILE *f, const json_t *claim)
     fputs("</code></pre>\n", f);
 }
 
-void report_doubt(FILE *f, const json_t *claim, bool open)
+void report_evidence(FILE *f, const json_t *claim, bool open)
 {
     fprintf(f,
             "<details%s>\n<summary>Everything needed to doubt it</summary>\n<dl class=\"facts\">\n",

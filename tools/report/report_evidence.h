@@ -9,6 +9,6 @@
 #include <jansson.h>
 
 /* <details> of a judged claim of results.json, unfolded if `open`. */
-void report_doubt(FILE *f, const json_t *claim, bool open);
+void report_evidence(FILE *f, const json_t *claim, bool open);
 
 #endif

@@ -71,7 +71,7 @@ static void write_title(FILE *f, const struct history *h, const struct history_p
     html_text(f, commit);
     fputs(", ", f);
     html_text(f, member_text(run->results, "date"));
-    fprintf(f, ": %s</title>", plain_number(v).s);
+    fprintf(f, ": %s</title>", html_number(v).s);
 }
 
 static void write_plot(FILE *f, const struct history *h, const struct history_series *s,
@@ -85,8 +85,8 @@ static void write_plot(FILE *f, const struct history *h, const struct history_se
     fprintf(f,
             "<td class=\"num\"><svg class=\"trend\" viewBox=\"0 0 %d %d\" width=\"%d\" "
             "height=\"%d\" role=\"img\" aria-label=\"%s, from %s to %s\">",
-            WIDTH, HEIGHT, WIDTH, HEIGHT, quantity_name[q], plain_number(scale.low).s,
-            plain_number(scale.high).s);
+            WIDTH, HEIGHT, WIDTH, HEIGHT, quantity_name[q], html_number(scale.low).s,
+            html_number(scale.high).s);
     if (q == DIFFERENCE && scale.low < 0 && scale.high > 0)
         fprintf(f, "<path class=\"grid\" d=\"M0 %.1fH%d\"/>", at_y(&scale, 0), WIDTH);
     fputs("<path class=\"curve\" d=\"", f);
@@ -112,7 +112,7 @@ static void write_plot(FILE *f, const struct history *h, const struct history_se
         write_title(f, h, p, v);
         fputs("</circle>", f);
     }
-    fprintf(f, "</svg>last %s</td>", plain_number(value_of(&s->point[s->num - 1], q)).s);
+    fprintf(f, "</svg>last %s</td>", html_number(value_of(&s->point[s->num - 1], q)).s);
 }
 
 static void write_series(FILE *f, const struct history *h, const struct history_series *s)
@@ -131,7 +131,7 @@ static void write_series(FILE *f, const struct history *h, const struct history_
     }
     /* To a hundredth, as rounding alone is no move; + 0.0: no minus sign at 0. */
     double z = rint(100 * s->z) / 100 + 0.0;
-    fprintf(f, "</td><td class=\"num\">%s</td>", s->num > 1 ? plain_number(z).s : "");
+    fprintf(f, "</td><td class=\"num\">%s</td>", s->num > 1 ? html_number(z).s : "");
     for (enum quantity q = 0; q < NUM_QUANTITIES; q++)
         write_plot(f, h, s, q);
     fputs("</tr>\n", f);
@@ -139,28 +139,28 @@ static void write_series(FILE *f, const struct history *h, const struct history_
 
 static void write_csv(FILE *f, const struct history *h)
 {
-    struct csv csv = csv_open(f, "history.csv",
-                              "scene,tested,against,commit,date,difference,low,high,"
-                              "variance_ratio,seconds,efficiency");
+    struct csv csv = csv_link_open(f, "history.csv",
+                                   "scene,tested,against,commit,date,difference,low,high,"
+                                   "variance_ratio,seconds,efficiency");
     for (size_t i = 0; i < h->num_series; i++) {
         const struct history_series *s = &h->series[i];
         for (size_t k = 0; k < s->num; k++) {
             const struct history_point *p = &s->point[k];
             char commit[128];
             history_commit(&h->run[p->run], commit, sizeof commit);
-            csv_text(&csv, s->scene);
-            csv_text(&csv, s->a);
-            csv_text(&csv, s->b);
-            csv_text(&csv, commit);
-            csv_text(&csv, member_text(h->run[p->run].results, "date"));
+            csv_link_text(&csv, s->scene);
+            csv_link_text(&csv, s->a);
+            csv_link_text(&csv, s->b);
+            csv_link_text(&csv, commit);
+            csv_link_text(&csv, member_text(h->run[p->run].results, "date"));
             const double v[] = {p->difference,     p->low,     p->high,
                                 p->variance_ratio, p->seconds, p->efficiency};
             for (size_t n = 0; n < sizeof v / sizeof *v; n++)
-                csv_number(&csv, v[n]);
-            csv_line(&csv);
+                csv_link_number(&csv, v[n]);
+            csv_link_line(&csv);
         }
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
 static void write_table(FILE *f, const struct history *h)
@@ -216,7 +216,7 @@ static void write_runs(FILE *f, const struct history *h)
             "</td><td class=\"num\">%zu</td><td class=\"num\">%zu</td><td class=\"num\">%s</td><td>",
             num, good,
             json_object_get(root, "seconds") != NULL
-                ? duration_text(member_number(root, "seconds")).s
+                ? html_duration(member_number(root, "seconds")).s
                 : "");
         html_text(f, h->run[r].path);
         fputs("</td></tr>\n", f);
@@ -224,7 +224,7 @@ static void write_runs(FILE *f, const struct history *h)
     fputs("</tbody></table></div></section>\n", f);
 }
 
-bool history_write_page(const struct history *h, const char *path, struct err *e)
+bool report_history(const struct history *h, const char *path, struct err *e)
 {
     struct out_file out;
     if (!make_parent_dirs(path, e) || !out_open(&out, path, e))

@@ -47,11 +47,11 @@ struct page {
 };
 
 /* The number on the page of the layer of m, which was read from path; the same path has one. */
-bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
-                    struct err *e) __attribute__((warn_unused_result));
+bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
+                           struct err *e) __attribute__((warn_unused_result));
 /* All layers, then the FLIP maps, and the colours of maps, as base64 in elements that no browser runs. */
-void page_write_layers(struct page *p);
-void page_free_layers(struct page *p);
+void report_pixel_data_write(struct page *p);
+void report_pixel_data_free(struct page *p);
 
 /* <section> of one scene: what it is for, its pictures, each of its claims. All claims are of the
  * same scene. Fails when a picture cannot be read or the sizes differ. */

@@ -10,8 +10,8 @@
  * pictures. The page of one scene has them whatever their size. */
 enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
 
-bool page_add_layer(struct page *p, const char *path, const struct moments *m, size_t *index,
-                    struct err *e)
+bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
+                           struct err *e)
 {
     for (*index = 0; *index < p->num_layers; ++*index)
         if (strcmp(p->layer[*index].path, path) == 0)
@@ -41,9 +41,9 @@ static void write_colours(FILE *f)
     enum { DIVERGING = 257, SEQUENTIAL = 256 };
     uint8_t colour[3 * (DIVERGING + SEQUENTIAL)];
     for (int i = 0; i < DIVERGING; i++)
-        diverging_rgb8(2.0 * i / (DIVERGING - 1) - 1, &colour[3 * i]);
+        plot_diverging_rgb8(2.0 * i / (DIVERGING - 1) - 1, &colour[3 * i]);
     for (int i = 0; i < SEQUENTIAL; i++)
-        sequential_rgb8((double)i / (SEQUENTIAL - 1), &colour[3 * (DIVERGING + i)]);
+        plot_sequential_rgb8((double)i / (SEQUENTIAL - 1), &colour[3 * (DIVERGING + i)]);
     fputs("<script type=\"text/plain\" id=\"colours\">", f);
     html_base64(f, colour, sizeof colour);
     fputs("</script>\n", f);
@@ -57,7 +57,7 @@ static bool has_room(const struct page *p, size_t size)
            (p->num_scenes <= 1 || (size_t)here + size * 4 / 3 + PAGE_RESERVE <= PAGE_LIMIT);
 }
 
-void page_write_layers(struct page *p)
+void report_pixel_data_write(struct page *p)
 {
     size_t left_out = 0, maps = 0, maps_left_out = 0;
     if (p->num_layers > 0)
@@ -103,7 +103,7 @@ void page_write_layers(struct page *p)
                 maps_left_out, maps);
 }
 
-void page_free_layers(struct page *p)
+void report_pixel_data_free(struct page *p)
 {
     for (size_t i = 0; i < p->num_layers; i++) {
         free(p->layer[i].path);

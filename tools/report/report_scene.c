@@ -45,7 +45,7 @@ static bool load_shot(struct page *p, struct scene *s, const json_t *claim, cons
     if (shot->m.width != s->shot[0].m.width || shot->m.height != s->shot[0].m.height)
         return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path, shot->m.width,
                        shot->m.height, s->shot[0].file, s->shot[0].m.width, s->shot[0].m.height);
-    return page_add_layer(p, path, &shot->m, &shot->layer, e);
+    return report_pixel_data_add(p, path, &shot->m, &shot->layer, e);
 }
 
 /* Ours first, then the references in the order that the keys 1 to 4 have in every scene, then others. */
@@ -87,7 +87,7 @@ static bool choose_white(struct scene *s, const json_t *claim, struct err *e)
         return err_set(e, "out of memory for the report");
     for (size_t i = 0; i < pixels; i++)
         v[i] = luminance(&shot->m.mean[3 * i]);
-    s->white = display_white(v, pixels, &s->white_capped);
+    s->white = plot_display_white(v, pixels, &s->white_capped);
     s->anchor = shot->engine;
     free(v);
     return true;
@@ -159,7 +159,7 @@ static void write_images(struct page *p, const struct scene *s)
     fprintf(p->f,
             "</ul>\n</div>\n<p class=\"caption\">All at the same exposure, so that what looks "
             "brighter is brighter: at 0 stops radiance %s and above is white",
-            plain_number(s->white).s);
+            html_number(s->white).s);
     fputs(s->white_capped ? " (7.5 times the median of " : " (the 99th percentile of ", p->f);
     html_text(p->f, s->anchor);
     fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the picture)"

@@ -10,7 +10,7 @@
 #include <string.h>
 
 static bool measure_flip(const struct moments *a, const struct moments *b, double white,
-                         struct alike *out, float *map, struct err *e)
+                         struct similarity *out, float *map, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
     double *shown = malloc(6 * pixels * sizeof *shown);
@@ -29,7 +29,7 @@ static bool measure_flip(const struct moments *a, const struct moments *b, doubl
 }
 
 static bool measure_idiff(const struct moments *a, const struct moments *b, double white,
-                          struct alike *out, struct err *e)
+                          struct similarity *out, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height, count[256];
     uint8_t *rgb8 = malloc(6 * pixels);
@@ -55,17 +55,17 @@ static bool is_black(const struct moments *m)
     return true;
 }
 
-bool alike_measure(const struct moments *a, const struct moments *b, double white,
-                   struct alike *out, float *map, struct err *e)
+bool report_similarity_measure(const struct moments *a, const struct moments *b, double white,
+                               struct similarity *out, float *map, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
-    *out = (struct alike){.has_flip = !is_black(b)};
+    *out = (struct similarity){.has_flip = !is_black(b)};
     return (!out->has_flip || (flip_exposures(b->mean, pixels, &out->exposures, e) &&
                                measure_flip(a, b, white, out, map, e))) &&
            measure_idiff(a, b, white, out, e);
 }
 
-static void write_line(FILE *f, const struct alike *l)
+static void write_line(FILE *f, const struct similarity *l)
 {
     fputs("<p class=\"caption\"><b>Beside the statistics.</b> ", f);
     if (l->has_flip)
@@ -73,28 +73,28 @@ static void write_line(FILE *f, const struct alike *l)
             f,
             "Mean FLIP, what the eye would see on swapping the pictures (0 nothing, 1 all): %.4f over "
             "%d exposures from %s to %s stops (HDR), %.4f as shown here (LDR). ",
-            l->hdr, l->exposures.num, plain_number(l->exposures.start).s,
-            plain_number(l->exposures.stop).s, l->ldr);
+            l->hdr, l->exposures.num, html_number(l->exposures.start).s,
+            html_number(l->exposures.stop).s, l->ldr);
     else
         fputs("FLIP is not defined, as the reference is black. ", f);
     fprintf(
         f,
         "idiff with Blender’s thresholds would say %s: %s\u00a0%% of the pixels differ by more than "
         "%g, where %g\u00a0%% may.</p>\n",
-        l->idiff_differs ? "<b>FAIL</b>" : "<b>pass</b>", plain_number(l->idiff_percent).s,
+        l->idiff_differs ? "<b>FAIL</b>" : "<b>pass</b>", html_number(l->idiff_percent).s,
         BLENDER_FAIL, BLENDER_PERCENT);
 }
 
-bool report_alike(struct page *p, const struct claim_ref *claim, const struct moments *a,
-                  const struct moments *b, double white, struct err *e)
+bool report_similarity(struct page *p, const struct claim_ref *claim, const struct moments *a,
+                       const struct moments *b, double white, struct err *e)
 {
     struct page_alike *grown = realloc(p->alike, (p->num_alike + 1) * sizeof *grown);
     float *map = malloc((size_t)a->width * (size_t)a->height * sizeof *map);
-    struct alike l = {0};
+    struct similarity l = {0};
     if (grown != NULL)
         p->alike = grown;
     bool ok = (grown != NULL && map != NULL) || err_set(e, "out of memory for the report");
-    ok = ok && alike_measure(a, b, white, &l, map, e);
+    ok = ok && report_similarity_measure(a, b, white, &l, map, e);
     if (ok) {
         struct page_alike *n = &grown[p->num_alike];
         *n = (struct page_alike){.claim = *claim,
@@ -135,23 +135,23 @@ static void write_row(FILE *f, const struct page_alike *n)
 
 static void write_csv(const struct page *p)
 {
-    struct csv csv = csv_open(p->f, "alike.csv",
-                              "scene,tested,against,verdict,flip_hdr,flip_ldr,idiff_percent,idiff");
+    struct csv csv = csv_link_open(
+        p->f, "alike.csv", "scene,tested,against,verdict,flip_hdr,flip_ldr,idiff_percent,idiff");
     for (size_t i = 0; i < p->num_alike; i++) {
         const struct page_alike *n = &p->alike[i];
         static const char *const text[] = {"scene", "a", "b", "verdict"};
         for (size_t k = 0; k < sizeof text / sizeof *text; k++)
-            csv_text(&csv, member_text(n->claim.json, text[k]));
-        csv_number(&csv, n->hdr);
-        csv_number(&csv, n->ldr);
-        csv_number(&csv, n->idiff_percent);
-        csv_text(&csv, n->idiff_differs ? "FAIL" : "pass");
-        csv_line(&csv);
+            csv_link_text(&csv, member_text(n->claim.json, text[k]));
+        csv_link_number(&csv, n->hdr);
+        csv_link_number(&csv, n->ldr);
+        csv_link_number(&csv, n->idiff_percent);
+        csv_link_text(&csv, n->idiff_differs ? "FAIL" : "pass");
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
-void report_alike_table(const struct page *p)
+void report_similarity_table(const struct page *p)
 {
     FILE *f = p->f;
     size_t equal_fail = 0, equal = 0, different_pass = 0, different = 0;

@@ -6,7 +6,7 @@
 #include "tools/images/flip.h"
 #include "report_internal.h"
 
-struct alike {
+struct similarity {
     bool has_flip;   /* false where the reference is black */
     double hdr, ldr; /* mean FLIP; LDR: as the page shows the pictures at 0 stops */
     struct flip_exposures exposures;
@@ -16,16 +16,16 @@ struct alike {
 
 /* Compares A with the reference B, radiance `white` being shown as white. map (a float a pixel) receives HDR-FLIP.
  * Fails only out of memory. */
-bool alike_measure(const struct moments *a, const struct moments *b, double white,
-                   struct alike *out, float *map, struct err *e)
+bool report_similarity_measure(const struct moments *a, const struct moments *b, double white,
+                               struct similarity *out, float *map, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The claim's line, and its place in the table; the map goes into the page as the claim's, for its script. */
-bool report_alike(struct page *p, const struct claim_ref *claim, const struct moments *a,
-                  const struct moments *b, double white, struct err *e)
+bool report_similarity(struct page *p, const struct claim_ref *claim, const struct moments *a,
+                       const struct moments *b, double white, struct err *e)
     __attribute__((warn_unused_result));
 
 /* <section> with the table of all claims that have such a line; nothing without any. */
-void report_alike_table(const struct page *p);
+void report_similarity_table(const struct page *p);
 
 #endif

@@ -10,7 +10,7 @@ static void write_p(FILE *f, double log10_p)
     if (log10_p > -4)
         fprintf(f, "%.3g", pow(10, log10_p));
     else
-        fprintf(f, "10<sup>%s</sup>", plain_number(log10_p).s);
+        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
 }
 
 static void write_row(FILE *f, const json_t *s, double alpha)
@@ -50,8 +50,8 @@ static void write_direction(FILE *f, const json_t *d)
     html_text(f, member_text(d, "name"));
     fputs("</b>", f);
     if (unit[0] != '\0') {
-        fprintf(f, " of %s [%s, %s] ", plain_number(member_number(d, "amount")).s,
-                plain_number(end_of(d, 0)).s, plain_number(end_of(d, 1)).s);
+        fprintf(f, " of %s [%s, %s] ", html_number(member_number(d, "amount")).s,
+                html_number(end_of(d, 0)).s, html_number(end_of(d, 1)).s);
         html_text(f, unit);
     }
     fprintf(f, ", which explains %.0f\u00a0%% of it. ", 100 * member_number(d, "explained"));
@@ -79,7 +79,7 @@ void report_statistics(FILE *f, const json_t *claim)
         write_direction(f, direction);
     if (ratio != NULL)
         fprintf(f, "The variance of one path of A is %s times that of B [%s, %s].",
-                plain_number(member_number(ratio, "ratio")).s, plain_number(end_of(ratio, 0)).s,
-                plain_number(end_of(ratio, 1)).s);
+                html_number(member_number(ratio, "ratio")).s, html_number(end_of(ratio, 0)).s,
+                html_number(end_of(ratio, 1)).s);
     fputs("</p>\n", f);
 }

@@ -32,14 +32,14 @@ static void write_row(FILE *f, const struct claim_ref *claim)
     fprintf(f,
             "</td><td class=\"num\">%s</td><td class=\"num\">%s to %s</td><td class=\"num\">%s</td>"
             "<td class=\"num\">%s</td>",
-            percent_column(member_number(c, "difference")).s,
-            percent_column(json_number_value(json_array_get(ci, 0))).s,
-            percent_column(json_number_value(json_array_get(ci, 1))).s,
-            plain_number(100 * member_number(c, "mdb_global")).s,
-            plain_number(100 * member_number(c, "margin_global")).s);
+            html_percent_column(member_number(c, "difference")).s,
+            html_percent_column(json_number_value(json_array_get(ci, 0))).s,
+            html_percent_column(json_number_value(json_array_get(ci, 1))).s,
+            html_number(100 * member_number(c, "mdb_global")).s,
+            html_number(100 * member_number(c, "margin_global")).s);
     fputs("<td class=\"num\">", f);
     if (json_object_get(c, "seconds_a") != NULL)
-        fputs(duration_text(member_number(c, "seconds_a")).s, f);
+        fputs(html_duration(member_number(c, "seconds_a")).s, f);
     fputs("</td></tr>\n", f);
 }
 
@@ -48,20 +48,22 @@ static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
     static const char *const text[] = {"scene", "a", "b", "verdict", "expected", "error"};
     static const char *const number[] = {"difference", "mdb_global", "margin_global", "alpha",
                                          "seconds_a"};
-    struct csv csv = csv_open(f, "claims.csv",
-                              "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
-                              "alpha,seconds,low,high");
+    struct csv csv =
+        csv_link_open(f, "claims.csv",
+                      "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
+                      "alpha,seconds,low,high");
     for (size_t i = 0; i < num; i++) {
         const json_t *c = claim[i].json, *ci = json_object_get(c, "ci");
         for (size_t k = 0; k < sizeof text / sizeof *text; k++)
-            csv_text(&csv, member_text(c, text[k]));
+            csv_link_text(&csv, member_text(c, text[k]));
         for (size_t k = 0; k < sizeof number / sizeof *number; k++)
-            csv_number(&csv, json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
+            csv_link_number(&csv,
+                            json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
         for (size_t k = 0; k < 2; k++)
-            csv_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
-        csv_line(&csv);
+            csv_link_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
+        csv_link_line(&csv);
     }
-    csv_close(&csv);
+    csv_link_close(&csv);
 }
 
 void report_table(FILE *f, const struct claim_ref *claim, size_t num)

@@ -50,7 +50,7 @@ void report_tiles(FILE *f, const json_t *claim)
                     side * (double)(k->index % columns), side * (double)(k->index / columns),
                     side * (double)(k->index % columns), side * (double)(k->index / columns),
                     pow(10, fmin(k->log10_p, 0)),
-                    plain_number(json_number_value(json_array_get(t, k->index))).s);
+                    html_number(json_number_value(json_array_get(t, k->index))).s);
         }
         fputs(
             "</div>\n<p class=\"caption tile-reading\" aria-live=\"polite\">Each is x, y of its "

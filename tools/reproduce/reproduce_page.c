@@ -110,7 +110,7 @@ static bool of_directory(const char *path, const char *to, struct reproduced *ou
     const char *const word[] = {"assay", "report", "--history", dir, NULL};
     if (!reproduced_command(out, word, e) || !history_read(dir, history_alpha, &h, e))
         return false;
-    bool ok = history_write_page(&h, to, e);
+    bool ok = report_history(&h, to, e);
     history_free(&h);
     return ok;
 }

@@ -58,7 +58,7 @@ void history_free(struct history *h);
 void history_commit(const struct history_run *run, char *out, size_t size);
 
 /* The page: a row for each series, with plots against the runs. By rename. */
-bool history_write_page(const struct history *h, const char *path, struct err *e)
+bool report_history(const struct history *h, const char *path, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

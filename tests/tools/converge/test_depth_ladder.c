@@ -94,7 +94,7 @@ static htmlDocPtr page_of(const char *json)
     FILE *f = open_memstream(&text, &size);
     assert_non_null(depths);
     assert_true(depth_ladder_check(depths, "x", &e));
-    report_depths(f, depths);
+    plot_depths(f, depths);
     fclose(f);
     htmlDocPtr doc =
         htmlReadMemory(text, (int)size, "x", "utf-8", HTML_PARSE_NOERROR | HTML_PARSE_NOWARNING);

@@ -116,16 +116,16 @@ static void csv_comes_back(void **state)
     size_t size;
     FILE *f = open_memstream(&link, &size);
     assert_non_null(f);
-    struct csv csv = csv_open(f, "x.csv", "name,a,b");
-    csv_text(&csv, "say \"hi\", <b>&#'\xc3\xa4");
-    csv_number(&csv, -0.25);
-    csv_number(&csv, NAN);
-    csv_line(&csv);
-    csv_text(&csv, "=1+1");
-    csv_number(&csv, 1e-9);
-    csv_number(&csv, 3);
-    csv_line(&csv);
-    csv_close(&csv);
+    struct csv csv = csv_link_open(f, "x.csv", "name,a,b");
+    csv_link_text(&csv, "say \"hi\", <b>&#'\xc3\xa4");
+    csv_link_number(&csv, -0.25);
+    csv_link_number(&csv, NAN);
+    csv_link_line(&csv);
+    csv_link_text(&csv, "=1+1");
+    csv_link_number(&csv, 1e-9);
+    csv_link_number(&csv, 3);
+    csv_link_line(&csv);
+    csv_link_close(&csv);
     fclose(f);
     char *text = saved(link);
     assert_string_equal(

@@ -263,15 +263,15 @@ static char *read_text(const char *path)
 static void numbers_and_text(void **state)
 {
     (void)state;
-    assert_string_equal(percent_column(0.0123).s, "+1.230");
-    assert_string_equal(percent_column(-0.25).s, "\u221225.000");
-    assert_string_equal(percent_column(-0.000001).s, "0.000");
-    assert_string_equal(percent_prose(-0.012345).s, "\u22121.23\u00a0%");
-    assert_string_equal(percent_plain(0.005).s, "0.5\u00a0%");
-    assert_string_equal(plain_number(-22.44).s, "\u221222.4");
-    assert_string_equal(duration_text(0.52).s, "0.5 s");
-    assert_string_equal(duration_text(98.1).s, "1 min 38 s");
-    assert_string_equal(duration_text(7380).s, "2 h 3 min");
+    assert_string_equal(html_percent_column(0.0123).s, "+1.230");
+    assert_string_equal(html_percent_column(-0.25).s, "\u221225.000");
+    assert_string_equal(html_percent_column(-0.000001).s, "0.000");
+    assert_string_equal(html_percent_prose(-0.012345).s, "\u22121.23\u00a0%");
+    assert_string_equal(html_percent_plain(0.005).s, "0.5\u00a0%");
+    assert_string_equal(html_number(-22.44).s, "\u221222.4");
+    assert_string_equal(html_duration(0.52).s, "0.5 s");
+    assert_string_equal(html_duration(98.1).s, "1 min 38 s");
+    assert_string_equal(html_duration(7380).s, "2 h 3 min");
 
     char *text = NULL;
     size_t size;
@@ -317,21 +317,21 @@ static void exposure(void **state)
     bool capped;
     for (size_t i = 0; i < 200; i++)
         v[i] = 200 - (double)i;
-    assert_float_equal(display_white(v, 200, &capped), 198 / 0.8, 1e-12);
+    assert_float_equal(plot_display_white(v, 200, &capped), 198 / 0.8, 1e-12);
     assert_false(capped);
 
     /* A lamp of 5 % of the pixels: 6 times the median, not the lamp, is at 0.8 of white. */
     for (size_t i = 0; i < 200; i++)
         v[i] = i < 10 ? 1000 : 2;
-    assert_float_equal(display_white(v, 200, &capped), 12 / 0.8, 1e-12);
+    assert_float_equal(plot_display_white(v, 200, &capped), 12 / 0.8, 1e-12);
     assert_true(capped);
 
     /* Mostly black: the median is over what is not black. One pixel of 200 is under 1 %. */
     memset(v, 0, sizeof v);
     v[7] = 3;
-    assert_float_equal(display_white(v, 200, &capped), 6 * 3 / 0.8, 1e-12);
+    assert_float_equal(plot_display_white(v, 200, &capped), 6 * 3 / 0.8, 1e-12);
     memset(v, 0, sizeof v);
-    assert_float_equal(display_white(v, 200, &capped), 1, 0);
+    assert_float_equal(plot_display_white(v, 200, &capped), 1, 0);
 }
 
 /* sRGB bytes to CIE L*a*b*: the inverse of what the map does, written from the definitions. */
@@ -366,7 +366,7 @@ static void diverging_map(void **state)
     double lab[STEPS + 1][3];
     for (int i = 0; i <= STEPS; i++) {
         uint8_t c[3];
-        diverging_rgb8(2.0 * i / STEPS - 1, c);
+        plot_diverging_rgb8(2.0 * i / STEPS - 1, c);
         lab_of(c, lab[i]);
     }
     for (int i = 0; i < STEPS; i++) {
@@ -381,10 +381,10 @@ static void diverging_map(void **state)
     assert_true(lab[STEPS][1] > 40); /* red */
 
     uint8_t c[3], end[3];
-    diverging_rgb8(NAN, c);
+    plot_diverging_rgb8(NAN, c);
     assert_true(c[0] == 128 && c[1] == 128 && c[2] == 128);
-    diverging_rgb8(INFINITY, c);
-    diverging_rgb8(1, end);
+    plot_diverging_rgb8(INFINITY, c);
+    plot_diverging_rgb8(1, end);
     assert_memory_equal(c, end, 3);
 }
 
@@ -397,7 +397,7 @@ static void sequential_map(void **state)
     double lab[STEPS + 1][3], length[STEPS], mean = 0;
     for (int i = 0; i <= STEPS; i++) {
         uint8_t c[3];
-        sequential_rgb8((double)i / STEPS, c);
+        plot_sequential_rgb8((double)i / STEPS, c);
         lab_of(c, lab[i]);
     }
     for (int i = 0; i < STEPS; i++) {
@@ -412,10 +412,10 @@ static void sequential_map(void **state)
         assert_float_equal(length[i] / mean, 1, 0.15);
     assert_true(lab[0][0] < 20 && lab[STEPS][0] > 85);
     uint8_t c[3], end[3];
-    sequential_rgb8(NAN, c);
+    plot_sequential_rgb8(NAN, c);
     assert_true(c[0] == 128 && c[1] == 128 && c[2] == 128);
-    sequential_rgb8(7, c);
-    sequential_rgb8(1, end);
+    plot_sequential_rgb8(7, c);
+    plot_sequential_rgb8(1, end);
     assert_memory_equal(c, end, 3);
 }
 
@@ -425,7 +425,7 @@ static void p_histogram(void **state)
     /* p = 10^-0.01 = 0.977, 10^-1.5 = 0.032, 10^-0.3 = 0.501, 10^-300 and 1: bins 9, 0, 5, 0, 9. */
     json_t *claim = json_pack("{s[f f f f f n]}", "tile_log10_p", -0.01, -1.5, -0.3, -300.0, 0.0);
     int count[20];
-    struct p_histogram h = p_histogram_of(claim, count);
+    struct p_histogram h = plot_p_histogram(claim, count);
     static const int wanted[10] = {2, 0, 0, 0, 0, 1, 0, 0, 0, 2};
     assert_int_equal(h.num_tiles, 5);
     assert_int_equal(h.bins, 10);
@@ -437,7 +437,7 @@ static void p_histogram(void **state)
     claim = json_pack("{s[]}", "tile_log10_p");
     for (int i = 0; i < 400; i++)
         json_array_append_new(json_object_get(claim, "tile_log10_p"), json_real(-0.5));
-    h = p_histogram_of(claim, count);
+    h = plot_p_histogram(claim, count);
     assert_int_equal(h.bins, 20);
     assert_float_equal(h.expected, 20, 0);
     int low = -1, high = -1;
@@ -583,9 +583,9 @@ static void pictures_have_the_values(void **state)
     size_t size;
     uint8_t *bytes = decode_base64(text, &size), c[3];
     assert_int_equal(size, 3 * (257 + 256));
-    diverging_rgb8(-0.5, c);
+    plot_diverging_rgb8(-0.5, c);
     assert_memory_equal(bytes + 3 * 64, c, 3);
-    sequential_rgb8(1, c);
+    plot_sequential_rgb8(1, c);
     assert_memory_equal(bytes + size - 3, c, 3);
     free(bytes);
     free(text);
@@ -787,14 +787,14 @@ static void alike(void **state)
     const double grey = 0.18418651851, white = 3;
     struct err e = {""};
     struct moments a, b;
-    struct alike l;
+    struct similarity l;
     float map[PIXELS];
     assert_true(moments_alloc(&a, SIDE, SIDE, &e) && moments_alloc(&b, SIDE, SIDE, &e));
     for (size_t i = 0; i < 3 * PIXELS; i++) {
         a.mean[i] = white;
         b.mean[i] = white * grey;
     }
-    assert_true(alike_measure(&a, &b, white, &l, map, &e));
+    assert_true(report_similarity_measure(&a, &b, white, &l, map, &e));
     assert_true(l.has_flip);
     assert_float_equal(l.ldr, redistributed(50), 1e-3);
     assert_int_equal(l.exposures.num, 2);
@@ -806,11 +806,11 @@ static void alike(void **state)
     assert_true(l.idiff_differs);
     assert_float_equal(l.idiff_percent, 100, 0);
 
-    assert_true(alike_measure(&b, &b, white, &l, map, &e));
+    assert_true(report_similarity_measure(&b, &b, white, &l, map, &e));
     assert_float_equal(l.ldr + l.hdr + l.idiff_percent, 0, 0);
     assert_false(l.idiff_differs);
     memset(b.mean, 0, 3 * PIXELS * sizeof *b.mean);
-    assert_true(alike_measure(&a, &b, white, &l, map, &e));
+    assert_true(report_similarity_measure(&a, &b, white, &l, map, &e));
     assert_false(l.has_flip);
     moments_free(&a);
     moments_free(&b);

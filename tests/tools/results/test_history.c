@@ -138,7 +138,7 @@ static void a_move_is_found(void **state)
     char page[128], *text = calloc(1, 1 << 20);
     struct err e = {""};
     snprintf(page, sizeof page, "%s/history.html", p.dir);
-    assert_true(history_write_page(&h, page, &e));
+    assert_true(report_history(&h, page, &e));
     FILE *f = fopen(page, "rb");
     assert_true(f != NULL && text != NULL);
     assert_true(fread(text, 1, (1 << 20) - 1, f) > 1000);
