@@ -98,7 +98,7 @@ static bool new_results(void *ctx, struct err *e)
 {
     char *argv[] = {"compare", "a.exr", "b  c.exr", NULL};
     (void)ctx;
-    json_t *root = results_new(3, argv, 0.01, e);
+    json_t *root = claim_result_new_results(3, argv, 0.01, e);
     alloc_fail_off();
     assert_true(root == NULL ||
                 strcmp(member_text(root, "command"), "assay compare a.exr 'b  c.exr'") == 0);
@@ -153,8 +153,8 @@ static bool read_results(void *ctx, struct err *e)
 {
     (void)ctx;
     json_t *results = NULL;
-    bool ok = results_read(RESULTS, &results, e) &&
-              results_write_junit(file(0, "out/junit.xml"), results, e);
+    bool ok =
+        results_read(RESULTS, &results, e) && junit_write(file(0, "out/junit.xml"), results, e);
     alloc_fail_off();
     alloc_fail_output(file(0, "out/junit.xml"), ok);
     json_decref(results);
@@ -169,7 +169,7 @@ static void results(void **state)
     alloc_json(ALLOC_JSON_FAILS, NULL);
     alloc_fail_each("results_new, jansson too", ALLOC_ALL, new_results, NULL);
     alloc_json(ALLOC_JSON_ENDS, NULL);
-    alloc_fail_each("results_read, results_write_junit", ALLOC_OURS, read_results, NULL);
+    alloc_fail_each("results_read, junit_write", ALLOC_OURS, read_results, NULL);
     /* libxml2's writer loses blocks where its lists fail. */
     alloc_fail_each("the same, libxml2 too", ALLOC_LOSSY, read_results, NULL);
 }

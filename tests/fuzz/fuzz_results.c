@@ -17,7 +17,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     FILE *nowhere = fopen("/dev/null", "w");
     fuzz_require(nowhere != NULL, "no /dev/null");
     for (int markdown = 0; markdown < 2; markdown++)
-        results_print_table(nowhere, root, markdown);
+        results_table_print(nowhere, root, markdown);
     fclose(nowhere);
     int code = results_exit_code(root);
     fuzz_require(code >= 0 && code <= 3, "an exit code that is not ours");

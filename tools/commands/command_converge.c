@@ -164,7 +164,7 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
     snprintf(html, sizeof html, "%s/index.html", out_dir);
     if (!json_write(json, results, e) || !report_write(json, html, e))
         return false;
-    convergence_print(stdout, json_object_get(results, "convergence"));
+    convergence_results_print(stdout, json_object_get(results, "convergence"));
     printf("\n%s\n", html);
     return true;
 }
@@ -211,7 +211,7 @@ int verb_converge(int argc, char **argv, struct err *e)
         code = results_exit_code(results);
     const json_t *scenes = json_object_get(results, "convergence");
     for (size_t i = 0; code == EXIT_NOT_JUDGED && i < json_array_size(scenes); i++)
-        convergence_rows(json_array_get(scenes, i), tell_not_judged, e);
+        convergence_results_rows(json_array_get(scenes, i), tell_not_judged, e);
     json_decref(results);
     return code;
 }

@@ -42,16 +42,16 @@ static bool print_markdown(FILE *f, const char *path, bool headline, struct err 
     const json_t *convergence = json_object_get(results, "convergence");
     if (headline) {
         fputs("## ", f);
-        annotations_headline(f, results);
+        github_annotations_headline(f, results);
         fputs("\n\n", f);
     }
     if (has_claims)
-        results_print_table(f, results, true);
+        results_table_print(f, results, true);
     stated_error_print(f, json_object_get(results, "consistency"), true);
     if (has_claims && convergence != NULL)
         putc('\n', f);
     if (convergence != NULL)
-        convergence_print_markdown(f, convergence);
+        convergence_results_print_markdown(f, convergence);
     json_decref(results);
     return true;
 }
@@ -61,7 +61,7 @@ static bool print_github(const char *path, struct err *e)
     json_t *results;
     if (!results_read(path, &results, e))
         return false;
-    annotations_print(stdout, results);
+    github_annotations_print(stdout, results);
     json_decref(results);
     const char *summary = getenv("GITHUB_STEP_SUMMARY");
     if (summary == NULL || summary[0] == '\0')
@@ -82,11 +82,11 @@ static bool print_matrix(const char *path, struct err *e)
     const json_t *convergence = json_object_get(results, "convergence");
     bool has_claims = json_array_size(json_object_get(results, "claims")) > 0;
     if (has_claims)
-        results_print_matrix(stdout, results);
+        results_matrix_print(stdout, results);
     if (has_claims && convergence != NULL)
         putchar('\n');
     if (convergence != NULL)
-        convergence_print_matrix(stdout, convergence);
+        convergence_matrix_print(stdout, convergence);
     json_decref(results);
     return true;
 }

@@ -192,11 +192,11 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     snprintf(json, sizeof json, "%s/results.json", out_dir);
     snprintf(junit, sizeof junit, "%s/junit.xml", out_dir);
     snprintf(html, sizeof html, "%s/index.html", out_dir);
-    if (!json_write(json, results, e) || !results_write_junit(junit, results, e) ||
+    if (!json_write(json, results, e) || !junit_write(junit, results, e) ||
         !report_write(json, html, e))
         return false;
     if (json_array_size(json_object_get(results, "claims")) > 0)
-        results_print_table(stdout, results, false);
+        results_table_print(stdout, results, false);
     stated_error_print(stdout, json_object_get(results, "consistency"), false);
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
@@ -205,7 +205,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     }
     print_not_expressible(results);
     if (!quiet)
-        cost_print(stderr, results);
+        render_cost_print(stderr, results);
     printf("\n%s\n", html);
     return true;
 }
@@ -217,7 +217,8 @@ static void tell_not_judged(const json_t *results, struct err *e)
     size_t n = 0;
     for (size_t i = json_array_size(claims); i-- > 0;) {
         const json_t *claim = json_array_get(claims, i);
-        if (claim_outcome(claim) == OUTCOME_NOT_JUDGED && !claim_lacks_time(claim)) {
+        if (results_claim_outcome(claim) == OUTCOME_NOT_JUDGED &&
+            !results_claim_lacks_time(claim)) {
             first = claim;
             n++;
         }

@@ -310,7 +310,7 @@ bool converge_run(const struct converge_options *opt, int argc, char **argv, jso
     double start = now_seconds();
     if (!suite_load(opt->suite_dir, &r.suite, e))
         return false;
-    json_t *root = results_new(argc, argv, opt->alpha, e), *convergence = json_array();
+    json_t *root = claim_result_new_results(argc, argv, opt->alpha, e), *convergence = json_array();
     bool ok = root != NULL;
     for (int i = 0; ok && i < opt->num_scenes; i++)
         if (suite_find(&r.suite, opt->scene[i]) == NULL)

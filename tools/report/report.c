@@ -290,7 +290,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     for (size_t i = 0; i < num; i++) {
         claim[i].json = json_array_get(claims, i);
         claim[i].index = i;
-        claim[i].outcome = claim_outcome(claim[i].json);
+        claim[i].outcome = results_claim_outcome(claim[i].json);
     }
     qsort(claim, num, sizeof *claim, compare_claims);
     if (!make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))

@@ -27,7 +27,7 @@ void report_badge(FILE *f, const struct claim_ref *claim)
     static const char *const mark[] = {"!", "✗", "✗", "✓"};
     fprintf(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> ",
             style[claim->outcome], mark[claim->outcome]);
-    if (claim->outcome == OUTCOME_NOT_JUDGED && !claim_lacks_time(claim->json))
+    if (claim->outcome == OUTCOME_NOT_JUDGED && !results_claim_lacks_time(claim->json))
         fputs("not judged", f);
     else
         html_text(f, member_text(claim->json, "verdict"));
@@ -45,7 +45,7 @@ void report_claim_error(struct page *p, const struct claim_ref *claim)
     report_badge(f, claim);
     fputs("</h3>\n<p class=\"error-line\">This claim could not be judged: ", f);
     html_text(f, member_text(claim->json, "error"));
-    fputs(claim_lacks_time(claim->json)
+    fputs(results_claim_lacks_time(claim->json)
               ? "</p>\n<p class=\"caption\">It counts as inconclusive. A larger budget would "
                 "judge it.</p>\n"
               : "</p>\n<p class=\"caption\">That is neither a pass nor a failure of the "

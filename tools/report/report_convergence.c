@@ -129,7 +129,7 @@ static void write_scene(FILE *f, const json_t *scene)
           "scope=\"col\">Quantity</th><th scope=\"col\" class=\"num\">Value and interval</th><th "
           "scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n",
           f);
-    convergence_rows(scene, write_row, f);
+    convergence_results_rows(scene, write_row, f);
     fputs("</tbody></table>\n</div>\n", f);
     write_rungs(f, scene);
     fputs("</section>\n", f);
@@ -145,7 +145,7 @@ void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
         num += json_array_size(engines);
         for (size_t k = 0; k < json_array_size(engines); k++) {
             const json_t *j = json_array_get(engines, k);
-            enum outcome o = convergence_outcome(j);
+            enum outcome o = convergence_results_outcome(j);
             errors += o == OUTCOME_NOT_JUDGED;
             wrong += o == OUTCOME_OPPOSITE || o == OUTCOME_UNDECIDED;
             judged += json_is_true(json_object_get(j, "judged"));

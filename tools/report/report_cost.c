@@ -6,7 +6,7 @@
 void report_cost(FILE *f, const json_t *results)
 {
     struct scene_cost cost[MAX_COSTS];
-    int num = cost_gather(results, cost);
+    int num = render_cost_gather(results, cost);
     double sum = 0;
     for (int i = 0; i < num; i++)
         sum += cost[i].ours_s + cost[i].references_s;

@@ -204,7 +204,7 @@ static void write_runs(FILE *f, const struct history *h)
         char commit[128];
         history_commit(&h->run[r], commit, sizeof commit);
         for (size_t i = 0; i < num; i++)
-            good += claim_outcome(json_array_get(claims, i)) == OUTCOME_AS_EXPECTED;
+            good += results_claim_outcome(json_array_get(claims, i)) == OUTCOME_AS_EXPECTED;
         fprintf(f, "<tr%s><th scope=\"row\">", good < num ? " class=\"bad\"" : "");
         html_text(f, member_text(root, "date"));
         fputs("</th><td>", f);

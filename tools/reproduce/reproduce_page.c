@@ -168,7 +168,7 @@ static bool of_junit(const char *path, const char *to, struct reproduced *out, s
     const char *const word[] = {"assay", "validate,", "of", results, NULL};
     if (!reproduced_command(out, word, e) || !results_read(results, &root, e))
         return false;
-    bool ok = results_write_junit(to, root, e);
+    bool ok = junit_write(to, root, e);
     json_decref(root);
     return ok;
 }

@@ -78,7 +78,7 @@ static json_t *claim_head(const struct claim_context *c)
     return j;
 }
 
-json_t *claim_judged(const struct claim_context *c, const struct comparison *r)
+json_t *claim_result_judged(const struct claim_context *c, const struct comparison *r)
 {
     json_t *j = claim_head(c);
     const struct region *g = r->global;
@@ -103,7 +103,7 @@ json_t *claim_judged(const struct claim_context *c, const struct comparison *r)
     return j;
 }
 
-json_t *claim_not_judged(const struct claim_context *c, const char *error)
+json_t *claim_result_not_judged(const struct claim_context *c, const char *error)
 {
     json_t *j = claim_head(c);
     if (j != NULL) {
@@ -113,7 +113,7 @@ json_t *claim_not_judged(const struct claim_context *c, const char *error)
     return j;
 }
 
-bool claim_add_observations(json_t *claim, const char *side, const struct moments *m)
+bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m)
 {
     char key[16];
     double n = m->n[0];
@@ -141,7 +141,7 @@ static void describe_machine(char *text, size_t size)
              model[0] ? model : "unknown processor");
 }
 
-json_t *results_new(int argc, char **argv, double alpha, struct err *e)
+json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e)
 {
     char date[32], machine[192];
     assert(argv[argc] == NULL);

@@ -17,15 +17,15 @@ struct claim_context {
 };
 
 /* New references, NULL if out of memory. */
-json_t *claim_judged(const struct claim_context *c, const struct comparison *result);
-json_t *claim_not_judged(const struct claim_context *c, const char *error);
+json_t *claim_result_judged(const struct claim_context *c, const struct comparison *result);
+json_t *claim_result_not_judged(const struct claim_context *c, const char *error);
 
 /* Adds how often and by what a side was observed: n, unit, spp (side "a" or "b"). */
-bool claim_add_observations(json_t *claim, const char *side, const struct moments *m);
+bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m);
 
 /* A new results object with everything but claims: command line (a verb and its arguments, NULL at argv[argc]; in words that
  * shell_split() reads back), date, machine. NULL with a line if an argument is no UTF-8, and out of memory. */
-json_t *results_new(int argc, char **argv, double alpha, struct err *e)
+json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -67,7 +67,7 @@ static void print_ratio(FILE *f, const json_t *rung, const char *name, const cha
         fprintf(f, " [%.2f, %.2f]", end(rung, interval, 0), end(rung, interval, 1));
 }
 
-void convergence_print_matrix(FILE *f, const json_t *convergence)
+void convergence_matrix_print(FILE *f, const json_t *convergence)
 {
     fputs(
         "| scene | slope, ours | Sobol | Cycles | bias at most %, ours | Sobol | variance / Cycles', ours, "

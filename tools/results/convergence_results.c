@@ -140,7 +140,7 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
     return depths == NULL || depth_ladder_check(depths, where, e);
 }
 
-bool convergence_check(const json_t *convergence, const char *path, struct err *e)
+bool convergence_results_check(const json_t *convergence, const char *path, struct err *e)
 {
     if (json_array_size(convergence) == 0)
         return err_set(e, "%s: 'convergence' is not an array with at least one scene", path);
@@ -163,7 +163,7 @@ static enum outcome outcome_of(const char *verdict)
     return strcmp(verdict, "INCONCLUSIVE") == 0 ? OUTCOME_UNDECIDED : OUTCOME_AS_EXPECTED;
 }
 
-enum outcome convergence_outcome(const json_t *engine)
+enum outcome convergence_results_outcome(const json_t *engine)
 {
     if (json_object_get(engine, "error") != NULL)
         return OUTCOME_NOT_JUDGED;
@@ -240,8 +240,8 @@ static void ratio_rows(const struct sink *s, const char *scene, const json_t *ra
     emit(s, scene, member_text(ratio, "a"), quantity, text, measured);
 }
 
-void convergence_rows(const json_t *scene, void (*row)(void *ctx, const struct convergence_row *r),
-                      void *ctx)
+void convergence_results_rows(const json_t *scene,
+                              void (*row)(void *ctx, const struct convergence_row *r), void *ctx)
 {
     const struct sink s = {row, ctx};
     const json_t *engines = json_object_get(scene, "engines");
@@ -278,7 +278,7 @@ static void print_row(void *ctx, const struct convergence_row *r)
     fprintf(ctx, "%-17s %-38s %-28s %s\n", r->engine, r->quantity, r->value, r->verdict);
 }
 
-void convergence_print(FILE *f, const json_t *convergence)
+void convergence_results_print(FILE *f, const json_t *convergence)
 {
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *s = json_array_get(convergence, i);
@@ -291,7 +291,7 @@ void convergence_print(FILE *f, const json_t *convergence)
                 100 * member_number(s, "reference_noise"), 100 * (1 - member_number(s, "alpha")));
         print_rungs(f, s);
         fprintf(f, "\n%-17s %-38s %-28s %s\n", "engine", "quantity", "value [interval]", "verdict");
-        convergence_rows(s, print_row, f);
+        convergence_results_rows(s, print_row, f);
     }
 }
 
@@ -311,9 +311,9 @@ static void print_markdown_row(void *ctx, const struct convergence_row *r)
     fputs("|\n", f);
 }
 
-void convergence_print_markdown(FILE *f, const json_t *convergence)
+void convergence_results_print_markdown(FILE *f, const json_t *convergence)
 {
     fputs("| scene | engine | quantity | value [interval] | verdict |\n|---|---|---|--:|---|\n", f);
     for (size_t i = 0; i < json_array_size(convergence); i++)
-        convergence_rows(json_array_get(convergence, i), print_markdown_row, f);
+        convergence_results_rows(json_array_get(convergence, i), print_markdown_row, f);
 }

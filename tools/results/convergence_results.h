@@ -32,11 +32,11 @@
 
 /* Checks all that the functions below and the report rely on; a failure is a line with file, scene,
  * engine and member. */
-bool convergence_check(const json_t *convergence, const char *path, struct err *e)
+bool convergence_results_check(const json_t *convergence, const char *path, struct err *e)
     __attribute__((warn_unused_result));
 
 /* How an engine came out; MEASURED is as expected. */
-enum outcome convergence_outcome(const json_t *engine);
+enum outcome convergence_results_outcome(const json_t *engine);
 
 /* One line "scene x engine x quantity" of one element of "convergence". Texts are valid until the callback
  * returns. */
@@ -44,12 +44,12 @@ struct convergence_row {
     const char *scene, *engine, *quantity, *value, *verdict;
     enum outcome outcome;
 };
-void convergence_rows(const json_t *scene, void (*row)(void *ctx, const struct convergence_row *r),
-                      void *ctx);
+void convergence_results_rows(const json_t *scene,
+                              void (*row)(void *ctx, const struct convergence_row *r), void *ctx);
 
 /* Rungs, then rows, of every scene, for a terminal. */
-void convergence_print(FILE *f, const json_t *convergence);
+void convergence_results_print(FILE *f, const json_t *convergence);
 /* The rows as a Markdown table. */
-void convergence_print_markdown(FILE *f, const json_t *convergence);
+void convergence_results_print_markdown(FILE *f, const json_t *convergence);
 
 #endif

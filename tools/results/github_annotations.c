@@ -38,17 +38,17 @@ static void print_title(FILE *f, enum outcome outcome, bool lacks_time, const ch
 
 static void print_claim(FILE *f, const json_t *claim)
 {
-    enum outcome outcome = claim_outcome(claim);
+    enum outcome outcome = results_claim_outcome(claim);
     if (outcome == OUTCOME_AS_EXPECTED)
         return;
-    print_title(f, outcome, claim_lacks_time(claim), member_text(claim, "scene"));
+    print_title(f, outcome, results_claim_lacks_time(claim), member_text(claim, "scene"));
     fputs("%3A ", f);
     print_escaped(f, member_text(claim, "a"), true);
     fputs(" against ", f);
     print_escaped(f, member_text(claim, "b"), true);
     fputs("::", f);
     if (outcome == OUTCOME_NOT_JUDGED) {
-        fputs(claim_lacks_time(claim) ? "INCONCLUSIVE: " : "could not be judged: ", f);
+        fputs(results_claim_lacks_time(claim) ? "INCONCLUSIVE: " : "could not be judged: ", f);
         print_escaped(f, member_text(claim, "error"), false);
     } else {
         print_escaped(f, member_text(claim, "verdict"), false);
@@ -73,19 +73,19 @@ static struct tally tally_of(const json_t *results)
                  *convergence = json_object_get(results, "convergence");
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *c = json_array_get(claims, i);
-        count(&t, claim_outcome(c), claim_lacks_time(c));
+        count(&t, results_claim_outcome(c), results_claim_lacks_time(c));
     }
     for (size_t i = 0; i < json_array_size(consistency); i++)
         count(&t, stated_error_outcome(json_array_get(consistency, i)), false);
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
         for (size_t k = 0; k < json_array_size(engines); k++)
-            count(&t, convergence_outcome(json_array_get(engines, k)), false);
+            count(&t, convergence_results_outcome(json_array_get(engines, k)), false);
     }
     return t;
 }
 
-void annotations_headline(FILE *f, const json_t *results)
+void github_annotations_headline(FILE *f, const json_t *results)
 {
     struct tally t = tally_of(results);
     if (t.wrong + t.undecided + t.errors == 0)
@@ -109,7 +109,7 @@ static void print_other(FILE *f, const char *what, const json_t *object, enum ou
     fputc('\n', f);
 }
 
-void annotations_print(FILE *f, const json_t *results)
+void github_annotations_print(FILE *f, const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims"),
                  *consistency = json_object_get(results, "consistency"),
@@ -125,10 +125,11 @@ void annotations_print(FILE *f, const json_t *results)
                      *engines = json_object_get(scene, "engines");
         for (size_t k = 0; k < json_array_size(engines); k++) {
             const json_t *j = json_array_get(engines, k);
-            print_other(f, "convergence", j, convergence_outcome(j), member_text(scene, "scene"));
+            print_other(f, "convergence", j, convergence_results_outcome(j),
+                        member_text(scene, "scene"));
         }
     }
     fputs("::notice title=assay::", f);
-    annotations_headline(f, results);
+    github_annotations_headline(f, results);
     fputc('\n', f);
 }

@@ -9,10 +9,10 @@
 /* "::error title=..::.." where a claim came out the opposite or could not be judged, "::warning .." where it
  * stayed undecided, and "::notice .." with the headline. Text from the file cannot end a command or start
  * another one. Format: "Workflow commands for GitHub Actions". */
-void annotations_print(FILE *f, const json_t *results);
+void github_annotations_print(FILE *f, const json_t *results);
 
 /* The headline in words: "All 5 claims came out as expected." The convergence and the stated errors are
  * counted as claims. */
-void annotations_headline(FILE *f, const json_t *results);
+void github_annotations_headline(FILE *f, const json_t *results);
 
 #endif

@@ -176,7 +176,7 @@ static bool gather(struct history *h, struct err *e)
         const json_t *claims = json_object_get(h->run[r].results, "claims");
         for (size_t i = 0; i < json_array_size(claims); i++) {
             const json_t *c = json_array_get(claims, i);
-            if (claim_outcome(c) == OUTCOME_NOT_JUDGED)
+            if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED)
                 continue;
             struct history_series *s = series_of(h, c, e);
             if (s == NULL)

@@ -96,7 +96,7 @@ static bool write_testcase(xmlTextWriter *w, const json_t *claim)
            write_text(w, quantity != NULL ? quantity : "mean") &&
            xmlTextWriterEndAttribute(w) >= 0 &&
            number_attribute(w, "time", "%.3f", member_number(claim, "seconds_a")) &&
-           write_verdict(w, claim, claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
+           write_verdict(w, claim, results_claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
 }
 
 static bool write_testsuite(xmlTextWriter *w, const json_t *results)
@@ -104,7 +104,7 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
     const json_t *claims = json_object_get(results, "claims");
     size_t num = json_array_size(claims), count[4] = {0};
     for (size_t i = 0; i < num; i++)
-        count[claim_outcome(json_array_get(claims, i))]++;
+        count[results_claim_outcome(json_array_get(claims, i))]++;
     size_t failures = count[OUTCOME_OPPOSITE] + count[OUTCOME_UNDECIDED];
     bool ok = xmlTextWriterSetIndent(w, 1) >= 0 &&
               xmlTextWriterStartDocument(w, NULL, "UTF-8", NULL) >= 0 &&
@@ -125,7 +125,7 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
     return ok && xmlTextWriterEndDocument(w) >= 0;
 }
 
-bool results_write_junit(const char *path, const json_t *results, struct err *e)
+bool junit_write(const char *path, const json_t *results, struct err *e)
 {
     bool failed = false;
     xml_complaints_to(&failed);

@@ -29,7 +29,7 @@ static int by_total(const void *a, const void *b)
                                 : strcmp(x->scene, y->scene);
 }
 
-int cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
+int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
 {
     int num = 0;
     size_t i, k;
@@ -47,7 +47,8 @@ int cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
         *(is_ours ? &e->ours_s : &e->references_s) += member_number(cost, "b");
         e->claims++;
         e->looks += (int)json_array_size(looks);
-        e->undecided += claim_lacks_time(c) || claim_outcome(c) == OUTCOME_UNDECIDED;
+        e->undecided +=
+            results_claim_lacks_time(c) || results_claim_outcome(c) == OUTCOME_UNDECIDED;
         json_array_foreach(looks, k, look) e->largest_n =
             fmax(e->largest_n, is_probe ? 0 : member_number(look, "n_a"));
     }
@@ -61,11 +62,11 @@ int cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
     return num;
 }
 
-void cost_print(FILE *f, const json_t *results)
+void render_cost_print(FILE *f, const json_t *results)
 {
     static const char *const format[] = {"%.2f", "%.1f", "%.0f"};
     struct scene_cost cost[MAX_COSTS];
-    int num = cost_gather(results, cost);
+    int num = render_cost_gather(results, cost);
     double sum = 0;
     for (int i = 0; i < num; i++)
         sum += total(&cost[i]);

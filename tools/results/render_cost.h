@@ -17,10 +17,10 @@ struct scene_cost {
 };
 
 /* Largest first; at most MAX_COSTS scenes, the number of them is returned. */
-int cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS]);
+int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS]);
 
 /* "cost: 41_cornell 38 s of 120 s, ...": the costliest scenes on one line; nothing where nothing was
  * rendered. */
-void cost_print(FILE *f, const json_t *results);
+void render_cost_print(FILE *f, const json_t *results);
 
 #endif

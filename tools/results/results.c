@@ -275,7 +275,7 @@ static bool check_claim(const json_t *claim, const char *where, struct err *e)
         return check_judged(claim, where, e);
     if (json_is_true(json_object_get(claim, "passed")))
         return err_set(e, "%s: has an 'error' and yet 'passed'", where);
-    if (json_object_get(claim, "verdict") != NULL && !claim_lacks_time(claim))
+    if (json_object_get(claim, "verdict") != NULL && !results_claim_lacks_time(claim))
         return err_set(e, "%s: has an 'error' and yet a 'verdict' that is not INCONCLUSIVE", where);
     return true;
 }
@@ -291,7 +291,7 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
         return false;
     const json_t *claims = json_object_get(root, "claims");
     const json_t *convergence = json_object_get(root, "convergence");
-    if (convergence != NULL && !convergence_check(convergence, path, e))
+    if (convergence != NULL && !convergence_results_check(convergence, path, e))
         return false;
     const json_t *consistency = json_object_get(root, "consistency");
     if (consistency != NULL && !stated_error_check(consistency, path, e))
@@ -337,7 +337,7 @@ double member_number(const json_t *object, const char *name)
     return json_number_value(json_object_get(object, name));
 }
 
-enum outcome claim_outcome(const json_t *claim)
+enum outcome results_claim_outcome(const json_t *claim)
 {
     if (json_object_get(claim, "error") != NULL)
         return OUTCOME_NOT_JUDGED;
@@ -352,7 +352,7 @@ enum outcome claim_outcome(const json_t *claim)
     return OUTCOME_UNDECIDED;
 }
 
-bool claim_lacks_time(const json_t *claim)
+bool results_claim_lacks_time(const json_t *claim)
 {
     const char *verdict = member_text(claim, "verdict");
     return json_object_get(claim, "error") != NULL && verdict != NULL &&
@@ -366,7 +366,7 @@ static bool any_lacks_time(const json_t *list)
     json_array_foreach(list, i, c)
     {
         const char *reason = member_text(c, "reason");
-        if (claim_lacks_time(c) ||
+        if (results_claim_lacks_time(c) ||
             (reason != NULL && strncmp(reason, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0))
             return true;
     }
@@ -384,14 +384,14 @@ int results_exit_code(const json_t *results)
     const json_t *claims = json_object_get(results, "claims");
     size_t count[4] = {0};
     for (size_t i = 0; i < json_array_size(claims); i++)
-        count[claim_lacks_time(json_array_get(claims, i))
+        count[results_claim_lacks_time(json_array_get(claims, i))
                   ? OUTCOME_UNDECIDED
-                  : claim_outcome(json_array_get(claims, i))]++;
+                  : results_claim_outcome(json_array_get(claims, i))]++;
     const json_t *convergence = json_object_get(results, "convergence");
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
         for (size_t k = 0; k < json_array_size(engines); k++)
-            count[convergence_outcome(json_array_get(engines, k))]++;
+            count[convergence_results_outcome(json_array_get(engines, k))]++;
     }
     const json_t *consistency = json_object_get(results, "consistency");
     for (size_t i = 0; i < json_array_size(consistency); i++)

@@ -76,10 +76,10 @@ double member_number(const json_t *object, const char *name);
 /* How a claim came out, worst first. OPPOSITE: DIFFERENT for EQUIVALENT or the reverse. UNDECIDED: any
  * other verdict that was not expected. */
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
-enum outcome claim_outcome(const json_t *claim);
+enum outcome results_claim_outcome(const json_t *claim);
 /* Of a claim that is OUTCOME_NOT_JUDGED: the budget ended before its first look. It has no numbers,
  * like any that was not judged, but counts as INCONCLUSIVE. */
-bool claim_lacks_time(const json_t *claim);
+bool results_claim_lacks_time(const json_t *claim);
 
 /* How the reason begins of what was not decided when the time of --budget was over; and whether there is such a claim or one that
  * lacks time. */
@@ -92,11 +92,11 @@ int results_exit_code(const json_t *results);
 
 /* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown, and below it
  * the error line of each claim that could not be judged. */
-void results_print_table(FILE *f, const json_t *results, bool markdown);
+void results_table_print(FILE *f, const json_t *results, bool markdown);
 
 /* JUnit XML: one testsuite, one testcase per claim; failure for a wrong verdict, error for one that
  * could not be judged. Appears by rename. */
-bool results_write_junit(const char *path, const json_t *results, struct err *e)
+bool junit_write(const char *path, const json_t *results, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

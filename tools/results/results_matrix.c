@@ -22,14 +22,14 @@ static void print_cell(FILE *f, const json_t *c)
         fputs(" |", f);
         return;
     }
-    if (claim_outcome(c) == OUTCOME_NOT_JUDGED) {
-        fputs(claim_lacks_time(c) ? " **INCONCLUSIVE** |" : " **NOT JUDGED** |", f);
+    if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED) {
+        fputs(results_claim_lacks_time(c) ? " **INCONCLUSIVE** |" : " **NOT JUDGED** |", f);
         return;
     }
     const json_t *ci = json_object_get(c, "ci");
     double lo = json_number_value(json_array_get(ci, 0));
     double hi = json_number_value(json_array_get(ci, 1));
-    bool as_expected = claim_outcome(c) == OUTCOME_AS_EXPECTED;
+    bool as_expected = results_claim_outcome(c) == OUTCOME_AS_EXPECTED;
     const char *verdict = member_text(c, "verdict"), *mark = "";
     if (!as_expected)
         mark = verdict;
@@ -44,7 +44,7 @@ static void print_cell(FILE *f, const json_t *c)
             100 * member_number(c, "difference"), 50 * (hi - lo), mdb_text);
 }
 
-void results_print_matrix(FILE *f, const json_t *results)
+void results_matrix_print(FILE *f, const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims");
     fputs("| scene | truth | Cycles | POV-Ray |\n|---|--:|--:|--:|\n", f);

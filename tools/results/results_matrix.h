@@ -10,6 +10,6 @@
  * POV-Ray. A cell has the difference of the image mean, the half width of its interval, and the MDB,
  * all in per cent; the verdict only where it is not EQUIVALENT, in bold where it was not expected.
  * `results` as results_read() checks them. */
-void results_print_matrix(FILE *f, const json_t *results);
+void results_matrix_print(FILE *f, const json_t *results);
 
 #endif

@@ -43,15 +43,15 @@ static void fill_row(struct row *r, const json_t *claim, bool markdown)
         [false] = {"ERROR", "WRONG", "WRONG", "ok"},
         [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
     };
-    enum outcome outcome = claim_outcome(claim);
+    enum outcome outcome = results_claim_outcome(claim);
     r->cell[SCENE] = member_text(claim, "scene");
     r->cell[TESTED] = member_text(claim, "a");
     r->cell[AGAINST] = member_text(claim, "b");
     r->cell[EXPECTED] = member_text(claim, "expected");
-    r->cell[MARK] = mark[markdown][claim_lacks_time(claim) ? OUTCOME_UNDECIDED : outcome];
+    r->cell[MARK] = mark[markdown][results_claim_lacks_time(claim) ? OUTCOME_UNDECIDED : outcome];
     if (outcome == OUTCOME_NOT_JUDGED) {
         r->cell[DIFFERENCE] = r->cell[MDB] = r->cell[MARGIN] = "-";
-        r->cell[VERDICT] = claim_lacks_time(claim) ? "INCONCLUSIVE" : "NOT JUDGED";
+        r->cell[VERDICT] = results_claim_lacks_time(claim) ? "INCONCLUSIVE" : "NOT JUDGED";
         return;
     }
     const json_t *ci = json_object_get(claim, "ci");
@@ -169,7 +169,7 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
     }
 }
 
-void results_print_table(FILE *f, const json_t *results, bool markdown)
+void results_table_print(FILE *f, const json_t *results, bool markdown)
 {
     const json_t *claims = json_object_get(results, "claims");
     if (markdown)

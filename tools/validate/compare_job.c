@@ -248,7 +248,7 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
     snprintf(z, sizeof z, "%s.z.exr", path);
     snprintf(relative, sizeof relative, "%s.relative.exr", path);
-    json_t *root = results_new(argc, argv, job->opt.alpha, e);
+    json_t *root = claim_result_new_results(argc, argv, job->opt.alpha, e);
     if (root == NULL)
         return false;
     if (!make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
@@ -258,11 +258,11 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
         json_decref(root);
         return false;
     }
-    json_t *claim = claim_judged(&context, &c->r);
+    json_t *claim = claim_result_judged(&context, &c->r);
     bool ok = claim != NULL;
     if (ok && !c->is_guessed)
-        ok = claim_add_observations(claim, "a", &c->m[0]) &&
-             claim_add_observations(claim, "b", &c->m[1]);
+        ok = claim_result_add_observations(claim, "a", &c->m[0]) &&
+             claim_result_add_observations(claim, "b", &c->m[1]);
     if (ok && c->notes.num > 0)
         ok = json_object_set_new(claim, "notes", notes_json(&c->notes)) == 0;
     if (ok && job->exchangeable)

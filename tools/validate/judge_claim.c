@@ -74,8 +74,8 @@ static void add_provenance(json_t *claim, struct validation *v, const struct cla
     enum fetch_result had_b = side_at(v, t->b, t->stage, t->look, &b);
     assert(had_a == FETCH_OK && had_b == FETCH_OK);
     (void)had_a, (void)had_b;
-    claim_add_observations(claim, "a", &a->m);
-    claim_add_observations(claim, "b", &b->m);
+    claim_result_add_observations(claim, "a", &a->m);
+    claim_result_add_observations(claim, "b", &b->m);
     json_object_set_new(claim, "seconds_a", json_real(a->seconds));
     json_object_set_new(claim, "seconds_b", json_real(b->seconds));
     if (a->rays.rays > 0)
@@ -147,7 +147,7 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
     struct claim_context c = context(v, t, rerun);
     json_t *files = files_of(v, t, &e);
     if (files != NULL)
-        t->result = claim_judged(&c, &t->c);
+        t->result = claim_result_judged(&c, &t->c);
     if (t->result != NULL) {
         json_object_set(t->result, "files", files);
         add_provenance(t->result, v, t);
@@ -156,7 +156,7 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
             json_object_set_new(t->result, "reason", json_string(reason));
         }
     } else {
-        t->result = claim_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
+        t->result = claim_result_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
     }
     json_decref(files);
     add_looks(t->result, v, t);
@@ -169,7 +169,7 @@ static void finish_unseen(struct validation *v, struct claim_run *t, const char 
     char rerun[8192];
     rerun_command(v, t, rerun, sizeof rerun);
     struct claim_context c = context(v, t, rerun);
-    t->result = claim_not_judged(&c, error);
+    t->result = claim_result_not_judged(&c, error);
     if (no_time)
         json_object_set_new(t->result, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
     add_looks(t->result, v, t);
@@ -296,7 +296,7 @@ bool claim_run_differs(const struct claim_run *t)
         return stated_error_outcome(t->result) == OUTCOME_OPPOSITE;
     const char *verdict = member_text(t->result, "verdict");
     return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
-           claim_outcome(t->result) == OUTCOME_OPPOSITE;
+           results_claim_outcome(t->result) == OUTCOME_OPPOSITE;
 }
 
 void claim_run_free(struct claim_run *t)

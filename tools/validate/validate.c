@@ -160,7 +160,7 @@ static int stages_of(const struct validate_options *o)
 bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
                     struct err *e)
 {
-    json_t *root = results_new(argc, argv, o->alpha, e);
+    json_t *root = claim_result_new_results(argc, argv, o->alpha, e);
     if (root == NULL)
         return false;
     json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));

@@ -95,7 +95,7 @@ static void the_command_of_results_is_read_back(void **state)
     static const char *const want[] = {"assay", "compare", "it's a.exr", "b  c.exr", "", NULL};
     char *argv[] = {"compare", "it's a.exr", "b  c.exr", "", NULL};
     struct err e = {""};
-    json_t *root = results_new(4, argv, 0.01, &e);
+    json_t *root = claim_result_new_results(4, argv, 0.01, &e);
     assert_non_null(root);
     expect_words(json_string_value(json_object_get(root, "command")), want);
     json_decref(root);

@@ -35,7 +35,7 @@ static char *printed(json_t *claims)
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
     json_t *results = json_pack("{so}", "claims", claims);
-    annotations_print(f, results);
+    github_annotations_print(f, results);
     fclose(f);
     json_decref(results);
     return text;

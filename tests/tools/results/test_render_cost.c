@@ -42,7 +42,7 @@ static void test_gather(void **state)
     (void)state;
     json_t *root = results();
     struct scene_cost c[MAX_COSTS];
-    assert_int_equal(cost_gather(root, c), 2);
+    assert_int_equal(render_cost_gather(root, c), 2);
     assert_string_equal(c[0].scene, "<b>");
     assert_true(c[0].ours_s == 20 && c[0].references_s == 0);
     assert_true(c[0].claims == 1 && c[0].looks == 0 && c[0].undecided == 1);
@@ -68,7 +68,7 @@ static void test_print(void **state)
 {
     (void)state;
     json_t *root = results();
-    char *line = printed(cost_print, root);
+    char *line = printed(render_cost_print, root);
     assert_string_equal(line, "cost: <b> 20 s of 30.5 s (1 undecided), a 10 s (1 undecided) of "
                               "processor time\n");
     free(line);
@@ -79,7 +79,7 @@ static void test_print(void **state)
     free(table);
     json_object_del(root, "consistency");
     json_array_clear(json_object_get(root, "claims"));
-    line = printed(cost_print, root);
+    line = printed(render_cost_print, root);
     table = printed(report_cost, root);
     assert_string_equal(line, "");
     assert_string_equal(table, "");

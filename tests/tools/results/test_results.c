@@ -439,7 +439,7 @@ static char *printed_table(const json_t *results, bool markdown)
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
-    results_print_table(f, results, markdown);
+    results_table_print(f, results, markdown);
     assert_int_equal(fclose(f), 0);
     return text;
 }
@@ -526,7 +526,7 @@ static void junit_reads_back(void **state)
                                               claim_with("INCONCLUSIVE", "EQUIVALENT"), error});
     struct place p = temp_place("deep/er/junit.xml");
     struct err e = {""};
-    if (!results_write_junit(p.path, root, &e))
+    if (!junit_write(p.path, root, &e))
         fail_msg("%s", e.msg);
 
     xmlDoc *doc = xmlReadFile(p.path, NULL, XML_PARSE_NONET | XML_PARSE_NOERROR);
@@ -608,12 +608,12 @@ static void an_argument_that_is_no_utf8_is_named(void **state)
                     "k\xfc"
                     "che.exr",
                     "b.exr", NULL};
-    assert_null(results_new(3, argv, 0.01, &e));
+    assert_null(claim_result_new_results(3, argv, 0.01, &e));
     assert_string_equal(e.msg, "argument 'k\xfc"
                                "che.exr' is no UTF-8, and results hold nothing else");
     argv[1] = "k\xc3\xbc"
               "che.exr";
-    json_t *root = results_new(3, argv, 0.01, &e);
+    json_t *root = claim_result_new_results(3, argv, 0.01, &e);
     assert_non_null(root);
     json_decref(root);
 }

@@ -541,7 +541,7 @@ static void results_become_a_matrix(void **state)
     FILE *f = open_memstream(&text, &size);
     json_object_set_new(json_array_get(json_object_get(scene, "engines"), 0), "floor_verdict",
                         json_string("INCONCLUSIVE"));
-    convergence_print_matrix(f, json_object_get(root, "convergence"));
+    convergence_matrix_print(f, json_object_get(root, "convergence"));
     fclose(f);
     /* No Sobol here, and Cycles could not be judged: empty cells. */
     const char *row = strstr(text, "| 41_cornell");
@@ -558,8 +558,8 @@ static void results_become_rows_and_an_exit_code(void **state)
     json_t *scene, *root = results_with(&scene);
     struct err e;
     char text[2048] = "";
-    assert_true(convergence_check(json_object_get(root, "convergence"), "x", &e));
-    convergence_rows(scene, remember_row, text);
+    assert_true(convergence_results_check(json_object_get(root, "convergence"), "x", &e));
+    convergence_results_rows(scene, remember_row, text);
     assert_string_equal(
         text, "41_cornell|pathtracer|slope of RMSE|-0.5000 [-0.5100, -0.4900]|EQUIVALENT\n"
               "41_cornell|pathtracer|RMS bias at 4 spp, %|1.000 [0.000, 0.400]|EQUIVALENT\n"
@@ -675,7 +675,7 @@ static void broken_results_are_refused(void **state)
                             : json_array_get(json_object_get(ratio, "rungs"), 0);
         json_object_set_new(owner, broken[i].member,
                             json_loads(broken[i].value, JSON_DECODE_ANY, NULL));
-        assert_false(convergence_check(json_object_get(root, "convergence"), "x.json", &e));
+        assert_false(convergence_results_check(json_object_get(root, "convergence"), "x.json", &e));
         if (strstr(e.msg, broken[i].line) == NULL || strstr(e.msg, "41_cornell") == NULL)
             fail_msg("'%s' does not say '%s' of 41_cornell", e.msg, broken[i].line);
         json_decref(root);
