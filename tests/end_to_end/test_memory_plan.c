@@ -150,12 +150,12 @@ static bool do_job(void *ctx, struct err *e)
     const struct plan *p = ctx;
     char path[PLAN_PATH + 256];
     struct err none = {0};
-    bool made = false, ok = plan_run_job(p, 0, &made, e);
+    bool made = false, ok = job_run(p, 0, &made, e);
     alloc_fail_off();
     assert_int_equal(ok, made);
-    assert_int_equal(ok, plan_is_made(p, 0));
-    assert_true(!ok || plan_verify(p, 0, &none));
-    plan_artefact(p, 0, NULL, path);
+    assert_int_equal(ok, job_run_is_made(p, 0));
+    assert_true(!ok || job_run_verify(p, 0, &none));
+    job_run_artefact(p, 0, NULL, path);
     if (ok)
         assert_true(remove_tree(path, &none));
     snprintf(path, sizeof path, "%s/jobs", plan_dir);
@@ -165,7 +165,8 @@ static bool do_job(void *ctx, struct err *e)
 
 static bool verify_job(void *ctx, struct err *e)
 {
-    return plan_is_made(ctx, 0) ? plan_verify(ctx, 0, e) : err_set(e, "out of memory or missing");
+    return job_run_is_made(ctx, 0) ? job_run_verify(ctx, 0, e)
+                                   : err_set(e, "out of memory or missing");
 }
 
 static bool gather(void *ctx, struct err *e)
@@ -207,8 +208,8 @@ static void plans(void **state)
     alloc_json(ALLOC_JSON_ENDS, NULL);
     alloc_fail_each("plan_run_job", ALLOC_ALL, do_job, &p);
     for (int k = 0; k < p.num; k++)
-        assert_true(plan_run_job(&p, k, &made, &e));
-    alloc_fail_each("plan_is_made, plan_verify", ALLOC_ALL, verify_job, &p);
+        assert_true(job_run(&p, k, &made, &e));
+    alloc_fail_each("plan_is_made, job_run_verify", ALLOC_ALL, verify_job, &p);
     int out = dup(STDOUT_FILENO), nowhere = open("/dev/null", O_WRONLY);
     assert_true(out >= 0 && nowhere >= 0 && fflush(stdout) == 0);
     dup2(nowhere, STDOUT_FILENO); /* it says what it wrote */

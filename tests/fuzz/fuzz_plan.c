@@ -44,11 +44,11 @@ static void look(void)
     }
     for (int k = 0; k < p.num; k++) {
         char path[PLAN_PATH + 256];
-        fuzz_require(!plan_is_made(&p, k), "a job is made where nothing is");
-        plan_artefact(&p, k, NULL, path);
+        fuzz_require(!job_run_is_made(&p, k), "a job is made where nothing is");
+        job_run_artefact(&p, k, NULL, path);
         fuzz_require(strncmp(path, dir, strlen(dir)) == 0 && strstr(path, "..") == NULL,
                      "an artefact outside the plan");
-        fuzz_require(!plan_verify(&p, k, &e), "a job is whole where nothing is");
+        fuzz_require(!job_run_verify(&p, k, &e), "a job is whole where nothing is");
         fuzz_check_line(&e, NULL);
     }
     int num = 0;

@@ -152,7 +152,7 @@ int verb_run_job(int argc, char **argv, struct err *e)
         int k = (int)strtol(argv[i], NULL, 10);
         printf("job %d: begins\n", k);
         fflush(stdout);
-        bool ok = plan_run_job(&p, k, &made, &why);
+        bool ok = job_run(&p, k, &made, &why);
         printf("job %d: %s\n", k, !ok ? why.msg : made ? "made" : "was there");
         fflush(stdout);
         failed += !ok;

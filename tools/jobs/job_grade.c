@@ -82,7 +82,8 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     return ok;
 }
 
-bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
+bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                    struct err *e)
 {
     struct grade_paths at;
     struct grade_settings s = grade_options_default(argc, &at);
@@ -115,11 +116,11 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
     char from[PLAN_PATH + 512], to[PLAN_PATH + 512], temp[PLAN_PATH + 512], id[128],
         artefact[PLAN_PATH + 256];
     id_of(submission, id);
-    plan_artefact(p, k, NULL, artefact);
+    job_run_artefact(p, k, NULL, artefact);
     snprintf(from, sizeof from, "%s/%s", artefact, id);
     snprintf(to, sizeof to, "%.4000s/%s", out, id);
     snprintf(temp, sizeof temp, "%.4000s/.%s.tmp%ld", out, id, (long)getpid());
-    if (!plan_verify(p, k, e))
+    if (!job_run_verify(p, k, e))
         return false;
     if (access(from, F_OK) != 0)
         return true;
@@ -130,7 +131,7 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
 }
 
 /* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
-int grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
+int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct grade_paths at;
     struct grade_settings s = grade_options_default(argc, &at);

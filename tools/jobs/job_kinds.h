@@ -26,28 +26,31 @@ bool plan_input(struct plan *p, const char *path, struct err *e)
     __attribute__((warn_unused_result));
 /* What "cycles" or "povray" is besides its scene: the program, cycles.py and its modules in share_dir. *sha256 (may be
  * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
-bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
-                        const char **sha256, struct err *e) __attribute__((warn_unused_result));
+bool job_reference_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
+                                 const char **sha256, struct err *e)
+    __attribute__((warn_unused_result));
 /* What a validation with --live runs: Blender, and POV-Ray where it is in PATH, since not every scene needs that. */
-bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e)
     __attribute__((warn_unused_result));
 /* The next job; input: what it alone reads, NULL at the end. After all of the above. */
 bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
               struct err *e) __attribute__((warn_unused_result));
 
 /* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
-bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
+bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                     struct err *e);
 /* Without naming the pictures on stdout. */
-bool render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
+bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
     __attribute__((warn_unused_result));
-int render_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
-int grade_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
-                   struct err *e);
-int validate_gather(const struct plan *p, int argc, char **argv, struct err *e);
-bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+int job_render_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                     struct err *e);
-int reference_gather(const struct plan *p, int argc, char **argv, struct err *e);
+int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool job_validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                       struct err *e);
+int job_validate_gather(const struct plan *p, int argc, char **argv, struct err *e);
+bool job_reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                        struct err *e);
+int job_reference_gather(const struct plan *p, int argc, char **argv, struct err *e);
 
 #endif

@@ -36,8 +36,8 @@ static bool add_words(struct plan *p, int argc, char **argv, int threads, struct
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }
 
-bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
-                        const char **sha256, struct err *e)
+bool job_reference_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
+                                 const char **sha256, struct err *e)
 {
     static const char *const scripts[] = {"cycles", "cycles_blender", "cycles_geometry",
                                           "cycles_light", "cycles_material"};
@@ -56,13 +56,13 @@ bool plan_engine_inputs(struct plan *p, const char *engine, const char *share_di
     return ok;
 }
 
-bool plan_live_inputs(struct plan *p, const char *share_dir, struct err *e)
+bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e)
 {
     char path[PLAN_PATH + 64];
     snprintf(path, sizeof path, "%.4000s/import_check/blender_import.py", share_dir);
-    return plan_input(p, path, e) && plan_engine_inputs(p, "cycles", share_dir, NULL, e) &&
+    return plan_input(p, path, e) && job_reference_engine_inputs(p, "cycles", share_dir, NULL, e) &&
            (!process_find("povray", path, sizeof path) ||
-            plan_engine_inputs(p, "povray", share_dir, NULL, e));
+            job_reference_engine_inputs(p, "povray", share_dir, NULL, e));
 }
 
 /* A reference that has to be rendered. */
@@ -145,7 +145,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     for (int k = 0; ok && k < 2; k++)
         for (int i = 0; ok && binary[k] == NULL && i < g->num; i++)
             if (strcmp(g->wanted[i].ref->engine, engines[k]) == 0)
-                ok = plan_engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
+                ok = job_reference_engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
     json_object_set_new(p->head, "references", json_array());
     for (int i = 0; ok && i < g->num; i++) {
         const struct wanted *w = &g->wanted[i];
@@ -155,8 +155,8 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     return ok;
 }
 
-bool reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
-                    struct err *e)
+bool job_reference_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                        struct err *e)
 {
     struct reference_command c;
     struct planning g = {.c = &c};
@@ -204,11 +204,11 @@ static const char **artefacts(const struct plan *p, int first, int num, struct e
     }
     char *at = (char *)(dir + num);
     for (int i = 0; i < num; i++, at += ROOM) {
-        if (!plan_verify(p, first + i, e)) {
+        if (!job_run_verify(p, first + i, e)) {
             free(dir);
             return NULL;
         }
-        plan_artefact(p, first + i, NULL, at);
+        job_run_artefact(p, first + i, NULL, at);
         dir[i] = at;
     }
     return dir;
@@ -259,7 +259,7 @@ static bool settle_one(void *ctx, const struct suite_scene *scene,
 }
 
 /* With --fresh nothing was up to date when it was planned. */
-int reference_gather(const struct plan *p, int argc, char **argv, struct err *e)
+int job_reference_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct reference_command c;
     struct gathering g = {.p = p, .c = &c};

@@ -117,7 +117,8 @@ static bool add_job(struct plan *p, const int cell[4], const int *range, struct 
     return plan_job(p, word, range != NULL ? 7 : 5, (const char *const[]){NULL}, e);
 }
 
-bool render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e)
+bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                     struct err *e)
 {
     struct options o;
     char beside[4096];

@@ -37,7 +37,7 @@ static bool open_part(struct gathering *g, int k, struct err *e)
     struct identity id = g->id;
     const int cell[4] = {o->cell[0] + part->x, o->cell[1] + o->cell[3] - part->y - part->height,
                          part->width, part->height};
-    plan_artefact(g->plan, k, plan_text(g->plan, "product"), path);
+    job_run_artefact(g->plan, k, plan_text(g->plan, "product"), path);
     identity_cell(cell, o->width, o->height, id.cell);
     id.first_sample = (uint32_t)part->first;
     part->state = calloc(1, sizeof *part->state);
@@ -225,7 +225,7 @@ static char *ranges_text(const struct gathering *g)
     return text;
 }
 
-bool render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
+bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct options o;
     struct scene scene = {0};
@@ -256,9 +256,9 @@ bool render_gather_quietly(const struct plan *p, int argc, char **argv, struct e
     return ok;
 }
 
-int render_gather(const struct plan *p, int argc, char **argv, struct err *e)
+int job_render_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
-    if (!render_gather_quietly(p, argc, argv, e))
+    if (!job_render_gather_quietly(p, argc, argv, e))
         return EXIT_NOT_JUDGED;
     struct options o;
     if (!options_parse(argc, argv, &o, e))

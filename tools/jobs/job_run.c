@@ -28,7 +28,7 @@ static void key_of(const json_t *job, char key[65])
         strcpy(key, text);
 }
 
-void plan_artefact(const struct plan *p, int k, const char *name, char path[ROOM])
+void job_run_artefact(const struct plan *p, int k, const char *name, char path[ROOM])
 {
     char key[65];
     json_t *job = job_of(p, k);
@@ -38,21 +38,21 @@ void plan_artefact(const struct plan *p, int k, const char *name, char path[ROOM
              name != NULL ? name : "");
 }
 
-bool plan_is_made(const struct plan *p, int k)
+bool job_run_is_made(const struct plan *p, int k)
 {
     char path[ROOM];
-    plan_artefact(p, k, RECEIPT, path);
+    job_run_artefact(p, k, RECEIPT, path);
     return access(path, R_OK) == 0;
 }
 
-bool plan_verify(const struct plan *p, int k, struct err *e)
+bool job_run_verify(const struct plan *p, int k, struct err *e)
 {
     char path[ROOM], hex[65];
-    plan_artefact(p, k, RECEIPT, path);
+    job_run_artefact(p, k, RECEIPT, path);
     json_t *receipt = json_load_file(path, 0, NULL);
     const char *sha256 = json_string_value(json_object_get(receipt, "sha256"));
     bool ok = sha256 != NULL || err_set(e, "job %d: %s is not there", k, path);
-    plan_artefact(p, k, NULL, path);
+    job_run_artefact(p, k, NULL, path);
     ok = ok && hash_tree(path, RECEIPT, hex, e);
     if (ok && strcmp(hex, sha256) != 0)
         ok = err_set(e, "job %d: %s is not what the job wrote", k, path);
@@ -147,16 +147,16 @@ static bool make(const struct plan *p, int k, const json_t *job, const char *key
 static bool put_in_place(const struct plan *p, int k, const char *from, struct err *e)
 {
     char to[ROOM];
-    plan_artefact(p, k, NULL, to);
+    job_run_artefact(p, k, NULL, to);
     if (rename(from, to) == 0)
         return true;
     int why = errno;
-    if ((why == EEXIST || why == ENOTEMPTY) && plan_is_made(p, k))
+    if ((why == EEXIST || why == ENOTEMPTY) && job_run_is_made(p, k))
         return remove_tree(from, e);
     return err_set(e, "%s: cannot appear: %s", to, strerror(why));
 }
 
-bool plan_run_job(const struct plan *p, int k, bool *made, struct err *e)
+bool job_run(const struct plan *p, int k, bool *made, struct err *e)
 {
     char path[ROOM], out[ROOM + 300], key[65], host[256] = "";
     struct err why = {""};
@@ -167,8 +167,8 @@ bool plan_run_job(const struct plan *p, int k, bool *made, struct err *e)
         json_decref(job);
         return err_set(e, "%s/plan.jsonl: line %d is no job", p->dir, k + 2);
     }
-    plan_artefact(p, k, NULL, path);
-    if (plan_is_made(p, k) && plan_verify(p, k, &why)) {
+    job_run_artefact(p, k, NULL, path);
+    if (job_run_is_made(p, k) && job_run_verify(p, k, &why)) {
         json_decref(job);
         return true;
     }

@@ -94,13 +94,14 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, bool by
     for (int code = EXIT_DIFFERENT; code <= EXIT_NOT_JUDGED; code++)
         plan_may_end(p, code);
     return plan_begin(p, o->out_dir, "results.json", g.cpus, e) &&
-           plan_input(p, o->pathtracer, e) && (!o->live || plan_live_inputs(p, o->share_dir, e)) &&
+           plan_input(p, o->pathtracer, e) &&
+           (!o->live || job_reference_live_inputs(p, o->share_dir, e)) &&
            (o->engine == NULL || plan_input(p, o->engine->file, e)) &&
            validate_parts(o, by_claim, plan_part, &g, e);
 }
 
-bool validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
-                   struct err *e)
+bool job_validate_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
+                       struct err *e)
 {
     struct validate_command c;
     if (!validate_command_read(argc, argv, &c, e))
@@ -133,8 +134,8 @@ static bool add_results(const struct plan *p, int k, const char *out, json_t *re
     static const char *const lists[] = {"claims", "not_expressible", "loader", "consistency"};
     char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
     json_t *part;
-    plan_artefact(p, k, "results.json", path);
-    if (!plan_verify(p, k, e) || !results_read(path, &part, e))
+    job_run_artefact(p, k, "results.json", path);
+    if (!job_run_verify(p, k, e) || !results_read(path, &part, e))
         return false;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
         json_t *more = json_object_get(part, lists[i]), *all = json_object_get(results, lists[i]);
@@ -150,14 +151,14 @@ static bool add_results(const struct plan *p, int k, const char *out, json_t *re
     double seconds = member_number(results, "seconds") + member_number(part, "seconds");
     json_object_set_new(results, "seconds", json_real(seconds));
     json_decref(part);
-    plan_artefact(p, k, "data", path);
+    job_run_artefact(p, k, "data", path);
     snprintf(to, sizeof to, "%.4000s", out);
     const char *const copy[] = {"cp", "-a", "--", path, to, NULL};
     const struct process process = {.argv = copy};
     return access(path, F_OK) != 0 || process_run(&process, NULL, e);
 }
 
-int validate_gather(const struct plan *p, int argc, char **argv, struct err *e)
+int job_validate_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct validate_command c;
     json_t *results = NULL;

@@ -191,7 +191,7 @@ static bool shape_whole(struct share *whole, struct piece *piece, int num, bool 
         for (int i = 0; i < values; i++) {
             struct share_part *p = &whole->part[k];
             p->channel[i] = channels + k * values + i;
-            part_name(p->first, p->last, i, text[p->channel[i]]);
+            share_part_name(p->first, p->last, i, text[p->channel[i]]);
             name[p->channel[i]] = text[p->channel[i]];
         }
     for (int i = 0; !keeps && i < num; i++)

@@ -22,10 +22,10 @@ static const struct {
     const char *name;
     bool (*plan)(int argc, char **argv, const struct plan_wishes *w, struct plan *p, struct err *e);
     int (*gather)(const struct plan *p, int argc, char **argv, struct err *e);
-} kinds[] = {{"pathtracer", render_plan, render_gather},
-             {"grade", grade_plan, grade_gather},
-             {"validate", validate_plan, validate_gather},
-             {"reference", reference_plan, reference_gather}};
+} kinds[] = {{"pathtracer", job_render_plan, job_render_gather},
+             {"grade", job_grade_plan, job_grade_gather},
+             {"validate", job_validate_plan, job_validate_gather},
+             {"reference", job_reference_plan, job_reference_gather}};
 enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 const char *plan_text(const struct plan *p, const char *name)
@@ -381,7 +381,7 @@ int plan_gather(const struct plan *p, struct err *e)
     if (argv == NULL)
         err_set(e, "out of memory");
     for (int k = 0; k < p->num && e->msg[0] == '\0'; k++)
-        if (!plan_is_made(p, k))
+        if (!job_run_is_made(p, k))
             err_set(e, "%s: job %d of %d is not made", p->dir, k, p->num);
     if (e->msg[0] == '\0')
         code = kinds[kind_of(plan_text(p, "kind"))].gather(p, argc, argv, e);

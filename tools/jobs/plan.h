@@ -48,13 +48,13 @@ bool plan_read(const char *dir, struct plan *out, struct err *e)
     __attribute__((warn_unused_result));
 void plan_free(struct plan *p);
 
-/* Is the artefact of job k there? Whether it is what was written, plan_verify() says. */
-bool plan_is_made(const struct plan *p, int k);
-bool plan_verify(const struct plan *p, int k, struct err *e) __attribute__((warn_unused_result));
+/* Is the artefact of job k there? Whether it is what was written, job_run_verify() says. */
+bool job_run_is_made(const struct plan *p, int k);
+bool job_run_verify(const struct plan *p, int k, struct err *e) __attribute__((warn_unused_result));
 
 /* Makes it, if it is not there with the right hash: *made. Fails if an input is not the one that was planned with or the
  * program fails; then there is no artefact. Current directory: the plan's cwd. */
-bool plan_run_job(const struct plan *p, int k, bool *made, struct err *e)
+bool job_run(const struct plan *p, int k, bool *made, struct err *e)
     __attribute__((warn_unused_result));
 
 /* Puts the artefacts together to what the command would have left, and returns its exit code. Fails with EXIT_NOT_JUDGED on
@@ -65,7 +65,7 @@ int plan_gather(const struct plan *p, struct err *e);
 bool plan_enter(const struct plan *p, struct err *e) __attribute__((warn_unused_result));
 
 /* DIR/jobs/KEY of job k[/name]. */
-void plan_artefact(const struct plan *p, int k, const char *name, char path[PLAN_PATH + 256]);
+void job_run_artefact(const struct plan *p, int k, const char *name, char path[PLAN_PATH + 256]);
 /* A text of the head. */
 const char *plan_text(const struct plan *p, const char *name);
 bool plan_are_texts(const json_t *array);

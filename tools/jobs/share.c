@@ -16,7 +16,7 @@ const char *const share_common[NUM_COMMON][2] = {{"assay:version", "version of t
                                                  {"assay:adaptive", "adaptive mode"},
                                                  {"assay:seed", "seed"}};
 
-const char *part_channel(int value)
+const char *share_part_channel(int value)
 {
     static const char *const moments[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                             "M2.B", "M3.R", "M3.G", "M3.B", "n"};
@@ -59,10 +59,10 @@ static bool find_channels(const struct share *s, struct share_part *p, bool kept
     for (int i = 0; i < PART_VALUES; i++) {
         char name[64];
         if (kept)
-            part_name(p->first, p->last, i, name);
-        p->channel[i] = image_channel(&s->im, kept ? name : part_channel(i));
+            share_part_name(p->first, p->last, i, name);
+        p->channel[i] = image_channel(&s->im, kept ? name : share_part_channel(i));
         if (i < 10 && p->channel[i] < 0)
-            return err_set(e, "%s: lacks channel %s", s->path, kept ? name : part_channel(i));
+            return err_set(e, "%s: lacks channel %s", s->path, kept ? name : share_part_channel(i));
     }
     return true;
 }
@@ -145,10 +145,10 @@ void share_free(struct share *s)
     *s = (struct share){0};
 }
 
-void part_name(uint32_t first, uint32_t last, int value, char name[64])
+void share_part_name(uint32_t first, uint32_t last, int value, char name[64])
 {
     snprintf(name, 64, "%lu:%lu.%s", (unsigned long)first, (unsigned long)last,
-             part_channel(value));
+             share_part_channel(value));
 }
 
 /* "A:B,C:D" of num ranges, each of them the first two numbers of `stride` bytes; to free(), NULL out of memory. */

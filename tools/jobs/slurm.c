@@ -127,7 +127,7 @@ static void look_at_artefacts(struct cluster *c)
     c->made = 0;
     for (int k = 0; k < c->plan->num; k++) {
         struct job *j = &c->job[k];
-        j->made = j->made || plan_is_made(c->plan, k);
+        j->made = j->made || job_run_is_made(c->plan, k);
         j->looks = j->made || j->queued ? 0 : j->looks + 1;
         c->made += j->made;
     }

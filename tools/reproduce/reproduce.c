@@ -150,9 +150,9 @@ bool reproduce_ranges(const char *path, const struct image *im, char **word, int
     ok = ok && reproduced_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
     for (int k = 0; ok && k < p.num; k++) {
         bool made;
-        ok = plan_run_job(&p, k, &made, e);
+        ok = job_run(&p, k, &made, e);
     }
-    ok = ok && render_gather_quietly(&p, count, words, e);
+    ok = ok && job_render_gather_quietly(&p, count, words, e);
     plan_free(&p);
     free(argv);
     return ok || err_prefix(e, "%s: made again", path);
