@@ -199,7 +199,7 @@ static bool write_report(const struct settings *s, const struct compared *c, int
     return temp_dir_close(&dir, ok ? e : &ignored) && ok;
 }
 
-int verb_compare(int argc, char **argv, struct err *e)
+int command_compare(int argc, char **argv, struct err *e)
 {
     struct settings s = {.job.opt.alpha = 1e-3, .expect = VERDICT_EQUIVALENT};
     struct compared c;

@@ -177,7 +177,7 @@ static void tell_not_judged(void *ctx, const struct convergence_row *r)
         err_set(e, "%s: could not be judged: %s", r->engine, r->value);
 }
 
-int verb_converge(int argc, char **argv, struct err *e)
+int command_converge(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], golden[4096], share[4096];
     beside_program(pathtracer, sizeof pathtracer, "pathtracer");

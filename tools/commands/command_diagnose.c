@@ -173,7 +173,7 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
     return !ok ? EXIT_NOT_JUDGED : d.finding == FINDING_CORRECT ? EXIT_EQUIVALENT : EXIT_DIFFERENT;
 }
 
-int verb_diagnose(int argc, char **argv, struct err *e)
+int command_diagnose(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], catalogue[4096];
     beside_program(pathtracer, sizeof pathtracer, "pathtracer");

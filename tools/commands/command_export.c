@@ -17,7 +17,7 @@ static bool parse(int argc, char **argv, struct export_job *s, struct err *e)
                    s->out);
 }
 
-int verb_export(int argc, char **argv, struct err *e)
+int command_export(int argc, char **argv, struct err *e)
 {
     struct export_job s;
     if (!parse(argc, argv, &s, e))

@@ -243,14 +243,14 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
                                              : EXIT_EQUIVALENT;
 }
 
-int verb_golden(int argc, char **argv, struct err *e)
+int command_golden(int argc, char **argv, struct err *e)
 {
     struct settings s = {
         .suite_dir = "reference/scenes",
         .opt = {.from_dir = "build/golden-candidate", .golden_dir = "golden", .alpha = 1e-3}};
     const char *what = argc > 1 ? argv[1] : "";
     if (strcmp(what, "render") == 0)
-        return verb_reference(argc - 1, argv + 1, e);
+        return command_reference(argc - 1, argv + 1, e);
     bool is_status = strcmp(what, "status") == 0, help = strcmp(what, "--help") == 0;
     if (!is_status && !help && strcmp(what, "approve") != 0) {
         err_set(e, "golden: '%s' is none of render, status, approve (see --help)", what);

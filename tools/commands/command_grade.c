@@ -149,7 +149,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
     return code;
 }
 
-int verb_grade(int argc, char **argv, struct err *e)
+int command_grade(int argc, char **argv, struct err *e)
 {
     struct grade_paths at;
     struct grade_settings s = grade_options_default(argc, &at);

@@ -57,7 +57,7 @@ static bool parse(int argc, char **argv, struct settings *s, struct err *e)
     return ok;
 }
 
-int verb_import_check(int argc, char **argv, struct err *e)
+int command_import_check(int argc, char **argv, struct err *e)
 {
     struct settings s = {
         .suite = "reference/scenes",

@@ -83,7 +83,7 @@ static void print_help(const char *verb, const char *what)
     cli_print_options(stdout, options);
 }
 
-int verb_plan(int argc, char **argv, struct err *e)
+int command_plan(int argc, char **argv, struct err *e)
 {
     struct words w;
     struct plan p;
@@ -129,7 +129,7 @@ static bool open_plan(int argc, char **argv, const char *help, struct plan *p, i
     return false;
 }
 
-int verb_run_job(int argc, char **argv, struct err *e)
+int command_run_job(int argc, char **argv, struct err *e)
 {
     struct plan p;
     int code, failed = 0;
@@ -165,7 +165,7 @@ int verb_run_job(int argc, char **argv, struct err *e)
     return failed > 0 ? EXIT_NOT_JUDGED : 0;
 }
 
-int verb_gather(int argc, char **argv, struct err *e)
+int command_gather(int argc, char **argv, struct err *e)
 {
     struct plan p;
     int code;
@@ -203,7 +203,7 @@ int slurm_command(const char *dir, int argc, char **argv, const struct plan_wish
     return code;
 }
 
-int verb_slurm(int argc, char **argv, struct err *e)
+int command_slurm(int argc, char **argv, struct err *e)
 {
     struct words w;
     if (!parse(argc, argv, &w, e))

@@ -8,7 +8,7 @@
 
 static const struct cli_option options[] = {{'h', "help", 0, "", "print this"}, {0}};
 
-int verb_merge(int argc, char **argv, struct err *e)
+int command_merge(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     int code = EXIT_NOT_JUDGED, num = 0;

@@ -69,7 +69,7 @@ static int on_slurm(int argc, char **argv, struct err *e)
     return code;
 }
 
-int verb_reference(int argc, char **argv, struct err *e)
+int command_reference(int argc, char **argv, struct err *e)
 {
     struct reference_command c;
     int code = EXIT_NOT_JUDGED;

@@ -116,7 +116,7 @@ static int write_history(const char *dir, const char *out, struct err *e)
     return code;
 }
 
-int verb_report(int argc, char **argv, struct err *e)
+int command_report(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     const char *results = NULL, *converge = NULL, *out = NULL, *history = NULL;

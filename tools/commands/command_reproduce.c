@@ -32,7 +32,7 @@ static void print_help(void)
     cli_print_options(stdout, options);
 }
 
-int verb_reproduce(int argc, char **argv, struct err *e)
+int command_reproduce(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     struct reproduce_options opt = {0};

@@ -286,7 +286,7 @@ int validate_command_finish(const struct validate_command *c, const json_t *resu
     return code;
 }
 
-int verb_validate(int argc, char **argv, struct err *e)
+int command_validate(int argc, char **argv, struct err *e)
 {
     struct validate_command c;
     json_t *results = NULL;

@@ -13,7 +13,7 @@ static const struct cli_option options[] = {
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
-int verb_watch(int argc, char **argv, struct err *e)
+int command_watch(int argc, char **argv, struct err *e)
 {
     struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
     const char *dir = NULL;

@@ -5,23 +5,23 @@
 
 #include "renderer/base/err.h"
 
-int verb_validate(int argc, char **argv, struct err *e);
-int verb_compare(int argc, char **argv, struct err *e);
-int verb_converge(int argc, char **argv, struct err *e);
-int verb_reference(int argc, char **argv, struct err *e);
-int verb_golden(int argc, char **argv, struct err *e);
-int verb_export(int argc, char **argv, struct err *e);
-int verb_import_check(int argc, char **argv, struct err *e);
-int verb_merge(int argc, char **argv, struct err *e);
-int verb_diagnose(int argc, char **argv, struct err *e);
-int verb_watch(int argc, char **argv, struct err *e);
-int verb_grade(int argc, char **argv, struct err *e);
-int verb_reproduce(int argc, char **argv, struct err *e);
-int verb_report(int argc, char **argv, struct err *e);
-int verb_plan(int argc, char **argv, struct err *e);
-int verb_run_job(int argc, char **argv, struct err *e);
-int verb_gather(int argc, char **argv, struct err *e);
-int verb_slurm(int argc, char **argv, struct err *e);
+int command_validate(int argc, char **argv, struct err *e);
+int command_compare(int argc, char **argv, struct err *e);
+int command_converge(int argc, char **argv, struct err *e);
+int command_reference(int argc, char **argv, struct err *e);
+int command_golden(int argc, char **argv, struct err *e);
+int command_export(int argc, char **argv, struct err *e);
+int command_import_check(int argc, char **argv, struct err *e);
+int command_merge(int argc, char **argv, struct err *e);
+int command_diagnose(int argc, char **argv, struct err *e);
+int command_watch(int argc, char **argv, struct err *e);
+int command_grade(int argc, char **argv, struct err *e);
+int command_reproduce(int argc, char **argv, struct err *e);
+int command_report(int argc, char **argv, struct err *e);
+int command_plan(int argc, char **argv, struct err *e);
+int command_run_job(int argc, char **argv, struct err *e);
+int command_gather(int argc, char **argv, struct err *e);
+int command_slurm(int argc, char **argv, struct err *e);
 
 /* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
  * jobs on the cluster, gathers. w NULL: no wishes. */

@@ -22,7 +22,7 @@ static bool prepare(const char *references, char *const *words, int num, struct 
     if (num > MOST - 1)
         return err_set(e, "too many options for a plan");
     memcpy(argv + 5, words, (size_t)num * sizeof *words);
-    return verb_grade(5 + num, (char **)argv, e) == 0;
+    return command_grade(5 + num, (char **)argv, e) == 0;
 }
 
 static bool beside_rubric(struct plan *p, const struct rubric *r, const char *name, struct err *e)
@@ -151,7 +151,7 @@ int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
             if (strcmp(argv[i], "--slurm") != 0)
                 words[num++] = argv[i];
     }
-    int code = ok ? verb_grade(num, (char **)words, e) : EXIT_NOT_JUDGED;
+    int code = ok ? command_grade(num, (char **)words, e) : EXIT_NOT_JUDGED;
     free(s.submission);
     free(words);
     return code;
