@@ -22,7 +22,7 @@ static void note_text(void *failed, const char *text, ...)
     *(bool *)failed = true;
 }
 
-void xml_complaints_to(bool *failed)
+void xml_errors_to(bool *failed)
 {
     xmlSetStructuredErrorFunc(failed, failed != NULL ? note : NULL);
     xmlSetGenericErrorFunc(failed, failed != NULL ? note_text : NULL);

@@ -73,7 +73,7 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         return NULL;
     }
     double nearest, furthest;
-    scene_distances(s, c->eye, &nearest, &furthest);
+    features_distances(s, c->eye, &nearest, &furthest);
     nearest -= (double)c->lens_radius; /* where a ray may start */
     furthest += (double)c->lens_radius;
     if (!(nearest > c->near && nearest > 0)) {

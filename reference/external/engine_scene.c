@@ -61,7 +61,7 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
         return false;
     /* Mitsuba's count of bounces is ours plus one whoever reads the file, and so on: that is the
      * exporter's business. depth_offset is only for {depth}. */
-    bool ok = check_features(en, scene_features(&s, &c), e);
+    bool ok = check_features(en, features_of_scene(&s, &c), e);
     if (ok && snprintf(path, PATH_SIZE, "%s/scene.%s", dir, ending_of(en->format)) >= PATH_SIZE)
         ok = err_set(e, "%.64s...: path too long", dir);
     switch (en->format) {

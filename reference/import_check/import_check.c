@@ -20,9 +20,9 @@ static bool read_vector(const struct import_pair *pair, const json_t *object, co
                         point *out, struct err *e)
 {
     point p = {0};
-    if (!import_read_point(json_object_get(object, key), 0, &p))
+    if (!import_geometry_read_point(json_object_get(object, key), 0, &p))
         return err_set(e, "blender_import.py: '%s' is not three numbers", key);
-    *out = import_point(pair, p);
+    *out = import_geometry_point(pair, p);
     return true;
 }
 
@@ -31,7 +31,7 @@ static bool compare_camera(struct import_pair *pair, const struct camera *c, con
 {
     const json_t *camera = json_array_get(cameras, 0);
     if (json_array_size(cameras) != 1) {
-        import_differ(pair, "Blender has %zu cameras", json_array_size(cameras));
+        import_geometry_differ(pair, "Blender has %zu cameras", json_array_size(cameras));
         return true;
     }
     if (json_object_get(camera, "eye") == NULL) {
@@ -48,21 +48,23 @@ static bool compare_camera(struct import_pair *pair, const struct camera *c, con
         double angle = point_angle(point_of(ours[i]), p);
         out->axis_error = fmax(out->axis_error, angle);
         if (!(angle <= AXIS_TOLERANCE))
-            import_differ(pair, "camera: '%s' is %.3g rad from Blender's", names[i], angle);
+            import_geometry_differ(pair, "camera: '%s' is %.3g rad from Blender's", names[i],
+                                   angle);
     }
     if (!read_vector(pair, camera, "eye", &p, e))
         return false;
     double d = point_length(point_sub(p, point_of(c->eye))) / pair->extent;
     out->place_error = fmax(out->place_error, d);
     if (!(d <= IMPORT_PLACE_TOLERANCE))
-        import_differ(pair, "camera: %.3g of the scene's extent from Blender's", d);
+        import_geometry_differ(pair, "camera: %.3g of the scene's extent from Blender's", d);
     const json_t *tan_h = json_object_get(camera, "tan_h");
     if (!json_is_number(tan_h))
         return err_set(e, "blender_import.py: a camera without 'tan_h'");
     out->angle_error = fabs(json_number_value(tan_h) / (double)c->tan_h - 1);
     if (!(out->angle_error <= ANGLE_TOLERANCE))
-        import_differ(pair, "camera: tangent of half the angle of view %.6f, Blender has %.6f",
-                      (double)c->tan_h, json_number_value(tan_h));
+        import_geometry_differ(pair,
+                               "camera: tangent of half the angle of view %.6f, Blender has %.6f",
+                               (double)c->tan_h, json_number_value(tan_h));
     return true;
 }
 
@@ -137,11 +139,11 @@ static bool compare_lights(struct import_pair *pair, const json_t *lights, json_
         if (ok && !known && strcmp(kind, "SUN") == 0 && s->environment != NULL && num_ambient-- > 0)
             known = true;
         if (ok && !known)
-            import_differ(pair, "Blender's light '%s' (%s) is none of ours", name, kind);
+            import_geometry_differ(pair, "Blender's light '%s' (%s) is none of ours", name, kind);
     }
     for (uint32_t l = 0; ok && l < s->num_lights; l++)
         if (s->lights[l].kind <= LIGHT_DIRECTIONAL && !used[l])
-            import_differ(pair, "light %u of ours is none of Blender's", l);
+            import_geometry_differ(pair, "light %u of ours is none of Blender's", l);
     free(used);
     return ok;
 }
@@ -158,12 +160,13 @@ static void count_unread(struct import_pair *pair, const bool *found)
             missing++;
         }
     if (missing > 0)
-        import_differ(pair, "%u triangles of ours are none of Blender's, first one of '%s'",
-                      missing, s->objects[s->tri_object[first]].name);
+        import_geometry_differ(pair,
+                               "%u triangles of ours are none of Blender's, first one of '%s'",
+                               missing, s->objects[s->tri_object[first]].name);
 }
 
-bool import_compare(const struct scene *s, const struct camera *c, const json_t *dump,
-                    struct import_report *out, struct err *e)
+bool import_check_compare(const struct scene *s, const struct camera *c, const json_t *dump,
+                          struct import_report *out, struct err *e)
 {
     *out = (struct import_report){.agrees = true};
     const char *error = json_string_value(json_object_get(dump, "error"));
@@ -186,7 +189,7 @@ bool import_compare(const struct scene *s, const struct camera *c, const json_t 
     bool *found = calloc((size_t)s->num_triangles + 2, sizeof *found);
     if (found == NULL)
         return err_set(e, "import check: out of memory");
-    bool ok = import_compare_meshes(&pair, meshes, found, e) &&
+    bool ok = import_geometry_compare(&pair, meshes, found, e) &&
               compare_camera(&pair, c, cameras, e) &&
               compare_lights(&pair, lights,
                              json_integer_value(json_object_get(dump, "num_ambient")), found, e);
@@ -233,8 +236,8 @@ static bool read_dumps(int num, const char *dir, json_t **dumps, struct err *e)
     return true;
 }
 
-bool import_run(const struct suite_scene *const *scene, int num, const struct import_options *opt,
-                json_t **dumps, struct err *e)
+bool import_check_run(const struct suite_scene *const *scene, int num,
+                      const struct import_options *opt, json_t **dumps, struct err *e)
 {
     char dir[4096], log[4096 + 32], relative[4096 + 32];
     int n = snprintf(dir, sizeof dir, "%s/import-XXXXXX", opt->work_dir);
@@ -295,7 +298,7 @@ bool import_check(const struct suite_scene *const *scene, int num, const struct 
                   json_t **reports, struct err *e)
 {
     json_t *dumps, *all = json_array();
-    if (!import_run(scene, num, opt, &dumps, e)) {
+    if (!import_check_run(scene, num, opt, &dumps, e)) {
         json_decref(all);
         return false;
     }
@@ -307,7 +310,7 @@ bool import_check(const struct suite_scene *const *scene, int num, const struct 
         struct err why = {0};
         json_t *report = NULL;
         if (suite_open(scene[i], &s, &c, &why)) {
-            if (import_compare(&s, &c, json_array_get(dumps, (size_t)i), &r, &why))
+            if (import_check_compare(&s, &c, json_array_get(dumps, (size_t)i), &r, &why))
                 report = report_json(scene[i]->name, &r);
             scene_free(&s);
         }

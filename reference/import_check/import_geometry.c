@@ -9,7 +9,7 @@
 enum { LARGEST_POLYGON = 16384 };
 static const uint32_t none = UINT32_MAX;
 
-void import_differ(struct import_pair *pair, const char *fmt, ...)
+void import_geometry_differ(struct import_pair *pair, const char *fmt, ...)
 {
     if (!pair->out->agrees)
         return;
@@ -39,7 +39,7 @@ struct check {
  *   Y_UP         (x,-z,y)   (x,y,z)
  *   Z_UP         (x,y,z)    (-x,z,y)
  *   X_UP         (-z,y,x)   (y,x,-z) */
-point import_point(const struct import_pair *pair, point b)
+point import_geometry_point(const struct import_pair *pair, point b)
 {
     switch (pair->axis) {
     case 'Z': return (point){-b.x, b.z, b.y};
@@ -140,10 +140,10 @@ static void check_normal(struct check *c, uint32_t corner, point theirs, double 
     c->pair->out->normal_error = fmax(c->pair->out->normal_error, angle);
     c->pair->out->normals++;
     if (!(angle <= tolerance))
-        import_differ(c->pair, "normal at (%.4f, %.4f, %.4f): %.4f rad from Blender's",
-                      (double)c->pair->s->position[corner].x,
-                      (double)c->pair->s->position[corner].y,
-                      (double)c->pair->s->position[corner].z, angle);
+        import_geometry_differ(c->pair, "normal at (%.4f, %.4f, %.4f): %.4f rad from Blender's",
+                               (double)c->pair->s->position[corner].x,
+                               (double)c->pair->s->position[corner].y,
+                               (double)c->pair->s->position[corner].z, angle);
 }
 
 static size_t corner_of(const struct polygon *p, uint32_t vertex)
@@ -184,7 +184,7 @@ static void match_polygon(struct check *c, const struct polygon *p)
         around += point_length(point_sub(b, a));
         p->vertex[i] = find_vertex(c, a);
         if (p->vertex[i] == none) {
-            import_differ(
+            import_geometry_differ(
                 c->pair,
                 "%s, polygon %zu: Blender has a corner at (%.5f, %.5f, %.5f), we have none",
                 p->object, p->index, a.x, a.y, a.z);
@@ -220,12 +220,12 @@ static void match_polygon(struct check *c, const struct polygon *p)
     c->pair->out->triangles += taken;
     c->pair->out->polygons++;
     if (!(point_length(point_sub(area, covered)) <= tolerance))
-        import_differ(
+        import_geometry_differ(
             c->pair, "%s, polygon %zu: our triangles do not make it up, by %.3g of its area",
             p->object, p->index, point_length(point_sub(area, covered)) / point_length(area));
 }
 
-bool import_read_point(const json_t *array, size_t at, point *out)
+bool import_geometry_read_point(const json_t *array, size_t at, point *out)
 {
     const json_t *v[3];
     for (size_t i = 0; i < 3; i++) {
@@ -256,10 +256,11 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
         json_int_t n = json_integer_value(json_array_get(sizes, i));
         ok = n >= 3 && n <= LARGEST_POLYGON;
         for (size_t k = 0; ok && k < (size_t)n; k++, at += 3) {
-            ok = import_read_point(corners, at, &places[k]) &&
-                 (!json_is_array(normals) || import_read_point(normals, at, &directions[k]));
-            places[k] = import_point(c->pair, places[k]);
-            directions[k] = import_point(c->pair, directions[k]);
+            ok = import_geometry_read_point(corners, at, &places[k]) &&
+                 (!json_is_array(normals) ||
+                  import_geometry_read_point(normals, at, &directions[k]));
+            places[k] = import_geometry_point(c->pair, places[k]);
+            directions[k] = import_geometry_point(c->pair, directions[k]);
         }
         if (!ok) {
             err_set(e, "blender_import.py: mesh '%s', polygon %zu: not numbers", name, i);
@@ -280,8 +281,8 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
     return ok;
 }
 
-bool import_compare_meshes(struct import_pair *pair, const json_t *meshes, bool *found,
-                           struct err *e)
+bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, bool *found,
+                             struct err *e)
 {
     struct check c = {
         .pair = pair, .tolerance = IMPORT_PLACE_TOLERANCE * pair->extent, .found = found};

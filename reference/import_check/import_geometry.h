@@ -23,16 +23,16 @@ struct import_pair {
 };
 
 /* From Blender's axes to ours. */
-point import_point(const struct import_pair *pair, point b);
+point import_geometry_point(const struct import_pair *pair, point b);
 /* Three numbers from `at` on; false if they are none. */
-bool import_read_point(const json_t *array, size_t at, point *out);
+bool import_geometry_read_point(const json_t *array, size_t at, point *out);
 /* The first difference of a file is the one that is reported. */
-void import_differ(struct import_pair *pair, const char *fmt, ...)
+void import_geometry_differ(struct import_pair *pair, const char *fmt, ...)
     __attribute__((format(printf, 2, 3)));
 
 /* found: one per triangle of ours, set for those that some polygon is made of. */
-bool import_compare_meshes(struct import_pair *pair, const json_t *meshes, bool *found,
-                           struct err *e) __attribute__((warn_unused_result));
+bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, bool *found,
+                             struct err *e) __attribute__((warn_unused_result));
 
 static inline point point_of(vec3 v)
 {

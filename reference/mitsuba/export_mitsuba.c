@@ -52,7 +52,7 @@ static void put_camera(struct writer *w)
     mitsuba_begin(w->xml, "sensor", c->lens_radius > 0 ? "thinlens" : "perspective", NULL, NULL);
     mitsuba_real(w->xml, "float", "fov", 2 * atan((double)c->tan_h) * 180 / M_PI);
     mitsuba_text(w->xml, "string", "fov_axis", "x");
-    /* Depths, not distances along the ray; nothing is cut (check_exportable()). */
+    /* Depths, not distances along the ray; nothing is cut (features_check_exportable()). */
     double corner = sqrt(1 + (double)c->tan_h * c->tan_h + (double)c->tan_v * c->tan_v);
     mitsuba_real(w->xml, "float", "near_clip", (double)c->near / corner);
     mitsuba_real(w->xml, "float", "far_clip", (double)c->far);
@@ -219,7 +219,7 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
     char ending[32];
     bool smooth = false;
     for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++)
-        smooth = smooth || !triangle_is_flat(w->s, i);
+        smooth = smooth || !features_triangle_is_flat(w->s, i);
     /* The side that glows is the geometric normal's for us, the shading normal's for Mitsuba. */
     if (smooth && !rgb_is_zero(m->radiance)) {
         smooth = false;
@@ -366,7 +366,7 @@ bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
     struct mitsuba_xml xml;
     struct writer w = {
         .xml = &xml, .s = s, .c = c, .stem = stem, .base = slash != NULL ? slash + 1 : stem};
-    if (!check_exportable("Mitsuba", s, c, e))
+    if (!features_check_exportable("Mitsuba", s, c, e))
         return false;
     bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) &&
               mitsuba_write(&xml, path, origin, w.named, e);

@@ -11,7 +11,7 @@
  * parameters $spp and $seed. The scene says its origin in comments unless that is NULL; the files beside it do not. Fails with one line on what Mitsuba cannot express: a boundary that only
  * refracts, Schlick's approximation, correlated shadowing, emission on both sides, smooth emitters
  * that reflect, a falloff that is not the inverse square, spot lights that are brighter in the
- * middle, the ambient light of the assignment, and what check_exportable() refuses. */
+ * middle, the ambient light of the assignment, and what features_check_exportable() refuses. */
 bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
                     const struct export_origin *origin, const char *path, struct err *e)
     __attribute__((warn_unused_result));

@@ -18,7 +18,7 @@ static void attribute(struct mitsuba_xml *x, const char *name, const char *value
 bool mitsuba_new(struct mitsuba_xml *x, struct err *e)
 {
     *x = (struct mitsuba_xml){.w = NULL};
-    xml_complaints_to(&x->failed);
+    xml_errors_to(&x->failed);
     x->buffer = xmlBufferCreate();
     if (x->buffer != NULL)
         x->w = xmlNewTextWriterMemory(x->buffer, 0);
@@ -58,7 +58,7 @@ void mitsuba_free(struct mitsuba_xml *x)
         xmlFreeTextWriter(x->w);
     if (x->buffer != NULL)
         xmlBufferFree(x->buffer);
-    xml_complaints_to(NULL);
+    xml_errors_to(NULL);
     *x = (struct mitsuba_xml){0};
 }
 

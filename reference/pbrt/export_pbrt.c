@@ -125,7 +125,7 @@ static void put_mesh(const struct writer *w, const struct object *o)
     bool smooth = false;
     fputs("Shape \"trianglemesh\" \"point3 P\" [", w->f);
     for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++) {
-        smooth = smooth || !triangle_is_flat(w->s, i);
+        smooth = smooth || !features_triangle_is_flat(w->s, i);
         for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++) {
             vec3 p = w->s->position[k];
             fprintf(w->f, "\n  %.9g %.9g %.9g", (double)p.x, (double)p.y, (double)p.z);
@@ -224,7 +224,7 @@ bool export_pbrt(const struct scene *s, const struct camera *c, int depth, FILE 
 {
     assert(depth >= 0);
     struct writer w = {f, s};
-    if (!check_exportable("pbrt", s, c, e))
+    if (!features_check_exportable("pbrt", s, c, e))
         return false;
     fprintf(f,
             "# pbrt --spp 64 --seed 1 --outfile OUT.exr THIS\n"

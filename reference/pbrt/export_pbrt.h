@@ -12,7 +12,7 @@
  * refraction that reflect less than all, Beckmann's distribution, separable shadowing, tinted glass,
  * a boundary that only refracts, Schlick's approximation, a falloff that is not the inverse square,
  * spot lights that are brighter in the middle, environment pictures, the ambient light of the
- * assignment, and what check_exportable() refuses. f stays open. */
+ * assignment, and what features_check_exportable() refuses. f stays open. */
 bool export_pbrt(const struct scene *s, const struct camera *c, int depth, FILE *f, struct err *e)
     __attribute__((warn_unused_result));
 

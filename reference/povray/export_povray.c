@@ -306,8 +306,8 @@ bool export_povray(const struct scene *s, const struct camera *c, int depth,
 {
     assert(v->lamp_cells >= 1 && (v->rule != POVRAY_GAUSS || v->lamp_cells % 2 == 0));
     assert(v->roulette >= 0 && v->roulette < 1 && v->scale > 0);
-    struct povray_plan plan;
-    if (!povray_plan(s, c, depth, &plan, e))
+    struct povray_passes plan;
+    if (!povray_passes(s, c, depth, &plan, e))
         return false;
     assert(v->pass >= 0 && v->pass < plan.num_passes);
     const struct povray_pass *pass = &plan.pass[v->pass];

@@ -9,7 +9,7 @@ struct povray_writer {
     FILE *f;
     const struct scene *s;
     const struct povray_variant *v;
-    const struct povray_plan *plan;
+    const struct povray_passes *plan;
     const struct povray_pass *pass;
     bool radiosity;
     bool hide_reflections; /* total reflection has to find nothing */

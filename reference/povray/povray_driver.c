@@ -1,4 +1,4 @@
-/* Drives POV-Ray: the pictures of a povray_set, rendered side by side. */
+/* Drives POV-Ray: the pictures of a povray_replicates, rendered side by side. */
 #include "reference/replicates/engine_driver.h"
 
 #include "povray_replicates.h"
@@ -16,7 +16,7 @@
 
 /* What the workers share. */
 struct crew {
-    const struct povray_set *set;
+    const struct povray_replicates *set;
     const struct reference_job *job; /* of the set */
     const char *program;
     int first, last; /* of the pictures that are wanted */
@@ -129,13 +129,13 @@ static bool run_task(struct crew *w, int t, struct err *e)
     bool ok = out != NULL || err_set(e, "a picture: out of memory");
     for (int pass = 0; ok && pass < w->set->plan.num_passes; pass++) {
         if (t < POVRAY_WINDOWS) {
-            struct povray_image fine = povray_set_window(w->set, t, pass);
+            struct povray_image fine = povray_replicates_window(w->set, t, pass);
             ok = render_one(w, &fine, 1, out, e);
         } else if (w->set->plan.pass[pass].recursion > 0) {
             struct povray_image indirect =
-                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, true);
+                povray_replicates_replicate(w->set, t - POVRAY_WINDOWS, pass, true);
             struct povray_image direct =
-                povray_set_replicate(w->set, t - POVRAY_WINDOWS, pass, false);
+                povray_replicates_replicate(w->set, t - POVRAY_WINDOWS, pass, false);
             ok = render_one(w, &indirect, 1, out, e) && render_one(w, &direct, -1, out, e);
         }
     }
@@ -216,13 +216,13 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
                    struct err *e)
 {
     char program[4096], version[128], sha256[65];
-    struct povray_set set;
+    struct povray_replicates set;
     struct crew w = {.set = &set, .job = job, .program = program, .first = first, .last = last};
     if (!process_find("povray", program, sizeof program))
         return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
     if (strlen(job->dir) >= 4096)
         return err_set(e, "%.64s...: path too long", job->dir);
-    if (!povray_set(job, &set, e))
+    if (!povray_replicates(job, &set, e))
         return false;
     w.next = first;
     return run_crew(&w, e) && engine_version(&w, version, e) && sha256_file(program, sha256, e) &&
@@ -233,22 +233,22 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
 
 static bool count(const struct reference_job *job, int *num, struct err *e)
 {
-    struct povray_set set;
-    if (!povray_set(job, &set, e))
+    struct povray_replicates set;
+    if (!povray_replicates(job, &set, e))
         return false;
     *num = POVRAY_WINDOWS + set.replicates;
     return true;
 }
 
-const struct driver povray_driver = {.engine = "povray",
-                                     .prefix = "picture",
-                                     .below_zero = true,
-                                     .count = count,
-                                     .render = render,
-                                     .fold = povray_fold};
+const struct engine_driver povray_driver = {.engine = "povray",
+                                            .prefix = "picture",
+                                            .below_zero = true,
+                                            .count = count,
+                                            .render = render,
+                                            .fold = povray_fold};
 
 bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
                    struct err *e)
 {
-    return driver_render(&povray_driver, job, out, manifest, e);
+    return engine_driver_render(&povray_driver, job, out, manifest, e);
 }

@@ -153,7 +153,7 @@ static void count_materials(const struct scene *s, struct census *n)
     }
 }
 
-static bool plan_falloff(const struct light *l, struct povray_plan *p, struct err *e)
+static bool plan_falloff(const struct light *l, struct povray_passes *p, struct err *e)
 {
     bool constant = l->attenuation[0] > 0 && l->attenuation[1] == 0 && l->attenuation[2] == 0;
     bool square = l->attenuation[0] == 0 && l->attenuation[1] == 0 && l->attenuation[2] > 0;
@@ -166,7 +166,7 @@ static bool plan_falloff(const struct light *l, struct povray_plan *p, struct er
     return true;
 }
 
-static bool plan_environment(const struct environment *env, struct povray_plan *p, struct err *e)
+static bool plan_environment(const struct environment *env, struct povray_passes *p, struct err *e)
 {
     struct environment_parts sky = environment_parts(env);
     if (environment_is_hidden(env))
@@ -180,7 +180,7 @@ static bool plan_environment(const struct environment *env, struct povray_plan *
     return true;
 }
 
-static bool plan_lights(const struct scene *s, struct povray_plan *p, struct census *n,
+static bool plan_lights(const struct scene *s, struct povray_passes *p, struct census *n,
                         struct err *e)
 {
     for (uint32_t i = 0; i < s->num_lights; i++) {
@@ -234,7 +234,7 @@ static void set_levels(struct povray_pass *pass, bool specular, int surfaces)
 }
 
 static void plan_passes(const struct scene *s, const struct census *n, int depth,
-                        struct povray_plan *p)
+                        struct povray_passes *p)
 {
     struct povray_pass lit = {.sources = true}, seen = {.glow = true};
     bool lone = one_plane_reflects(s, p->extent);
@@ -260,7 +260,7 @@ static void plan_passes(const struct scene *s, const struct census *n, int depth
     p->specular = n->specular;
 }
 
-static bool check_depth(const struct povray_plan *p, const struct census *n, int depth,
+static bool check_depth(const struct povray_passes *p, const struct census *n, int depth,
                         struct err *e)
 {
     for (int i = 0; i < p->num_passes; i++) {
@@ -278,7 +278,7 @@ static bool check_depth(const struct povray_plan *p, const struct census *n, int
     return true;
 }
 
-bool povray_plan_is_noisy(const struct povray_plan *p)
+bool povray_passes_are_noisy(const struct povray_passes *p)
 {
     bool indirect = false;
     for (int i = 0; i < p->num_passes; i++)
@@ -286,11 +286,11 @@ bool povray_plan_is_noisy(const struct povray_plan *p)
     return indirect && !p->constant;
 }
 
-bool povray_plan(const struct scene *s, const struct camera *c, int depth, struct povray_plan *out,
-                 struct err *e)
+bool povray_passes(const struct scene *s, const struct camera *c, int depth,
+                   struct povray_passes *out, struct err *e)
 {
     assert(depth >= 0);
-    struct povray_plan p = {0};
+    struct povray_passes p = {0};
     struct census n = {0};
     p.extent = length(sub(s->bounds_max, s->bounds_min));
     for (uint32_t i = 0; i < s->num_materials; i++)

@@ -27,7 +27,7 @@ struct povray_pass {
     double bailout_indirect;
 };
 
-struct povray_plan {
+struct povray_passes {
     struct povray_pass pass[2];
     int num_passes; /* 1 or 2 */
     bool specular;  /* there is a mirror, glass or refraction */
@@ -46,11 +46,11 @@ struct povray_plan {
  * red, green or blue but emits it while reflecting others, glass that povray_glass.h refuses, depth
  * beyond what is verified, shading normals behind their triangle, and sizes at which POV-Ray's fixed
  * tolerances show. */
-bool povray_plan(const struct scene *s, const struct camera *c, int depth, struct povray_plan *out,
-                 struct err *e) __attribute__((warn_unused_result));
+bool povray_passes(const struct scene *s, const struct camera *c, int depth,
+                   struct povray_passes *out, struct err *e) __attribute__((warn_unused_result));
 
 /* Some pass has indirect light that is not constant: the pictures have noise. */
-bool povray_plan_is_noisy(const struct povray_plan *p);
+bool povray_passes_are_noisy(const struct povray_passes *p);
 
 enum {
     POVRAY_MOST_TEXELS = 254, /* POV-Ray's maps hold 256 entries, two of which close the circle */

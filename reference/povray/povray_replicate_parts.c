@@ -31,20 +31,20 @@ static void set_shift(struct povray_image *p, int width, int height, double u, d
     p->variant.shift_y = (v - 0.5) / (p->grid * height);
 }
 
-static double scale_within_octave(const struct povray_plan *plan, double u)
+static double scale_within_octave(const struct povray_passes *plan, double u)
 {
     return POVRAY_TOP_VALUE / plan->radiance * exp2(u);
 }
 
 /* As many cells a side as keep all lamps together below `most` spotlights. */
-static int cells(const struct povray_plan *plan, const int *choice, int most)
+static int cells(const struct povray_passes *plan, const int *choice, int most)
 {
     while (choice[1] != 0 && plan->num_lamps * *choice * *choice > most)
         choice++;
     return *choice;
 }
 
-struct povray_image povray_window(const struct povray_plan *plan, int width, int height, int j,
+struct povray_image povray_window(const struct povray_passes *plan, int width, int height, int j,
                                   int pass)
 {
     assert(j >= 0 && j < POVRAY_WINDOWS);
@@ -66,7 +66,7 @@ struct povray_image povray_window(const struct povray_plan *plan, int width, int
     return p;
 }
 
-struct povray_image povray_replicate(const struct povray_plan *plan, int width, int height,
+struct povray_image povray_replicate(const struct povray_passes *plan, int width, int height,
                                      int grid, int i, uint32_t seed, int pass, bool indirect)
 {
     assert(grid > 0 && i >= 0);

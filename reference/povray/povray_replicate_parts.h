@@ -40,10 +40,10 @@ struct povray_image {
 /* Both are of pass `pass` of the plan.
  * Window j, 0 <= j < POVRAY_WINDOWS, of a picture of width x height. The shifts are a Hammersley set
  * over one sub-pixel. */
-struct povray_image povray_window(const struct povray_plan *plan, int width, int height, int j,
+struct povray_image povray_window(const struct povray_passes *plan, int width, int height, int j,
                                   int pass);
 /* One of the two pictures of replicate i, of which everything random follows from seed. */
-struct povray_image povray_replicate(const struct povray_plan *plan, int width, int height,
+struct povray_image povray_replicate(const struct povray_passes *plan, int width, int height,
                                      int grid, int i, uint32_t seed, int pass, bool indirect);
 
 #endif

@@ -8,25 +8,27 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool povray_set(const struct reference_job *job, struct povray_set *out, struct err *e)
+bool povray_replicates(const struct reference_job *job, struct povray_replicates *out,
+                       struct err *e)
 {
-    *out = (struct povray_set){.job = job,
-                               .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
-    if (!povray_plan(job->scene, job->camera, job->suite->depth, &out->plan, e))
+    *out = (struct povray_replicates){
+        .job = job, .size = (size_t)job->suite->width * (size_t)job->suite->height * 3};
+    if (!povray_passes(job->scene, job->camera, job->suite->depth, &out->plan, e))
         return false;
-    if (povray_plan_is_noisy(&out->plan)) {
+    if (povray_passes_are_noisy(&out->plan)) {
         assert(job->ref->replicates > 1 && job->ref->subgrid > 0);
         out->replicates = job->ref->replicates;
     }
     return true;
 }
 
-struct povray_image povray_set_window(const struct povray_set *s, int j, int pass)
+struct povray_image povray_replicates_window(const struct povray_replicates *s, int j, int pass)
 {
     return povray_window(&s->plan, s->job->suite->width, s->job->suite->height, j, pass);
 }
 
-struct povray_image povray_set_replicate(const struct povray_set *s, int i, int pass, bool indirect)
+struct povray_image povray_replicates_replicate(const struct povray_replicates *s, int i, int pass,
+                                                bool indirect)
 {
     i += s->job->opt->first_replicate;
     return povray_replicate(&s->plan, s->job->suite->width, s->job->suite->height,
@@ -34,7 +36,7 @@ struct povray_image povray_set_replicate(const struct povray_set *s, int i, int 
                             indirect);
 }
 
-void povray_command_line(const struct povray_set *s, const char *program,
+void povray_command_line(const struct povray_replicates *s, const char *program,
                          const struct povray_image *p, char text[4][32],
                          const char *argv[POVRAY_ARGS])
 {
@@ -48,14 +50,14 @@ void povray_command_line(const struct povray_set *s, const char *program,
     memcpy(argv, args, sizeof args);
 }
 
-static bool describe(const struct povray_set *s, const json_t *said, json_t *manifest,
+static bool describe(const struct povray_replicates *s, const json_t *said, json_t *manifest,
                      struct err *e)
 {
     char text[4][32], command[512] = "povray";
     const char *argv[POVRAY_ARGS];
     int replicates = s->replicates;
-    struct povray_image first =
-        replicates > 0 ? povray_set_replicate(s, 0, 0, true) : povray_set_window(s, 0, 0);
+    struct povray_image first = replicates > 0 ? povray_replicates_replicate(s, 0, 0, true)
+                                               : povray_replicates_window(s, 0, 0);
     povray_command_line(s, "povray", &first, text, argv);
     for (int i = 1; argv[i] != NULL; i++)
         snprintf(command + strlen(command), sizeof command - strlen(command), " %s", argv[i]);
@@ -63,7 +65,8 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
     for (int i = 0; i < replicates; i++) {
         json_array_append_new(seeds, json_integer(replicate_seed(
                                          s->job->opt->seed, s->job->opt->first_replicate + i)));
-        json_array_append_new(blocks, json_integer(povray_set_replicate(s, i, 0, true).block));
+        json_array_append_new(blocks,
+                              json_integer(povray_replicates_replicate(s, i, 0, true).block));
     }
     double top = POVRAY_TOP_VALUE / s->plan.radiance;
     json_t *passes = json_array();
@@ -74,7 +77,7 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
                               pass->glow, "recursion_limit", pass->recursion, "max_trace_level",
                               pass->levels, "max_trace_level_indirect", pass->levels_indirect));
     }
-    struct povray_image fine = povray_set_window(s, 0, 0);
+    struct povray_image fine = povray_replicates_window(s, 0, 0);
     json_t *settings =
         json_pack("{s:o, s:[f,f], s:{s:i, s:i, s:i, s:s}}", "passes", passes, "scale", top, 2 * top,
                   "fine", "windows", (int)POVRAY_WINDOWS, "subgrid", (int)POVRAY_WINDOW_GRID,
@@ -100,7 +103,7 @@ static bool describe(const struct povray_set *s, const json_t *said, json_t *man
 }
 
 /* The mean of the windows. */
-static bool mean_window(const struct povray_set *s, const struct replicate_images *pictures,
+static bool mean_window(const struct povray_replicates *s, const struct replicate_images *pictures,
                         double *fine, struct err *e)
 {
     for (int t = 0; t < POVRAY_WINDOWS; t++) {
@@ -118,9 +121,10 @@ static bool mean_window(const struct povray_set *s, const struct replicate_image
 }
 
 /* fine + the difference of replicate k, into the moments. */
-static bool add_replicate(const struct povray_set *s, const struct replicate_images *pictures,
-                          int k, const double *fine, struct replicate_repeats *repeats,
-                          struct replicates *all, struct moments *m, struct err *e)
+static bool add_replicate(const struct povray_replicates *s,
+                          const struct replicate_images *pictures, int k, const double *fine,
+                          struct replicate_repeats *repeats, struct replicates *all,
+                          struct moments *m, struct err *e)
 {
     char path[REPLICATE_IMAGE_PATH];
     pictures->path_of(pictures->ctx, POVRAY_WINDOWS + k, path);
@@ -143,8 +147,9 @@ static bool add_replicate(const struct povray_set *s, const struct replicate_ima
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
-static bool fold_pictures(const struct povray_set *s, const struct replicate_images *pictures,
-                          struct moments *out, json_t *manifest, struct err *e)
+static bool fold_pictures(const struct povray_replicates *s,
+                          const struct replicate_images *pictures, struct moments *out,
+                          json_t *manifest, struct err *e)
 {
     const struct suite_scene *suite = s->job->suite;
     int replicates = s->replicates;
@@ -180,7 +185,7 @@ static bool fold_pictures(const struct povray_set *s, const struct replicate_ima
 bool povray_fold(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
-    struct povray_set s;
-    return povray_set(job, &s, e) && describe(&s, said, manifest, e) &&
+    struct povray_replicates s;
+    return povray_replicates(job, &s, e) && describe(&s, said, manifest, e) &&
            fold_pictures(&s, pictures, out, manifest, e);
 }

@@ -20,7 +20,7 @@ uint32_t replicate_seed(uint32_t seed, int k);
 
 /* An engine. Rendering and folding share nothing but pictures and what was said, so that they can be done on different
  * machines. Each fails with one line if the engine cannot express the scene at all. */
-struct driver {
+struct engine_driver {
     const char *engine;
     const char *prefix; /* of a picture's file, replicate_images_path() */
     bool below_zero;    /* pictures are differences */
@@ -36,13 +36,13 @@ struct driver {
     bool (*fold)(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
 };
-extern const struct driver cycles_driver, povray_driver;
+extern const struct engine_driver cycles_driver, povray_driver;
 /* NULL if there is none of that name. */
-const struct driver *driver_of(const char *engine);
+const struct engine_driver *engine_driver_of(const char *engine);
 
 /* All of it here: count, render, fold. */
-bool driver_render(const struct driver *driver, const struct reference_job *job,
-                   struct moments *out, json_t *manifest, struct err *e)
+bool engine_driver_render(const struct engine_driver *driver, const struct reference_job *job,
+                          struct moments *out, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
 bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
                    struct err *e) __attribute__((warn_unused_result));

@@ -48,9 +48,9 @@ static bool hash_povray(const struct reference_job *job, const char *path, char 
                         struct err *e)
 {
     const struct suite_scene *s = job->suite;
-    struct povray_plan plan;
+    struct povray_passes plan;
     if (!hash_binary("povray", hex[0], e) ||
-        !povray_plan(job->scene, job->camera, s->depth, &plan, e))
+        !povray_passes(job->scene, job->camera, s->depth, &plan, e))
         return false;
     uint32_t seed = replicate_seed(job->opt->seed, 0);
     FILE *f = fopen(path, "w");

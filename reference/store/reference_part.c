@@ -11,10 +11,10 @@
 #define PART   "part.json"
 #define PREFIX "picture"
 
-static const struct driver *need_driver(const struct suite_scene *scene,
-                                        const struct suite_reference *ref, struct err *e)
+static const struct engine_driver *need_driver(const struct suite_scene *scene,
+                                               const struct suite_reference *ref, struct err *e)
 {
-    const struct driver *d = driver_of(ref->engine);
+    const struct engine_driver *d = engine_driver_of(ref->engine);
     if (d == NULL)
         err_set(e, "%s: '%s' is no engine that is rendered", scene->name, ref->engine);
     return d;
@@ -46,7 +46,7 @@ static bool count(const struct suite_scene *scene, const struct suite_reference 
     struct camera camera;
     const struct reference_job job = {
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
-    const struct driver *driver = need_driver(scene, ref, e);
+    const struct engine_driver *driver = need_driver(scene, ref, e);
     if (driver == NULL || !suite_open(scene, &s, &camera, e))
         return false;
     bool ok = driver->count(&job, num, e);
@@ -70,7 +70,7 @@ struct range {
 static bool render_range(const struct reference_job *job, void *ctx, struct err *e)
 {
     const struct range *r = ctx;
-    const struct driver *driver = driver_of(job->ref->engine);
+    const struct engine_driver *driver = engine_driver_of(job->ref->engine);
     bool ok = driver->render(job, r->first, r->last, r->said, e);
     for (int k = r->first; ok && k < r->last; k++) {
         char from[REPLICATE_IMAGE_PATH], to[REPLICATE_IMAGE_PATH];
@@ -190,7 +190,7 @@ static bool fold(const struct suite_scene *scene, const struct suite_reference *
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
     if (!suite_open(scene, &s, &camera, e))
         return false;
-    bool ok = driver_of(ref->engine)->fold(&job, &pictures, g->said, out, manifest, e);
+    bool ok = engine_driver_of(ref->engine)->fold(&job, &pictures, g->said, out, manifest, e);
     scene_free(&s);
     return ok;
 }

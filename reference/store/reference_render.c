@@ -72,7 +72,7 @@ void timing_stop(struct timing *t)
     t->cpu_s = cpu_s() - t->cpu_s;
 }
 
-const struct driver *driver_of(const char *engine)
+const struct engine_driver *engine_driver_of(const char *engine)
 {
     return strcmp(engine, cycles_driver.engine) == 0   ? &cycles_driver
            : strcmp(engine, povray_driver.engine) == 0 ? &povray_driver
@@ -80,7 +80,7 @@ const struct driver *driver_of(const char *engine)
 }
 
 struct here {
-    const struct driver *driver;
+    const struct engine_driver *driver;
     const char *dir;
 };
 
@@ -90,8 +90,8 @@ static void path_here(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH])
     replicate_images_path(h->dir, h->driver->prefix, k, path);
 }
 
-bool driver_render(const struct driver *driver, const struct reference_job *job,
-                   struct moments *out, json_t *manifest, struct err *e)
+bool engine_driver_render(const struct engine_driver *driver, const struct reference_job *job,
+                          struct moments *out, json_t *manifest, struct err *e)
 {
     const struct here here = {driver, job->dir};
     const struct replicate_images pictures = {path_here, &here};
@@ -141,7 +141,8 @@ struct whole {
 static bool render_whole(const struct reference_job *job, void *ctx, struct err *e)
 {
     struct whole *w = ctx;
-    return w->rendered = driver_render(driver_of(job->ref->engine), job, w->out, w->manifest, e);
+    return w->rendered = engine_driver_render(engine_driver_of(job->ref->engine), job, w->out,
+                                              w->manifest, e);
 }
 
 static bool engine_render(const struct suite_scene *scene, const struct suite_reference *ref,
@@ -176,7 +177,7 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
                       struct err *e)
 {
     bool is_truth = strcmp(ref->engine, "truth") == 0;
-    if (!is_truth && driver_of(ref->engine) == NULL)
+    if (!is_truth && engine_driver_of(ref->engine) == NULL)
         return err_set(e, "%s: unknown reference engine '%s'", scene->name, ref->engine);
     struct timing t = timing_start();
     json_t *m = json_object();

@@ -39,7 +39,7 @@ static dvec3 unit_normal(const vec3 *p)
     return d3_scale(n, 1 / d3_length(n));
 }
 
-bool triangle_is_flat(const struct scene *s, uint32_t triangle)
+bool features_triangle_is_flat(const struct scene *s, uint32_t triangle)
 {
     dvec3 n = unit_normal(s->position + 3 * (size_t)triangle);
     for (size_t k = 3 * (size_t)triangle; k < 3 * (size_t)triangle + 3; k++)
@@ -54,7 +54,7 @@ static double gap(float p, float a, float b, float c)
     return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
 }
 
-void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
+void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
 {
     *nearest = INFINITY;
     *furthest = 0;
@@ -79,7 +79,7 @@ void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *f
 static bool may_be_cut(const struct scene *s, const struct camera *c)
 {
     double nearest, furthest, lens = (double)c->lens_radius;
-    scene_distances(s, c->eye, &nearest, &furthest);
+    features_distances(s, c->eye, &nearest, &furthest);
     return !(nearest - lens > (double)c->near && furthest + lens < (double)c->far);
 }
 
@@ -115,7 +115,7 @@ static unsigned light_features(const struct light *l)
     return 0;
 }
 
-unsigned scene_features(const struct scene *s, const struct camera *c)
+unsigned features_of_scene(const struct scene *s, const struct camera *c)
 {
     unsigned f = 0;
     for (uint32_t i = 0; i < s->num_objects; i++)
@@ -125,7 +125,7 @@ unsigned scene_features(const struct scene *s, const struct camera *c)
     if (s->num_spheres > 0)
         f |= 1u << FEATURE_SPHERE;
     for (uint32_t i = 0; i < s->num_triangles && !(f & 1u << FEATURE_SMOOTH); i++)
-        if (!triangle_is_flat(s, i))
+        if (!features_triangle_is_flat(s, i))
             f |= 1u << FEATURE_SMOOTH;
     if (c->lens_radius > 0)
         f |= 1u << FEATURE_LENS;
@@ -134,8 +134,8 @@ unsigned scene_features(const struct scene *s, const struct camera *c)
     return f;
 }
 
-bool check_exportable(const char *engine, const struct scene *s, const struct camera *c,
-                      struct err *e)
+bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
+                               struct err *e)
 {
     double square = (double)c->tan_h * c->height / c->width;
     dvec3 right = wide(c->right), up = wide(c->up), back = wide(c->backward);

@@ -30,19 +30,19 @@ enum feature {
 extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
 
 /* Bit 1 << enum feature of all that picture needs. */
-unsigned scene_features(const struct scene *s, const struct camera *c);
+unsigned features_of_scene(const struct scene *s, const struct camera *c);
 
 /* True if a triangle's shading normals are its geometric normal, but for the rounding of text. */
-bool triangle_is_flat(const struct scene *s, uint32_t triangle);
+bool features_triangle_is_flat(const struct scene *s, uint32_t triangle);
 
 /* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
  * the larger of its plane's and its box's), and that of the furthest. */
-void scene_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
+void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
 
 /* For the writers of scene files: fails, with `engine` in front, where the camera's pixels are not
  * square or its axes not orthogonal, where the near or far plane cuts, and where a shading normal of
  * a vertex is on the back of its triangle. */
-bool check_exportable(const char *engine, const struct scene *s, const struct camera *c,
-                      struct err *e) __attribute__((warn_unused_result));
+bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
+                               struct err *e) __attribute__((warn_unused_result));
 
 #endif

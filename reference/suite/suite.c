@@ -148,7 +148,7 @@ static bool load_scene(const char *dir, const char *name, struct suite_scene *s,
         return err_set(e, "%s: %s", file, why.text);
     if (s->json == NULL)
         return err_set(e, "%s:%d: %s", file, why.line, why.text);
-    return suite_read_scene(file, s, e) && hash_scene(s, e);
+    return suite_json_read(file, s, e) && hash_scene(s, e);
 }
 
 /* A 9x scene is held against another scene's references, at the same size. */

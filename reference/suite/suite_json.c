@@ -198,7 +198,7 @@ static bool read_not_expressible(const struct json_node *n, struct suite_scene *
     return true;
 }
 
-bool suite_read_scene(const char *file, struct suite_scene *s, struct err *e)
+bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
 {
     static const char *const keys[] = {
         "title",      "detects",         "blind_to",    "width",

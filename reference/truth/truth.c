@@ -55,9 +55,9 @@ static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct
 
 static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, NULL}};
 
-static const struct truth_kind *const families[] = {furnaces,   truth_lights, truth_lamps,
-                                                    truth_lens, truth_optics, truth_window,
-                                                    truth_ggx,  truth_sky,    truth_sun};
+static const struct truth_kind *const families[] = {
+    furnaces,           truth_one_lamp, truth_several_lamps, truth_lens, truth_mirrors_and_glass,
+    truth_snell_window, truth_ggx,      truth_sky,           truth_sun};
 
 static const struct truth_kind *find_kind(const char *name)
 {

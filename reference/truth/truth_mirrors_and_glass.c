@@ -328,7 +328,7 @@ static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct 
     return truth_view_render(&view, truth_glass_sphere_radiance, &s, out, e);
 }
 
-const struct truth_kind truth_optics[] = {{"mirror_box", fill_mirror_box},
-                                          {"glass_slab", fill_slab},
-                                          {"glass_sphere", fill_sphere},
-                                          {NULL, NULL}};
+const struct truth_kind truth_mirrors_and_glass[] = {{"mirror_box", fill_mirror_box},
+                                                     {"glass_slab", fill_slab},
+                                                     {"glass_sphere", fill_sphere},
+                                                     {NULL, NULL}};

@@ -22,7 +22,7 @@
 
 #include "truth.h"
 
-extern const struct truth_kind truth_optics[]; /* ends with a NULL name */
+extern const struct truth_kind truth_mirrors_and_glass[]; /* ends with a NULL name */
 
 /* Unpolarised reflectance of a smooth boundary by Fresnel's equations [Born99 1.5.2]; cos_i in (0,1],
  * n: index behind over index in front. *cos_t (may be NULL): cosine behind, 0 under total reflection. */

@@ -16,7 +16,7 @@
 
 #include "truth.h"
 
-extern const struct truth_kind truth_lights[]; /* ends with a NULL name */
+extern const struct truth_kind truth_one_lamp[]; /* ends with a NULL name */
 
 /* Irradiance [W m^-2] at the point (x, 0, z), normal +Y, from an isotropic point light of radiant
  * intensity 1 W/sr at `light`, light[1] > 0: inverse square and cosine law. */

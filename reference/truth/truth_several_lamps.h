@@ -9,6 +9,6 @@
 
 #include "truth.h"
 
-extern const struct truth_kind truth_lamps[]; /* ends with a NULL name */
+extern const struct truth_kind truth_several_lamps[]; /* ends with a NULL name */
 
 #endif

@@ -57,4 +57,4 @@ static bool fill_window(const struct suite_scene *scene, json_t *values, struct 
     return truth_view_render(&view, window_radiance, &w, out, e);
 }
 
-const struct truth_kind truth_window[] = {{"snell_window", fill_window}, {NULL, NULL}};
+const struct truth_kind truth_snell_window[] = {{"snell_window", fill_window}, {NULL, NULL}};

@@ -11,7 +11,7 @@
 
 #include "truth.h"
 
-extern const struct truth_kind truth_window[]; /* ends with a NULL name */
+extern const struct truth_kind truth_snell_window[]; /* ends with a NULL name */
 
 /* Shares of floor and sky in the radiance inside that is seen under the angle with that cosine from the
  * normal: F and n^2 (1 - F), F by Fresnel's equations from inside [Veach97 5.2]. */

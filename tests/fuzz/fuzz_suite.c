@@ -10,7 +10,7 @@ static void read_as(const char *name, const char *file, const uint8_t *data, siz
     struct err e = {""};
     snprintf(s.name, sizeof s.name, "%s", name);
     s.json = json_loadb((const char *)data, size, JSON_REJECT_DUPLICATES, NULL);
-    if (s.json != NULL && !suite_read_scene(file, &s, &e))
+    if (s.json != NULL && !suite_json_read(file, &s, &e))
         fuzz_check_line(&e, file);
     json_decref(s.json);
 }

@@ -128,13 +128,13 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
 bool junit_write(const char *path, const json_t *results, struct err *e)
 {
     bool failed = false;
-    xml_complaints_to(&failed);
+    xml_errors_to(&failed);
     xmlBuffer *buffer = xmlBufferCreate();
     xmlTextWriter *writer = buffer != NULL ? xmlNewTextWriterMemory(buffer, 0) : NULL;
     bool ok = writer != NULL && write_testsuite(writer, results);
     xmlFreeTextWriter(writer);
     ok = ok && !failed;
-    xml_complaints_to(NULL);
+    xml_errors_to(NULL);
     struct out_file out;
     if (!ok) {
         /* results_read() has seen that all of it is there and UTF-8. */

@@ -321,12 +321,14 @@ static void scenes_know_what_they_need(void **state)
         assert_non_null(s);
         if (!suite_open(s, &scene, &camera, &e))
             fail_msg("%s", e.msg);
-        assert_int_equal(scene_features(&scene, &camera), cases[i].features);
+        assert_int_equal(features_of_scene(&scene, &camera), cases[i].features);
         camera.lens_radius = 0.01f;
-        assert_int_equal(scene_features(&scene, &camera), cases[i].features | 1u << FEATURE_LENS);
+        assert_int_equal(features_of_scene(&scene, &camera),
+                         cases[i].features | 1u << FEATURE_LENS);
         camera.lens_radius = 0;
         camera.far = 0.01f;
-        assert_int_equal(scene_features(&scene, &camera), cases[i].features | 1u << FEATURE_CLIP);
+        assert_int_equal(features_of_scene(&scene, &camera),
+                         cases[i].features | 1u << FEATURE_CLIP);
         scene_free(&scene);
     }
 }
@@ -374,7 +376,7 @@ static void materials_and_lights_have_features(void **state)
         build_camera(&s, v3(0, 0, 0), 40);
         if (!scene_finish(&s, "test", &e) || !camera_init(&c, &s, 8, 8, &e))
             fail_msg("%s", e.msg);
-        assert_int_equal(scene_features(&s, &c), want);
+        assert_int_equal(features_of_scene(&s, &c), want);
         scene_free(&s);
     }
 }

@@ -114,7 +114,7 @@ static struct import_report compare(struct fixture *f)
 {
     struct import_report r;
     struct err e;
-    if (!import_compare(&f->s, &f->c, f->dump, &r, &e))
+    if (!import_check_compare(&f->s, &f->c, f->dump, &r, &e))
         fail_msg("%s", e.msg);
     return r;
 }
@@ -265,16 +265,16 @@ static void what_cannot_be_compared_is_no_agreement(void **state)
     struct err e;
     make(&f, 'Y');
     json_object_set_new(f.dump, "error", json_string("the importer ended with CANCELLED"));
-    assert_false(import_compare(&f.s, &f.c, f.dump, &r, &e));
+    assert_false(import_check_compare(&f.s, &f.c, f.dump, &r, &e));
     assert_non_null(strstr(e.msg, "CANCELLED"));
     json_object_del(f.dump, "error");
     json_object_del(f.dump, "lights");
-    assert_false(import_compare(&f.s, &f.c, f.dump, &r, &e));
+    assert_false(import_check_compare(&f.s, &f.c, f.dump, &r, &e));
     free_all(&f);
     make(&f, 'Y');
     json_t *mesh = json_array_get(json_object_get(f.dump, "meshes"), 0);
     json_array_append_new(json_object_get(mesh, "sizes"), json_integer(3)); /* without corners */
-    assert_false(import_compare(&f.s, &f.c, f.dump, &r, &e));
+    assert_false(import_check_compare(&f.s, &f.c, f.dump, &r, &e));
     free_all(&f);
     json_t *reports = json_pack("[{s:s, s:b}]", "scene", "x", "agrees", 1);
     assert_int_equal(import_result_exit_code(reports), 0);
@@ -306,8 +306,8 @@ static void blender_reads_what_we_read(void **state)
     struct err e;
     struct fixture f = {.axis = 'Z'};
     struct import_report r;
-    if (!import_run(scenes, 1, &opt, &dumps, &e) || !suite_open(&suite, &f.s, &f.c, &e) ||
-        !import_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e))
+    if (!import_check_run(scenes, 1, &opt, &dumps, &e) || !suite_open(&suite, &f.s, &f.c, &e) ||
+        !import_check_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e))
         fail_msg("%s", e.msg);
     if (!r.agrees)
         fail_msg("%s", r.what);
@@ -324,7 +324,7 @@ static void blender_reads_what_we_read(void **state)
 
     /* Negative control: one vertex of ours moved by 1e-4 of the extent. */
     f.s.position[0].x += 1e-4f * length(sub(f.s.bounds_max, f.s.bounds_min));
-    assert_true(import_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e));
+    assert_true(import_check_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e));
     assert_false(r.agrees);
     json_decref(dumps);
     scene_free(&f.s);

@@ -42,12 +42,12 @@ static struct camera finish(struct scene *s)
     return c;
 }
 
-static struct povray_plan plan(struct scene *s, int depth)
+static struct povray_passes plan(struct scene *s, int depth)
 {
     struct err e;
-    struct povray_plan p;
+    struct povray_passes p;
     struct camera c = finish(s);
-    if (!povray_plan(s, &c, depth, &p, &e))
+    if (!povray_passes(s, &c, depth, &p, &e))
         fail_msg("%s", e.msg);
     scene_free(s);
     return p;
@@ -87,7 +87,7 @@ static void test_recursion(void **state)
     } sources[] = {{0, 0}, {1, 0}, {2, 1}, {5, 4}, {21, 20}};
     for (size_t i = 0; i < sizeof sources / sizeof *sources; i++) {
         struct scene s = floor_and_ball(true);
-        struct povray_plan p = plan(&s, sources[i].depth);
+        struct povray_passes p = plan(&s, sources[i].depth);
         assert_int_equal(p.num_passes, 1);
         assert_true(p.pass[0].sources == (sources[i].depth > 0) && p.pass[0].glow);
         assert_false(p.constant);
@@ -96,7 +96,7 @@ static void test_recursion(void **state)
     for (int depth = 0; depth <= 5; depth += 5) {
         struct scene s = floor_and_ball(false);
         build_sphere(&s, v3(0, 2, 0), .2f, 1, build_material(&s, grey(.5f), grey(3)));
-        struct povray_plan p = plan(&s, depth);
+        struct povray_passes p = plan(&s, depth);
         assert_int_equal(p.num_passes, 1);
         assert_true(p.pass[0].glow && !p.pass[0].sources);
         assert_int_equal(p.pass[0].recursion, depth);
@@ -137,8 +137,8 @@ static void test_furnace_is_constant(void **state)
 static void refused(struct scene *s, const struct camera *c, int depth, const char *why)
 {
     struct err e = {"nothing"};
-    struct povray_plan p;
-    assert_false(povray_plan(s, c, depth, &p, &e));
+    struct povray_passes p;
+    assert_false(povray_passes(s, c, depth, &p, &e));
     if (strstr(e.msg, why) == NULL)
         fail_msg("'%s' does not say '%s'", e.msg, why);
     assert_null(strchr(e.msg, '\n'));
@@ -160,9 +160,9 @@ static void test_camera_refused(void **state)
     bad.far = 5;
     refused(&s, &bad, 1, "farther than 5");
     refused(&s, &c, 22, "depth 21 only");
-    struct povray_plan p;
+    struct povray_passes p;
     struct err e;
-    assert_true(povray_plan(&s, &c, 21, &p, &e));
+    assert_true(povray_passes(&s, &c, 21, &p, &e));
     scene_free(&s);
 }
 

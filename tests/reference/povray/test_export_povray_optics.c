@@ -72,9 +72,9 @@ static int count(const char *text, const char *what)
 static void refused(struct scene *s, int depth, const char *why)
 {
     struct err e = {"nothing"};
-    struct povray_plan p;
+    struct povray_passes p;
     struct camera c = finish(s);
-    assert_false(povray_plan(s, &c, depth, &p, &e));
+    assert_false(povray_passes(s, &c, depth, &p, &e));
     if (strstr(e.msg, why) == NULL)
         fail_msg("'%s' does not say '%s'", e.msg, why);
     assert_null(strchr(e.msg, '\n'));
@@ -87,14 +87,14 @@ static void test_passes(void **state)
     (void)state;
     struct scene s = ball_of(MATERIAL_GLASS);
     struct camera c = finish(&s);
-    struct povray_plan p;
+    struct povray_passes p;
     struct err e;
-    assert_true(povray_plan(&s, &c, 1, &p, &e));
-    assert_true(p.num_passes == 2 && p.specular && !povray_plan_is_noisy(&p));
+    assert_true(povray_passes(&s, &c, 1, &p, &e));
+    assert_true(p.num_passes == 2 && p.specular && !povray_passes_are_noisy(&p));
     assert_true(p.pass[0].sources && !p.pass[0].glow && p.pass[0].levels == 1);
     assert_true(!p.pass[1].sources && p.pass[1].glow && p.pass[1].levels == 2);
-    assert_true(povray_plan(&s, &c, 10, &p, &e));
-    assert_true(povray_plan_is_noisy(&p));
+    assert_true(povray_passes(&s, &c, 10, &p, &e));
+    assert_true(povray_passes_are_noisy(&p));
     assert_true(p.pass[0].levels == 10 && p.pass[0].recursion == 9);
     assert_true(p.pass[1].levels == 11 && p.pass[1].recursion == 9);
     /* j diffuse surfaces take 3j/2 levels: a path of 10 surfaces, 8 of them diffuse and then a
@@ -219,9 +219,9 @@ static void test_sky_refused(void **state)
     for (int which = 0; which < 2; which++) {
         struct scene s = ball_of(MATERIAL_DIFFUSE);
         struct camera c = finish(&s);
-        struct povray_plan p;
+        struct povray_passes p;
         add_sky(&s, which == 0 ? environment_upper_half(grey(1), &e) : image(255, 2));
-        assert_false(povray_plan(&s, &c, 1, &p, &e));
+        assert_false(povray_passes(&s, &c, 1, &p, &e));
         assert_non_null(strstr(e.msg, which == 0 ? "only diffuse surfaces see" : "255 x 2"));
         scene_free(&s);
     }
@@ -302,9 +302,9 @@ static void test_mixed_lights(void **state)
     build_sphere(&s, v3(.75f, 1, 0), .125f, 1, build_material(&s, grey(0), grey(2)));
     build_sphere(&s, v3(-.75f, 1, 0), .125f, 1, build_material(&s, grey(.5f), grey(2)));
     struct camera c = finish(&s);
-    struct povray_plan p;
+    struct povray_passes p;
     struct err e;
-    assert_true(povray_plan(&s, &c, 3, &p, &e));
+    assert_true(povray_passes(&s, &c, 3, &p, &e));
     assert_true(p.num_passes == 2 && p.num_lamps == 2);
     assert_true(p.pass[0].recursion == 2 && p.pass[1].recursion == 3);
     char *lit = text_of(&s, &c, 3, 0), *seen = text_of(&s, &c, 3, 1);

@@ -44,11 +44,11 @@ bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, co
 {
     const struct camera *c = &v->camera;
     char dir[4096], path[4200], log[4200], size[3][16];
-    struct povray_plan plan;
+    struct povray_passes plan;
     memset(image, 0, 3 * (size_t)c->width * (size_t)c->height * sizeof *image);
     snprintf(dir, sizeof dir, "%s/povray", work_dir);
     snprintf(log, sizeof log, "%s/log", dir);
-    if (!povray_plan(&v->scene, c, v->depth, &plan, e) || !make_dirs(dir, e))
+    if (!povray_passes(&v->scene, c, v->depth, &plan, e) || !make_dirs(dir, e))
         return false;
     for (int pass = 0; pass < plan.num_passes; pass++) {
         struct povray_image p =
