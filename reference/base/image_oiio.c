@@ -17,11 +17,11 @@ bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e)
     /* Beside the programs; beside the directory of the tests; where `make install` puts it. */
     static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so"};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-        beside_program(path, IMAGE_OIIO_PATH, places[i]);
+        fs_beside_program(path, IMAGE_OIIO_PATH, places[i]);
         if (access(path, R_OK) == 0)
             return true;
     }
-    beside_program(path, IMAGE_OIIO_PATH, places[0]);
+    fs_beside_program(path, IMAGE_OIIO_PATH, places[0]);
     return err_set(e, "cannot load what reads pictures: %s is not there", path);
 }
 

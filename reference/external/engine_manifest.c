@@ -103,14 +103,14 @@ static json_t *seeds_of(const struct engine_job *j)
     return seeds;
 }
 
-/* In words that shell_split() reads back. */
+/* In words that shell_quote_split() reads back. */
 static char *command_line(const json_t *args)
 {
     size_t num = json_array_size(args);
     const char **word = calloc(num + 1, sizeof *word);
     for (size_t i = 0; word != NULL && i < num; i++)
         word[i] = json_string_value(json_array_get(args, i));
-    char *text = word != NULL ? shell_join(NULL, word) : NULL;
+    char *text = word != NULL ? shell_quote_join(NULL, word) : NULL;
     free(word);
     return text;
 }

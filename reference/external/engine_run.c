@@ -225,7 +225,7 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
                     engine_write_scene(en, scene, dir, j.scene, e) && run_all(&j, out, e);
     bool ok = rendered && engine_describe(&j, out, now_seconds() - start, manifest, e) &&
-              remove_tree(dir, e);
+              fs_remove_tree(dir, e);
     if (ok)
         return true;
     if (rendered)

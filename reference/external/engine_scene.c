@@ -87,5 +87,5 @@ bool engine_expresses(const struct engine *en, const struct suite_scene *scene, 
     if (mkdtemp(sub) == NULL)
         return err_set(why, "%s: cannot make a directory in it: %s", dir, strerror(errno));
     bool ok = engine_write_scene(en, scene, sub, path, why);
-    return remove_tree(sub, ok ? why : &ignored) && ok;
+    return fs_remove_tree(sub, ok ? why : &ignored) && ok;
 }

@@ -272,7 +272,7 @@ bool import_check_run(const struct suite_scene *const *scene, int num,
         struct err why = *e;
         return err_set(e, "%.900s (see %s)", why.msg, dir);
     }
-    if (remove_tree(dir, e))
+    if (fs_remove_tree(dir, e))
         return true;
     json_decref(*dumps);
     return false;

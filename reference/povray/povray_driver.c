@@ -103,7 +103,7 @@ static bool render_one(struct crew *w, const struct povray_image *p, float sign,
     snprintf(pov, sizeof pov, "%s/scene.pov", dir);
     snprintf(exr, sizeof exr, "%s/scene.exr", dir);
     snprintf(log, sizeof log, "%s/povray.log", dir);
-    if (!make_dirs(dir, e))
+    if (!fs_make_dirs(dir, e))
         return false;
     FILE *f = fopen(pov, "w");
     if (f == NULL)
@@ -118,7 +118,7 @@ static bool render_one(struct crew *w, const struct povray_image *p, float sign,
         .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
     bool radiosity = p->variant.indirect && w->set->plan.pass[p->variant.pass].recursion > 0;
     return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
-           add_picture(w, p, exr, sign, out, e) && remove_tree(dir, e);
+           add_picture(w, p, exr, sign, out, e) && fs_remove_tree(dir, e);
 }
 
 /* Adds its passes up, box-averaged to the job's size, into a file. */

@@ -44,7 +44,7 @@ static json_t *load_manifest(const char *path, struct err *e)
 static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
 {
     char dir[PATH_SIZE];
-    if (!golden_path(dir, golden_dir, scene, "", "", e) || !make_dirs(dir, e))
+    if (!golden_path(dir, golden_dir, scene, "", "", e) || !fs_make_dirs(dir, e))
         return -1;
     int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC), r = -1;
     if (fd >= 0)

@@ -95,7 +95,7 @@ bool reference_key(const struct suite_scene *scene, const struct suite_reference
         snprintf(path, sizeof path, "%s/scene", dir);
         ok = cycles ? hash_cycles(&job, path, hex, e) : hash_povray(&job, path, hex, e);
         struct err cleanup;
-        if (!remove_tree(dir, &cleanup) && ok) {
+        if (!fs_remove_tree(dir, &cleanup) && ok) {
             *e = cleanup;
             ok = false;
         }

@@ -124,7 +124,7 @@ bool reference_in_directory(const struct suite_scene *scene, const struct suite_
         scene_free(&s);
     }
     if (ok)
-        return remove_tree(dir, e);
+        return fs_remove_tree(dir, e);
     if (rmdir(dir) != 0) {
         struct err what = *e;
         err_set(e, "%.900s (see %s)", what.msg, dir);

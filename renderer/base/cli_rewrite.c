@@ -2,22 +2,24 @@
 
 #include <string.h>
 
-const struct option_words render_how[] = {{"-f", 1},       {"--out", 1},     {"--samples", 1},
-                                          {"-t", 1},       {"--threads", 1}, {"--time", 1},
-                                          {"--error", 1},  {"--slurm", 1},   {"--write-every", 1},
-                                          {"--resume", 1}, {"--heatmap", 1}, {"--keep-state", 0},
-                                          {"-q", 0},       {"--quiet", 0},   {0}};
+const struct option_words cli_rewrite_render[] = {
+    {"-f", 1},       {"--out", 1},     {"--samples", 1},
+    {"-t", 1},       {"--threads", 1}, {"--time", 1},
+    {"--error", 1},  {"--slurm", 1},   {"--write-every", 1},
+    {"--resume", 1}, {"--heatmap", 1}, {"--keep-state", 0},
+    {"-q", 0},       {"--quiet", 0},   {0}};
 
-bool has_word(int argc, char *const *argv, const char *short_name, const char *long_name)
+bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
+                          const char *long_name)
 {
     const struct option_words table[] = {{short_name, 0}, {long_name, 0}, {0}};
     for (int i = 1; i < argc; i++)
-        if (words_to_drop(table, &argv[i], 1) > 0)
+        if (cli_rewrite_to_drop(table, &argv[i], 1) > 0)
             return true;
     return false;
 }
 
-int words_to_drop(const struct option_words *table, char *const *word, int left)
+int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left)
 {
     for (const struct option_words *o = table; o->name != NULL; o++) {
         size_t n = strlen(o->name);
@@ -29,11 +31,11 @@ int words_to_drop(const struct option_words *table, char *const *word, int left)
     return 0;
 }
 
-int words_kept(const struct option_words *table, int num, char *const *word, char **kept)
+int cli_rewrite_kept(const struct option_words *table, int num, char *const *word, char **kept)
 {
     int n = 0;
     for (int i = 0; i < num;) {
-        int drop = words_to_drop(table, &word[i], num - i);
+        int drop = cli_rewrite_to_drop(table, &word[i], num - i);
         if (drop == 0)
             kept[n++] = word[i];
         i += drop > 0 ? drop : 1;

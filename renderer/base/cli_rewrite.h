@@ -10,15 +10,16 @@ struct option_words {
 };
 
 /* What says how far, where to, where or how a render of pathtracer goes on, not what it is of. Ends with a NULL name. */
-extern const struct option_words render_how[];
+extern const struct option_words cli_rewrite_render[];
 
 /* Is an option among the words, as -t, --threads or --threads=N? */
-bool has_word(int argc, char *const *argv, const char *short_name, const char *long_name);
+bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
+                          const char *long_name);
 
 /* How many words from word[0] on to leave out by the table: 0, or an option and its arguments, `left` at most. */
-int words_to_drop(const struct option_words *table, char *const *word, int left);
+int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left);
 
 /* Into kept[], with room for num, the words that the table does not leave out; how many. kept may be word. */
-int words_kept(const struct option_words *table, int num, char *const *word, char **kept);
+int cli_rewrite_kept(const struct option_words *table, int num, char *const *word, char **kept);
 
 #endif

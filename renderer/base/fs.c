@@ -47,7 +47,7 @@ void out_abandon(struct out_file *o)
     unlink(o->temp);
 }
 
-bool make_dirs(const char *path, struct err *e)
+bool fs_make_dirs(const char *path, struct err *e)
 {
     char p[4096];
     if (strlen(path) >= sizeof p)
@@ -70,7 +70,7 @@ bool make_dirs(const char *path, struct err *e)
     return true;
 }
 
-bool make_parent_dirs(const char *path, struct err *e)
+bool fs_make_parent_dirs(const char *path, struct err *e)
 {
     const char *slash = strrchr(path, '/');
     if (slash == NULL || slash == path)
@@ -81,7 +81,7 @@ bool make_parent_dirs(const char *path, struct err *e)
         return err_set(e, "%.64s...: path too long", path);
     memcpy(dir, path, n);
     dir[n] = '\0';
-    return make_dirs(dir, e);
+    return fs_make_dirs(dir, e);
 }
 
 static int remove_one(const char *path, const struct stat *st, int flag, struct FTW *ftw)
@@ -92,7 +92,7 @@ static int remove_one(const char *path, const struct stat *st, int flag, struct 
     return remove(path);
 }
 
-bool remove_tree(const char *path, struct err *e)
+bool fs_remove_tree(const char *path, struct err *e)
 {
     struct stat st;
     if (lstat(path, &st) != 0)
@@ -102,18 +102,18 @@ bool remove_tree(const char *path, struct err *e)
     return true;
 }
 
-const char *base_of(const char *path)
+const char *fs_base(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash != NULL ? slash + 1 : path;
 }
 
-void beside_file(const char *path, const char *name, char *beside, size_t size)
+void fs_beside_file(const char *path, const char *name, char *beside, size_t size)
 {
-    snprintf(beside, size, "%.*s%s", (int)(base_of(path) - path), path, name);
+    snprintf(beside, size, "%.*s%s", (int)(fs_base(path) - path), path, name);
 }
 
-void beside_program(char *path, size_t size, const char *name)
+void fs_beside_program(char *path, size_t size, const char *name)
 {
     char self[3072];
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);

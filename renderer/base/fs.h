@@ -23,18 +23,18 @@ bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_re
 void out_abandon(struct out_file *o);
 
 /* mkdir -p. */
-bool make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+bool fs_make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
 /* mkdir -p of the directory part of path. */
-bool make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+bool fs_make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
 /* rm -r of a directory that we made; missing is fine. */
-bool remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
+bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
 
 /* The name of a file without its directories, within `path`. */
-const char *base_of(const char *path);
+const char *fs_base(const char *path);
 /* Into beside: the file `name` in the directory of the file `path`. */
-void beside_file(const char *path, const char *name, char *beside, size_t size);
+void fs_beside_file(const char *path, const char *name, char *beside, size_t size);
 
 /* Into path: the file `name` beside the program that runs, or in the current directory if that cannot be known. */
-void beside_program(char *path, size_t size, const char *name);
+void fs_beside_program(char *path, size_t size, const char *name);
 
 #endif

@@ -7,7 +7,7 @@
 
 enum { CACHE_LINE = 64, HUGE_PAGE = 2 << 20 };
 
-void *alloc_large(size_t size)
+void *huge_alloc(size_t size)
 {
     size_t page = size >= HUGE_PAGE ? HUGE_PAGE : CACHE_LINE;
     size = (size + page - 1) / page * page;
@@ -17,7 +17,7 @@ void *alloc_large(size_t size)
     return p;
 }
 
-void *calloc_large(size_t num, size_t size)
+void *huge_calloc(size_t num, size_t size)
 {
     char *p = calloc(num, size);
     if (p == NULL)

@@ -6,9 +6,9 @@
 
 /* `size` bytes, aligned to 64; an array of megabytes lies on large pages where the system has them:
  * fewer misses of the page table. Not zeroed. The caller's, to free(); NULL if out of memory. */
-void *alloc_large(size_t size) __attribute__((warn_unused_result));
+void *huge_alloc(size_t size) __attribute__((warn_unused_result));
 /* As calloc(); megabytes lie on large pages where the system has them, for the most part: fewer faults
  * when they are touched first. The caller's, to free(). */
-void *calloc_large(size_t num, size_t size) __attribute__((warn_unused_result));
+void *huge_calloc(size_t num, size_t size) __attribute__((warn_unused_result));
 
 #endif

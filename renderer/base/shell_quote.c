@@ -19,7 +19,7 @@ static char *append(char *to, const char *word)
     return stpcpy(to, "'");
 }
 
-char *shell_join(const char *first, const char *const *word)
+char *shell_quote_join(const char *first, const char *const *word)
 {
     enum { WORST = 4, AROUND = 3 }; /* '\'' for each quote; two quotes and a blank */
     size_t size = 1 + (first != NULL ? WORST * strlen(first) + AROUND : 0);
@@ -39,7 +39,7 @@ char *shell_join(const char *first, const char *const *word)
     return text;
 }
 
-char *shell_ascii(const char *text)
+char *shell_quote_ascii(const char *text)
 {
     enum { WORST = 9 }; /* of a byte: '$'\012'' */
     char *ascii = malloc(WORST * strlen(text) + 1), *to = ascii;
@@ -112,7 +112,7 @@ static bool take_word(const char **text, char **to)
     return true;
 }
 
-char **shell_split(const char *text, int *num, struct err *e)
+char **shell_quote_split(const char *text, int *num, struct err *e)
 {
     size_t length = strlen(text), most = length / 2 + 2;
     char **word = malloc(most * sizeof *word + length + 2);

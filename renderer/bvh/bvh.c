@@ -180,7 +180,7 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
 {
     *prim = NO_HIT;
     stats->rays++;
-    const struct shear s = shear_of(&r);
+    const struct shear s = shape_shear(&r);
     if (t->nodes == NULL) {
         stats->primitive_tests += t->num_primitives;
         leaf_closest(t, 0, t->num_primitives, &r, &s, u, v, prim);
@@ -212,7 +212,7 @@ static void closest(const struct bvh *t, ray r, float *d, float *u, float *v, ui
 static bool is_occluded(const struct bvh *t, const ray *r, uint32_t ignore, struct bvh_stats *stats)
 {
     float d, u, v;
-    const struct shear s = shear_of(r);
+    const struct shear s = shape_shear(r);
     stats->rays++;
     if (t->nodes == NULL) {
         for (uint32_t i = 0; i < t->num_primitives; i++) {

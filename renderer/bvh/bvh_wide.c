@@ -16,8 +16,8 @@ struct empty_leaf {
 struct build {
     struct wide *w;
     int threads;
-    struct wide_parts parts;
-    const struct wide_splitter *splitter;
+    struct wide_build parts;
+    const struct sah_split_passes *splitter;
     const struct scene *scene;
     struct wide_item *item;
     size_t capacity; /* bytes of the arena */
@@ -35,7 +35,7 @@ static bool reserve(struct build *b, size_t size)
     if (w->used + size > WIDE_PLACE)
         return false; /* references end here, at some 8 10^7 triangles */
     size_t capacity = b->capacity + b->capacity / 2 + size;
-    char *larger = alloc_large(capacity);
+    char *larger = huge_alloc(capacity);
     if (larger == NULL)
         return false;
     memcpy(larger, w->arena, w->used);
@@ -150,7 +150,7 @@ static bool add_node(struct build *b, uint32_t i, int depth)
 {
     const struct wide_part *part = b->parts.part;
     uint32_t child[WIDTH];
-    int n = wide_parts_children(&b->parts, i, child);
+    int n = wide_build_children(&b->parts, i, child);
     struct wide *w = b->w;
     if (!reserve(b, sizeof(struct wide_node)))
         return false;
@@ -188,8 +188,8 @@ static bool add_node(struct build *b, uint32_t i, int depth)
 
 static bool add_tree(struct build *b, const struct wide_range *all)
 {
-    return wide_parts_build(b->splitter, b->item, b->scene->num_triangles, all, b->threads,
-                            &b->parts) &&
+    return wide_build_make(b->splitter, b->item, b->scene->num_triangles, all, b->threads,
+                           &b->parts) &&
            add_node(b, 0, 0);
 }
 
@@ -200,7 +200,7 @@ static bool add_list(struct build *b, struct wide_range *all)
         prim[i] = i;
     if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
         return false;
-    wide_flat_fill(b->scene, prim, (int)all->count, b->w->flat);
+    small_scene_fill(b->scene, prim, (int)all->count, b->w->flat);
     uint32_t triangles = b->scene->num_triangles;
     for (uint32_t i = 0; i < all->count;) {
         uint32_t end = i < triangles ? triangles : all->count;
@@ -242,7 +242,7 @@ static bool take_large(struct build *b, struct wide_range *all)
         return true;
     if ((w->flat = malloc(sizeof *w->flat)) == NULL)
         return false;
-    wide_flat_fill(b->scene, prim, (int)num, w->flat);
+    small_scene_fill(b->scene, prim, (int)num, w->flat);
     if (!w->flat->quick) {
         free(w->flat);
         w->flat = NULL;
@@ -263,12 +263,12 @@ static bool take_large(struct build *b, struct wide_range *all)
 struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
 {
     static const struct {
-        const struct wide_kernel *kernel;
-        const struct wide_splitter *splitter;
+        const struct traverse *kernel;
+        const struct sah_split_passes *splitter;
     } code[] = {
-        [ISA_SSE42] = {&wide_kernel_sse42, &wide_splitter_sse42},
-        [ISA_AVX2] = {&wide_kernel_avx2, &wide_splitter_avx2},
-        [ISA_AVX512] = {&wide_kernel_avx512, &wide_splitter_avx512},
+        [ISA_SSE42] = {&traverse_sse42, &sah_split_sse42},
+        [ISA_AVX2] = {&traverse_avx2, &sah_split_avx2},
+        [ISA_AVX512] = {&traverse_avx512, &sah_split_avx512},
     };
     if (!isa_choose(&isa, e))
         return NULL;
@@ -280,8 +280,8 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     w->kernel = code[isa].kernel;
     w->num_triangles = s->num_triangles;
     b.capacity = 64 * (size_t)all.count + 4096;
-    w->arena = alloc_large(b.capacity);
-    b.item = alloc_large(all.count * sizeof *b.item);
+    w->arena = huge_alloc(b.capacity);
+    b.item = huge_alloc(all.count * sizeof *b.item);
     if (w->arena == NULL || b.item == NULL)
         goto fail;
     parallel_for(threads, all.count, set_items, &b);
@@ -302,12 +302,12 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);
     free(b.item);
     free(b.leaf);
-    wide_parts_free(&b.parts);
+    wide_build_free(&b.parts);
     return w;
 fail:
     free(b.item);
     free(b.leaf);
-    wide_parts_free(&b.parts);
+    wide_build_free(&b.parts);
     wide_free(w);
     err_set(e, "out of memory for the acceleration structure of %u primitives", all.count);
     return NULL;

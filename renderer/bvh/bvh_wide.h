@@ -33,15 +33,15 @@ struct wide_leaf {
     uint32_t prim[WIDTH];
 };
 
-struct wide_kernel;
+struct traverse;
 
-struct wide_flat;
+struct small_scene;
 
 struct wide {
-    struct wide_flat *flat; /* the list; NULL: there is none */
-    char *arena;            /* nodes and leaves; at 0 the root, or the leaves of a list */
-    size_t used;            /* bytes */
-    const struct wide_kernel *kernel;
+    struct small_scene *flat; /* the list; NULL: there is none */
+    char *arena;              /* nodes and leaves; at 0 the root, or the leaves of a list */
+    size_t used;              /* bytes */
+    const struct traverse *kernel;
     float min[3], max[3];           /* of the scene */
     float tree_min[3], tree_max[3]; /* of what is in the tree */
     uint32_t num_list_leaves;       /* what the list counts as in tests */

@@ -10,7 +10,7 @@
 
 enum { NOTHING = INT32_MAX /* no primitive yet: more than any */ };
 
-struct octet {
+struct ray8 {
     vf o[3], d[3], sx, sy, sz, tmin, tmax;
     vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
                  distance counts only if its number is smaller */
@@ -34,8 +34,8 @@ INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
     return v;
 }
 
-/* As shear_of(). */
-INLINE void octet_shear(struct octet *q)
+/* As shape_shear(). */
+INLINE void octet_shear(struct ray8 *q)
 {
     vf x = vf_abs(q->d[0]), y = vf_abs(q->d[1]), z = vf_abs(q->d[2]);
     vi is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
@@ -46,7 +46,7 @@ INLINE void octet_shear(struct octet *q)
 }
 
 /* Origins, directions and ends. */
-INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
 {
     bool in_row = true;
     for (int i = 1; i < LANES; i++)
@@ -63,8 +63,8 @@ INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct 
 }
 
 /* Results of all lanes; prim -1: nothing. */
-INLINE void octet_store(const struct octet *q, const uint16_t lane[LANES], vf t, vf u, vf v,
-                        vi prim, struct hits *h)
+INLINE void octet_store(const struct ray8 *q, const uint16_t lane[LANES], vf t, vf u, vf v, vi prim,
+                        struct hits *h)
 {
     if (q->in_row) {
         vf_store_any(h->t + lane[0], t);
@@ -81,7 +81,7 @@ INLINE void octet_store(const struct octet *q, const uint16_t lane[LANES], vf t,
     }
 }
 
-INLINE void octet_store_flags(const struct octet *q, const uint16_t lane[LANES], unsigned mask,
+INLINE void octet_store_flags(const struct ray8 *q, const uint16_t lane[LANES], unsigned mask,
                               bool *flag)
 {
     const uint64_t flags = bytes_of(mask);
@@ -92,7 +92,7 @@ INLINE void octet_store_flags(const struct octet *q, const uint16_t lane[LANES],
             flag[lane[i]] = flags >> 8 * i & 1;
 }
 
-INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
 {
     octet_load(r, lane, q);
     vi tmax = (vi)q->tmax;
@@ -113,7 +113,7 @@ static inline const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint1
     return filled;
 }
 
-INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct octet *q)
+INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
 {
     const uint32_t *a = r->ignore;
     q->ignore =
@@ -124,7 +124,7 @@ INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struc
 /* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
  * of float of their distance from the origin [Woop13 3.3]; reciprocal, products and difference of the
  * slabs come to no more than 4 of distance and coordinate together. Twice that. */
-INLINE vf growth(const struct wide *w, const struct octet *q)
+INLINE vf growth(const struct wide *w, const struct ray8 *q)
 {
     vf reach = vf_set(0), coordinate = reach;
     for (int a = 0; a < 3; a++) {
@@ -141,7 +141,7 @@ INLINE vf inverse(vf d, vf grow)
     return 1 / vf_select(vf_lt(vf_abs(d), tiny), (vf)((vi)tiny | (vi)sign), d);
 }
 
-INLINE void octet_slabs(const struct wide *w, struct octet *q)
+INLINE void octet_slabs(const struct wide *w, struct ray8 *q)
 {
     vf grow = growth(w, q);
     for (int a = 0; a < 3; a++) {
@@ -152,7 +152,7 @@ INLINE void octet_slabs(const struct wide *w, struct octet *q)
 }
 
 /* Lanes that meet the tree's box within (tmin, limit]. */
-INLINE unsigned octet_box(const struct wide *w, const struct octet *q)
+INLINE unsigned octet_box(const struct wide *w, const struct ray8 *q)
 {
     vf begin = q->tmin, end = q->limit;
     for (int a = 0; a < 3; a++) {

@@ -115,5 +115,5 @@ static uint32_t partition(struct wide_item *item, uint32_t n, const struct wide_
     return i;
 }
 
-const struct wide_splitter FOR_ISA(wide_splitter) = {
+const struct sah_split_passes FOR_ISA(sah_split) = {
     .split = split, .partition = partition, .bounds = bounds};

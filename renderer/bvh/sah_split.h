@@ -28,7 +28,7 @@ struct wide_split {
     struct wide_box left, right;
 };
 
-struct wide_splitter {
+struct sah_split_passes {
     /* By the surface area heuristic, a leaf of up to eight costing one. centres: box of the doubled
      * centres. */
     void (*split)(const struct wide_item *item, uint32_t n, const struct wide_box *centres,
@@ -41,6 +41,6 @@ struct wide_splitter {
                    struct wide_box *centres);
 };
 
-extern const struct wide_splitter wide_splitter_sse42, wide_splitter_avx2, wide_splitter_avx512;
+extern const struct sah_split_passes sah_split_sse42, sah_split_avx2, sah_split_avx512;
 
 #endif

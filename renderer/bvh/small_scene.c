@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static uint8_t find_corner(struct wide_flat *f, vec3 p)
+static uint8_t find_corner(struct small_scene *f, vec3 p)
 {
     const float q[3] = {p.x, p.y, p.z};
     for (int i = 0; i < f->num_corners; i++)
@@ -13,7 +13,7 @@ static uint8_t find_corner(struct wide_flat *f, vec3 p)
     return (uint8_t)f->num_corners++;
 }
 
-static uint8_t find_edge(struct wide_flat *f, uint8_t from, uint8_t to)
+static uint8_t find_edge(struct small_scene *f, uint8_t from, uint8_t to)
 {
     for (int i = 0; i < f->num_edges; i++) {
         if (f->edge[i][0] == from && f->edge[i][1] == to)
@@ -30,7 +30,7 @@ struct point {
     double v[3];
 };
 
-static struct point corner_of(const struct wide_flat *f, int triangle, int k)
+static struct point corner_of(const struct small_scene *f, int triangle, int k)
 {
     const float *p = f->corner[f->triangle[triangle].corner[k]];
     return (struct point){{p[0], p[1], p[2]}};
@@ -61,7 +61,7 @@ static void set_row(float row[4], struct point a, double scale, struct point ori
 
 /* With corner k of triangle i for the origin; false if rounding would be more than a few hundredths of
  * it. */
-static bool set_face(const struct wide_flat *f, int i, int k, struct flat_face *face)
+static bool set_face(const struct small_scene *f, int i, int k, struct flat_face *face)
 {
     struct point o = corner_of(f, i, k);
     struct point eu = difference(corner_of(f, i, (k + 1) % 3), o);
@@ -83,7 +83,7 @@ static bool set_face(const struct wide_flat *f, int i, int k, struct flat_face *
 }
 
 /* The corner of triangle j that completes triangle i, seen from its corner k, to a parallelogram. */
-static bool completes(const struct wide_flat *f, int i, int k, int j)
+static bool completes(const struct small_scene *f, int i, int k, int j)
 {
     const uint8_t *a = f->triangle[i].corner, *b = f->triangle[j].corner;
     int other = -1, shared = 0;
@@ -103,7 +103,7 @@ static bool completes(const struct wide_flat *f, int i, int k, int j)
     return true;
 }
 
-static void fill_faces(struct wide_flat *f)
+static void fill_faces(struct small_scene *f)
 {
     bool done[WIDE_FLAT] = {false};
     f->quick = f->reach > 1e-4f && f->reach < 1e4f;
@@ -127,9 +127,9 @@ static void fill_faces(struct wide_flat *f)
     }
 }
 
-void wide_flat_fill(const struct scene *s, const uint32_t *prim, int num, struct wide_flat *f)
+void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f)
 {
-    *f = (struct wide_flat){0};
+    *f = (struct small_scene){0};
     for (int i = 0; i < num; i++)
         f->number[i] = (int32_t)prim[i];
     for (; f->num_triangles < num && prim[f->num_triangles] < s->num_triangles;

@@ -19,7 +19,7 @@ struct flat_face {
     bool is_triangle; /* prim[0] alone */
 };
 
-struct wide_flat {
+struct small_scene {
     int num_corners, num_edges, num_triangles, num_spheres, num_faces;
     float corner[FLAT_CORNERS][3];
     uint8_t edge[FLAT_EDGES][2]; /* its two corners */
@@ -45,6 +45,6 @@ struct wide_flat {
 #define FLAT_SLACK (16 * FLT_EPSILON)
 
 /* Of up to WIDE_FLAT primitives of a scene, in ascending order. */
-void wide_flat_fill(const struct scene *s, const uint32_t *prim, int num, struct wide_flat *f);
+void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f);
 
 #endif

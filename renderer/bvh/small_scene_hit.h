@@ -12,7 +12,7 @@ struct list {
     vf x[FLAT_CORNERS], y[FLAT_CORNERS], z[FLAT_CORNERS], edge[FLAT_EDGES][2];
 };
 
-INLINE void list_init(const struct wide_flat *f, const struct octet *q, struct list *l)
+INLINE void list_init(const struct small_scene *f, const struct ray8 *q, struct list *l)
 {
     const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
     for (int i = 0; i < f->num_corners; i++) {
@@ -43,8 +43,8 @@ INLINE void list_init(const struct wide_flat *f, const struct octet *q, struct l
 
 /* Triangle i against all rays, as sheared_hit(); lanes that meet it inside (tmin, limit). No branches:
  * some ray of eight is almost always inside, and when not cannot be predicted. */
-INLINE vi list_triangle(const struct wide_flat *f, const struct list *l, int i,
-                        const struct octet *q, vf limit, vf *t, vf *u, vf *v)
+INLINE vi list_triangle(const struct small_scene *f, const struct list *l, int i,
+                        const struct ray8 *q, vf limit, vf *t, vf *u, vf *v)
 {
     const uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
     const vf *edge = l->edge[0], zero = vf_set(0);
@@ -64,7 +64,7 @@ INLINE vf below(vf a)
     return (vf)vi_select(zero, vi_set(INT32_MIN + 1), b + 1 + 2 * vi_lt(vi_set(-1), b));
 }
 
-INLINE vi list_sphere(const struct wide_flat *f, int i, const struct octet *q, vf limit, vf *t)
+INLINE vi list_sphere(const struct small_scene *f, int i, const struct ray8 *q, vf limit, vf *t)
 {
     const float *s = f->sphere[i];
     return sphere_hit(q->o[0] - s[0], q->o[1] - s[1], q->o[2] - s[2], q->d[0], q->d[1], q->d[2],
@@ -78,7 +78,7 @@ struct list_hits {
 };
 
 static __attribute__((noinline)) void
-list_closest_exact(const struct wide_flat *f, const struct octet *q, struct list_hits *best)
+list_closest_exact(const struct small_scene *f, const struct ray8 *q, struct list_hits *best)
 {
     struct list l;
     vf t = vf_set(0), u, v;
@@ -100,13 +100,13 @@ list_closest_exact(const struct wide_flat *f, const struct octet *q, struct list
     }
 }
 
-INLINE vi does_not_ignore(const struct wide_flat *f, int i, const struct octet *q)
+INLINE vi does_not_ignore(const struct small_scene *f, int i, const struct ray8 *q)
 {
     return ~vi_eq(q->ignore, vi_set(f->number[i]));
 }
 
-static __attribute__((noinline)) vi list_occluded_exact(const struct wide_flat *f,
-                                                        const struct octet *q)
+static __attribute__((noinline)) vi list_occluded_exact(const struct small_scene *f,
+                                                        const struct ray8 *q)
 {
     struct list l;
     vf t, u, v;
@@ -126,7 +126,7 @@ struct quick {
     vi fit;
 };
 
-INLINE struct quick quick_init(const struct wide_flat *f, const struct octet *q)
+INLINE struct quick quick_init(const struct small_scene *f, const struct ray8 *q)
 {
     vf m = vf_max(vf_max(vf_abs(q->o[0]), vf_abs(q->o[1])), vf_abs(q->o[2]));
     m = vf_max(vf_set(f->reach), m);
@@ -145,7 +145,7 @@ struct quick_plane {
     vf nd, no;
 };
 
-INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct octet *q)
+INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct ray8 *q)
 {
     const float *n = face->normal;
     const vf *o = q->o, *d = q->d;
@@ -164,7 +164,7 @@ INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
 }
 
 INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
-                                   const struct octet *q, const struct quick *k)
+                                   const struct ray8 *q, const struct quick *k)
 {
     const float *ur = face->u_row, *vr = face->v_row;
     const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
@@ -186,7 +186,7 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
 
 /* The nearest hits of the lanes that the quick form can tell, of the others anything; which these
  * are. */
-INLINE vi list_closest_quick(const struct wide_flat *f, const struct octet *q,
+INLINE vi list_closest_quick(const struct small_scene *f, const struct ray8 *q,
                              struct list_hits *best)
 {
     const struct quick k = quick_init(f, q);
@@ -256,7 +256,7 @@ INLINE vi list_closest_quick(const struct wide_flat *f, const struct octet *q,
 }
 
 /* Lanes that meet something; *known: those of which the quick form can tell. */
-INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, vi *known)
+INLINE vi list_occluded_quick(const struct small_scene *f, const struct ray8 *q, vi *known)
 {
     const struct quick k = quick_init(f, q);
     const vf zero = vf_set(0);
@@ -281,7 +281,7 @@ INLINE vi list_occluded_quick(const struct wide_flat *f, const struct octet *q, 
 }
 
 /* Sheared rays. */
-INLINE void list_closest_eight(const struct wide_flat *f, const struct octet *q,
+INLINE void list_closest_eight(const struct small_scene *f, const struct ray8 *q,
                                struct list_hits *best)
 {
     if (!f->quick || bits(list_closest_quick(f, q, best)) != 255)
@@ -289,7 +289,7 @@ INLINE void list_closest_eight(const struct wide_flat *f, const struct octet *q,
 }
 
 /* Lanes that meet something. is_sheared: the rays are; else they will be if need be. */
-INLINE vi list_occluded_eight(const struct wide_flat *f, struct octet *q, bool is_sheared)
+INLINE vi list_occluded_eight(const struct small_scene *f, struct ray8 *q, bool is_sheared)
 {
     vi known = vi_set(0), met = known;
     if (f->quick)
@@ -306,7 +306,7 @@ static __attribute__((noinline)) void list_closest(const struct wide *w, const s
                                                    struct bvh_stats *stats)
 {
     for (int k = 0; k < n; k += LANES) {
-        struct octet q;
+        struct ray8 q;
         struct list_hits best;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
@@ -323,7 +323,7 @@ static __attribute__((noinline)) void list_occluded(const struct wide *w, const 
                                                     struct bvh_stats *stats)
 {
     for (int k = 0; k < n; k += LANES) {
-        struct octet q;
+        struct ray8 q;
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, n, filled);
         octet_load(r, eight, &q);

@@ -7,7 +7,7 @@
 
 /* The list beside the tree, first: results of all lanes, what is met so far into o, and the lanes that the
  * tree is for. Functions of their own, or gcc takes minutes with sanitizers. */
-static __attribute__((noinline)) unsigned closest_beside(const struct wide *w, struct octet *o,
+static __attribute__((noinline)) unsigned closest_beside(const struct wide *w, struct ray8 *o,
                                                          const uint16_t *eight, struct hits *h)
 {
     struct list_hits best;
@@ -25,7 +25,7 @@ static __attribute__((noinline)) unsigned closest_beside(const struct wide *w, s
     return octet_box(w, o);
 }
 
-static __attribute__((noinline)) unsigned occluded_beside(const struct wide *w, struct octet *o,
+static __attribute__((noinline)) unsigned occluded_beside(const struct wide *w, struct ray8 *o,
                                                           const uint16_t *eight, bool *occluded)
 {
     vi met = list_occluded_eight(w->flat, o, true);
@@ -39,7 +39,7 @@ static __attribute__((noinline)) unsigned occluded_beside(const struct wide *w, 
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                   bool any, struct hits *h, bool *occluded, struct bvh_stats *stats)
 {
-    struct octet octet, *o = &octet;
+    struct ray8 octet, *o = &octet;
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
         const uint16_t *eight = eight_of(lane, k, num_lanes, filled);
@@ -110,4 +110,4 @@ static void occluded(const struct wide *w, const struct rays *r, const uint16_t 
         trace(w, r, lane, num_lanes, true, NULL, occluded, stats);
 }
 
-const struct wide_kernel FOR_ISA(wide_kernel) = {.closest = closest, .occluded = occluded};
+const struct traverse FOR_ISA(traverse) = {.closest = closest, .occluded = occluded};

@@ -5,13 +5,13 @@
 #include "bvh_wide.h"
 
 /* As bvh_closest() and bvh_occluded(). */
-struct wide_kernel {
+struct traverse {
     void (*closest)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                     struct hits *h, struct bvh_stats *stats);
     void (*occluded)(const struct wide *w, const struct rays *r, const uint16_t *lane,
                      int num_lanes, bool *occluded, struct bvh_stats *stats);
 };
 
-extern const struct wide_kernel wide_kernel_sse42, wide_kernel_avx2, wide_kernel_avx512;
+extern const struct traverse traverse_sse42, traverse_avx2, traverse_avx512;
 
 #endif

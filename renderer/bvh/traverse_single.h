@@ -11,7 +11,7 @@ enum { ROW = sizeof(vf) };
 
 /* One ray, and what it has found. */
 struct single {
-    const struct octet *q; /* lane `lane` of it */
+    const struct ray8 *q; /* lane `lane` of it */
     int lane;
     size_t row[3]; /* planes of entry, in bytes from the start of a node */
     int k[3];      /* axes of the shear */
@@ -31,7 +31,7 @@ INLINE vf splat(const vf *a, int i)
     return vf_set(lane_of(a, i));
 }
 
-INLINE void single_init(const struct octet *q, int lane, struct single *s)
+INLINE void single_init(const struct ray8 *q, int lane, struct single *s)
 {
     static const int shear[3][3] = {{1, 2, 0}, {2, 0, 1}, {0, 1, 2}};
     s->q = q;
@@ -50,7 +50,7 @@ INLINE void single_init(const struct octet *q, int lane, struct single *s)
 INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf limit,
                       vf *t, vf *u, vf *v)
 {
-    const struct octet *q = s->q;
+    const struct ray8 *q = s->q;
     const int i = s->lane;
     if (spheres) {
         *u = *v = vf_set(0);

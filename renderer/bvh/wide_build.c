@@ -11,10 +11,10 @@
 enum { MAX_FREE_DEPTH = 64 };
 
 struct build {
-    const struct wide_splitter *splitter;
+    const struct sah_split_passes *splitter;
     struct wide_item *item;
     uint32_t num_triangles;
-    struct wide_parts *parts;
+    struct wide_build *parts;
 };
 
 static bool is_sphere(const struct build *b, uint32_t item)
@@ -48,7 +48,7 @@ static uint32_t spheres_last(struct build *b, struct wide_range *r)
 /* Cuts r in two: what is left of it, and *right. */
 static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
 {
-    const struct wide_splitter *k = b->splitter;
+    const struct sah_split_passes *k = b->splitter;
     struct wide_item *item = b->item + r->first;
     struct wide_split s = {.cost = FLT_MAX};
     struct wide_range l = {.first = r->first, .depth = r->depth + 1};
@@ -71,12 +71,12 @@ static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
 }
 
 /* Room for so many more. */
-static bool reserve(struct wide_parts *p, size_t more)
+static bool reserve(struct wide_build *p, size_t more)
 {
     if (p->num + more <= p->room)
         return true;
     size_t room = p->room + p->room / 2 + more + 64;
-    struct wide_part *larger = alloc_large(room * sizeof *larger);
+    struct wide_part *larger = huge_alloc(room * sizeof *larger);
     if (larger == NULL)
         return false;
     if (p->part != NULL)
@@ -138,7 +138,7 @@ static bool add_part(struct build *b, uint32_t i, struct wide_range *r)
 }
 
 /* The parts that become children: those of part i, which has `slots` of them. */
-static int gather_children(const struct wide_parts *p, uint32_t i, int slots, uint32_t *child,
+static int gather_children(const struct wide_build *p, uint32_t i, int slots, uint32_t *child,
                            int n)
 {
     const struct wide_part *c = &p->part[i];
@@ -154,7 +154,7 @@ static int gather_children(const struct wide_parts *p, uint32_t i, int slots, ui
 /* One thread's own part of the tree, which hangs on part `at` of the whole. */
 struct branch {
     uint32_t at;
-    struct wide_parts parts;
+    struct wide_build parts;
 };
 
 /* Several threads: large ranges are cut one by one, smaller ones become branches. */
@@ -209,13 +209,13 @@ static int grow_range(void *ctx, const struct parallel_task *task, struct parall
         ok = ok && add_branch(g, &n);
         pthread_mutex_unlock(&g->lock);
         if (!ok)
-            wide_parts_free(&n.parts);
+            wide_build_free(&n.parts);
         return ok ? 0 : -1;
     }
     struct wide_range left = t.range, right;
     cut(g->b, &left, &right);
     pthread_mutex_lock(&g->lock);
-    struct wide_parts *p = g->b->parts;
+    struct wide_build *p = g->b->parts;
     bool ok = reserve(p, 2);
     uint32_t i = (uint32_t)p->num;
     if (ok) {
@@ -232,14 +232,14 @@ static int grow_range(void *ctx, const struct parallel_task *task, struct parall
 /* The branches' parts behind those there are. */
 static bool join_branches(struct grove *g)
 {
-    struct wide_parts *p = g->b->parts;
+    struct wide_build *p = g->b->parts;
     size_t more = 0;
     for (size_t k = 0; k < g->num; k++)
         more += g->branch[k].parts.num;
     if (!reserve(p, more))
         return false;
     for (size_t k = 0; k < g->num; k++) {
-        const struct wide_parts *from = &g->branch[k].parts;
+        const struct wide_build *from = &g->branch[k].parts;
         uint32_t shift = (uint32_t)p->num - 1;
         for (size_t i = 0; i < from->num; i++) {
             struct wide_part *to = &p->part[i == 0 ? g->branch[k].at : i + shift];
@@ -247,7 +247,7 @@ static bool join_branches(struct grove *g)
             to->left += to->left != 0 ? shift : 0;
         }
         p->num += from->num - 1;
-        wide_parts_free(&g->branch[k].parts);
+        wide_build_free(&g->branch[k].parts);
     }
     return true;
 }
@@ -264,7 +264,7 @@ static bool grow_on_threads(struct build *b, const struct wide_range *all, int t
         ok = join_branches(&g);
     else
         for (size_t k = 0; k < g.num; k++)
-            wide_parts_free(&g.branch[k].parts);
+            wide_build_free(&g.branch[k].parts);
     free(g.branch);
     for (size_t i = num_cut; ok && i-- > 0;)
         if (b->parts->part[i].left != 0 && b->parts->part[i].left < num_cut)
@@ -272,8 +272,9 @@ static bool grow_on_threads(struct build *b, const struct wide_range *all, int t
     return ok;
 }
 
-bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
-                      const struct wide_range *all, int threads, struct wide_parts *p)
+bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
+                     uint32_t num_triangles, const struct wide_range *all, int threads,
+                     struct wide_build *p)
 {
     enum { LEAST_FOR_THREADS = 1 << 14 };
     struct build b = {.splitter = s, .item = item, .num_triangles = num_triangles, .parts = p};
@@ -286,7 +287,7 @@ bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uin
     return add_part(&b, 0, &r);
 }
 
-int wide_parts_children(const struct wide_parts *p, uint32_t i, uint32_t child[WIDTH])
+int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH])
 {
     uint32_t left = p->part[i].left;
     int slots = p->part[i].left_slots[0];
@@ -295,7 +296,7 @@ int wide_parts_children(const struct wide_parts *p, uint32_t i, uint32_t child[W
     return gather_children(p, left + 1, WIDTH - slots, child, n);
 }
 
-void wide_parts_free(struct wide_parts *p)
+void wide_build_free(struct wide_build *p)
 {
     free(p->part);
 }

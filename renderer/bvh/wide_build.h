@@ -24,7 +24,7 @@ struct wide_part {
     uint8_t left_slots[WIDTH];
 };
 
-struct wide_parts {
+struct wide_build {
     struct wide_part *part; /* 0 is the root */
     size_t num, room;
 };
@@ -39,13 +39,13 @@ static inline float wide_half_area(const struct wide_box *b)
 /* Cuts the items in `all` in two until each part is a leaf, of up to eight triangles or of up to eight
  * spheres (those from num_triangles on), by the surface area heuristic [Wald07], and chooses children
  * [Ylitie17]. More than eight items, so the root is no leaf; they are put in order of the parts. *p is
- * empty before; wide_parts_free() afterwards. The same tree on any number of threads, though its parts may
+ * empty before; wide_build_free() afterwards. The same tree on any number of threads, though its parts may
  * have other numbers. False if out of memory. */
-bool wide_parts_build(const struct wide_splitter *s, struct wide_item *item, uint32_t num_triangles,
-                      const struct wide_range *all, int threads, struct wide_parts *p)
-    __attribute__((warn_unused_result));
+bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
+                     uint32_t num_triangles, const struct wide_range *all, int threads,
+                     struct wide_build *p) __attribute__((warn_unused_result));
 /* The children of part i, not a leaf, as a node; how many. */
-int wide_parts_children(const struct wide_parts *p, uint32_t i, uint32_t child[WIDTH]);
-void wide_parts_free(struct wide_parts *p);
+int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH]);
+void wide_build_free(struct wide_build *p);
 
 #endif

@@ -14,10 +14,10 @@ bool moments_alloc(struct moments *m, int width, int height, struct err *e)
     if (width < 1 || height < 1)
         return err_set(e, "cannot make moments of %d x %d pixels", width, height);
     size_t pixels = (size_t)width * (size_t)height;
-    m->n = calloc_large(pixels, sizeof *m->n);
-    m->mean = calloc_large(3 * pixels, sizeof *m->mean);
-    m->m2 = calloc_large(3 * pixels, sizeof *m->m2);
-    m->m3 = calloc_large(3 * pixels, sizeof *m->m3);
+    m->n = huge_calloc(pixels, sizeof *m->n);
+    m->mean = huge_calloc(3 * pixels, sizeof *m->mean);
+    m->m2 = huge_calloc(3 * pixels, sizeof *m->m2);
+    m->m3 = huge_calloc(3 * pixels, sizeof *m->m3);
     if (m->n == NULL || m->mean == NULL || m->m2 == NULL || m->m3 == NULL) {
         moments_free(m);
         return err_set(e, "out of memory for moments of %d x %d pixels", width, height);

@@ -13,7 +13,7 @@
 enum { NUM_LINES = 9, LINE = 600, MAX_ARRAYS = 8 };
 
 /* The head: what has to be the same, a line each. */
-static void head_lines(char line[NUM_LINES][LINE], const struct identity *id, bool first_hits)
+static void head_lines(char line[NUM_LINES][LINE], const struct render_id *id, bool first_hits)
 {
     snprintf(line[0], LINE, "assay state 1\n");
     snprintf(line[1], LINE, "version %s\n", assay_version);
@@ -54,7 +54,8 @@ static void put(FILE *f, struct sha256_ctx *ctx, const void *data, size_t size)
     fwrite(data, 1, size, f); /* out_commit() looks at the error flag */
 }
 
-bool state_write(const char *path, const struct identity *id, const struct film *f, struct err *e)
+bool checkpoint_write(const char *path, const struct render_id *id, const struct film *f,
+                      struct err *e)
 {
     struct out_file out;
     struct sha256_ctx ctx;
@@ -86,8 +87,8 @@ static bool get(FILE *f, struct sha256_ctx *ctx, void *data, size_t size)
     return true;
 }
 
-static bool check_head(FILE *f, struct sha256_ctx *ctx, const char *path, const struct identity *id,
-                       bool first_hits, struct err *e)
+static bool check_head(FILE *f, struct sha256_ctx *ctx, const char *path,
+                       const struct render_id *id, bool first_hits, struct err *e)
 {
     char line[NUM_LINES][LINE], got[LINE];
     head_lines(line, id, first_hits);
@@ -112,7 +113,7 @@ static bool check_head(FILE *f, struct sha256_ctx *ctx, const char *path, const 
 }
 
 /* What follows the head: as long as it has to be, and with the hash that stands at its end. */
-static bool check_body(const struct state_file *s, struct sha256_ctx *ctx, uint32_t counts[2])
+static bool check_body(const struct checkpoint *s, struct sha256_ctx *ctx, uint32_t counts[2])
 {
     uint8_t block[1 << 16], digest[SHA256_DIGEST_SIZE], stored[SHA256_DIGEST_SIZE];
     struct film shape = {0};
@@ -137,12 +138,12 @@ static bool check_body(const struct state_file *s, struct sha256_ctx *ctx, uint3
            memcmp(digest, stored, sizeof digest) == 0;
 }
 
-bool state_open(struct state_file *s, const char *path, const struct identity *id, int width,
-                int height, bool first_hits, struct err *e)
+bool checkpoint_open(struct checkpoint *s, const char *path, const struct render_id *id, int width,
+                     int height, bool first_hits, struct err *e)
 {
     struct sha256_ctx ctx;
     uint32_t counts[2];
-    *s = (struct state_file){.width = width, .height = height, .first_hits = first_hits};
+    *s = (struct checkpoint){.width = width, .height = height, .first_hits = first_hits};
     if (strlen(path) >= sizeof s->path)
         return err_set(e, "%.64s...: path too long", path);
     strcpy(s->path, path);
@@ -155,7 +156,7 @@ bool state_open(struct state_file *s, const char *path, const struct identity *i
     if (ok && !check_body(s, &ctx, counts))
         ok = err_set(e, "%s: damaged or cut short", path);
     if (!ok) {
-        state_close(s);
+        checkpoint_close(s);
         return false;
     }
     s->num_samples = counts[0];
@@ -163,7 +164,7 @@ bool state_open(struct state_file *s, const char *path, const struct identity *i
     return true;
 }
 
-void state_close(struct state_file *s)
+void checkpoint_close(struct checkpoint *s)
 {
     if (s->f != NULL)
         fclose(s->f);
@@ -179,8 +180,8 @@ static bool counts_are_sane(const double *n, int num, uint32_t most)
     return true;
 }
 
-bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
-                struct err *e)
+bool checkpoint_rows(struct checkpoint *s, int y, int num, struct film *f, int at_x, int at_y,
+                     struct err *e)
 {
     struct array a[MAX_ARRAYS];
     size_t width = (size_t)s->width, before = 0;
@@ -204,20 +205,20 @@ bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, 
     return true;
 }
 
-bool state_read(const char *path, const struct identity *id, struct film *film, struct err *e)
+bool checkpoint_read(const char *path, const struct render_id *id, struct film *film, struct err *e)
 {
-    struct state_file s;
+    struct checkpoint s;
     int width = film->m.width, height = film->m.height;
-    if (!state_open(&s, path, id, width, height, film->first != NULL, e))
+    if (!checkpoint_open(&s, path, id, width, height, film->first != NULL, e))
         return false;
     bool ok = true;
     if (s.has_target) {
         film->target = calloc((size_t)width * (size_t)height, sizeof *film->target);
         ok = film->target != NULL || err_set(e, "%s: out of memory", path);
     }
-    ok = ok && state_rows(&s, 0, height, film, 0, 0, e);
+    ok = ok && checkpoint_rows(&s, 0, height, film, 0, 0, e);
     if (ok)
         film->num_samples = s.num_samples;
-    state_close(&s);
+    checkpoint_close(&s);
     return ok;
 }

@@ -10,16 +10,16 @@
 #include <stdio.h>
 
 /* Appears by rename. */
-bool state_write(const char *path, const struct identity *id, const struct film *f, struct err *e)
-    __attribute__((warn_unused_result));
+bool checkpoint_write(const char *path, const struct render_id *id, const struct film *f,
+                      struct err *e) __attribute__((warn_unused_result));
 
 /* Fills a film that film_alloc() made. Fails with a line on a missing or damaged file, and on one of
  * another render, naming the first thing that differs. */
-bool state_read(const char *path, const struct identity *id, struct film *f, struct err *e)
+bool checkpoint_read(const char *path, const struct render_id *id, struct film *f, struct err *e)
     __attribute__((warn_unused_result));
 
 /* A state read by rows, for putting together a picture that is larger than memory. */
-struct state_file {
+struct checkpoint {
     FILE *f; /* NULL: closed */
     char path[4096];
     int width, height;
@@ -28,13 +28,14 @@ struct state_file {
     long body;            /* where it begins */
 };
 /* Reads all of it once, to see that it is whole and of that render. */
-bool state_open(struct state_file *s, const char *path, const struct identity *id, int width,
-                int height, bool first_hits, struct err *e) __attribute__((warn_unused_result));
+bool checkpoint_open(struct checkpoint *s, const char *path, const struct render_id *id, int width,
+                     int height, bool first_hits, struct err *e)
+    __attribute__((warn_unused_result));
 /* Rows y .. y+num-1 into a film that is at least as wide, from its pixel (at_x, at_y) on; the target too if the
  * film has one. Not film.num_samples. */
-bool state_rows(struct state_file *s, int y, int num, struct film *f, int at_x, int at_y,
-                struct err *e) __attribute__((warn_unused_result));
-/* Gives the file back, until state_rows() wants it again: so any number of states can be read in turn. */
-void state_close(struct state_file *s);
+bool checkpoint_rows(struct checkpoint *s, int y, int num, struct film *f, int at_x, int at_y,
+                     struct err *e) __attribute__((warn_unused_result));
+/* Gives the file back, until checkpoint_rows() wants it again: so any number of states can be read in turn. */
+void checkpoint_close(struct checkpoint *s);
 
 #endif

@@ -150,7 +150,7 @@ static bool has_ending(const char *path, const char *ending)
     return dot != NULL && strcasecmp(dot, ending) == 0;
 }
 
-bool is_exr(const char *path)
+bool image_is_exr(const char *path)
 {
     return has_ending(path, ".exr");
 }
@@ -223,7 +223,7 @@ static bool parse_cell(struct options *s, const char *const value[4], struct err
 static bool parse_starter(struct options *s, const char *v, struct err *e)
 {
     int which;
-    if (!cli_choice("--starter", v, starter_names, &which, e))
+    if (!cli_choice("--starter", v, cs184_deviation_names, &which, e))
         return false;
     s->starter |= 1u << which;
     return true;

@@ -18,7 +18,7 @@ struct options {
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
     int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
-    unsigned starter; /* 1 << enum starter (cs184_deviations.h) */
+    unsigned starter; /* 1 << enum cs184_deviation (cs184_deviations.h) */
     int spp;          /* of the whole picture, the most if adaptive */
     int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
@@ -47,6 +47,6 @@ bool options_parse(int argc, char **argv, struct options *o, struct err *e)
 void options_print(const struct options *o);
 
 /* Does a file name end in .exr (else it ends in .png)? */
-bool is_exr(const char *path);
+bool image_is_exr(const char *path);
 
 #endif

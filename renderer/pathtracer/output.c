@@ -29,7 +29,7 @@ struct texts {
 static bool make_texts(const struct output *o, uint32_t num_samples,
                        const struct render_stats *stats, struct texts *t)
 {
-    t->command = shell_join(NULL, (const char *const *)o->argv);
+    t->command = shell_quote_join(NULL, (const char *const *)o->argv);
     if (t->command == NULL)
         return false;
     snprintf(t->samples, sizeof t->samples, "%d:%lld", o->opt->first,
@@ -85,7 +85,7 @@ struct output_writer *output_open(const struct output *o, int width, int height,
     *w = (struct output_writer){
         .o = o, .stats = stats, .width = width, .height = height, .num_samples = num_samples};
     for (int i = 0; i < o->opt->num_outputs; i++)
-        png = png || !is_exr(o->opt->output[i]);
+        png = png || !image_is_exr(o->opt->output[i]);
     w->rgb8 = png ? malloc(bytes) : NULL;
     w->rates = png && adaptive ? malloc(bytes) : NULL;
     if (!png || (w->rgb8 != NULL && (w->rates != NULL || !adaptive)))
@@ -101,7 +101,7 @@ static bool exr_rows(struct output_writer *w, const struct film *band, struct er
     struct image layers = {0};
     bool ok = true;
     for (int i = 0; ok && i < opt->num_outputs; i++) {
-        if (!is_exr(opt->output[i]))
+        if (!image_is_exr(opt->output[i]))
             continue;
         if (band->first != NULL && layers.data == NULL)
             ok = film_layers(band, &layers, e);
@@ -144,13 +144,13 @@ bool output_rows(struct output_writer *w, const struct film *band, struct err *e
 static bool write_png(const struct output_writer *w, const char *path, enum picture_kind kind,
                       const uint8_t *rgb8, struct err *e)
 {
-    struct picture_texts t;
+    struct png_metadata t;
     bool cut = kind == PICTURE_IMAGE && w->o->ranges != NULL;
     uint32_t num = cut || w->most == 0 ? w->num_samples : (uint32_t)w->most;
-    if (!picture_texts_make(w->o, kind, num, &t))
+    if (!png_metadata_make(w->o, kind, num, &t))
         return err_set(e, "%s: out of memory", path);
     bool ok = image_write_png_texts(path, w->width, w->height, rgb8, t.attr, t.num, e);
-    picture_texts_free(&t);
+    png_metadata_free(&t);
     return ok;
 }
 
@@ -168,7 +168,7 @@ bool output_close(struct output_writer *w, struct err *e)
     const struct options *opt = w->o->opt;
     bool ok = true;
     for (int i = 0; ok && i < opt->num_outputs; i++) {
-        if (is_exr(opt->output[i])) {
+        if (image_is_exr(opt->output[i])) {
             ok = moments_writer_close(w->exr[i], e);
             w->exr[i] = NULL;
             continue;
@@ -201,16 +201,17 @@ bool output_pictures(const struct output *o, const struct film *f, const struct 
     return false;
 }
 
-bool output_state_path(const struct output *o, const char *picture, char path[STATE_PATH],
+bool output_state_path(const struct output *o, const char *picture, char path[CHECKPOINT_PATH],
                        struct err *e)
 {
     if (picture == NULL)
         picture = o->opt->output[0];
-    int n = snprintf(path, STATE_PATH, "%s.state", picture);
-    return (n > 0 && n < STATE_PATH) || err_set(e, "%.64s...: path too long", picture);
+    int n = snprintf(path, CHECKPOINT_PATH, "%s.state", picture);
+    return (n > 0 && n < CHECKPOINT_PATH) || err_set(e, "%.64s...: path too long", picture);
 }
 
-void print_summary(const struct output *o, const struct film *f, const struct render_stats *stats)
+void output_print_summary(const struct output *o, const struct film *f,
+                          const struct render_stats *stats)
 {
     const struct moments *m = &f->m;
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -241,7 +242,7 @@ void print_summary(const struct output *o, const struct film *f, const struct re
                 100 * film_relative_error(f));
 }
 
-void print_how_to_resume(const struct output *o, const struct film *f)
+void output_print_how_to_resume(const struct output *o, const struct film *f)
 {
     /* Right behind the program: "--" may end the options. */
     const char **word = calloc((size_t)o->argc + 3, sizeof *word);
@@ -254,7 +255,7 @@ void print_how_to_resume(const struct output *o, const struct film *f)
             word[n++] = o->opt->output[0];
         }
         memcpy(word + n, o->argv + 1, (size_t)(o->argc - 1) * sizeof *word);
-        command = shell_join(NULL, word);
+        command = shell_quote_join(NULL, word);
     }
     fprintf(stderr, "pathtracer: interrupted after %lu of %d samples per pixel; to go on:\n%s\n",
             (unsigned long)f->num_samples, o->opt->last - o->opt->first,

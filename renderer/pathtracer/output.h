@@ -6,7 +6,7 @@
 
 struct output {
     const struct options *opt;
-    const struct identity *id;
+    const struct render_id *id;
     const struct scene *scene;
     char accel[160]; /* what the rays are traced with, in words */
     const char *
@@ -34,17 +34,18 @@ bool output_close(struct output_writer *w, struct err *e) __attribute__((warn_un
 void output_abandon(struct output_writer *w);
 
 /* PICTURE.state beside the first picture, or beside `picture` if that is not NULL. */
-enum { STATE_PATH = 4096 };
-bool output_state_path(const struct output *o, const char *picture, char path[STATE_PATH],
+enum { CHECKPOINT_PATH = 4096 };
+bool output_state_path(const struct output *o, const char *picture, char path[CHECKPOINT_PATH],
                        struct err *e) __attribute__((warn_unused_result));
 
 /* The assignment's colours of a sampling rate n/most: blue (0) through green (1/2) to red (1). */
 void rate_colour(double rate, uint8_t rgb8[3]);
 
 /* The image mean with its standard error, on stdout; what it cost, on stderr. */
-void print_summary(const struct output *o, const struct film *f, const struct render_stats *stats);
+void output_print_summary(const struct output *o, const struct film *f,
+                          const struct render_stats *stats);
 
 /* On stderr: how far the render came, and the command that goes on with it. */
-void print_how_to_resume(const struct output *o, const struct film *f);
+void output_print_how_to_resume(const struct output *o, const struct film *f);
 
 #endif

@@ -21,7 +21,7 @@ enum { EXIT_BAD_INPUT = 3, EXIT_SIGNAL = 128 };
 /* What the renderer's control calls back with. */
 struct session {
     struct output out;
-    char state_path[STATE_PATH];
+    char state_path[CHECKPOINT_PATH];
     sigset_t signals; /* blocked while rendering, so that they can be looked for */
     int signal;       /* the first that came; 0: none */
 };
@@ -56,7 +56,7 @@ static bool signal_came(void *arg)
 static bool write_meanwhile(void *arg, const struct film *f, struct err *e)
 {
     const struct session *s = arg;
-    return output_pictures(&s->out, f, NULL, e) && state_write(s->state_path, s->out.id, f, e);
+    return output_pictures(&s->out, f, NULL, e) && checkpoint_write(s->state_path, s->out.id, f, e);
 }
 
 static bool setup_camera(const struct options *o, const struct scene *scene, struct camera *c,
@@ -94,7 +94,7 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_dark_lights > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
                 scene->num_dark_lights);
-    starter_apply(scene, o->starter);
+    cs184_deviations_apply(scene, o->starter);
     if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)
@@ -132,12 +132,12 @@ static struct render_options render_options_of(const struct options *o)
 static bool start_film(const struct session *s, const struct options *o, struct film *f,
                        struct err *e)
 {
-    char path[STATE_PATH];
+    char path[CHECKPOINT_PATH];
     if (!film_alloc(f, o->cell[2], o->cell[3], o->aov, e))
         return false;
     if (o->resume == NULL)
         return true;
-    if (!output_state_path(&s->out, o->resume, path, e) || !state_read(path, s->out.id, f, e))
+    if (!output_state_path(&s->out, o->resume, path, e) || !checkpoint_read(path, s->out.id, f, e))
         return false;
     if (f->num_samples > (uint32_t)(o->last - o->first))
         return err_set(e, "%s: has %lu samples per pixel already, more than the %d asked for", path,
@@ -153,7 +153,7 @@ static bool finish(struct session *s, const struct film *f, const struct render_
     if (!output_pictures(&s->out, f, stats, e))
         return false;
     if (stats->end == RENDER_ASKED || o->keep_state)
-        return state_write(s->state_path, s->out.id, f, e);
+        return checkpoint_write(s->state_path, s->out.id, f, e);
     unlink(s->state_path);
     return true;
 }
@@ -162,29 +162,29 @@ static bool write_heatmap(const struct output *out, const struct bvh *bvh, const
                           const struct render_options *opt, struct err *e)
 {
     const char *path = out->opt->heatmap;
-    struct picture_texts t;
+    struct png_metadata t;
     uint64_t most;
-    if (!picture_texts_make(out, PICTURE_HEATMAP, 0, &t))
+    if (!png_metadata_make(out, PICTURE_HEATMAP, 0, &t))
         return err_set(e, "%s: out of memory", path);
     bool ok = heatmap_write(path, bvh, c, opt->x, opt->y, opt->width, opt->height, t.attr, t.num,
                             &most, e);
     if (ok)
         printf("%s: at most %llu nodes visited\n", path, (unsigned long long)most);
-    picture_texts_free(&t);
+    png_metadata_free(&t);
     return ok;
 }
 
 static bool run(struct session *s, struct err *e)
 {
     const struct options *o = s->out.opt;
-    struct identity id;
+    struct render_id id;
     struct scene scene = {0};
     struct camera camera;
     struct film film = {0};
     struct bvh *bvh = NULL;
     bool ok = false;
     if (!load_scene(o, &scene, e) || !setup_camera(o, &scene, &camera, e) ||
-        !identity_make(o, &id, e))
+        !render_id_make(o, &id, e))
         goto done;
     double start = now_seconds();
     bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
@@ -217,9 +217,9 @@ static bool run(struct session *s, struct err *e)
         s->signal = 0; /* it came too late to cut anything short */
     ok = finish(s, &film, &stats, e);
     if (ok)
-        print_summary(&s->out, &film, &stats);
+        output_print_summary(&s->out, &film, &stats);
     if (ok && s->signal != 0)
-        print_how_to_resume(&s->out, &film);
+        output_print_how_to_resume(&s->out, &film);
 done:
     s->out.id = NULL; /* this function's own */
     s->out.scene = NULL;
@@ -233,7 +233,7 @@ done:
 static bool hand_over(int argc, char **argv, struct err *e)
 {
     char path[4096];
-    beside_program(path, sizeof path, "assay");
+    fs_beside_program(path, sizeof path, "assay");
     char **words = calloc((size_t)argc + 3, sizeof *words);
     if (words == NULL)
         return err_set(e, "--slurm: out of memory");

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-const char *const picture_kind_names[] = {"image", "rates", "heatmap", NULL};
+const char *const png_metadata_kind_names[] = {"image", "rates", "heatmap", NULL};
 
 /* No option says in two ways what the samples and the kind of picture say already. */
 static const struct option_words said_apart[] = {{"-s", 1}, {"--spp", 1}, {"--aov", 0}, {0}};
@@ -27,28 +27,28 @@ static char *canonical_command(const struct output *o, enum picture_kind kind)
             word[n++] = most;
             word[n++] = spp;
         }
-        int kept = words_kept(render_how, num - 1, apart + 1, word + n);
-        word[n + words_kept(said_apart, kept, word + n, word + n)] = NULL;
-        command = shell_join(NULL, (const char *const *)word);
+        int kept = cli_rewrite_kept(cli_rewrite_render, num - 1, apart + 1, word + n);
+        word[n + cli_rewrite_kept(said_apart, kept, word + n, word + n)] = NULL;
+        command = shell_quote_join(NULL, (const char *const *)word);
     }
     free(apart);
     free(word);
     return command;
 }
 
-static void validate_log(struct picture_texts *t, const char *name, const char *value)
+static void validate_log(struct png_metadata *t, const char *name, const char *value)
 {
     t->attr[t->num++] = (struct image_attr){name, value};
 }
 
-bool picture_texts_make(const struct output *o, enum picture_kind kind, uint32_t num_samples,
-                        struct picture_texts *t)
+bool png_metadata_make(const struct output *o, enum picture_kind kind, uint32_t num_samples,
+                       struct png_metadata *t)
 {
-    *t = (struct picture_texts){.command = canonical_command(o, kind)};
+    *t = (struct png_metadata){.command = canonical_command(o, kind)};
     if (t->command == NULL)
         return false;
     validate_log(t, "assay:version", assay_version);
-    validate_log(t, "assay:picture", picture_kind_names[kind]);
+    validate_log(t, "assay:picture", png_metadata_kind_names[kind]);
     validate_log(t, "assay:command", t->command);
     validate_log(t, "assay:scene", o->id->scene);
     validate_log(t, "assay:settings", o->id->settings);
@@ -69,8 +69,8 @@ bool picture_texts_make(const struct output *o, enum picture_kind kind, uint32_t
     return true;
 }
 
-void picture_texts_free(struct picture_texts *t)
+void png_metadata_free(struct png_metadata *t)
 {
     free(t->command);
-    *t = (struct picture_texts){0};
+    *t = (struct png_metadata){0};
 }

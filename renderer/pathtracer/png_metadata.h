@@ -7,14 +7,14 @@
 
 enum picture_kind { PICTURE_IMAGE, PICTURE_RATES, PICTURE_HEATMAP };
 /* "image", "rates", "heatmap": the text assay:picture. NULL-terminated. */
-extern const char *const picture_kind_names[];
+extern const char *const png_metadata_kind_names[];
 
 /* The texts of one PNG; those of the output and its identity have to live as long. */
-enum { PICTURE_TEXTS = 10 };
-struct picture_texts {
+enum { PNG_METADATA_TEXTS = 10 };
+struct png_metadata {
     char *command;
     char samples[64], most[16];
-    struct image_attr attr[PICTURE_TEXTS];
+    struct image_attr attr[PNG_METADATA_TEXTS];
     int num;
 };
 
@@ -23,8 +23,8 @@ struct picture_texts {
  * and assay:samples, "A:B", num_samples of them. Of an image also
  * assay:ranges where sums of ranges were added. Of rates assay:most, the number of samples that is red.
  * False out of memory; else to be freed. */
-bool picture_texts_make(const struct output *o, enum picture_kind kind, uint32_t num_samples,
-                        struct picture_texts *t) __attribute__((warn_unused_result));
-void picture_texts_free(struct picture_texts *t);
+bool png_metadata_make(const struct output *o, enum picture_kind kind, uint32_t num_samples,
+                       struct png_metadata *t) __attribute__((warn_unused_result));
+void png_metadata_free(struct png_metadata *t);
 
 #endif

@@ -5,10 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
-bool identity_make(const struct options *o, struct identity *id, struct err *e)
+bool render_id_make(const struct options *o, struct render_id *id, struct err *e)
 {
     char camera[65] = "none", environment[65] = "none";
-    *id = (struct identity){.first_sample = (uint32_t)o->first};
+    *id = (struct render_id){.first_sample = (uint32_t)o->first};
     if (!sha256_file(o->scene, id->scene, e) ||
         (o->camera_file != NULL && !sha256_file(o->camera_file, camera, e)) ||
         (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)))
@@ -36,16 +36,16 @@ bool identity_make(const struct options *o, struct identity *id, struct err *e)
     else
         snprintf(id->adaptive, sizeof id->adaptive, "off");
     snprintf(id->seed, sizeof id->seed, "%llu", (unsigned long long)o->seed);
-    identity_cell(o->cell, o->width, o->height, id->cell);
+    render_id_cell(o->cell, o->width, o->height, id->cell);
     return true;
 }
 
-void identity_cell(const int cell[4], int width, int height, char text[64])
+void render_id_cell(const int cell[4], int width, int height, char text[64])
 {
     snprintf(text, 64, "%d %d %d %d of %d %d", cell[0], cell[1], cell[2], cell[3], width, height);
 }
 
-bool identity_parse_cell(const char *text, int c[6])
+bool render_id_parse_cell(const char *text, int c[6])
 {
     int end = 0;
     if (strlen(text) > 60 ||

@@ -5,7 +5,7 @@
 
 #include "options.h"
 
-struct identity {
+struct render_id {
     char scene[65];     /* SHA-256 of the scene file, lower-case hex */
     char settings[512]; /* what decides the law of a sample: "integrator path; direct mis; ..." */
     char adaptive[96];  /* "off", "rule N TOL" or "pilot N TOL most SPP" */
@@ -15,12 +15,12 @@ struct identity {
 };
 
 /* Reads scene and camera file to hash them. */
-bool identity_make(const struct options *o, struct identity *id, struct err *e)
+bool render_id_make(const struct options *o, struct render_id *id, struct err *e)
     __attribute__((warn_unused_result));
 
 /* X Y DX DY and the W and H of the whole -> "X Y DX DY of W H". */
-void identity_cell(const int cell[4], int width, int height, char text[64]);
+void render_id_cell(const int cell[4], int width, int height, char text[64]);
 /* "X Y DX DY of W H" -> six numbers; false on anything else or a cell that is not inside. */
-bool identity_parse_cell(const char *text, int cell[6]) __attribute__((warn_unused_result));
+bool render_id_parse_cell(const char *text, int cell[6]) __attribute__((warn_unused_result));
 
 #endif

@@ -1,8 +1,9 @@
 #include "cs184_deviations.h"
 
-const char *const starter_names[NUM_STARTERS + 1] = {"light-pdf", "turned-lamp", "beckmann", NULL};
+const char *const cs184_deviation_names[NUM_CS184_DEVIATIONS + 1] = {"light-pdf", "turned-lamp",
+                                                                     "beckmann", NULL};
 
-vec3 starter_turn(const struct scene *s, const struct light *l, vec3 p)
+vec3 cs184_deviations_turn(const struct scene *s, const struct light *l, vec3 p)
 {
     const vec3 *q = s->position + 3 * (size_t)l->first;
     if (l->count != 2)
@@ -20,7 +21,7 @@ static void turn_lamp(struct scene *s, const struct light *l)
     if (l->count != 2)
         return;
     for (int i = 0; i < 6; i++)
-        turned[i] = starter_turn(s, l, q[i]);
+        turned[i] = cs184_deviations_turn(s, l, q[i]);
     for (int i = 0; i < 6; i++) {
         q[i] = turned[i];
         s->bounds_min = vmin(s->bounds_min, q[i]);
@@ -28,13 +29,13 @@ static void turn_lamp(struct scene *s, const struct light *l)
     }
 }
 
-void starter_apply(struct scene *s, unsigned bits)
+void cs184_deviations_apply(struct scene *s, unsigned bits)
 {
     s->starter = bits;
-    for (uint32_t l = 0; l < s->num_lights && starter_has(s, STARTER_TURNED_LAMP); l++)
+    for (uint32_t l = 0; l < s->num_lights && starter_has(s, CS184_TURNED_LAMP); l++)
         if (s->lights[l].kind == LIGHT_TRIANGLES)
             turn_lamp(s, &s->lights[l]);
-    for (uint32_t m = 0; m < s->num_materials && starter_has(s, STARTER_BECKMANN); m++)
+    for (uint32_t m = 0; m < s->num_materials && starter_has(s, CS184_BECKMANN); m++)
         if (s->materials[m].microfacet == MICROFACET_BECKMANN)
             s->materials[m].microfacet = MICROFACET_BECKMANN_STARTER;
 }

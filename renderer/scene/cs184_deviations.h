@@ -5,24 +5,24 @@
 
 #include "scene.h"
 
-enum starter {
-    STARTER_LIGHT_PDF, /* the density of a light sample lacks a factor 1/distance: irradiance falls as 1/r */
-    STARTER_TURNED_LAMP, /* the rectangle that is sampled is turned by 90 degrees against the one that is seen */
-    STARTER_BECKMANN, /* the shadowing of rough metals has a pi for a sqrt(pi) (microfacet.h) */
-    NUM_STARTERS
+enum cs184_deviation {
+    CS184_LIGHT_PDF, /* the density of a light sample lacks a factor 1/distance: irradiance falls as 1/r */
+    CS184_TURNED_LAMP, /* the rectangle that is sampled is turned by 90 degrees against the one that is seen */
+    CS184_BECKMANN, /* the shadowing of rough metals has a pi for a sqrt(pi) (microfacet.h) */
+    NUM_CS184_DEVIATIONS
 };
-extern const char *const starter_names[NUM_STARTERS + 1]; /* NULL at the end */
+extern const char *const cs184_deviation_names[NUM_CS184_DEVIATIONS + 1]; /* NULL at the end */
 
-static inline bool starter_has(const struct scene *s, enum starter what)
+static inline bool starter_has(const struct scene *s, enum cs184_deviation what)
 {
     return (s->starter >> what & 1) != 0;
 }
 
-/* Sets s->starter to `bits` (1 << enum starter), and turns the lamps that are seen, so that what is sampled stays as in the
+/* Sets s->starter to `bits` (1 << enum cs184_deviation), and turns the lamps that are seen, so that what is sampled stays as in the
  * file, and changes the kind of rough metals. Only rectangles, lights of two triangles, are turned; once. Before the hierarchy is built. */
-void starter_apply(struct scene *s, unsigned bits);
+void cs184_deviations_apply(struct scene *s, unsigned bits);
 
 /* The point of a rectangle that stands for p of the turned one: by 90 degrees about its centre, in its plane. */
-vec3 starter_turn(const struct scene *s, const struct light *l, vec3 p);
+vec3 cs184_deviations_turn(const struct scene *s, const struct light *l, vec3 p);
 
 #endif

@@ -192,8 +192,8 @@ struct environment *environment_read(const char *path, struct err *e)
         err_set(e, "%s: an environment map must be an .exr or .hdr file", path);
         return NULL;
     }
-    bool is_exr = strcasecmp(dot, ".exr") == 0;
-    if (!(is_exr ? image_read_exr(path, &im, NULL, e) : image_read_hdr(path, &im, e)))
+    bool image_is_exr = strcasecmp(dot, ".exr") == 0;
+    if (!(image_is_exr ? image_read_exr(path, &im, NULL, e) : image_read_hdr(path, &im, e)))
         return NULL;
     struct environment *env = environment_from_image(&im, path, e);
     image_free(&im);

@@ -2,7 +2,7 @@
 
 #include <float.h>
 
-struct shear shear_of(const ray *r)
+struct shear shape_shear(const ray *r)
 {
     const float d[3] = {r->d.x, r->d.y, r->d.z};
     float x = fabsf(d[0]), y = fabsf(d[1]), z = fabsf(d[2]);

@@ -16,7 +16,7 @@ struct shear {
     int kx, ky, kz;
 };
 
-struct shear shear_of(const ray *r);
+struct shear shape_shear(const ray *r);
 
 /* [Woop13]. s must be the shear of r, whose tmin and tmax may have changed since. If r meets the triangle inside (tmin, tmax): true, with distance t and barycentric
  * coordinates (u, v) of the second and third vertex. Both sides are hit, and the rim counts. Of

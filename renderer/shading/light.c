@@ -237,14 +237,14 @@ static struct light_sample as_starter(const struct scene *s, const struct light 
                                       struct light_sample ours)
 {
     struct light_sample out = ours;
-    if (starter_has(s, STARTER_TURNED_LAMP) && light->count == 2) {
+    if (starter_has(s, CS184_TURNED_LAMP) && light->count == 2) {
         const vec3 *q = s->position + 3 * (size_t)light->first;
         out = (struct light_sample){.sphere = NO_HIT};
         finish_area_sample(&out, &s->materials[s->tri_material[light->first]], p,
-                           starter_turn(s, light, mad(p, ours.distance, ours.wi)),
+                           cs184_deviations_turn(s, light, mad(p, ours.distance, ours.wi)),
                            normalize(cross(sub(q[1], q[0]), sub(q[2], q[0]))), 1 / light->area);
     }
-    if (starter_has(s, STARTER_LIGHT_PDF) && out.pdf_w > 0)
+    if (starter_has(s, CS184_LIGHT_PDF) && out.pdf_w > 0)
         out.pdf_w /= out.distance;
     return out;
 }

@@ -75,7 +75,7 @@ struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
     struct lanes_scene *l = calloc(1, sizeof *l);
     const size_t words = RECORD_WORDS * (size_t)scene_num_primitives(s);
     if (l != NULL) {
-        l->primitive = alloc_large(words * sizeof *l->primitive);
+        l->primitive = huge_alloc(words * sizeof *l->primitive);
         l->material = calloc(s->num_materials + 1, MATERIAL_WORDS * sizeof *l->material);
     }
     if (l == NULL || l->primitive == NULL || l->material == NULL) {

@@ -21,10 +21,10 @@ bool film_alloc(struct film *f, int width, int height, bool first_hits, struct e
     if (!moments_alloc(&f->m, width, height, e))
         return false;
     size_t pixels = (size_t)width * (size_t)height;
-    f->s1 = calloc_large(pixels, sizeof *f->s1);
-    f->s2 = calloc_large(pixels, sizeof *f->s2);
+    f->s1 = huge_calloc(pixels, sizeof *f->s1);
+    f->s2 = huge_calloc(pixels, sizeof *f->s2);
     if (first_hits)
-        f->first = calloc_large(pixels, sizeof *f->first);
+        f->first = huge_calloc(pixels, sizeof *f->first);
     if (f->s1 == NULL || f->s2 == NULL || (first_hits && f->first == NULL)) {
         film_free(f);
         return err_set(e, "out of memory for a picture of %d x %d pixels", width, height);

@@ -37,7 +37,7 @@ static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    return !remove_tree(dir, &e);
+    return !fs_remove_tree(dir, &e);
 }
 
 /* Two bugs seen in one view of 16 x 12 cells: one brightens all, one the left half. */
@@ -112,7 +112,7 @@ static void bugs(void **state)
     struct err e;
     struct catalogue c;
     make_catalogue(&c);
-    assert_true(make_parent_dirs(file(0, "catalogue/x"), &e));
+    assert_true(fs_make_parent_dirs(file(0, "catalogue/x"), &e));
     alloc_fail_each("catalogue_write, catalogue_read", ALLOC_ALL, keep_catalogue, &c);
     alloc_fail_each("diagnose", ALLOC_ALL, name_bug, &c);
 }

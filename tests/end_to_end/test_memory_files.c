@@ -35,14 +35,14 @@ static int make_place(void **state)
         return -1;
     snprintf(out, sizeof out, "%s/out/x", dir);
     snprintf(whole, sizeof whole, "%s/whole/x", dir);
-    return make_parent_dirs(out, &e) && make_parent_dirs(whole, &e) ? 0 : -1;
+    return fs_make_parent_dirs(out, &e) && fs_make_parent_dirs(whole, &e) ? 0 : -1;
 }
 
 static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 static struct moments some_moments(void)
@@ -148,11 +148,11 @@ static void moments_files(void **state)
     alloc_fail_output(whole, true);
 }
 
-static const struct identity id = {.scene = "5ce4e",
-                                   .settings = "integrator path",
-                                   .adaptive = "pilot",
-                                   .seed = "1",
-                                   .cell = "0 0 5 18 of 5 18"};
+static const struct render_id id = {.scene = "5ce4e",
+                                    .settings = "integrator path",
+                                    .adaptive = "pilot",
+                                    .seed = "1",
+                                    .cell = "0 0 5 18 of 5 18"};
 
 static bool film_and_state(void *ctx, struct err *e)
 {
@@ -166,11 +166,11 @@ static bool film_and_state(void *ctx, struct err *e)
     }
     if (ok)
         moments_add(&f.m, 7, (double[3]){1, 2, 3});
-    ok = ok && state_write(out, &id, &f, e);
+    ok = ok && checkpoint_write(out, &id, &f, e);
     alloc_fail_off();
     assert_int_equal(access(out, F_OK) == 0, ok);
     alloc_fail_on();
-    ok = ok && film_alloc(&back, WIDTH, HEIGHT, true, e) && state_read(out, &id, &back, e);
+    ok = ok && film_alloc(&back, WIDTH, HEIGHT, true, e) && checkpoint_read(out, &id, &back, e);
     alloc_fail_off();
     if (ok) {
         assert_int_equal(back.num_samples, 3);
@@ -185,7 +185,8 @@ static bool film_and_state(void *ctx, struct err *e)
 static void states(void **state)
 {
     (void)state;
-    alloc_fail_each("film_alloc, state_write, state_read", ALLOC_ALL, film_and_state, NULL);
+    alloc_fail_each("film_alloc, checkpoint_write, checkpoint_read", ALLOC_ALL, film_and_state,
+                    NULL);
 }
 
 static bool read_picture(void *ctx, struct err *e)

@@ -55,7 +55,7 @@ static void write_png(const char *path, uint64_t seed)
         for (int c = 0; c < 3; c++)
             rgb8[3 * p + c] = tone_map(TONE_CGL, v);
     }
-    assert_true(make_parent_dirs(path, &e) && image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
+    assert_true(fs_make_parent_dirs(path, &e) && image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
 }
 
 static void make_rubric(void)
@@ -126,7 +126,7 @@ static int tear_down(void **state)
     moments_free(&reference);
     free(rubric);
     free(answers);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 static bool read_student(void *ctx, struct err *e)

@@ -42,7 +42,7 @@ static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    return !remove_tree(dir, &e);
+    return !fs_remove_tree(dir, &e);
 }
 
 static void hold(double *right, double sum)
@@ -125,7 +125,7 @@ static void inputs(void **state)
     uint64_t seed = 5;
     simulate(&m, LAW_EXPONENTIAL, 1, 16, false, &seed);
     assert_true(moments_write(file(0, "m.exr"), &m, NULL, 0, &e) &&
-                make_parent_dirs(file(1, "replicates/x"), &e));
+                fs_make_parent_dirs(file(1, "replicates/x"), &e));
     moments_free(&m);
     write_pfm(file(1, "one.pfm"), 1);
     write_pfm(file(1, "two.pfm"), 2);
@@ -182,7 +182,7 @@ static void merging(void **state)
     (void)state;
     struct err e;
     double right = 0;
-    assert_true(make_parent_dirs(file(0, "merged/x"), &e));
+    assert_true(fs_make_parent_dirs(file(0, "merged/x"), &e));
     write_share(file(0, "s0.exr"), "0 0 4 2 of 4 2", "0:4", 1);
     write_share(file(0, "s1.exr"), "0 0 4 2 of 4 2", "4:8", 2);
     alloc_fail_each("share_read, merge_shares, share_write", ALLOC_ALL, merge, &right);

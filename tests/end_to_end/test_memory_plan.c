@@ -36,14 +36,14 @@ static int make_place(void **state)
     snprintf(picture, sizeof picture, "%s/out/x.png", dir);
     snprintf(plan_dir, sizeof plan_dir, "%s/plan", dir);
     snprintf(program, sizeof program, "%s/program", dir);
-    return make_parent_dirs(picture, &e) ? 0 : -1;
+    return fs_make_parent_dirs(picture, &e) ? 0 : -1;
 }
 
 static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 static char *command[] = {"pathtracer", "-q", "-r", "8",     "32",
@@ -60,20 +60,20 @@ static void write_states(const struct plan *p)
         int num;
         char **more = plan_words(json_object_get(job, "words"), &num), *argv[WORDS + 16], path[256];
         struct options o;
-        struct identity id;
+        struct render_id id;
         struct film f;
         struct err e = {0};
         assert_true(num <= 16);
         memcpy(argv, command, sizeof command);
         memcpy(argv + WORDS, more, (size_t)(num + 1) * sizeof *more);
-        assert_true(options_parse(WORDS + num, argv, &o, &e) && identity_make(&o, &id, &e) &&
+        assert_true(options_parse(WORDS + num, argv, &o, &e) && render_id_make(&o, &id, &e) &&
                     film_alloc(&f, o.cell[2], o.cell[3], false, &e));
         f.num_samples = (uint32_t)(o.last - o.first);
         for (size_t i = 0; i < (size_t)(o.cell[2] * o.cell[3]); i++)
             for (int n = o.first; n < o.last; n++)
                 moments_add(&f.m, i, (double[3]){o.cell[1], 0.5, n});
         snprintf(path, sizeof path, "%s/%d_%d:%d.state", dir, o.cell[1], o.first, o.last);
-        assert_true(state_write(path, &id, &f, &e));
+        assert_true(checkpoint_write(path, &id, &f, &e));
         film_free(&f);
         free(more);
         json_decref(job);
@@ -157,7 +157,7 @@ static bool do_job(void *ctx, struct err *e)
     assert_true(!ok || job_run_verify(p, 0, &none));
     job_run_artefact(p, 0, NULL, path);
     if (ok)
-        assert_true(remove_tree(path, &none));
+        assert_true(fs_remove_tree(path, &none));
     snprintf(path, sizeof path, "%s/jobs", plan_dir);
     assert_true(rmdir(path) == 0 || access(path, F_OK) != 0); /* nothing else is in it */
     return ok;

@@ -41,7 +41,7 @@ static int make_place(void **state)
     if (mkdtemp(dir) == NULL)
         return -1;
     snprintf(out, sizeof out, "%s/out/x", dir);
-    return make_parent_dirs(out, &e) && suite_load("reference/scenes", &suite, &e) ? 0 : -1;
+    return fs_make_parent_dirs(out, &e) && suite_load("reference/scenes", &suite, &e) ? 0 : -1;
 }
 
 static int remove_place(void **state)
@@ -49,7 +49,7 @@ static int remove_place(void **state)
     struct err e;
     alloc_fail_sum(state);
     suite_free(&suite);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 struct export
@@ -228,7 +228,7 @@ static bool keep_golden(void *ctx, struct err *e)
     assert_true(access(path, F_OK) != 0);
     json_decref(read);
     moments_free(&back);
-    assert_true(remove_tree(golden, e));
+    assert_true(fs_remove_tree(golden, e));
     return ok;
 }
 

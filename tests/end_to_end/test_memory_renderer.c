@@ -176,11 +176,11 @@ static void environments(void **state)
 static bool words(void *ctx, struct err *e)
 {
     const char *const *word = ctx;
-    char *text = shell_join("first", word), *ascii = NULL, **back = NULL;
+    char *text = shell_quote_join("first", word), *ascii = NULL, **back = NULL;
     int num = 0;
-    bool ok =
-        ((text != NULL && (ascii = shell_ascii(text)) != NULL) || err_set(e, "out of memory")) &&
-        (back = shell_split(ascii, &num, e)) != NULL;
+    bool ok = ((text != NULL && (ascii = shell_quote_ascii(text)) != NULL) ||
+               err_set(e, "out of memory")) &&
+              (back = shell_quote_split(ascii, &num, e)) != NULL;
     alloc_fail_off();
     if (ok) {
         assert_int_equal(num, 3);
@@ -197,12 +197,12 @@ static bool command_line(void *ctx, struct err *e)
 {
     char *argv[] = {"pathtracer", "-qs4", "-f", "x.exr", ctx, NULL};
     struct options o;
-    struct identity id = {0};
+    struct render_id id = {0};
     struct camera c = {.width = 4, .height = 4};
     char **apart = NULL;
     bool ok = options_parse(5, argv, &o, e) &&
               ((apart = options_apart(5, argv)) != NULL || err_set(e, "out of memory")) &&
-              identity_make(&o, &id, e) && camera_read_file(&c, "tests/fuzz/seeds/camera.info", e);
+              render_id_make(&o, &id, e) && camera_read_file(&c, "tests/fuzz/seeds/camera.info", e);
     alloc_fail_off();
     if (ok) {
         char digest[65];
@@ -219,7 +219,7 @@ static void command_lines(void **state)
 {
     (void)state;
     static const char *word[] = {"two words", "it's\n", NULL};
-    alloc_fail_each("shell_join, shell_ascii, shell_split", ALLOC_ALL, words, word);
+    alloc_fail_each("shell_join, shell_quote_ascii, shell_quote_split", ALLOC_ALL, words, word);
     alloc_fail_each("options, identity, camera file", ALLOC_ALL, command_line,
                     "reference/scenes/11_furnace.dae");
 }

@@ -45,7 +45,7 @@ static void copy(const char *from, const char *to)
     struct err e = {0};
     char bytes[65536];
     FILE *in = fopen(from, "rb"), *out = NULL;
-    if (!make_parent_dirs(to, &e) || (out = fopen(to, "wb")) == NULL || in == NULL)
+    if (!fs_make_parent_dirs(to, &e) || (out = fopen(to, "wb")) == NULL || in == NULL)
         fail_msg("%s: cannot be copied to %s", from, to);
     size_t n = fread(bytes, 1, sizeof bytes, in);
     assert_int_equal(fwrite(bytes, 1, n, out), n);
@@ -66,7 +66,7 @@ static int remove_place(void **state)
 {
     struct err e;
     alloc_fail_sum(state);
-    return !remove_tree(dir, &e);
+    return !fs_remove_tree(dir, &e);
 }
 
 static bool load_suite(void *ctx, struct err *e)
@@ -165,7 +165,7 @@ static void results(void **state)
 {
     (void)state;
     struct err e;
-    assert_true(make_parent_dirs(file(0, "out/x"), &e));
+    assert_true(fs_make_parent_dirs(file(0, "out/x"), &e));
     alloc_json(ALLOC_JSON_FAILS, NULL);
     alloc_fail_each("results_new, jansson too", ALLOC_ALL, new_results, NULL);
     alloc_json(ALLOC_JSON_ENDS, NULL);
@@ -233,7 +233,8 @@ static void comparisons_and_reports(void **state)
     char *argv[] = {"compare", "a.exr", "b.exr", NULL};
     write_side(file(0, "a.exr"), 1);
     write_side(file(0, "b.exr"), 2);
-    assert_true(make_parent_dirs(file(0, "json/x"), &e) && make_parent_dirs(file(0, "page/x"), &e));
+    assert_true(fs_make_parent_dirs(file(0, "json/x"), &e) &&
+                fs_make_parent_dirs(file(0, "page/x"), &e));
     snprintf(json_output, sizeof json_output, "%s", file(0, "json/c.json"));
     alloc_json(ALLOC_JSON_ENDS, json_output);
     alloc_fail_each("compared_run, compare_job_write_json", ALLOC_ALL, compare_files, NULL);
@@ -303,7 +304,8 @@ static bool make_again(void *ctx, struct err *e)
     }
     assert_true(ok || access(keep, F_OK) != 0);
     reproduced_free(&r);
-    assert_true(remove_tree(file(2, "again"), &ignored) && remove_tree(file(2, "kept"), &ignored));
+    assert_true(fs_remove_tree(file(2, "again"), &ignored) &&
+                fs_remove_tree(file(2, "kept"), &ignored));
     return ok;
 }
 
@@ -312,7 +314,7 @@ static void exports(void **state)
     (void)state;
     static const char *const name[] = {"exports/x.json", "exports/x.pov", "exports/x.xml"};
     struct err e = {0};
-    assert_true(make_parent_dirs(file(0, name[0]), &e));
+    assert_true(fs_make_parent_dirs(file(0, name[0]), &e));
     alloc_json(ALLOC_JSON_ENDS, NULL);
     alloc_fail_each("exporting_run", ALLOC_ALL, export_scene, (void *)file(0, name[1]));
     for (int i = 0; i < 3; i++) {

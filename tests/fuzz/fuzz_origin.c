@@ -11,18 +11,18 @@ static void check_command(const char *command)
 {
     struct err e = {""};
     int num = 0, again = 0;
-    char **word = shell_split(command, &num, &e);
+    char **word = shell_quote_split(command, &num, &e);
     if (word == NULL) {
         fuzz_check_line(&e, NULL);
         return;
     }
-    char *text = shell_join(NULL, (const char *const *)word);
+    char *text = shell_quote_join(NULL, (const char *const *)word);
     fuzz_require(text != NULL, "no memory");
-    char *ascii = shell_ascii(text);
+    char *ascii = shell_quote_ascii(text);
     fuzz_require(ascii != NULL, "no memory");
     for (const char *c = ascii; *c != '\0'; c++)
         fuzz_require(*c >= ' ' && *c <= '~', "a byte that is not printable ASCII");
-    char **back = shell_split(ascii, &again, &e);
+    char **back = shell_quote_split(ascii, &again, &e);
     fuzz_require(back != NULL && again == num, "words that are not read back");
     for (int i = 0; i < num; i++)
         fuzz_require(strcmp(word[i], back[i]) == 0, "another word than was written");

@@ -111,7 +111,7 @@ static bool look_at_all(const struct rate_image *r, struct claim_run *task, int 
         worker[i].crew = &crew;
         snprintf(worker[i].work, sizeof worker[i].work, "%s/diagnose_rates/%d.%d", r->build,
                  (int)getpid(), i);
-        if (!make_dirs(worker[i].work, e) ||
+        if (!fs_make_dirs(worker[i].work, e) ||
             pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
             break;
     }

@@ -329,7 +329,7 @@ static bool make_effects(const struct maker *m, const struct error_modes_base *b
         worker[i] = none;
         worker[i].crew = &crew;
         snprintf(worker[i].work, sizeof worker[i].work, "%s/%d", m->work, i);
-        if (!make_dirs(worker[i].work, e) ||
+        if (!fs_make_dirs(worker[i].work, e) ||
             pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
             break;
         started++;
@@ -404,7 +404,7 @@ int main(int argc, char **argv)
     }
     m.build = argv[1];
     snprintf(m.work, sizeof m.work, "%s/catalogue", m.build);
-    bool ok = suite_load("reference/scenes", &m.suite, &e) && make_dirs(m.work, &e) &&
+    bool ok = suite_load("reference/scenes", &m.suite, &e) && fs_make_dirs(m.work, &e) &&
               list_bugs(argv[2], &m.made, &e);
     struct err none;
     if (ok && !catalogue_read(argv[3], &m.old, &none))
@@ -413,7 +413,7 @@ int main(int argc, char **argv)
     ok = ok && (m.made.view != NULL || err_set(&e, "out of memory"));
     for (int i = 0; ok && i < NUM_VIEWS; i++)
         ok = make_view(&m, i, &e) && catalogue_write(m.work, &m.made, &e);
-    ok = ok && make_dirs(argv[3], &e) && catalogue_write(argv[3], &m.made, &e);
+    ok = ok && fs_make_dirs(argv[3], &e) && catalogue_write(argv[3], &m.made, &e);
     if (ok)
         report_blind(&m.made);
     else

@@ -8,6 +8,6 @@ const char *data_dir(char *path, size_t size, const char *checkout, const char *
 {
     if (access("reference/scenes", R_OK) == 0)
         return checkout;
-    beside_program(path, size, installed);
+    fs_beside_program(path, size, installed);
     return path;
 }

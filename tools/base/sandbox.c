@@ -319,7 +319,7 @@ static void drop_large(const char *out, const struct sandbox_job *job)
 
 static bool make_out(const struct sandbox *s, const char *out, struct err *e)
 {
-    if (!make_dirs(out, e))
+    if (!fs_make_dirs(out, e))
         return false;
     if (s->drop && !s->unsafe && chown(out, NOBODY, NOBODY) != 0)
         return err_set(e, "%s: cannot give it to nobody: %s", out, strerror(errno));
@@ -356,7 +356,7 @@ bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct 
         drop_large(job->out, job);
     }
     struct err ignored;
-    if (box[0] != '\0' && !remove_tree(box, &ignored))
+    if (box[0] != '\0' && !fs_remove_tree(box, &ignored))
         ok = ok && err_set(e, "%s", ignored.msg);
     free(l);
     return ok;

@@ -46,7 +46,7 @@ static void remove_old(const char *temp, const char *start)
             snprintf(path, sizeof path, "%s/%s", temp, entry->d_name) >= (int)sizeof path)
             continue;
         int fd;
-        bool removed = lock_dir(path, &fd) == 0 && remove_tree(path, &ignored);
+        bool removed = lock_dir(path, &fd) == 0 && fs_remove_tree(path, &ignored);
         (void)removed; /* it is in the way of nobody */
         if (fd >= 0)
             close(fd);
@@ -85,7 +85,7 @@ bool temp_dir_close(struct temp_dir *d, struct err *e)
 {
     bool ok = true;
     if (d->path[0] != '\0') {
-        ok = remove_tree(d->path, e);
+        ok = fs_remove_tree(d->path, e);
         if (d->lock >= 0)
             close(d->lock);
     }

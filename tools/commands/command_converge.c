@@ -180,7 +180,7 @@ static void tell_not_judged(void *ctx, const struct convergence_row *r)
 int command_converge(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], golden[4096], share[4096];
-    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
     struct converge_options o = {
         .out_dir = "build/converge",
         .pathtracer = pathtracer,

@@ -176,7 +176,7 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
 int command_diagnose(int argc, char **argv, struct err *e)
 {
     char pathtracer[4096], suite[4096], catalogue[4096];
-    beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
     struct settings s = {
         .pathtracer = pathtracer,
         .diagnose = {.alpha = 1e-6},

@@ -129,7 +129,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
                                        .threads = cli_processors(),
                                        .timeout_s = 3600};
     if (s->prepare) {
-        code = make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
+        code = fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
         if (code == 0 && !s->quiet)
             printf("references of %s: %s\n", r->path, cache);
     } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
@@ -137,7 +137,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
         int num;
         char **word = grade_options_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");
-        if (ok && make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
+        if (ok && fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
         free(word);
         sandbox_close(&box);

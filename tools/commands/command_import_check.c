@@ -67,7 +67,7 @@ int command_import_check(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     if (s.done)
         return 0;
-    if (!make_dirs(s.opt.work_dir, e) || !suite_load(s.suite, &suite, e))
+    if (!fs_make_dirs(s.opt.work_dir, e) || !suite_load(s.suite, &suite, e))
         return EXIT_NOT_JUDGED;
     int code = EXIT_NOT_JUDGED;
     json_t *reports;

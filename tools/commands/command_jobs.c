@@ -197,7 +197,7 @@ int slurm_command(const char *dir, int argc, char **argv, const struct plan_wish
     if (ok)
         code = plan_gather(&p, e);
     /* What has been put together needs no plan of ours; one that the user named is the user's. */
-    if (ok && dir == NULL && e->msg[0] == '\0' && !remove_tree(p.dir, &ignored))
+    if (ok && dir == NULL && e->msg[0] == '\0' && !fs_remove_tree(p.dir, &ignored))
         fprintf(stderr, "assay: note: %s\n", ignored.msg);
     plan_free(&p);
     return code;

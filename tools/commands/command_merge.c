@@ -43,7 +43,7 @@ int command_merge(int argc, char **argv, struct err *e)
         err_set(e, "merge needs an output and two shares or more (see --help)");
         goto done;
     }
-    command = shell_join("assay", (const char *const *)argv);
+    command = shell_quote_join("assay", (const char *const *)argv);
     if ((command != NULL || err_set(e, "out of memory")) && merge_shares(share, num, &whole, e) &&
         share_write(out, &whole, command, e)) {
         printf("%s\n", out);

@@ -49,7 +49,7 @@ static bool choose(void *ctx, const struct suite_scene *scene, const struct suit
 static bool make_pictures(const struct reference_command *c, struct err *e)
 {
     struct chosen one = {NULL, NULL};
-    return reference_options_each(c, choose, &one, e) && make_dirs(c->out, e) &&
+    return reference_options_each(c, choose, &one, e) && fs_make_dirs(c->out, e) &&
            reference_render_part(one.scene, one.ref, &c->opt, c->first, c->last, c->out, e);
 }
 

@@ -181,7 +181,7 @@ int command_report(int argc, char **argv, struct err *e)
     }
     char beside[4096];
     if (out == NULL) {
-        beside_file(results, "index.html", beside, sizeof beside);
+        fs_beside_file(results, "index.html", beside, sizeof beside);
         out = beside;
     }
     if (!report_write_with(results, converge, out, e))

@@ -252,7 +252,7 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
 {
     const char *engine = NULL;
     *c = (struct validate_command){.help = false};
-    beside_program(c->pathtracer, sizeof c->pathtracer, "pathtracer");
+    fs_beside_program(c->pathtracer, sizeof c->pathtracer, "pathtracer");
     c->opt = (struct validate_options){
         .out_dir = "build/report",
         .pathtracer = c->pathtracer,

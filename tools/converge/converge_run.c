@@ -315,7 +315,7 @@ bool converge_run(const struct converge_options *opt, int argc, char **argv, jso
     for (int i = 0; ok && i < opt->num_scenes; i++)
         if (suite_find(&r.suite, opt->scene[i]) == NULL)
             ok = err_set(e, "no scene '%s' in %s", opt->scene[i], opt->suite_dir);
-    if (ok && (ok = make_dirs(opt->out_dir, e))) {
+    if (ok && (ok = fs_make_dirs(opt->out_dir, e))) {
         snprintf(r.dir, sizeof r.dir, "%.4096s/converge-XXXXXX", opt->out_dir);
         if (mkdtemp(r.dir) == NULL)
             ok = err_set(e, "%s: cannot make a directory in it: %s", opt->out_dir, strerror(errno));

@@ -128,7 +128,8 @@ char *export_job_command(const struct export_job *s, const char *name)
     if (s->scene[0] == '-')
         word[n++] = "--";
     word[n] = s->scene;
-    char *text = shell_join(NULL, word), *ascii = text != NULL ? shell_ascii(text) : NULL;
+    char *text = shell_quote_join(NULL, word),
+         *ascii = text != NULL ? shell_quote_ascii(text) : NULL;
     free(text);
     return ascii;
 }
@@ -167,7 +168,7 @@ static bool with_origin(const struct export_job *s, const struct scene *scene,
     if (!sha256_file(s->scene, hash, e) ||
         (s->environment != NULL && !sha256_file(s->environment, environment, e)))
         return false;
-    char *command = export_job_command(s, NULL), *named = export_job_command(s, base_of(s->out));
+    char *command = export_job_command(s, NULL), *named = export_job_command(s, fs_base(s->out));
     const struct export_origin origin = {.version = s->version != NULL ? s->version : assay_version,
                                          .command = s->command != NULL ? s->command : command,
                                          .named = s->command != NULL ? s->command : named,
@@ -185,7 +186,7 @@ bool export_job_run(const struct export_job *s, struct err *e)
 {
     struct scene scene = {0};
     struct camera camera;
-    bool ok = make_parent_dirs(s->out, e) && collada_load(s->scene, DIALECT_AUTO, &scene, e) &&
+    bool ok = fs_make_parent_dirs(s->out, e) && collada_load(s->scene, DIALECT_AUTO, &scene, e) &&
               (s->environment == NULL || scene_read_environment(&scene, s->environment, e));
     if (ok && !camera_init(&camera, &scene, s->width, s->height, e))
         ok = err_prefix(e, "%s", s->scene);

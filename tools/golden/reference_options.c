@@ -119,7 +119,7 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();
     c->opt.work_dir = c->work;
-    if (!make_dirs(c->work, e) || !suite_load(c->suite_dir, &c->suite, e))
+    if (!fs_make_dirs(c->work, e) || !suite_load(c->suite_dir, &c->suite, e))
         return false;
     for (int i = 0; i < c->num_only; i++)
         if (suite_find(&c->suite, c->only[i]) == NULL)

@@ -50,7 +50,7 @@ static bool stage_file(const char *from, const char *dir, struct err *e)
 bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
 {
     char path[8192];
-    if (!make_dirs(dir, e))
+    if (!fs_make_dirs(dir, e))
         return false;
     chmod(dir, 0755);
     for (int i = 0; i < r->num_pictures; i++) {
@@ -221,7 +221,7 @@ bool submission_build(const struct rubric *r, const struct sandbox *box, const c
                  r->limit.disk >> 20);
     else if (rename(built, s->tree) != 0 || chmod(s->tree, 0644) != 0)
         return err_set(e, "%s: %s", s->tree, strerror(errno));
-    return remove_tree(out, e);
+    return fs_remove_tree(out, e);
 }
 
 bool submission_open(const struct rubric *r, const char *path, const char *work,
@@ -236,7 +236,7 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
     snprintf(out->id, sizeof out->id, "%.127s", last_part(out->path));
     if (stat(out->path, &st) != 0)
         return err_set(e, "%s: %s", path, strerror(errno));
-    if (!make_dirs(work, e))
+    if (!fs_make_dirs(work, e))
         return false;
     chmod(work, 0755);
     out->kind = kind_of(r, out, S_ISDIR(st.st_mode));
@@ -291,7 +291,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     snprintf(made->path, sizeof made->path, "%s/%s%s", out_dir, p->name, dot);
     snprintf(made->rates, sizeof made->rates, "%s/%s_rate.png", out_dir, p->name);
     bool ok = move_file(out, r->output, made->path, &there, e) &&
-              move_file(out, rates, made->rates, &has_rates, e) && remove_tree(out, e);
+              move_file(out, rates, made->rates, &has_rates, e) && fs_remove_tree(out, e);
     if (result.end != SANDBOX_OK)
         snprintf(made->why, sizeof made->why, "the program: %s", result.why);
     else if (!there)

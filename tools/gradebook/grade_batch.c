@@ -233,7 +233,7 @@ static json_t *command_of(const struct grade_job *job, const char *path)
         return NULL;
     memcpy(word, job->word, (size_t)num * sizeof *word);
     word[num] = path;
-    char *text = shell_join("assay", word);
+    char *text = shell_quote_join("assay", word);
     json_t *command = text != NULL ? json_string(text) : NULL;
     free(text);
     free(word);
@@ -252,7 +252,7 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     snprintf(log, sizeof log, "%s/build.log", out);
     if (!job->again && is_done(file, key, grade))
         return true;
-    if (!remove_tree(out, e) || !make_dirs(out, e) ||
+    if (!fs_remove_tree(out, e) || !fs_make_dirs(out, e) ||
         !submission_build(job->rubric, job->sandbox, work, log, &s, e))
         return false;
     *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
@@ -299,7 +299,7 @@ static void *work(void *ctx)
         snprintf(dir, sizeof dir, "%s/work-%d", job->sandbox->dir.path, i);
         if (!grade_one(job, job->path[i], dir, &b->grade[i], &e))
             b->grade[i] = trouble_json(job, job->path[i], e.msg);
-        bool removed = remove_tree(dir, &ignored);
+        bool removed = fs_remove_tree(dir, &ignored);
         (void)removed; /* goes with the sandbox's directory */
         pthread_mutex_lock(&b->lock);
         b->done++;
@@ -346,7 +346,7 @@ bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e
     pthread_t thread[MOST_JOBS];
     struct batch b = {.job = job, .lock = PTHREAD_MUTEX_INITIALIZER};
     int started = 0, jobs = job->jobs < MOST_JOBS ? job->jobs : MOST_JOBS;
-    if (!check_ids(job, e) || !make_dirs(job->out, e))
+    if (!check_ids(job, e) || !fs_make_dirs(job->out, e))
         return false;
     b.grade = calloc((size_t)job->num, sizeof(json_t *));
     *grades = json_array();

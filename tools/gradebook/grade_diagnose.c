@@ -80,14 +80,15 @@ static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
     const struct diagnose_gather_options opt = {
         .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
     snprintf(out, sizeof out, "%s/diagnose", work);
-    if (!make_dirs(out, e) || !submission_picture(d->rubric, box, s, view, d->stage, work, out,
-                                                  seed * 1000u + (uint64_t)view, threads, &made, e))
+    if (!fs_make_dirs(out, e) ||
+        !submission_picture(d->rubric, box, s, view, d->stage, work, out,
+                            seed * 1000u + (uint64_t)view, threads, &made, e))
         return false;
     bool ok = made.why[0] == '\0'
                   ? diagnose_gather_image(&opt, d->catalogue.view[view].name, made.path, clue, e)
                   : err_set(e, "%.500s", made.why);
     struct err ignored;
-    return remove_tree(out, ok ? e : &ignored) && ok;
+    return fs_remove_tree(out, ok ? e : &ignored) && ok;
 }
 
 static json_t *finding_json(const struct catalogue *c, const struct diagnosis *found)

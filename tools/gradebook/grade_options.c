@@ -111,7 +111,7 @@ char **grade_options_words(int argc, char **argv, const struct grade_settings *s
     int all = 0;
     while (word[all] != NULL)
         all++;
-    all = words_kept(how, all, word, word);
+    all = cli_rewrite_kept(how, all, word, word);
     *num = 0;
     for (int i = 0; i < all; i++) {
         bool is_submission = false;
@@ -139,7 +139,7 @@ void grade_options_help(void)
 
 struct grade_settings grade_options_default(int argc, struct grade_paths *at)
 {
-    beside_program(at->pathtracer, sizeof at->pathtracer, "pathtracer");
+    fs_beside_program(at->pathtracer, sizeof at->pathtracer, "pathtracer");
     return (struct grade_settings){
         .out = "grades",
         .pathtracer = at->pathtracer,

@@ -278,7 +278,7 @@ bool grade_write_file(const char *dir, const json_t *grades, const char *name, c
     struct out_file o;
     if (strcmp(name, "results.json") == 0)
         return write_json(to, gradescope(grades), e);
-    if (!make_parent_dirs(to, e) || !out_open(&o, to, e))
+    if (!fs_make_parent_dirs(to, e) || !out_open(&o, to, e))
         return false;
     if (json_is_array(grades) ? write_text(grades, name, o.f, e)
                               : student_page(o.f, dir, grades, e))

@@ -66,7 +66,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     int num = 0;
     char **words = grade_options_words(argc, argv, s, &num);
     bool ok = words != NULL || err_set(e, "out of memory");
-    beside_program(assay, sizeof assay, "assay");
+    fs_beside_program(assay, sizeof assay, "assay");
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
     snprintf(references, sizeof references, "%s/references", p->dir);
     const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
@@ -126,7 +126,7 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
         return true;
     const char *const copy[] = {"cp", "-a", "--", from, temp, NULL};
     const struct process process = {.argv = copy};
-    return remove_tree(temp, e) && process_run(&process, NULL, e) && remove_tree(to, e) &&
+    return fs_remove_tree(temp, e) && process_run(&process, NULL, e) && fs_remove_tree(to, e) &&
            (rename(temp, to) == 0 || err_set(e, "%s: cannot appear: %s", to, strerror(errno)));
 }
 
@@ -139,7 +139,7 @@ int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
     int num = 0;
     const char **words = calloc((size_t)argc + 4, sizeof *words);
     bool ok = (s.submission != NULL && words != NULL) || err_set(e, "out of memory");
-    ok = ok && grade_options_parse(argc, argv, &s, e) && make_dirs(s.out, e);
+    ok = ok && grade_options_parse(argc, argv, &s, e) && fs_make_dirs(s.out, e);
     for (int k = 0; ok && k < p->num; k++)
         ok = place(p, k, s.out, s.submission[k], e);
     if (ok) {

@@ -29,7 +29,7 @@ static const struct option_words not_of_a_job[] = {{"--only", 1},
 static bool add_words(struct plan *p, int argc, char **argv, int threads, struct err *e)
 {
     char assay[4096], t[16];
-    beside_program(assay, sizeof assay, "assay");
+    fs_beside_program(assay, sizeof assay, "assay");
     snprintf(t, sizeof t, "%d", threads);
     const char *const first[] = {assay, "reference", "-t", t, "--out", "{out}", "{job}"};
     return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
@@ -137,7 +137,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     static const char *const engines[] = {"cycles", "povray"};
     const struct reference_command *c = g->c;
     const char *binary[2] = {NULL, NULL};
-    int threads = has_word(argc, argv, "-t", "--threads") ? c->opt.threads : 1;
+    int threads = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? c->opt.threads : 1;
     if (c->last > 0)
         return err_set(e, "--pictures: these are a job already");
     bool ok = plan_begin(p, c->out, "part.json", threads, e) &&

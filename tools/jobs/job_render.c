@@ -88,8 +88,8 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct option
     char **word = calloc((size_t)argc, sizeof *word);
     if (word == NULL)
         return err_set(e, "out of memory");
-    int num = words_kept(render_how, argc - 1, argv + 1, word);
-    num = words_kept(cells_and_threads, num, word, word);
+    int num = cli_rewrite_kept(cli_rewrite_render, argc - 1, argv + 1, word);
+    num = cli_rewrite_kept(cells_and_threads, num, word, word);
     bool ok =
         plan_run_words(p, first, (int)(sizeof first / sizeof *first) - (some ? 0 : 2), false, e) &&
         plan_run_words(p, (const char *const *)word, num, true, e);
@@ -125,9 +125,9 @@ bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct 
     int ranges = w->ranges > 0 ? w->ranges : 1;
     if (!options_parse(argc, argv, &o, e) || !check_options(&o, e) || !check_ranges(&o, ranges, e))
         return false;
-    beside_program(beside, sizeof beside, "pathtracer");
+    fs_beside_program(beside, sizeof beside, "pathtracer");
     int parts = o.slurm > 0 ? o.slurm : w->parts > 0 ? w->parts : PLAN_PARTS;
-    int threads = has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
+    int threads = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
     const char *const inputs[] = {o.scene, o.camera_file, o.environment_file};
     bool ok = plan_begin(p, o.output[0], PRODUCT, threads, e) &&
               add_words(p, argc, argv, &o, w->pathtracer != NULL ? w->pathtracer : beside, threads,

@@ -15,13 +15,13 @@
 struct part {
     int x, y, width, height;  /* in the picture, origin at the top left */
     int first, last;          /* its samples */
-    struct state_file *state; /* NULL: not yet, or no more */
+    struct checkpoint *state; /* NULL: not yet, or no more */
 };
 
 struct gathering {
     const struct plan *plan;
     const struct options *o;
-    struct identity id; /* of the whole */
+    struct render_id id; /* of the whole */
     struct part *part;
     bool ranges;
     struct film more; /* ranges: a band of one that is added */
@@ -34,16 +34,16 @@ static bool open_part(struct gathering *g, int k, struct err *e)
     struct part *part = &g->part[k];
     const struct options *o = g->o;
     char path[PLAN_PATH + 256];
-    struct identity id = g->id;
+    struct render_id id = g->id;
     const int cell[4] = {o->cell[0] + part->x, o->cell[1] + o->cell[3] - part->y - part->height,
                          part->width, part->height};
     job_run_artefact(g->plan, k, plan_text(g->plan, "product"), path);
-    identity_cell(cell, o->width, o->height, id.cell);
+    render_id_cell(cell, o->width, o->height, id.cell);
     id.first_sample = (uint32_t)part->first;
     part->state = calloc(1, sizeof *part->state);
     if (part->state == NULL)
         return err_set(e, "out of memory");
-    return state_open(part->state, path, &id, part->width, part->height, o->aov, e) &&
+    return checkpoint_open(part->state, path, &id, part->width, part->height, o->aov, e) &&
            (o->pilot_tolerance < 0 || part->state->has_target ||
             err_set(e, "%s: its pilot has decided nothing", path));
 }
@@ -51,7 +51,7 @@ static bool open_part(struct gathering *g, int k, struct err *e)
 static void close_part(struct part *part)
 {
     if (part->state != NULL)
-        state_close(part->state);
+        checkpoint_close(part->state);
     free(part->state);
     part->state = NULL;
 }
@@ -159,11 +159,11 @@ static bool read_band(struct gathering *g, int y, int num, struct film *band, st
         bool is_first = part->first == g->o->first;
         struct film *into = is_first ? band : &g->more;
         if ((part->state == NULL && !open_part(g, k, e)) ||
-            !state_rows(part->state, from - part->y, to - from, into, part->x, from - y, e) ||
+            !checkpoint_rows(part->state, from - part->y, to - from, into, part->x, from - y, e) ||
             !check_counts(g, part, into, from - y, to - from, e) ||
             (!is_first && !add_rows(g, part, band, from - y, to - from, e)))
             return false;
-        state_close(part->state);
+        checkpoint_close(part->state);
         if (to == part->y + part->height)
             close_part(part);
     }
@@ -202,9 +202,9 @@ static bool write_whole(struct gathering *g, const struct output *out, struct er
         output_abandon(w);
     }
     if (ok && o->keep_state) {
-        char path[STATE_PATH];
+        char path[CHECKPOINT_PATH];
         band.num_samples = g->num_samples;
-        ok = output_state_path(out, NULL, path, e) && state_write(path, &g->id, &band, e);
+        ok = output_state_path(out, NULL, path, e) && checkpoint_write(path, &g->id, &band, e);
     }
     film_free(&band);
     film_free(&g->more);
@@ -237,9 +237,9 @@ bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, stru
     /* As a render here would have been asked for. */
     static const struct option_words slurm[] = {{"--slurm", 1}, {0}};
     if (ok)
-        out.argc = words_kept(slurm, argc, argv, word);
+        out.argc = cli_rewrite_kept(slurm, argc, argv, word);
     out.argv = word;
-    ok = ok && options_parse(out.argc, word, &o, e) && identity_make(&o, &g.id, e) &&
+    ok = ok && options_parse(out.argc, word, &o, e) && render_id_make(&o, &g.id, e) &&
          collada_load(o.scene, (enum dialect)o.dialect, &scene, e) && find_parts(&g, e);
     if (ok)
         snprintf(out.accel, sizeof out.accel, "%s: in %d parts", bvh_kind_names[o.accel], p->num);

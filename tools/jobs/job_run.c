@@ -152,7 +152,7 @@ static bool put_in_place(const struct plan *p, int k, const char *from, struct e
         return true;
     int why = errno;
     if ((why == EEXIST || why == ENOTEMPTY) && job_run_is_made(p, k))
-        return remove_tree(from, e);
+        return fs_remove_tree(from, e);
     return err_set(e, "%s: cannot appear: %s", to, strerror(why));
 }
 
@@ -175,13 +175,13 @@ bool job_run(const struct plan *p, int k, bool *made, struct err *e)
     gethostname(host, sizeof host - 1);
     snprintf(out, sizeof out, "%s.tmp-%s-%ld", path, host, (long)getpid());
     bool ok = check_inputs(json_object_get(p->head, "inputs"), e) &&
-              check_inputs(json_object_get(job, "inputs"), e) && remove_tree(out, e) &&
-              make_dirs(out, e) && make(p, k, job, key, out, e);
+              check_inputs(json_object_get(job, "inputs"), e) && fs_remove_tree(out, e) &&
+              fs_make_dirs(out, e) && make(p, k, job, key, out, e);
     if (ok && why.msg[0] != '\0') /* there is one, but it is not whole */
-        ok = remove_tree(path, e);
+        ok = fs_remove_tree(path, e);
     ok = ok && put_in_place(p, k, out, e);
     if (!ok)
-        (void)!remove_tree(out, &why);
+        (void)!fs_remove_tree(out, &why);
     json_decref(job);
     *made = ok;
     return ok;

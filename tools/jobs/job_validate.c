@@ -28,7 +28,7 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct valida
                       const char *threads, int claims, struct err *e)
 {
     char assay[4096], n[16], seed[16];
-    beside_program(assay, sizeof assay, "assay");
+    fs_beside_program(assay, sizeof assay, "assay");
     snprintf(n, sizeof n, "%d", claims);
     snprintf(seed, sizeof seed, "%u", (unsigned)o->reference_seed);
     const char *const first[] = {
@@ -85,7 +85,7 @@ static bool plan_jobs(struct validate_command *c, int argc, char **argv, bool by
 {
     const struct validate_options *o = &c->opt;
     struct planning g = {.p = p, .opt = o, .argc = argc, .argv = argv};
-    g.cpus = has_word(argc, argv, "-t", "--threads") ? o->threads : 1;
+    g.cpus = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? o->threads : 1;
     if (o->budget_s > 0 || o->until_different || o->of_claims > 0)
         return err_set(e, "%s cannot be cut into jobs: what is looked at next depends on the rest",
                        o->budget_s > 0      ? "--budget"
@@ -165,7 +165,7 @@ int job_validate_gather(const struct plan *p, int argc, char **argv, struct err 
     int code = EXIT_NOT_JUDGED;
     if (!validate_command_read(argc, argv, &c, e))
         return EXIT_NOT_JUDGED;
-    bool ok = make_dirs(c.opt.out_dir, e) && validate_start(&c.opt, argc, argv, &results, e);
+    bool ok = fs_make_dirs(c.opt.out_dir, e) && validate_start(&c.opt, argc, argv, &results, e);
     for (int k = 0; ok && k < p->num; k++)
         ok = add_results(p, k, c.opt.out_dir, results, e);
     if (ok)

@@ -82,7 +82,7 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
                      p->dir[0] != '\0' ? p->dir : output);
     if (n < 0 || (size_t)n >= sizeof dir)
         return err_set(e, "%.64s...: path too long", output);
-    if (!make_dirs(dir, e))
+    if (!fs_make_dirs(dir, e))
         return false;
     if (realpath(dir, full) == NULL || strlen(full) >= sizeof p->dir)
         return err_set(e, "%s: %s", dir, strerror(errno));
@@ -121,7 +121,7 @@ bool plan_user_words(struct plan *p, const struct option_words *leave_out, int n
     char **kept = calloc((size_t)num + 1, sizeof *kept);
     if (kept == NULL)
         return err_set(e, "out of memory");
-    int n = words_kept(leave_out, num, word, kept);
+    int n = cli_rewrite_kept(leave_out, num, word, kept);
     bool ok = plan_run_words(p, (const char *const *)kept, n, true, e);
     free(kept);
     return ok;

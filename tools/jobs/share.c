@@ -120,7 +120,7 @@ bool share_read(const char *path, struct share *s, struct err *e)
         return false;
     const char *cell = image_get_attr(&s->im, "assay:cell");
     const char *samples = image_get_attr(&s->im, "assay:samples");
-    bool ok = cell != NULL && samples != NULL && identity_parse_cell(cell, s->cell) &&
+    bool ok = cell != NULL && samples != NULL && render_id_parse_cell(cell, s->cell) &&
               s->cell[2] == s->m.width && s->cell[3] == s->m.height;
     for (int i = 0; i < NUM_COMMON; i++)
         ok = ok && image_get_attr(&s->im, share_common[i][0]) != NULL;
@@ -174,7 +174,7 @@ bool share_write(const char *path, const struct share *s, const char *command, s
     char cell[64];
     char *samples = write_ranges(s->range, s->num_ranges, sizeof *s->range);
     char *parts = write_ranges(s->part, s->num_parts, sizeof *s->part);
-    identity_cell(s->cell, s->cell[4], s->cell[5], cell);
+    render_id_cell(s->cell, s->cell[4], s->cell[5], cell);
     struct image_attr attrs[NUM_COMMON + 4] = {
         {"assay:command", command}, {"assay:cell", cell}, {"assay:samples", samples}};
     int num = 3;

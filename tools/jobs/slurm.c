@@ -191,7 +191,7 @@ static bool submit(struct cluster *c, int lost, struct err *e)
     c->rounds++;
     if (!write_round(c, lost, tasks, e))
         return false;
-    beside_program(assay, sizeof assay, "assay");
+    fs_beside_program(assay, sizeof assay, "assay");
     round_path(c, c->rounds, todo);
     snprintf(name, sizeof name, "--job-name=%s%d", c->name, c->rounds);
     snprintf(array, sizeof array, "--array=1-%d", tasks);
@@ -200,8 +200,9 @@ static bool submit(struct cluster *c, int lost, struct err *e)
     char output[ROOM + 64];
     snprintf(output, sizeof output, "--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name,
              c->rounds);
-    char *run = shell_join("exec", (const char *const[]){assay, "run-job", c->plan->dir, NULL});
-    char *jobs = shell_join(NULL, (const char *const[]){todo, NULL});
+    char *run =
+        shell_quote_join("exec", (const char *const[]){assay, "run-job", c->plan->dir, NULL});
+    char *jobs = shell_quote_join(NULL, (const char *const[]){todo, NULL});
     bool ok = run != NULL && jobs != NULL;
     size_t need = ok ? (size_t)snprintf(script, sizeof script,
                                         "%s $(sed -n ${SLURM_ARRAY_TASK_ID}p %s)", run, jobs)
@@ -293,10 +294,10 @@ bool slurm_make(const struct plan *p, struct err *e)
     if (!sha256_file(path, hex, e))
         return false;
     snprintf(path, sizeof path, "%s/log", p->dir);
-    if (!make_dirs(path, e))
+    if (!fs_make_dirs(path, e))
         return false;
     snprintf(path, sizeof path, "%s/jobs", p->dir);
-    if (!make_dirs(path, e))
+    if (!fs_make_dirs(path, e))
         return false;
     c.job = calloc((size_t)p->num + 1, sizeof *c.job);
     if (c.job == NULL)

@@ -293,7 +293,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
         claim[i].outcome = results_claim_outcome(claim[i].json);
     }
     qsort(claim, num, sizeof *claim, compare_claims);
-    if (!make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
+    if (!fs_make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
         goto done;
     page.f = out.f;
     if (write_page(&page, root, converge_path, claim, num, e))

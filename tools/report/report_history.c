@@ -227,7 +227,7 @@ static void write_runs(FILE *f, const struct history *h)
 bool report_history(const struct history *h, const char *path, struct err *e)
 {
     struct out_file out;
-    if (!make_parent_dirs(path, e) || !out_open(&out, path, e))
+    if (!fs_make_parent_dirs(path, e) || !out_open(&out, path, e))
         return false;
     FILE *f = out.f;
     fprintf(f,

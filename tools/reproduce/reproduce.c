@@ -59,7 +59,7 @@ static bool command_of(const char *path, const struct image *im,
         argv[n++] = "-s";
         argv[n++] = spp;
     }
-    int kept = words_kept(render_how, num - 1, word + 1, word + 1);
+    int kept = cli_rewrite_kept(cli_rewrite_render, num - 1, word + 1, word + 1);
     for (int i = 1; i <= kept; i++)
         argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
     return true;
@@ -202,7 +202,7 @@ static bool remake(const char *path, const struct reproduce_options *opt, const 
     const char *command = image_get_attr(&im, "assay:command");
     char **word = NULL;
     bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
-    if (ok && (word = shell_split(command, &num, e)) == NULL)
+    if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     snprintf(out->made_by, sizeof out->made_by, "%s", attr(&im, "assay:version"));
     if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
@@ -229,7 +229,7 @@ static bool reproduce_picture(const char *path, const struct reproduce_options *
     struct image then = {0}, now = {0};
     struct reproduce_options with = *opt;
     char to[MAX_PATH], beside[4096];
-    beside_program(beside, sizeof beside, "pathtracer");
+    fs_beside_program(beside, sizeof beside, "pathtracer");
     if (with.pathtracer == NULL)
         with.pathtracer = beside;
     if (image_is_png(path))

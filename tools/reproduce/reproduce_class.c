@@ -13,9 +13,9 @@ enum { MAX_PATH = 4096 + 64 };
 static bool is_one(const char *path, const char *const *names, const char *grades,
                    char source[MAX_PATH])
 {
-    beside_file(path, grades, source, MAX_PATH);
+    fs_beside_file(path, grades, source, MAX_PATH);
     for (int i = 0; names[i] != NULL; i++)
-        if (strcmp(base_of(path), names[i]) == 0)
+        if (strcmp(fs_base(path), names[i]) == 0)
             return access(source, F_OK) == 0;
     return false;
 }
@@ -43,11 +43,11 @@ bool reproduce_class(const char *path, const struct reproduce_options *opt, cons
     if (grades == NULL)
         return err_set(e, "%s:%d: %s", source, je.line, je.text);
     /* OUT of OUT/grades.json and of OUT/ID/grade.json. */
-    beside_file(source, json_is_array(grades) ? "." : "..", of, sizeof of);
-    snprintf(to, sizeof to, "%.4000s/%s", dir, base_of(path));
+    fs_beside_file(source, json_is_array(grades) ? "." : "..", of, sizeof of);
+    snprintf(to, sizeof to, "%.4000s/%s", dir, fs_base(path));
     const char *const word[] = {"assay", "grade,", "of", source, NULL};
     bool ok = reproduced_command(out, word, e) &&
-              grade_write_file(of, grades, base_of(path), to, e) &&
+              grade_write_file(of, grades, fs_base(path), to, e) &&
               reproduce_bytes(path, to, out, e) && reproduce_keep(to, opt, e);
     json_decref(grades);
     return ok;

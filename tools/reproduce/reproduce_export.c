@@ -85,7 +85,7 @@ static bool compare_all(const char *path, const char *made, const char *name,
     for (const struct dirent *f; ok && (f = readdir(d)) != NULL;)
         if (strcmp(f->d_name, name) != 0 && strcmp(f->d_name, ".") != 0 &&
             strcmp(f->d_name, "..") != 0) {
-            beside_file(path, f->d_name, then, sizeof then);
+            fs_beside_file(path, f->d_name, then, sizeof then);
             ok = join(now, made, f->d_name, e) &&
                  (access(then, R_OK) == 0 ||
                   err_set(e, "%s: '%s' is not beside it", path, f->d_name)) &&
@@ -128,7 +128,7 @@ bool reproduce_export(const char *path, const struct reproduce_options *opt, con
         ok = err_set(e, "%s: does not say by what command it was made", path);
     if (ok && opt->pathtracer != NULL)
         ok = err_set(e, "%s: --pathtracer is for pictures", path);
-    if (ok && (word = shell_split(said.command, &num, e)) == NULL)
+    if (ok && (word = shell_quote_split(said.command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     if (ok)
         snprintf(out->made_by, sizeof out->made_by, "%s", said.version != NULL ? said.version : "");

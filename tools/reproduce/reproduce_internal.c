@@ -13,7 +13,7 @@
 bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
 {
     free(out->command);
-    out->command = shell_join(NULL, word);
+    out->command = shell_quote_join(NULL, word);
     return out->command != NULL || err_set(e, "out of memory");
 }
 

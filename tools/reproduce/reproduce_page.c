@@ -91,7 +91,7 @@ static bool of_results(const char *path, const json_t *origin, const char *to,
 {
     char results[MAX_PATH];
     const char *converge = member_text(origin, "converge");
-    beside_file(path, "results.json", results, sizeof results);
+    fs_beside_file(path, "results.json", results, sizeof results);
     if (access(results, R_OK) != 0)
         return err_set(e, "%s: the results that it shows are not beside it: %s", path, results);
     if (converge != NULL && access(converge, R_OK) != 0)
@@ -106,7 +106,7 @@ static bool of_directory(const char *path, const char *to, struct reproduced *ou
 {
     char dir[MAX_PATH];
     struct history h;
-    beside_file(path, ".", dir, sizeof dir);
+    fs_beside_file(path, ".", dir, sizeof dir);
     const char *const word[] = {"assay", "report", "--history", dir, NULL};
     if (!reproduced_command(out, word, e) || !history_read(dir, history_alpha, &h, e))
         return false;
@@ -143,9 +143,9 @@ static bool of_page(const char *path, const char *dir, const char *to, struct re
         return false;
     const char *version = member_text(origin, "version");
     snprintf(out->made_by, sizeof out->made_by, "%s", version != NULL ? version : "");
-    char **word = shell_split(member_text(origin, "command"), &num, e);
+    char **word = shell_quote_split(member_text(origin, "command"), &num, e);
     bool ok = word != NULL || err_prefix(e, "%s", path);
-    if (ok && (num < 2 || strcmp(base_of(word[0]), "assay") != 0))
+    if (ok && (num < 2 || strcmp(fs_base(word[0]), "assay") != 0))
         ok = err_set(e, "%s: made by no command of assay", path);
     if (ok && num > 2 && strcmp(word[1], "report") == 0 && strcmp(word[2], "--history") == 0)
         ok = of_directory(path, to, out, e);
@@ -162,7 +162,7 @@ static bool of_junit(const char *path, const char *to, struct reproduced *out, s
 {
     char results[MAX_PATH];
     json_t *root;
-    beside_file(path, "results.json", results, sizeof results);
+    fs_beside_file(path, "results.json", results, sizeof results);
     if (access(results, R_OK) != 0)
         return err_set(e, "%s: the results that it lists are not beside it: %s", path, results);
     const char *const word[] = {"assay", "validate,", "of", results, NULL};

@@ -70,7 +70,7 @@ static bool read_command(const char *path, const struct image *im, enum picture_
     const char *command = image_get_attr(im, "assay:command");
     if (command == NULL)
         return err_set(e, "%s: does not say by what command it was made", path);
-    if (!cli_choice("assay:picture", attr(im, "assay:picture"), picture_kind_names, &k, e))
+    if (!cli_choice("assay:picture", attr(im, "assay:picture"), png_metadata_kind_names, &k, e))
         return err_prefix(e, "%s", path);
     *kind = (enum picture_kind)k;
     if (strncmp(command, program, strlen(program)) != 0)
@@ -79,7 +79,7 @@ static bool read_command(const char *path, const struct image *im, enum picture_
     if (text == NULL)
         return err_set(e, "out of memory");
     stpcpy(stpcpy(stpcpy(text, program), output), command + strlen(program));
-    *word = shell_split(text, num, e);
+    *word = shell_quote_split(text, num, e);
     free(text);
     return *word != NULL || err_prefix(e, "%s", path);
 }

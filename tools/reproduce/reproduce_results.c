@@ -96,8 +96,8 @@ static bool choose_output(const char *path, const json_t *then, char **word, con
             snprintf(product, MAX_PATH, "%.4000s/grades.json", dir);
     } else if (strcmp(verb, "compare") == 0) {
         *option = "--json";
-        snprintf(file, MAX_PATH, "%.3000s/%.900s", dir, base_of(path));
-        snprintf(product, MAX_PATH, "%.3000s/%.900s", dir, base_of(path));
+        snprintf(file, MAX_PATH, "%.3000s/%.900s", dir, fs_base(path));
+        snprintf(product, MAX_PATH, "%.3000s/%.900s", dir, fs_base(path));
     } else if (strcmp(verb, "validate") != 0 && strcmp(verb, "converge") != 0) {
         return err_set(e, "%s: made by 'assay %s', which is not made again", path, verb);
     }
@@ -116,8 +116,8 @@ static int more_words(const char *path, const char *verb, const json_t *then, ch
         return 2;
     }
     /* OUT/ID/grade.json, OUT/grades.json */
-    beside_file(path, json_object_get(then, "id") != NULL ? "../.references" : ".references", text,
-                MAX_PATH);
+    fs_beside_file(path, json_object_get(then, "id") != NULL ? "../.references" : ".references",
+                   text, MAX_PATH);
     if (strcmp(verb, "grade") == 0 && access(text, R_OK) == 0) {
         argv[0] = "--references";
         argv[1] = text;
@@ -151,20 +151,20 @@ bool results_run_again(const char *path, const json_t *then, int num, char **wor
     char assay[4096], log[MAX_PATH], file[MAX_PATH], text[MAX_PATH];
     const char *option, *verb = num > 1 ? word[1] : "";
     struct process_usage usage = {.exit_status = -1};
-    if (num < 2 || strcmp(base_of(word[0]), "assay") != 0)
+    if (num < 2 || strcmp(fs_base(word[0]), "assay") != 0)
         return err_set(e, "%s: made by no command of assay", path);
     if (!choose_output(path, then, word, dir, &option, file, product, e))
         return false;
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     if (argv == NULL)
         return err_set(e, "out of memory");
-    beside_program(assay, sizeof assay, "assay");
+    fs_beside_program(assay, sizeof assay, "assay");
     snprintf(log, sizeof log, "%.4000s/log", dir);
     /* Those of a grade are without them. */
     int n = together_kept(num - 2, word + 2);
-    n = words_kept(strcmp(verb, "grade") == 0 ? none : how, n, word + 2, word + 2);
+    n = cli_rewrite_kept(strcmp(verb, "grade") == 0 ? none : how, n, word + 2, word + 2);
     if (json_object_get(then, "reference_seed") != NULL)
-        n = words_kept(seed, n, word + 2, word + 2);
+        n = cli_rewrite_kept(seed, n, word + 2, word + 2);
     argv[0] = assay;
     argv[1] = verb;
     argv[2] = "-q";
@@ -196,7 +196,7 @@ static json_t *command_of_class(const char *path, const json_t *grades, struct e
         const char *text = member_text(g, "command");
         if (ok && text == NULL)
             ok = err_set(e, "%s: does not say by what command it was made", path);
-        if (ok && (one[i] = shell_split(text, &num, e)) == NULL)
+        if (ok && (one[i] = shell_quote_split(text, &num, e)) == NULL)
             ok = err_prefix(e, "%s", path);
         if (ok && i == 0) {
             first = num;
@@ -212,7 +212,7 @@ static json_t *command_of_class(const char *path, const json_t *grades, struct e
             word[first - 1 + (int)i] = one[i][num - 1];
     }
     if (ok && first > 0) {
-        char *text = shell_join(NULL, word);
+        char *text = shell_quote_join(NULL, word);
         ok = text != NULL || err_set(e, "out of memory");
         command = ok ? json_pack("{ss}", "command", text) : NULL;
         free(text);
@@ -248,7 +248,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
         ok = err_set(
             e, "%s: its --budget was over before all was decided: that depends on the machine",
             path);
-    if (ok && (word = shell_split(command, &num, e)) == NULL)
+    if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     ok = ok && results_run_again(path, origin, num, word, dir, product, out, e);
     if (ok && (now = json_load_file(product, 0, &je)) == NULL)

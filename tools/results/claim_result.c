@@ -150,7 +150,7 @@ json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err
             err_set(e, "argument '%s' is no UTF-8, and results hold nothing else", argv[i]);
             return NULL;
         }
-    char *command = shell_join("assay", (const char *const *)argv);
+    char *command = shell_quote_join("assay", (const char *const *)argv);
     if (command == NULL) {
         err_set(e, "out of memory");
         return NULL;

@@ -139,7 +139,7 @@ bool junit_write(const char *path, const json_t *results, struct err *e)
     if (!ok) {
         /* results_read() has seen that all of it is there and UTF-8. */
         err_set(e, "%s: out of memory for the JUnit XML", path);
-    } else if (!make_parent_dirs(path, e) || !out_open(&out, path, e)) {
+    } else if (!fs_make_parent_dirs(path, e) || !out_open(&out, path, e)) {
         ok = false;
     } else {
         fwrite(xmlBufferContent(buffer), 1, (size_t)xmlBufferLength(buffer), out.f);

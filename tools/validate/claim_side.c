@@ -158,7 +158,8 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                                        .timeout_s = program_time(v),
                                        .picture = path,
                                        .log = log};
-    if (!make_parent_dirs(path, e) || !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))
+    if (!fs_make_parent_dirs(path, e) ||
+        !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))
         return false;
     out->written = keep;
     if (!keep) {
@@ -198,7 +199,7 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
     full_path(v, file, path);
     if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
         return false;
-    return make_parent_dirs(path, e) && json_write(path, out->manifest, e);
+    return fs_make_parent_dirs(path, e) && json_write(path, out->manifest, e);
 }
 
 static bool copy(const struct moments *m, struct moments *out, struct err *e)
@@ -323,7 +324,7 @@ bool side_write(const struct validation *v, struct side *s, int stage, int look,
     assert(o->present);
     file_of(v, s, stage, look, "exr", file);
     full_path(v, file, path);
-    if (!o->written && !(make_parent_dirs(path, e) && moments_write(path, &o->m, NULL, 0, e)))
+    if (!o->written && !(fs_make_parent_dirs(path, e) && moments_write(path, &o->m, NULL, 0, e)))
         return false;
     o->written = true;
     return true;

@@ -251,7 +251,7 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     json_t *root = claim_result_new_results(argc, argv, job->opt.alpha, e);
     if (root == NULL)
         return false;
-    if (!make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
+    if (!fs_make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
         !image_write_exr(relative, &c->r.relative, e) ||
         !side_file(c, 0, path, side[0], sizeof side[0], e) ||
         !side_file(c, 1, path, side[1], sizeof side[1], e)) {

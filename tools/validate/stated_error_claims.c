@@ -37,7 +37,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                        .picture = picture,
                                        .log = log};
     double cpu_s;
-    if (!make_parent_dirs(picture, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
+    if (!fs_make_parent_dirs(picture, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
     unlink(picture);

@@ -218,7 +218,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         json_decref(cannot);
         return false;
     }
-    bool ok = make_dirs(opt->out_dir, e) && select_claims(&v, cannot, e);
+    bool ok = fs_make_dirs(opt->out_dir, e) && select_claims(&v, cannot, e);
     if (!ok)
         goto done;
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
@@ -275,7 +275,7 @@ bool validate_parts(const struct validate_options *opt, bool by_claim,
 {
     struct validation v = {.opt = opt, .sequence = sequence_of(opt), .stages = stages_of(opt)};
     json_t *cannot = json_array();
-    bool ok = suite_load(opt->suite_dir, &v.suite, e) && make_dirs(opt->out_dir, e) &&
+    bool ok = suite_load(opt->suite_dir, &v.suite, e) && fs_make_dirs(opt->out_dir, e) &&
               select_claims(&v, cannot, e);
     for (int i = 0, end; ok && i < v.num_tasks; i = end) {
         for (end = i + 1; !by_claim && end < v.num_tasks && v.task[end].scene == v.task[i].scene;)

@@ -28,7 +28,7 @@ int probe_setup(void **state)
     assert_non_null(mkdtemp(f->dir));
     snprintf(f->work, sizeof f->work, "%s/work", f->dir);
     snprintf(f->bin, sizeof f->bin, "%s/bin", f->dir);
-    probe_ok(make_dirs(f->work, &e) && make_dirs(f->bin, &e), &e);
+    probe_ok(fs_make_dirs(f->work, &e) && fs_make_dirs(f->bin, &e), &e);
     snprintf(f->path, sizeof f->path, "%s", getenv("PATH"));
     f->s = build_scene();
     f->suite = (struct suite_scene){.name = "test", .width = 4, .height = 4, .depth = 1};
@@ -49,7 +49,7 @@ int probe_teardown(void **state)
 {
     struct probe *f = *state;
     struct err e;
-    bool ok = remove_tree(f->dir, &e) && setenv("PATH", f->path, 1) == 0;
+    bool ok = fs_remove_tree(f->dir, &e) && setenv("PATH", f->path, 1) == 0;
     scene_free(&f->s);
     free(f);
     return ok ? 0 : -1;

@@ -65,7 +65,7 @@ static int teardown(void **state)
 {
     struct fixture *f = *state;
     struct err e;
-    bool ok = remove_tree(f->dir, &e);
+    bool ok = fs_remove_tree(f->dir, &e);
     scene_free(&f->s);
     free(f);
     return ok ? 0 : -1;

@@ -48,7 +48,7 @@ static int tear_down(void **state)
     (void)state;
     struct err e;
     suite_free(&suite);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 static const char *path_of(const char *name)
@@ -445,7 +445,8 @@ static void replicates_are_folded(void **state)
     assert_int_equal(strlen(json_string_value(json_object_get(manifest, "binary_sha256"))), 64);
     /* One of the words has blanks. */
     int num;
-    char **word = shell_split(json_string_value(json_object_get(manifest, "command")), &num, &e);
+    char **word =
+        shell_quote_split(json_string_value(json_object_get(manifest, "command")), &num, &e);
     assert_non_null(word);
     const json_t *command = json_object_get(en.json, "command");
     assert_int_equal(num, json_array_size(command));

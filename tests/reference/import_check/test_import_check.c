@@ -328,7 +328,7 @@ static void blender_reads_what_we_read(void **state)
     assert_false(r.agrees);
     json_decref(dumps);
     scene_free(&f.s);
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
 }
 
 int main(void)

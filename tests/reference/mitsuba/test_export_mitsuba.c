@@ -38,7 +38,7 @@ static int tear_down(void **state)
 {
     (void)state;
     struct err e;
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 static const char *path_of(const char *name)

@@ -36,7 +36,7 @@ void fixture_init(struct fixture *f, struct scene s, int size, int depth)
 void fixture_free(struct fixture *f)
 {
     struct err e;
-    assert_true(remove_tree(f->dir, &e));
+    assert_true(fs_remove_tree(f->dir, &e));
     scene_free(&f->s);
 }
 

@@ -188,7 +188,7 @@ static void fake_end(struct fake *k)
     struct err e;
     setenv("PATH", k->path, 1);
     free(k->path);
-    assert_true(remove_tree(k->dir, &e));
+    assert_true(fs_remove_tree(k->dir, &e));
 }
 
 /* The one-line error of a render with that engine. */

@@ -59,7 +59,7 @@ static int teardown(void **state)
 {
     struct fixture *f = *state;
     struct err e;
-    bool ok = remove_tree(f->dir, &e);
+    bool ok = fs_remove_tree(f->dir, &e);
     moments_free(&f->m);
     json_decref(f->manifest);
     free(f);

@@ -40,7 +40,7 @@ static void make_dir(char dir[64])
 static void drop_dir(const char *dir)
 {
     struct err e;
-    if (!remove_tree(dir, &e))
+    if (!fs_remove_tree(dir, &e))
         fail_msg("%s", e.msg);
 }
 

@@ -21,7 +21,7 @@ static void expect_words(const char *text, const char *const *want)
 {
     int num;
     struct err e = {""};
-    char **got = shell_split(text, &num, &e);
+    char **got = shell_quote_split(text, &num, &e);
     assert_non_null(got);
     for (int i = 0; i < num; i++)
         assert_string_equal(got[i], want[i]);
@@ -33,20 +33,20 @@ static void expect_words(const char *text, const char *const *want)
 static void what_was_joined_is_split(void **state)
 {
     (void)state;
-    char *text = shell_join(NULL, words);
+    char *text = shell_quote_join(NULL, words);
     expect_words(text, words);
     free(text);
-    text = shell_join(words[0], words + 1);
+    text = shell_quote_join(words[0], words + 1);
     expect_words(text, words);
     free(text);
-    text = shell_join(NULL, words + NUM_WORDS);
+    text = shell_quote_join(NULL, words + NUM_WORDS);
     assert_string_equal(text, "");
     free(text);
 }
 
 static char *ascii_of(const char *const *word)
 {
-    char *text = shell_join(NULL, word), *ascii = shell_ascii(text);
+    char *text = shell_quote_join(NULL, word), *ascii = shell_quote_ascii(text);
     free(text);
     assert_non_null(ascii);
     for (const char *c = ascii; *c != '\0'; c++)
@@ -82,7 +82,7 @@ static void no_word_is_lost_however_many(void **state)
     static const char *many[MANY + 1];
     for (int i = 0; i < MANY; i++)
         many[i] = i % 2 == 0 ? "''''''''''''''''''''''''''''''''" : "b";
-    char *text = shell_join(NULL, many);
+    char *text = shell_quote_join(NULL, many);
     assert_int_equal(strlen(text), MANY / 2 * (2 + 4 * 32 + 1) + MANY - 1);
     expect_words(text, many);
     free(text);
@@ -123,7 +123,7 @@ static void expect_of_a_shell(const char *before, char *text, const char *after)
 static void a_shell_reads_the_same_words(void **state)
 {
     (void)state;
-    expect_of_a_shell("", shell_join(NULL, words), "");
+    expect_of_a_shell("", shell_quote_join(NULL, words), "");
     expect_of_a_shell("bash <<'END'\n", ascii_of(words), "\nEND\n");
 }
 
@@ -137,7 +137,7 @@ static void what_a_shell_would_act_on_is_refused(void **state)
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         int num;
         struct err e = {""};
-        if (shell_split(bad[i], &num, &e) != NULL)
+        if (shell_quote_split(bad[i], &num, &e) != NULL)
             fail_msg("'%s' is accepted", bad[i]);
         assert_non_null(strstr(e.msg, "not a plain command"));
     }

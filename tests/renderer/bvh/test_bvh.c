@@ -117,7 +117,7 @@ static void hierarchies_equal_brute_force(void **state)
 
 static bool meets(const struct triangle *tri, const ray *r, float *t, float *u, float *v)
 {
-    struct shear s = shear_of(r);
+    struct shear s = shape_shear(r);
     return triangle_intersect(tri, r, &s, t, u, v);
 }
 

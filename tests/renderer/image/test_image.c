@@ -317,7 +317,7 @@ static int teardown(void **state)
 {
     (void)state;
     struct err e;
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 int main(void)

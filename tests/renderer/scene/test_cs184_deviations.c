@@ -18,7 +18,7 @@ static struct scene lamp(float width, float depth, float height, unsigned bits)
     if (!scene_finish(&s, "test", &e))
         fail_msg("%s", e.msg);
     assert_int_equal(s.num_lights, 1);
-    starter_apply(&s, bits);
+    cs184_deviations_apply(&s, bits);
     return s;
 }
 
@@ -73,7 +73,7 @@ static void a_density_without_a_distance(void **state)
     for (float height = 0.5f; height < 3; height *= 2)
         for (int defect = 0; defect < 2; defect++) {
             vec3 most;
-            struct scene s = lamp(1, 0.5f, height, defect ? 1u << STARTER_LIGHT_PDF : 0);
+            struct scene s = lamp(1, 0.5f, height, defect ? 1u << CS184_LIGHT_PDF : 0);
             expect(sampled_irradiance(&s, p, &most), irradiance(1, 0.5f, height, p, defect != 0));
             scene_free(&s);
         }
@@ -85,7 +85,7 @@ static void a_lamp_that_is_turned(void **state)
     (void)state;
     const vec3 p = v3(1.2f, 0, 0.1f);
     vec3 most;
-    struct scene s = lamp(2, 0.5f, 1, 1u << STARTER_TURNED_LAMP);
+    struct scene s = lamp(2, 0.5f, 1, 1u << CS184_TURNED_LAMP);
     vec3 seen = v3(0, 0, 0);
     for (int i = 0; i < 6; i++) {
         assert_true(fabsf(s.position[i].y - 1) < 1e-6f);
@@ -110,7 +110,7 @@ static void other_lamps_stay(void **state)
     build_triangle(&s, v3(0, 1, 0), v3(1, 1, 0), v3(0, 1, 1), build_material(&s, grey(0), grey(1)));
     if (!scene_finish(&s, "test", &e))
         fail_msg("%s", e.msg);
-    starter_apply(&s, 1u << STARTER_TURNED_LAMP);
+    cs184_deviations_apply(&s, 1u << CS184_TURNED_LAMP);
     assert_true(s.position[1].x == 1 && s.position[1].z == 0 && s.position[2].z == 1);
     scene_free(&s);
 }

@@ -133,11 +133,11 @@ static bool at_once(void *arg)
     return !s->has_pilot || s->film->target != NULL;
 }
 
-static const struct identity some_id = {.scene = "5ce4e",
-                                        .settings = "integrator path",
-                                        .adaptive = "off",
-                                        .seed = "77",
-                                        .cell = "0 0 32 32 of 32 32"};
+static const struct render_id some_id = {.scene = "5ce4e",
+                                         .settings = "integrator path",
+                                         .adaptive = "off",
+                                         .seed = "77",
+                                         .cell = "0 0 32 32 of 32 32"};
 
 /* Stopped after every pass, written, read and gone on with, with 1 and 2 threads in turn: the same bits
  * as without. Plain, with layers, with the assignment's rule, with a pilot. */
@@ -164,7 +164,8 @@ static void resumed_equals_uninterrupted(void **state)
             struct film read;
             o.threads = 3 - o.threads;
             assert_true(film_alloc(&read, SIZE, SIZE, mode == 1, &e));
-            if (!state_write(path, &some_id, &film, &e) || !state_read(path, &some_id, &read, &e))
+            if (!checkpoint_write(path, &some_id, &film, &e) ||
+                !checkpoint_read(path, &some_id, &read, &e))
                 fail_msg("%s", e.msg);
             film_free(&film);
             film = read;
@@ -264,12 +265,12 @@ static void ranges_add_up(void **state)
     drop(&f);
 }
 
-static void expect_no_state(const char *path, const struct identity *id, const char *why)
+static void expect_no_state(const char *path, const struct render_id *id, const char *why)
 {
     struct err e = {0};
     struct film film;
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
-    assert_false(state_read(path, id, &film, &e));
+    assert_false(checkpoint_read(path, id, &film, &e));
     if (strncmp(e.msg, path, strlen(path)) != 0 || strstr(e.msg, why) == NULL)
         fail_msg("'%s' lacks '%s'", e.msg, why);
     film_free(&film);
@@ -284,9 +285,9 @@ static void bad_states(void **state)
     snprintf(path, sizeof path, "%s/bad.state", dir);
     expect_no_state(path, &some_id, "No such file");
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
-    assert_true(state_write(path, &some_id, &film, &e));
+    assert_true(checkpoint_write(path, &some_id, &film, &e));
     film_free(&film);
-    struct identity id = some_id;
+    struct render_id id = some_id;
     strcpy(id.seed, "78");
     expect_no_state(path, &id, "'seed 77' there, 'seed 78' here");
     id = some_id;

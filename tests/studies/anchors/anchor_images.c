@@ -275,7 +275,7 @@ static bool write_kept(const struct crew_job *j, const struct kept_header *h, st
     struct out_file o;
     if (j->job->kept == NULL)
         return true;
-    if (!make_parent_dirs(j->job->kept, e) || !out_open(&o, j->job->kept, e))
+    if (!fs_make_parent_dirs(j->job->kept, e) || !out_open(&o, j->job->kept, e))
         return false;
     fwrite(h, sizeof *h, 1, o.f); /* out_commit() asks ferror() */
     transfer_pool(o.f, j->pool, put);

@@ -226,7 +226,7 @@ static void test_idiff_program(void **state)
     }
     free(picture[0]);
     free(picture[1]);
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
 }
 
 /* Sums of binomial probabilities (GSL's), by brute force, against the two searches of anchors.c. */
@@ -373,7 +373,7 @@ static void test_real_renders(void **state)
     if (!anchor_render(&job, &p, &e))
         fail_msg("%s", e.msg);
     check_kept(&job, &p);
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
     double difference = 0, var = 0, *z = calloc(3 * CELLS, sizeof *z);
     assert_non_null(z);
     for (size_t i = 0; i < CELLS; i++) {
@@ -467,7 +467,7 @@ static void test_page(void **state)
         free(a);
         free(b);
     }
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
     free(r);
 }
 
@@ -491,7 +491,7 @@ static void test_damaged_record(void **state)
         assert_false(anchors_load(path, r, &e));
         assert_non_null(strstr(e.msg, path));
     }
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
     assert_false(anchors_load(path, r, &e));
     free(r);
 }

@@ -92,7 +92,7 @@ int main(int argc, char **argv)
     setvbuf(stdout, NULL, _IOLBF, 0);
     char path[4096];
     snprintf(path, sizeof path, "%s/results.json", o.out);
-    bool wrong = false, ok = make_dirs(o.out, &e);
+    bool wrong = false, ok = fs_make_dirs(o.out, &e);
     json_t *all = json_object();
     for (int k = 0; ok && k < NUM_PARTS; k++) {
         bool asked = first == argc;

@@ -128,7 +128,7 @@ static bool run(enum bench_engine engine, const struct bench_options *o, const s
     view.camera.height /= r->shrink;
     size_t size = 3 * (size_t)view.camera.width * (size_t)view.camera.height;
     snprintf(work, sizeof work, "%s/work", o->out);
-    if (!make_dirs(work, e))
+    if (!fs_make_dirs(work, e))
         return false;
     for (int k = 0; k < NUM_RUNGS; k++) {
         uint32_t seed = (uint32_t)(1000 * engine + 10 * round + k);

@@ -48,7 +48,7 @@ bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, co
     memset(image, 0, 3 * (size_t)c->width * (size_t)c->height * sizeof *image);
     snprintf(dir, sizeof dir, "%s/povray", work_dir);
     snprintf(log, sizeof log, "%s/log", dir);
-    if (!povray_passes(&v->scene, c, v->depth, &plan, e) || !make_dirs(dir, e))
+    if (!povray_passes(&v->scene, c, v->depth, &plan, e) || !fs_make_dirs(dir, e))
         return false;
     for (int pass = 0; pass < plan.num_passes; pass++) {
         struct povray_image p =

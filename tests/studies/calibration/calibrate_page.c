@@ -325,7 +325,7 @@ bool page_write(const char *dir, const char *command, const struct settings *s,
         return err_set(e, "out of memory for the acceptance lines");
     calibrate_check(s, r, all);
     snprintf(path, sizeof path, "%s/README.md", dir);
-    bool ok = make_dirs(dir, e) && page_draw(dir, s, r, e) && out_open(&out, path, e);
+    bool ok = fs_make_dirs(dir, e) && page_draw(dir, s, r, e) && out_open(&out, path, e);
     if (ok) {
         heading(out.f, command, s, all);
         false_alarms(out.f, s, r);

@@ -73,7 +73,7 @@ static bool open_cache(const struct maker *m, const char *name, const char *hash
                                    .cache = cache,
                                    .threads = 1,
                                    .timeout_s = 3600};
-    return make_dirs(cache, e) && submission_stage(m->rubric, stage, e);
+    return fs_make_dirs(cache, e) && submission_stage(m->rubric, stage, e);
 }
 
 static bool render(const struct maker *m, int view, int batch, const struct answer_options *opt,
@@ -318,7 +318,7 @@ int main(int argc, char **argv)
               rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
     if (ok && m.rubric->bugs[0] != '\0') { /* that it is not there is a mistake */
         snprintf(dir, sizeof dir, "%s/%s", m.rubric->dir, m.rubric->bugs);
-        ok = make_dirs(dir, &e) && rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
+        ok = fs_make_dirs(dir, &e) && rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
     }
     if (ok && mistakes.num > 0)
         ok = err_set(&e, "%s:%d: %s", argv[3], mistakes.at[0].line, mistakes.at[0].text);

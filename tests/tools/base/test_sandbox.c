@@ -39,7 +39,7 @@ static struct sandbox_result run_with(const char *script, struct sandbox_limits 
     struct sandbox_result r;
     if (!has_sandbox)
         skip();
-    assert_true(remove_tree(out_dir, &ignored));
+    assert_true(fs_remove_tree(out_dir, &ignored));
     const struct sandbox_job job = {.argv = (const char *const[]){"sh", "-c", script, NULL},
                                     .tree = tree,
                                     .keep = (const char *const[]){"out.png", "second", NULL},

@@ -27,7 +27,7 @@ static int tear_down(void **state)
 {
     struct err e;
     (void)state;
-    return !remove_tree(temp, &e);
+    return !fs_remove_tree(temp, &e);
 }
 
 static bool write_file(const char *dir, const char *text)

@@ -81,7 +81,7 @@ static void furnace(void **state)
     struct converge_job none = job;
     none.pathtracer = "/nonexistent";
     assert_false(depth_ladder_measure(&none, NULL, 16, &depths, &e));
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
     suite_free(&suite);
 }
 

@@ -49,7 +49,7 @@ static int teardown(void **state)
     catalogue_free(&f->c);
     free(f->clue);
     gsl_rng_free(f->rng);
-    return remove_tree(f->dir, &e) ? 0 : -1;
+    return fs_remove_tree(f->dir, &e) ? 0 : -1;
 }
 
 /* ---- files */
@@ -72,7 +72,7 @@ static void copy_patches(const struct fixture *f, const char *to, const char *ch
                          const char *left_out)
 {
     struct err e;
-    assert_true(make_dirs(to, &e));
+    assert_true(fs_make_dirs(to, &e));
     for (int b = 0; b < f->c.num_bugs; b++) {
         char name[80];
         const char *bug = f->c.bug[b].name;
@@ -159,7 +159,7 @@ static void test_a_damaged_catalogue_is_refused(void **state)
     struct catalogue c;
     char dir[100], name[160];
     snprintf(dir, sizeof dir, "%s/damaged", f->dir);
-    assert_true(make_dirs(dir, &e));
+    assert_true(fs_make_dirs(dir, &e));
     copy(CATALOGUE, "manifest.json", dir, -1);
     assert_false(catalogue_read(dir, &c, &e)); /* no pictures */
     for (int v = 0; v < f->c.num_views; v++) {

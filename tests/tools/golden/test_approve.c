@@ -56,7 +56,7 @@ static int teardown(void **state)
 {
     struct fixture *f = *state;
     struct err e;
-    bool ok = remove_tree(f->dir, &e);
+    bool ok = fs_remove_tree(f->dir, &e);
     free(f);
     return ok ? 0 : -1;
 }

@@ -100,7 +100,7 @@ static int tear_down(void **state)
     free(rubric);
     suite_free(&suite);
     gsl_rng_free(rng);
-    return remove_tree(dir, &e) ? 0 : -1;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
 /* bug -1: none. Noise: variance over ours. */

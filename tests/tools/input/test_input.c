@@ -82,7 +82,7 @@ static void test_directory(void **state)
     struct err e;
     struct notes notes = {0};
     static const float v[3][6] = {{1, 5, 0, 7, 7, 7}, {2, 5, 0, 7, 7, 7}, {6, 5, 3, 7, 7, 7}};
-    assert_true(make_dirs(file(0, "runs"), &e));
+    assert_true(fs_make_dirs(file(0, "runs"), &e));
     write_floats(file(1, "runs/s1.exr"), 2, 1, 3, rgb_names, v[0]);
     odd_pfm(file(1, "runs/s2.pfm"), 2, 1, v[1]);
     odd_file(file(1, "runs/.hidden"), "not looked at");
@@ -466,7 +466,7 @@ static int tear_down(void **state)
 {
     (void)state;
     struct err e;
-    return !remove_tree(folder, &e);
+    return !fs_remove_tree(folder, &e);
 }
 
 int main(void)

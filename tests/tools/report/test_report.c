@@ -50,7 +50,7 @@ static void run_free(struct run *r)
 {
     struct err e;
     json_decref(r->claims);
-    assert_true(remove_tree(r->dir, &e));
+    assert_true(fs_remove_tree(r->dir, &e));
 }
 
 static void run_write_results(const struct run *r)
@@ -97,7 +97,7 @@ static void write_radiance(const struct run *r, const char *file, const char *un
         m.n[i] = exact ? 1 : 64;
     static const double special[3] = {0.1, 0.05, 0.2};
     memcpy(&m.mean[3 * (size_t)(SPECIAL_Y * side + SPECIAL_X)], special, sizeof special);
-    if (!make_parent_dirs(path, &e) || !moments_write(path, &m, NULL, 0, &e))
+    if (!fs_make_parent_dirs(path, &e) || !moments_write(path, &m, NULL, 0, &e))
         fail_msg("%s", e.msg);
     moments_free(&m);
 }
@@ -738,7 +738,7 @@ static void bad_input_is_named(void **state)
         write_small_files(&r);
         add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
         /* An older page must survive a failure. */
-        assert_true(make_parent_dirs(r.page, &e));
+        assert_true(fs_make_parent_dirs(r.page, &e));
         FILE *f = fopen(r.page, "wb");
         assert_non_null(f);
         fputs("old", f);

@@ -30,7 +30,7 @@ static struct place place_make(void)
 static void place_free(const struct place *p)
 {
     struct err e;
-    assert_true(remove_tree(p->dir, &e));
+    assert_true(fs_remove_tree(p->dir, &e));
 }
 
 static void write_text(const struct place *p, const char *name, const char *text)
@@ -38,7 +38,7 @@ static void write_text(const struct place *p, const char *name, const char *text
     char path[256];
     struct err e = {""};
     snprintf(path, sizeof path, "%s/%s", p->dir, name);
-    assert_true(make_parent_dirs(path, &e));
+    assert_true(fs_make_parent_dirs(path, &e));
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     fputs(text, f);

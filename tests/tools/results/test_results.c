@@ -90,7 +90,7 @@ static struct place temp_place(const char *file)
 static void remove_place(const struct place *p)
 {
     struct err e;
-    assert_true(remove_tree(p->dir, &e));
+    assert_true(fs_remove_tree(p->dir, &e));
 }
 
 static void write_text(const char *path, const char *text)

@@ -639,7 +639,7 @@ static void the_page_shows_the_rungs(void **state)
     json_object_del(root, "convergence");
     assert_true(json_write(results, root, &e));
     assert_false(report_write(results, page, &e)); /* neither claims nor convergence */
-    assert_true(remove_tree(dir, &e));
+    assert_true(fs_remove_tree(dir, &e));
     json_decref(root);
 }
 
