@@ -17,16 +17,18 @@ static bool read_asset(struct loader *ld, const xmlNode *root, mat4 *axes)
 {
     xmlNode *asset, *unit, *up;
     *axes = mat4_identity();
-    if (!one_child(ld, root, "asset", &asset))
+    if (!element_one_child(ld, root, "asset", &asset))
         return false;
     if (asset == NULL)
         return true;
-    if (!only_children(ld, asset,
-                       "contributor coverage created keywords modified revision subject title unit "
-                       "up_axis extra") ||
-        !one_child(ld, asset, "unit", &unit) || !one_child(ld, asset, "up_axis", &up))
+    if (!element_only_children(
+            ld, asset,
+            "contributor coverage created keywords modified revision subject title unit "
+            "up_axis extra") ||
+        !element_one_child(ld, asset, "unit", &unit) ||
+        !element_one_child(ld, asset, "up_axis", &up))
         return false;
-    const char *meter = unit != NULL ? attribute(unit, "meter") : NULL;
+    const char *meter = unit != NULL ? element_attribute(unit, "meter") : NULL;
     if (meter != NULL && ld->dialect == DIALECT_COLLADA) {
         char *end;
         bool plain = meter[0] != '\0' && meter[strspn(meter, "0123456789+-.eE")] == '\0';
@@ -36,7 +38,7 @@ static bool read_asset(struct loader *ld, const xmlNode *root, mat4 *axes)
     }
     if (up == NULL)
         return true;
-    char *axis = read_word(ld, up);
+    char *axis = text_read_word(ld, up);
     if (axis == NULL)
         return false;
     bool known = true;
@@ -53,7 +55,8 @@ static bool read_asset(struct loader *ld, const xmlNode *root, mat4 *axes)
 static bool read_matrix(struct loader *ld, const xmlNode *n, mat4 *out)
 {
     double v[16];
-    bool ok = ld->dialect == DIALECT_CGL ? read_up_to(ld, n, v, 16) : read_exactly(ld, n, v, 16);
+    bool ok = ld->dialect == DIALECT_CGL ? text_read_up_to(ld, n, v, 16)
+                                         : text_read_exactly(ld, n, v, 16);
     if (ok)
         memcpy(out->m, v, sizeof v);
     if (ok && ld->dialect == DIALECT_COLLADA && !mat4_is_affine(out))
@@ -64,7 +67,7 @@ static bool read_matrix(struct loader *ld, const xmlNode *n, mat4 *out)
 static bool read_lookat(struct loader *ld, const xmlNode *n, mat4 *out)
 {
     double v[9];
-    if (!read_exactly(ld, n, v, 9))
+    if (!text_read_exactly(ld, n, v, 9))
         return false;
     dvec3 eye = d3(v[0], v[1], v[2]), up = d3(v[6], v[7], v[8]);
     dvec3 backward = d3_sub(eye, d3(v[3], v[4], v[5]));
@@ -81,26 +84,26 @@ static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
 {
     double v[4];
     *out = mat4_identity();
-    if (is_element(n, "matrix"))
+    if (element_is(n, "matrix"))
         return read_matrix(ld, n, out);
-    if (is_element(n, "lookat"))
+    if (element_is(n, "lookat"))
         return read_lookat(ld, n, out);
-    if (is_element(n, "skew"))
+    if (element_is(n, "skew"))
         return fail_at(ld, n, "<skew> is not supported");
-    if (is_element(n, "translate")) {
-        if (!read_exactly(ld, n, v, 3))
+    if (element_is(n, "translate")) {
+        if (!text_read_exactly(ld, n, v, 3))
             return false;
         *out = mat4_translate(d3(v[0], v[1], v[2]));
         return true;
     }
-    if (is_element(n, "scale")) {
-        if (!read_exactly(ld, n, v, 3))
+    if (element_is(n, "scale")) {
+        if (!text_read_exactly(ld, n, v, 3))
             return false;
         *out = mat4_scale(d3(v[0], v[1], v[2]));
         return true;
     }
-    if (is_element(n, "rotate")) {
-        if (!read_exactly(ld, n, v, 4))
+    if (element_is(n, "rotate")) {
+        if (!text_read_exactly(ld, n, v, 4))
             return false;
         dvec3 axis = d3(v[0], v[1], v[2]);
         if (!d3_normalize(&axis))
@@ -113,7 +116,7 @@ static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
 
 static const char *name_of(const xmlNode *node)
 {
-    const char *name = attribute(node, "name"), *id = attribute(node, "id");
+    const char *name = element_attribute(node, "name"), *id = element_attribute(node, "id");
     return name != NULL ? name : id != NULL ? id : "node";
 }
 
@@ -124,13 +127,14 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
     double sign;
     uint32_t material;
     const char *name = name_of(at->node);
-    if (!follow(ld, instance, "url", "geometry", &geometry) ||
-        !transform_sign(ld, instance, &at->to_world, &sign) || !geometry_get(ld, geometry, &mesh))
+    if (!element_follow(ld, instance, "url", "geometry", &geometry) ||
+        !build_transform_sign(ld, instance, &at->to_world, &sign) ||
+        !geometry_get(ld, geometry, &mesh))
         return false;
     if (mesh->is_sphere)
         return material_get(ld, instance, geometry, NULL, &material) &&
-               begin_object(ld, name, NULL, material, false) &&
-               add_sphere(ld, instance, &at->to_world, mesh->radius, mesh->normal_out);
+               build_begin_object(ld, name, NULL, material, false) &&
+               build_add_sphere(ld, instance, &at->to_world, mesh->radius, mesh->normal_out);
     for (size_t g = 0; g < mesh->num_groups; g++) {
         const struct mesh_group *group = &mesh->groups[g];
         if (group->symbol == NULL && ld->dialect == DIALECT_COLLADA)
@@ -138,10 +142,10 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
                            (const char *)group->node->name);
         const char *suffix = mesh->num_groups > 1 ? group->symbol : NULL;
         if (!material_get(ld, instance, group->node, group->symbol, &material) ||
-            !begin_object(ld, name, suffix, material, false))
+            !build_begin_object(ld, name, suffix, material, false))
             return false;
         for (size_t t = group->first; t < group->first + group->count; t++)
-            if (!add_triangle(ld, instance, &at->to_world, sign, mesh->corners + 3 * t))
+            if (!build_add_triangle(ld, instance, &at->to_world, sign, mesh->corners + 3 * t))
                 return false;
     }
     return true;
@@ -152,35 +156,36 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
 static bool instance_node(struct loader *ld, const xmlNode *instance, const struct place *at)
 {
     xmlNode *node;
-    if (!only_children(ld, instance, "extra") || !follow(ld, instance, "url", "node", &node))
+    if (!element_only_children(ld, instance, "extra") ||
+        !element_follow(ld, instance, "url", "node", &node))
         return false;
     for (const struct place *p = at; p != NULL; p = p->above)
         if (p->node == node)
             return fail_at(ld, instance, "<instance_node>: '%.60s' contains itself",
-                           attribute(instance, "url"));
+                           element_attribute(instance, "url"));
     return walk(ld, node, at);
 }
 
 static bool read_content(struct loader *ld, const xmlNode *c, const struct place *at)
 {
     xmlNode *target;
-    if (is_element(c, "node"))
+    if (element_is(c, "node"))
         return walk(ld, c, at);
-    if (is_element(c, "instance_node"))
+    if (element_is(c, "instance_node"))
         return instance_node(ld, c, at);
-    if (is_element(c, "instance_geometry"))
+    if (element_is(c, "instance_geometry"))
         return instance_geometry(ld, c, at);
-    if (is_element(c, "instance_light"))
-        return follow(ld, c, "url", "light", &target) &&
+    if (element_is(c, "instance_light"))
+        return element_follow(ld, c, "url", "light", &target) &&
                light_instance(ld, c, target, name_of(at->node), &at->to_world);
-    if (is_element(c, "instance_camera"))
-        return follow(ld, c, "url", "camera", &target) &&
+    if (element_is(c, "instance_camera"))
+        return element_follow(ld, c, "url", "camera", &target) &&
                camera_instance(ld, c, target, &at->to_world);
-    if (is_one_of(c, "matrix lookat translate rotate scale asset extra"))
+    if (element_is_one_of(c, "matrix lookat translate rotate scale asset extra"))
         return true;
-    if (is_element(c, "instance_controller"))
+    if (element_is(c, "instance_controller"))
         return fail_at(ld, c, "<instance_controller> is not supported");
-    return fail_unexpected(ld, c);
+    return element_fail_unexpected(ld, c);
 }
 
 static bool walk(struct loader *ld, const xmlNode *node, const struct place *above)
@@ -190,13 +195,13 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
         return fail_at(ld, node, "nodes nested deeper than %d", MAX_NODE_DEPTH);
     if (ld->num_nodes++ >= MAX_NODES)
         return fail_at(ld, node, "more than %d instances of nodes", MAX_NODES);
-    for (const xmlNode *c = first_child(node); c != NULL; c = next_sibling(c)) {
+    for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c)) {
         mat4 m;
         if (!read_transform(ld, c, &m))
             return false;
         at.to_world = mat4_mul(&at.to_world, &m);
     }
-    for (const xmlNode *c = first_child(node); c != NULL; c = next_sibling(c))
+    for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c))
         if (!read_content(ld, c, &at))
             return false;
     return true;
@@ -206,15 +211,17 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
  * something that would be missing from the picture. */
 static bool check_libraries(struct loader *ld, const xmlNode *root)
 {
-    for (const xmlNode *c = first_child(root); c != NULL; c = next_sibling(c)) {
-        if (is_one_of(c, "asset scene extra library_cameras library_lights library_images "
-                         "library_effects library_materials library_geometries library_nodes "
-                         "library_visual_scenes"))
+    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
+        if (element_is_one_of(c,
+                              "asset scene extra library_cameras library_lights library_images "
+                              "library_effects library_materials library_geometries library_nodes "
+                              "library_visual_scenes"))
             continue;
         if (strncmp((const char *)c->name, "library_", 8) != 0)
-            return fail_unexpected(ld, c);
-        for (const xmlNode *item = first_child(c); item != NULL; item = next_sibling(item))
-            if (!is_one_of(item, "asset extra"))
+            return element_fail_unexpected(ld, c);
+        for (const xmlNode *item = element_first_child(c); item != NULL;
+             item = element_next_sibling(item))
+            if (!element_is_one_of(item, "asset extra"))
                 return fail_at(ld, item, "<%.60s> in <%.60s> is not supported",
                                (const char *)item->name, (const char *)c->name);
     }
@@ -224,16 +231,17 @@ static bool check_libraries(struct loader *ld, const xmlNode *root)
 static bool find_visual_scene(struct loader *ld, const xmlNode *root, xmlNode **out)
 {
     xmlNode *scene, *instance;
-    if (!one_child(ld, root, "scene", &scene))
+    if (!element_one_child(ld, root, "scene", &scene))
         return false;
     if (scene == NULL)
         return fail_at(ld, root, "no <scene>");
-    if (!only_children(ld, scene, "instance_visual_scene extra") ||
-        !one_child(ld, scene, "instance_visual_scene", &instance))
+    if (!element_only_children(ld, scene, "instance_visual_scene extra") ||
+        !element_one_child(ld, scene, "instance_visual_scene", &instance))
         return false;
     if (instance == NULL)
         return fail_at(ld, scene, "<scene> without <instance_visual_scene>");
-    return only_children(ld, instance, "extra") && follow(ld, instance, "url", "visual_scene", out);
+    return element_only_children(ld, instance, "extra") &&
+           element_follow(ld, instance, "url", "visual_scene", out);
 }
 
 static bool read_scene(struct loader *ld)
@@ -242,12 +250,13 @@ static bool read_scene(struct loader *ld)
     xmlNode *visual;
     mat4 axes;
     if (!check_libraries(ld, root) || !read_asset(ld, root, &axes) ||
-        !find_visual_scene(ld, root, &visual) || !only_children(ld, visual, "asset node extra"))
+        !find_visual_scene(ld, root, &visual) ||
+        !element_only_children(ld, visual, "asset node extra"))
         return false;
     mat4 unit = mat4_scale(d3(ld->unit, ld->unit, ld->unit));
     struct place top = {NULL, NULL, mat4_mul(&axes, &unit), 0};
-    for (const xmlNode *c = first_child(visual); c != NULL; c = next_sibling(c))
-        if (is_element(c, "node") && !walk(ld, c, &top))
+    for (const xmlNode *c = element_first_child(visual); c != NULL; c = element_next_sibling(c))
+        if (element_is(c, "node") && !walk(ld, c, &top))
             return false;
     if (scene_num_primitives(&ld->scene) == 0)
         return fail_at(ld, visual, "nothing to render: no triangles, no spheres");
@@ -258,8 +267,8 @@ static bool read_scene(struct loader *ld)
         camera_default(ld);
     /* The assignment frames its objects, among them a mesh that gives way to its lamp. */
     vec3 lo, hi;
-    bool has_frame = find_bounds(ld, false, &lo, &hi);
-    drop_twin_lamps(ld);
+    bool has_frame = build_find_bounds(ld, false, &lo, &hi);
+    build_drop_twin_lamps(ld);
     if (!scene_finish(&ld->scene, ld->path, ld->err))
         return false;
     if (has_frame) {

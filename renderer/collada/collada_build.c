@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-void *grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity)
+void *build_grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity)
 {
     if (count < *capacity)
         return data;
@@ -20,7 +20,7 @@ void *grow(struct loader *ld, void *data, size_t size, size_t count, size_t *cap
     return p;
 }
 
-void copy_name(char *out, size_t size, const char *name)
+void build_copy_name(char *out, size_t size, const char *name)
 {
     size_t n = strlen(name);
     if (n >= size) {
@@ -35,10 +35,11 @@ void copy_name(char *out, size_t size, const char *name)
             out[i] = '_';
 }
 
-bool add_material(struct loader *ld, const struct material *m, uint32_t *index)
+bool build_add_material(struct loader *ld, const struct material *m, uint32_t *index)
 {
     struct scene *s = &ld->scene;
-    struct material *p = grow(ld, s->materials, sizeof *p, s->num_materials, &ld->cap_materials);
+    struct material *p =
+        build_grow(ld, s->materials, sizeof *p, s->num_materials, &ld->cap_materials);
     if (p == NULL)
         return false;
     s->materials = p;
@@ -47,10 +48,10 @@ bool add_material(struct loader *ld, const struct material *m, uint32_t *index)
     return true;
 }
 
-bool add_light(struct loader *ld, const struct light *l)
+bool build_add_light(struct loader *ld, const struct light *l)
 {
     struct scene *s = &ld->scene;
-    struct light *p = grow(ld, s->lights, sizeof *p, s->num_lights, &ld->cap_lights);
+    struct light *p = build_grow(ld, s->lights, sizeof *p, s->num_lights, &ld->cap_lights);
     if (p == NULL)
         return false;
     s->lights = p;
@@ -58,16 +59,16 @@ bool add_light(struct loader *ld, const struct light *l)
     return true;
 }
 
-bool begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
-                  bool is_lamp)
+bool build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
+                        bool is_lamp)
 {
     struct scene *s = &ld->scene;
     size_t capacity = ld->cap_objects;
-    struct object *o = grow(ld, s->objects, sizeof *o, s->num_objects, &capacity);
+    struct object *o = build_grow(ld, s->objects, sizeof *o, s->num_objects, &capacity);
     if (o == NULL)
         return false;
     s->objects = o;
-    bool *lamps = grow(ld, ld->is_lamp, sizeof *lamps, s->num_objects, &ld->cap_objects);
+    bool *lamps = build_grow(ld, ld->is_lamp, sizeof *lamps, s->num_objects, &ld->cap_objects);
     if (lamps == NULL)
         return false;
     ld->is_lamp = lamps;
@@ -78,7 +79,7 @@ bool begin_object(struct loader *ld, const char *name, const char *symbol, uint3
     char full[512];
     snprintf(full, sizeof full, "%.255s%s%.255s", name, symbol != NULL ? ":" : "",
              symbol != NULL ? symbol : "");
-    copy_name(o->name, sizeof o->name, full);
+    build_copy_name(o->name, sizeof o->name, full);
     return true;
 }
 
@@ -88,19 +89,19 @@ static bool reserve_triangle(struct loader *ld)
     size_t count = s->num_triangles, cap[4];
     for (int i = 0; i < 4; i++)
         cap[i] = ld->cap_triangles;
-    vec3 *p = grow(ld, s->position, 3 * sizeof *p, count, &cap[0]);
+    vec3 *p = build_grow(ld, s->position, 3 * sizeof *p, count, &cap[0]);
     if (p == NULL)
         return false;
     s->position = p;
-    p = grow(ld, s->normal, 3 * sizeof *p, count, &cap[1]);
+    p = build_grow(ld, s->normal, 3 * sizeof *p, count, &cap[1]);
     if (p == NULL)
         return false;
     s->normal = p;
-    uint32_t *id = grow(ld, s->tri_material, sizeof *id, count, &cap[2]);
+    uint32_t *id = build_grow(ld, s->tri_material, sizeof *id, count, &cap[2]);
     if (id == NULL)
         return false;
     s->tri_material = id;
-    id = grow(ld, s->tri_object, sizeof *id, count, &cap[3]);
+    id = build_grow(ld, s->tri_object, sizeof *id, count, &cap[3]);
     if (id == NULL)
         return false;
     s->tri_object = id;
@@ -117,7 +118,7 @@ static bool to_world(struct loader *ld, const xmlNode *n, const mat4 *m, dvec3 p
     return true;
 }
 
-bool transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign)
+bool build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign)
 {
     if (!mat4_is_affine(m))
         return fail_at(ld, n, "the last row of a matrix above is not 0 0 0 1");
@@ -130,8 +131,8 @@ bool transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *
     return true;
 }
 
-bool add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
-                  const struct corner c[3])
+bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
+                        const struct corner c[3])
 {
     struct scene *s = &ld->scene;
     /* A mirrored triangle keeps its front side by changing its winding. */
@@ -183,7 +184,8 @@ static double uniform_scale(const mat4 *m)
     return sqrt(s2);
 }
 
-bool add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius, float normal_out)
+bool build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
+                      float normal_out)
 {
     struct scene *s = &ld->scene;
     double factor = uniform_scale(m);
@@ -195,15 +197,15 @@ bool add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radiu
     if (!to_world(ld, n, m, d3(0, 0, 0), &sphere.centre))
         return false;
     size_t cap[3] = {ld->cap_spheres, ld->cap_spheres, ld->cap_spheres};
-    struct sphere *p = grow(ld, s->spheres, sizeof *p, s->num_spheres, &cap[0]);
+    struct sphere *p = build_grow(ld, s->spheres, sizeof *p, s->num_spheres, &cap[0]);
     if (p == NULL)
         return false;
     s->spheres = p;
-    uint32_t *id = grow(ld, s->sphere_material, sizeof *id, s->num_spheres, &cap[1]);
+    uint32_t *id = build_grow(ld, s->sphere_material, sizeof *id, s->num_spheres, &cap[1]);
     if (id == NULL)
         return false;
     s->sphere_material = id;
-    id = grow(ld, s->sphere_object, sizeof *id, s->num_spheres, &cap[2]);
+    id = build_grow(ld, s->sphere_object, sizeof *id, s->num_spheres, &cap[2]);
     if (id == NULL)
         return false;
     s->sphere_object = id;
@@ -217,7 +219,7 @@ bool add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radiu
     return true;
 }
 
-bool find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi)
+bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi)
 {
     const struct scene *s = &ld->scene;
     *lo = v3(FLT_MAX, FLT_MAX, FLT_MAX);
@@ -296,11 +298,11 @@ static void remove_object(struct loader *ld, uint32_t i)
         s->objects[k].first_triangle -= o.num_triangles;
 }
 
-void drop_twin_lamps(struct loader *ld)
+void build_drop_twin_lamps(struct loader *ld)
 {
     struct scene *s = &ld->scene;
     vec3 lo, hi;
-    find_bounds(ld, true, &lo, &hi);
+    build_find_bounds(ld, true, &lo, &hi);
     float reach = 0.01f * length(sub(hi, lo));
     unsigned dropped = 0;
     for (uint32_t lamp = 0; lamp < s->num_objects; lamp++) {

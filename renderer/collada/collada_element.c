@@ -26,7 +26,7 @@ bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    return fail_line(ld, line_of(n), "%s", text);
+    return fail_line(ld, element_line(n), "%s", text);
 }
 
 bool(fail_memory)(struct loader *ld)
@@ -34,14 +34,14 @@ bool(fail_memory)(struct loader *ld)
     return err_set(ld->err, "%s: out of memory", ld->path);
 }
 
-bool fail_unexpected(struct loader *ld, const xmlNode *child)
+bool element_fail_unexpected(struct loader *ld, const xmlNode *child)
 {
     return fail_at(ld, child, "unexpected <%.60s> in <%.60s>", (const char *)child->name,
                    (const char *)child->parent->name);
 }
 
 /* The parser's own line numbers end at 65535, so element_start() keeps them in _private. */
-long line_of(const xmlNode *n)
+long element_line(const xmlNode *n)
 {
     return (long)(intptr_t)n->_private;
 }
@@ -53,23 +53,23 @@ static bool same_namespace(const xmlNs *a, const xmlNs *b)
     return xmlStrEqual(a->href, b->href);
 }
 
-xmlNode *first_child(const xmlNode *n)
+xmlNode *element_first_child(const xmlNode *n)
 {
     return xmlFirstElementChild((xmlNode *)n);
 }
 
-xmlNode *next_sibling(const xmlNode *n)
+xmlNode *element_next_sibling(const xmlNode *n)
 {
     return xmlNextElementSibling((xmlNode *)n);
 }
 
-bool is_element(const xmlNode *n, const char *name)
+bool element_is(const xmlNode *n, const char *name)
 {
     return strcmp((const char *)n->name, name) == 0 &&
            same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
 }
 
-bool is_one_of(const xmlNode *n, const char *words)
+bool element_is_one_of(const xmlNode *n, const char *words)
 {
     while (*words != '\0') {
         size_t length = strcspn(words, " ");
@@ -81,34 +81,34 @@ bool is_one_of(const xmlNode *n, const char *words)
     return false;
 }
 
-bool only_children(struct loader *ld, const xmlNode *n, const char *words)
+bool element_only_children(struct loader *ld, const xmlNode *n, const char *words)
 {
-    for (const xmlNode *c = first_child(n); c != NULL; c = next_sibling(c))
-        if (!is_one_of(c, words))
-            return fail_unexpected(ld, c);
+    for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c))
+        if (!element_is_one_of(c, words))
+            return element_fail_unexpected(ld, c);
     return true;
 }
 
-xmlNode *child_named(const xmlNode *n, const char *name)
+xmlNode *element_child_named(const xmlNode *n, const char *name)
 {
-    for (xmlNode *c = first_child(n); c != NULL; c = next_sibling(c))
-        if (is_element(c, name))
+    for (xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c))
+        if (element_is(c, name))
             return c;
     return NULL;
 }
 
-bool one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out)
+bool element_one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out)
 {
-    *out = child_named(n, name);
+    *out = element_child_named(n, name);
     if (*out == NULL)
         return true;
-    for (const xmlNode *c = next_sibling(*out); c != NULL; c = next_sibling(c))
-        if (is_element(c, name))
+    for (const xmlNode *c = element_next_sibling(*out); c != NULL; c = element_next_sibling(c))
+        if (element_is(c, name))
             return fail_at(ld, c, "a second <%s> in <%.60s>", name, (const char *)n->name);
     return true;
 }
 
-const char *attribute(const xmlNode *n, const char *name)
+const char *element_attribute(const xmlNode *n, const char *name)
 {
     for (const xmlAttr *a = n->properties; a != NULL; a = a->next)
         if (a->ns == NULL && strcmp((const char *)a->name, name) == 0)
@@ -118,10 +118,10 @@ const char *attribute(const xmlNode *n, const char *name)
     return NULL;
 }
 
-bool attribute_count_or(struct loader *ld, const xmlNode *n, const char *name, uint64_t missing,
-                        uint64_t *out)
+bool element_attribute_count_or(struct loader *ld, const xmlNode *n, const char *name,
+                                uint64_t missing, uint64_t *out)
 {
-    const char *s = attribute(n, name);
+    const char *s = element_attribute(n, name);
     if (s == NULL) {
         *out = missing;
         return true;
@@ -133,61 +133,64 @@ bool attribute_count_or(struct loader *ld, const xmlNode *n, const char *name, u
         v = 10 * v + (uint64_t)(s[i] - '0');
     if (digits == 0 || s[digits + strspn(s + digits, " ")] != '\0' || v >= UINT32_MAX)
         return fail_at(ld, n, "<%.60s>: attribute %s=\"%.60s\" is not a number below 2^32-1",
-                       (const char *)n->name, name, attribute(n, name));
+                       (const char *)n->name, name, element_attribute(n, name));
     *out = v;
     return true;
 }
 
-bool attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out)
+bool element_attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out)
 {
-    if (attribute(n, name) == NULL)
+    if (element_attribute(n, name) == NULL)
         return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
-    return attribute_count_or(ld, n, name, 0, out);
+    return element_attribute_count_or(ld, n, name, 0, out);
 }
 
-int compare_ids(const void *a, const void *b)
+int element_compare_ids(const void *a, const void *b)
 {
     const struct id_entry *x = a, *y = b;
     return strcmp(x->id, y->id);
 }
 
-bool follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-            xmlNode **out)
+bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
+                    xmlNode **out)
 {
-    const char *url = attribute(n, name);
+    const char *url = element_attribute(n, name);
     if (url == NULL)
         return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
     if (url[0] != '#')
         return fail_at(ld, n, "reference '%.200s' leads out of the file: not supported", url);
     struct id_entry key = {url + 1, NULL};
     const struct id_entry *hit =
-        ld->num_ids > 0 ? bsearch(&key, ld->ids, ld->num_ids, sizeof key, compare_ids) : NULL;
+        ld->num_ids > 0 ? bsearch(&key, ld->ids, ld->num_ids, sizeof key, element_compare_ids)
+                        : NULL;
     if (hit == NULL)
         return fail_at(ld, n, "no element with id '%.200s'", url + 1);
     const struct id_entry *end = ld->ids + ld->num_ids;
-    if ((hit > ld->ids && compare_ids(hit - 1, hit) == 0) ||
-        (hit + 1 < end && compare_ids(hit + 1, hit) == 0))
+    if ((hit > ld->ids && element_compare_ids(hit - 1, hit) == 0) ||
+        (hit + 1 < end && element_compare_ids(hit + 1, hit) == 0))
         return fail_at(ld, n, "more than one element has id '%.200s'", url + 1);
-    if (!is_element(hit->node, element))
+    if (!element_is(hit->node, element))
         return fail_at(ld, n, "'%.200s' is a <%.60s>, not a <%s>", url,
                        (const char *)hit->node->name, element);
     *out = hit->node;
     return true;
 }
 
-bool is_own_profile(const char *profile)
+bool element_is_own_profile(const char *profile)
 {
     return profile != NULL && (strcmp(profile, "ASSAY") == 0 || strcmp(profile, "CGL") == 0);
 }
 
-bool own_technique(struct loader *ld, const xmlNode *n, xmlNode **out)
+bool element_own_technique(struct loader *ld, const xmlNode *n, xmlNode **out)
 {
     *out = NULL;
-    for (const xmlNode *extra = first_child(n); extra != NULL; extra = next_sibling(extra)) {
-        if (!is_element(extra, "extra"))
+    for (const xmlNode *extra = element_first_child(n); extra != NULL;
+         extra = element_next_sibling(extra)) {
+        if (!element_is(extra, "extra"))
             continue;
-        for (xmlNode *t = first_child(extra); t != NULL; t = next_sibling(t)) {
-            if (!is_element(t, "technique") || !is_own_profile(attribute(t, "profile")))
+        for (xmlNode *t = element_first_child(extra); t != NULL; t = element_next_sibling(t)) {
+            if (!element_is(t, "technique") ||
+                !element_is_own_profile(element_attribute(t, "profile")))
                 continue;
             if (*out != NULL)
                 return fail_at(ld, t, "<%.60s> has more than one technique of profile ASSAY or CGL",
@@ -198,13 +201,13 @@ bool own_technique(struct loader *ld, const xmlNode *n, xmlNode **out)
     return true;
 }
 
-bool technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out)
+bool element_technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out)
 {
-    *out = first_child(technique);
+    *out = element_first_child(technique);
     if (*out == NULL)
         return fail_at(ld, technique, "empty technique of profile '%s'",
-                       attribute(technique, "profile"));
-    if (next_sibling(*out) != NULL)
-        return fail_unexpected(ld, next_sibling(*out));
+                       element_attribute(technique, "profile"));
+    if (element_next_sibling(*out) != NULL)
+        return element_fail_unexpected(ld, element_next_sibling(*out));
     return true;
 }

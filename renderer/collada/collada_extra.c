@@ -14,13 +14,14 @@ struct material_tag {
 static bool read_cgl_emission(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     xmlNode *radiance;
-    if (!only_children(ld, tag, "radiance") || !one_child(ld, tag, "radiance", &radiance))
+    if (!element_only_children(ld, tag, "radiance") ||
+        !element_one_child(ld, tag, "radiance", &radiance))
         return false;
     if (radiance == NULL)
         return fail_at(ld, tag, "<emission> without <radiance>");
     m->reflectance = grey(0);
     m->radiance_both_sides = true;
-    return read_color(ld, radiance, &m->radiance, NULL);
+    return text_read_color(ld, radiance, &m->radiance, NULL);
 }
 
 /* Ours adds to the reflection of profile_COMMON, which is in *m already. */
@@ -30,12 +31,13 @@ static bool read_assay_emission(struct loader *ld, const xmlNode *tag, struct ma
     double n;
     if (!rgb_is_zero(m->radiance))
         return fail_at(ld, tag, "<emission> here and in profile_COMMON: give one");
-    if (!only_children(ld, tag, "radiance sides") || !one_child(ld, tag, "radiance", &radiance) ||
-        !one_child(ld, tag, "sides", &sides))
+    if (!element_only_children(ld, tag, "radiance sides") ||
+        !element_one_child(ld, tag, "radiance", &radiance) ||
+        !element_one_child(ld, tag, "sides", &sides))
         return false;
     if (radiance == NULL || sides == NULL)
         return fail_at(ld, tag, "<emission> needs <radiance> and <sides>");
-    if (!read_color(ld, radiance, &m->radiance, NULL) || !read_exactly(ld, sides, &n, 1))
+    if (!text_read_color(ld, radiance, &m->radiance, NULL) || !text_read_exactly(ld, sides, &n, 1))
         return false;
     if (n != 1 && n != 2)
         return fail_at(ld, sides, "<sides> is 1 or 2, not %g", n);
@@ -48,11 +50,11 @@ static bool read_factor(struct loader *ld, const xmlNode *tag, const char *name,
                         rgb *out)
 {
     xmlNode *n;
-    if (!one_child(ld, tag, name, &n))
+    if (!element_one_child(ld, tag, name, &n))
         return false;
     if (n == NULL)
         return fail_at(ld, tag, "<%s> without <%s>", (const char *)tag->name, name);
-    if (!read_color(ld, n, out, NULL))
+    if (!text_read_color(ld, n, out, NULL))
         return false;
     return rgb_max(*out) <= most || fail_at(ld, n, "<%s> above %g", name, (double)most);
 }
@@ -63,11 +65,11 @@ static bool read_number(struct loader *ld, const xmlNode *tag, const char *name,
 {
     xmlNode *n;
     double v;
-    if (!one_child(ld, tag, name, &n))
+    if (!element_one_child(ld, tag, name, &n))
         return false;
     if (n == NULL)
         return fail_at(ld, tag, "<%s> without <%s>", (const char *)tag->name, name);
-    if (!read_exactly(ld, n, &v, 1))
+    if (!text_read_exactly(ld, n, &v, 1))
         return false;
     /* Compared as what will be stored: 0.0001 is not the same number in both precisions. */
     *out = fabs(v) <= (double)hi ? (float)v : INFINITY;
@@ -80,18 +82,18 @@ static bool no_roughness(struct loader *ld, const xmlNode *tag)
 {
     xmlNode *n;
     double v;
-    if (!one_child(ld, tag, "roughness", &n))
+    if (!element_one_child(ld, tag, "roughness", &n))
         return false;
     if (n == NULL)
         return true;
-    return read_exactly(ld, n, &v, 1) &&
+    return text_read_exactly(ld, n, &v, 1) &&
            (v == 0 || fail_at(ld, n, "rough %s is not supported", (const char *)tag->name));
 }
 
 static bool read_mirror(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     m->kind = MATERIAL_MIRROR;
-    return only_children(ld, tag, "reflectance") &&
+    return element_only_children(ld, tag, "reflectance") &&
            read_factor(ld, tag, "reflectance", 1, &m->reflectance);
 }
 
@@ -99,7 +101,7 @@ static bool read_refraction(struct loader *ld, const xmlNode *tag, struct materi
 {
     m->kind = MATERIAL_REFRACTION;
     m->reflectance = grey(0);
-    return only_children(ld, tag, "transmittance roughness ior") && no_roughness(ld, tag) &&
+    return element_only_children(ld, tag, "transmittance roughness ior") && no_roughness(ld, tag) &&
            read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
            read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
 }
@@ -107,7 +109,7 @@ static bool read_refraction(struct loader *ld, const xmlNode *tag, struct materi
 static bool read_glass(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     m->kind = MATERIAL_GLASS;
-    return only_children(ld, tag, "transmittance reflectance roughness ior") &&
+    return element_only_children(ld, tag, "transmittance reflectance roughness ior") &&
            no_roughness(ld, tag) && read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
            read_factor(ld, tag, "reflectance", 1, &m->reflectance) &&
            read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
@@ -120,7 +122,7 @@ static bool read_cgl_microfacet(struct loader *ld, const xmlNode *tag, struct ma
     m->microfacet = MICROFACET_BECKMANN;
     m->conductor = true;
     m->reflectance = grey(0);
-    return only_children(ld, tag, "alpha eta k") &&
+    return element_only_children(ld, tag, "alpha eta k") &&
            read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha) &&
            read_factor(ld, tag, "eta", 1000, &m->eta) && read_factor(ld, tag, "k", 1000, &m->k);
 }
@@ -130,12 +132,12 @@ static bool read_choice(struct loader *ld, const xmlNode *tag, const char *name,
                         const char *second, bool *is_second)
 {
     xmlNode *n;
-    if (!one_child(ld, tag, name, &n))
+    if (!element_one_child(ld, tag, name, &n))
         return false;
     *is_second = false;
     if (n == NULL)
         return true;
-    char *word = read_word(ld, n);
+    char *word = text_read_word(ld, n);
     if (word == NULL)
         return false;
     *is_second = strcmp(word, second) == 0;
@@ -150,10 +152,10 @@ static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct 
     bool beckmann;
     m->kind = MATERIAL_MICROFACET;
     m->reflectance = grey(0);
-    m->conductor = child_named(tag, "reflectance") == NULL;
-    if (!only_children(ld, tag,
-                       m->conductor ? "distribution shadowing alpha eta k"
-                                    : "distribution shadowing alpha reflectance") ||
+    m->conductor = element_child_named(tag, "reflectance") == NULL;
+    if (!element_only_children(ld, tag,
+                               m->conductor ? "distribution shadowing alpha eta k"
+                                            : "distribution shadowing alpha reflectance") ||
         !read_choice(ld, tag, "distribution", "ggx", "beckmann", &beckmann) ||
         !read_choice(ld, tag, "shadowing", "correlated", "separable", &m->separable) ||
         !read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha))
@@ -177,14 +179,14 @@ static const struct material_tag TAGS[] = {
     {"CGL", "microfacet", read_cgl_microfacet},
 };
 
-bool read_material_tag(struct loader *ld, const xmlNode *technique, struct material *m)
+bool extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m)
 {
-    const char *profile = attribute(technique, "profile");
+    const char *profile = element_attribute(technique, "profile");
     xmlNode *tag;
-    if (!technique_content(ld, technique, &tag))
+    if (!element_technique_content(ld, technique, &tag))
         return false;
     for (size_t i = 0; i < sizeof TAGS / sizeof *TAGS; i++)
-        if (strcmp(TAGS[i].profile, profile) == 0 && is_element(tag, TAGS[i].name))
+        if (strcmp(TAGS[i].profile, profile) == 0 && element_is(tag, TAGS[i].name))
             return TAGS[i].read(ld, tag, m);
     return fail_at(ld, tag, "unknown material tag '%.60s'", (const char *)tag->name);
 }

@@ -114,85 +114,85 @@ bool fail_memory(struct loader *ld);
 #define fail_memory(ld) ((void)fail_memory(ld), false)
 #endif
 /* "unexpected <child> in <parent>". */
-bool fail_unexpected(struct loader *ld, const xmlNode *child);
-long line_of(const xmlNode *n);
+bool element_fail_unexpected(struct loader *ld, const xmlNode *child);
+long element_line(const xmlNode *n);
 
 /* Child elements in document order; NULL at the end. */
-xmlNode *first_child(const xmlNode *n);
-xmlNode *next_sibling(const xmlNode *n);
+xmlNode *element_first_child(const xmlNode *n);
+xmlNode *element_next_sibling(const xmlNode *n);
 /* First child element of that name or NULL. */
-xmlNode *child_named(const xmlNode *n, const char *name);
+xmlNode *element_child_named(const xmlNode *n, const char *name);
 /* The only child element of that name, NULL if there is none; fails if there are two. */
-bool one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out);
+bool element_one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out);
 /* Is it the COLLADA element of that name? */
-bool is_element(const xmlNode *n, const char *name);
+bool element_is(const xmlNode *n, const char *name);
 /* Is its name one of the words, separated by blanks? */
-bool is_one_of(const xmlNode *n, const char *words);
+bool element_is_one_of(const xmlNode *n, const char *words);
 /* Fails if a child's name is not one of the words. */
-bool only_children(struct loader *ld, const xmlNode *n, const char *words);
+bool element_only_children(struct loader *ld, const xmlNode *n, const char *words);
 /* The attribute's value or NULL; lives in the document. */
-const char *attribute(const xmlNode *n, const char *name);
+const char *element_attribute(const xmlNode *n, const char *name);
 /* Required unsigned attribute. */
-bool attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out);
+bool element_attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out);
 /* The same with a default. */
-bool attribute_count_or(struct loader *ld, const xmlNode *n, const char *name, uint64_t missing,
-                        uint64_t *out);
+bool element_attribute_count_or(struct loader *ld, const xmlNode *n, const char *name,
+                                uint64_t missing, uint64_t *out);
 /* The element that attribute `name` ("#id") points to; it must be called `element`. */
-bool follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-            xmlNode **out);
+bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
+                    xmlNode **out);
 /* Orders ids by name, for qsort() and bsearch(). */
-int compare_ids(const void *a, const void *b);
+int element_compare_ids(const void *a, const void *b);
 /* Is it "ASSAY" or "CGL"? */
-bool is_own_profile(const char *profile);
+bool element_is_own_profile(const char *profile);
 /* The profile="ASSAY" or profile="CGL" technique in the element's <extra>s, NULL if none. */
-bool own_technique(struct loader *ld, const xmlNode *n, xmlNode **out);
+bool element_own_technique(struct loader *ld, const xmlNode *n, xmlNode **out);
 /* The only child element of a technique of ours. */
-bool technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out);
+bool element_technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out);
 
 /* collada_text.c */
 
 /* The element's text as finite numbers, appended. */
-bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out);
-bool read_uints(struct loader *ld, const xmlNode *n, struct uints *out);
+bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out);
+bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out);
 /* Exactly n of them. */
-bool read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count);
+bool text_read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count);
 /* At least one, at most `most`; the missing ones are 0. */
-bool read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most);
+bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most);
 /* A non-negative colour; alpha (may be NULL) is 1 where there are only three numbers. */
-bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
+bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
 /* The element's text without blanks around it; the caller frees. NULL: failed. */
-char *read_word(struct loader *ld, const xmlNode *n);
+char *text_read_word(struct loader *ld, const xmlNode *n);
 
 /* collada_extra.c */
 
 /* Our or the assignment's material tag in a technique of theirs, on top of what profile_COMMON has
  * put into *m. */
-bool read_material_tag(struct loader *ld, const xmlNode *technique, struct material *m);
+bool extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m);
 
 /* collada_build.c */
 
 /* `data` (count elements of size bytes, room for *capacity) with room for one more: moved or as it
  * was. NULL: out of memory, and `data` still belongs to the caller. */
-void *grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity);
+void *build_grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity);
 /* Copies a name: at most size-1 bytes, whole UTF-8 characters, no control characters. */
-void copy_name(char *out, size_t size, const char *name);
-bool add_material(struct loader *ld, const struct material *m, uint32_t *index);
-bool add_light(struct loader *ld, const struct light *l);
+void build_copy_name(char *out, size_t size, const char *name);
+bool build_add_material(struct loader *ld, const struct material *m, uint32_t *index);
+bool build_add_light(struct loader *ld, const struct light *l);
 /* A new object that the following triangles and spheres belong to. */
-bool begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
-                  bool is_lamp);
+bool build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
+                        bool is_lamp);
 /* One triangle of the object begun last, through the transform, whose determinant has that sign.
  * `n` is who to blame. */
-bool add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
-                  const struct corner c[3]);
-bool add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
-                float normal_out);
+bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
+                        const struct corner c[3]);
+bool build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
+                      float normal_out);
 /* Sign of the determinant; fails for a matrix that is singular or not affine. */
-bool transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign);
+bool build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign);
 /* Bounds of all primitives, with or without those of light elements. False if there are none. */
-bool find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi);
+bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi);
 /* CGL: emissive meshes that show the same lamp as an area light are taken out. */
-void drop_twin_lamps(struct loader *ld);
+void build_drop_twin_lamps(struct loader *ld);
 
 /* collada_source.c */
 
@@ -218,9 +218,9 @@ struct inputs {
 };
 
 /* Reads the inputs of a <polylist>, <triangles> or <polygons>. */
-bool read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
-                 struct inputs *in);
-void sources_release(struct sources *all);
+bool source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
+                        struct inputs *in);
+void source_release(struct sources *all);
 
 /* collada_mesh.c */
 bool geometry_get(struct loader *ld, const xmlNode *geometry, const struct mesh **out);

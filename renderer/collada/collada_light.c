@@ -15,11 +15,11 @@ static vec3 to_float(dvec3 v)
 static bool required_color(struct loader *ld, const xmlNode *n, const char *name, rgb *out)
 {
     xmlNode *color;
-    if (!one_child(ld, n, name, &color))
+    if (!element_one_child(ld, n, name, &color))
         return false;
     if (color == NULL)
         return fail_at(ld, n, "<%.60s> without <%s>", (const char *)n->name, name);
-    return read_color(ld, color, out, NULL);
+    return text_read_color(ld, color, out, NULL);
 }
 
 /* A missing number is 0 and *given false. */
@@ -28,10 +28,10 @@ static bool optional_number(struct loader *ld, const xmlNode *n, const char *nam
 {
     xmlNode *c;
     *out = 0;
-    if (!one_child(ld, n, name, &c))
+    if (!element_one_child(ld, n, name, &c))
         return false;
     *given = c != NULL;
-    return c == NULL || read_exactly(ld, c, out, 1);
+    return c == NULL || text_read_exactly(ld, c, out, 1);
 }
 
 static bool required_positive(struct loader *ld, const xmlNode *n, const char *name, double *out)
@@ -42,7 +42,8 @@ static bool required_positive(struct loader *ld, const xmlNode *n, const char *n
     if (!given)
         return fail_at(ld, n, "<%.60s> without <%s>", (const char *)n->name, name);
     if (!(*out > 0))
-        return fail_at(ld, child_named(n, name), "<%s> must be positive, not %g", name, *out);
+        return fail_at(ld, element_child_named(n, name), "<%s> must be positive, not %g", name,
+                       *out);
     return true;
 }
 
@@ -60,7 +61,7 @@ static bool read_attenuation(struct loader *ld, const xmlNode *n, struct light *
         if (!given && i == 0)
             a[i] = 1;
         if (!(a[i] >= 0))
-            return fail_at(ld, child_named(n, NAMES[i]), "<%s> is negative", NAMES[i]);
+            return fail_at(ld, element_child_named(n, NAMES[i]), "<%s> is negative", NAMES[i]);
         a[i] /= i == 0 ? 1 : i == 1 ? ld->unit : ld->unit * ld->unit;
     }
     if (a[0] + a[1] + a[2] == 0)
@@ -88,14 +89,14 @@ static bool place_light(struct loader *ld, const xmlNode *n, const mat4 *m, stru
 static bool add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_POINT, .attenuation = {1, 0, 0}};
-    if (!only_children(ld, n,
-                       "color constant_attenuation linear_attenuation quadratic_attenuation") ||
+    if (!element_only_children(
+            ld, n, "color constant_attenuation linear_attenuation quadratic_attenuation") ||
         !required_color(ld, n, "color", &l.value))
         return false;
     /* The assignment's point lights do not fall off, whatever the file says. */
     if (ld->dialect == DIALECT_COLLADA && !read_attenuation(ld, n, &l))
         return false;
-    return place_light(ld, n, m, &l) && add_light(ld, &l);
+    return place_light(ld, n, m, &l) && build_add_light(ld, &l);
 }
 
 /* A point light with a cone around its -Z. */
@@ -106,9 +107,10 @@ static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
     double angle, exponent;
     if (ld->dialect == DIALECT_CGL)
         return fail_at(ld, n, "spot lights of the assignment are not supported: they never shone");
-    if (!only_children(ld, n,
-                       "color constant_attenuation linear_attenuation quadratic_attenuation "
-                       "falloff_angle falloff_exponent") ||
+    if (!element_only_children(
+            ld, n,
+            "color constant_attenuation linear_attenuation quadratic_attenuation "
+            "falloff_angle falloff_exponent") ||
         !required_color(ld, n, "color", &l.value) || !read_attenuation(ld, n, &l) ||
         !optional_number(ld, n, "falloff_exponent", &given, &exponent) ||
         !optional_number(ld, n, "falloff_angle", &given, &angle))
@@ -116,10 +118,10 @@ static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
     if (!given)
         angle = 180;
     if (!(angle >= 0.1 && angle <= 180))
-        return fail_at(ld, child_named(n, "falloff_angle"),
+        return fail_at(ld, element_child_named(n, "falloff_angle"),
                        "<falloff_angle> of %g degrees is not between 0.1 and 180", angle);
     if (!(exponent >= 0 && exponent <= 1e6))
-        return fail_at(ld, child_named(n, "falloff_exponent"),
+        return fail_at(ld, element_child_named(n, "falloff_exponent"),
                        "<falloff_exponent> of %g is not between 0 and 1e6", exponent);
     l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * DEGREE) : 0;
     l.exponent = (float)exponent;
@@ -127,13 +129,13 @@ static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
     if (!d3_normalize(&backward))
         return fail_at(ld, n, "the light has no direction");
     l.axis = neg(to_float(backward));
-    return place_light(ld, n, m, &l) && add_light(ld, &l);
+    return place_light(ld, n, m, &l) && build_add_light(ld, &l);
 }
 
 static bool add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_DIRECTIONAL};
-    if (!only_children(ld, n, "color") || !required_color(ld, n, "color", &l.value))
+    if (!element_only_children(ld, n, "color") || !required_color(ld, n, "color", &l.value))
         return false;
     /* It shines along its -Z. The assignment takes the point (0,0,-1) with the translation for the
      * direction towards the light. */
@@ -141,7 +143,7 @@ static bool add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
     if (!d3_normalize(&to_light))
         return fail_at(ld, n, "the light has no direction");
     l.to_light = to_float(to_light);
-    return add_light(ld, &l);
+    return build_add_light(ld, &l);
 }
 
 /* A rectangle that emits to its -Z side is geometry: so what light sampling aims at and what a ray
@@ -152,16 +154,16 @@ static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name,
     struct material lamp = {.kind = MATERIAL_DIFFUSE, .radiance = radiance};
     uint32_t material;
     double sign, x = width / 2, y = height / 2;
-    copy_name(lamp.name, sizeof lamp.name, name);
-    if (!transform_sign(ld, n, m, &sign) || !add_material(ld, &lamp, &material) ||
-        !begin_object(ld, name, NULL, material, true))
+    build_copy_name(lamp.name, sizeof lamp.name, name);
+    if (!build_transform_sign(ld, n, m, &sign) || !build_add_material(ld, &lamp, &material) ||
+        !build_begin_object(ld, name, NULL, material, true))
         return false;
     /* Counter-clockwise seen from -Z. */
     const dvec3 p[4] = {{-x, -y, 0}, {-x, y, 0}, {x, y, 0}, {x, -y, 0}};
     unsigned dropped = ld->scene.num_degenerate;
     for (int t = 0; t < 2; t++) {
         struct corner c[3] = {{.position = p[0]}, {.position = p[1 + t]}, {.position = p[2 + t]}};
-        if (!add_triangle(ld, n, m, sign, c))
+        if (!build_add_triangle(ld, n, m, sign, c))
             return false;
     }
     if (ld->scene.num_degenerate != dropped)
@@ -173,7 +175,7 @@ static bool add_ambient(struct loader *ld, const xmlNode *n)
 {
     struct light l = {.kind = LIGHT_ENVIRONMENT};
     rgb color;
-    if (!only_children(ld, n, "color") || !required_color(ld, n, "color", &color))
+    if (!element_only_children(ld, n, "color") || !required_color(ld, n, "color", &color))
         return false;
     if (rgb_is_zero(color))
         return true;
@@ -181,7 +183,7 @@ static bool add_ambient(struct loader *ld, const xmlNode *n)
         return fail_at(ld, n, "a second ambient light");
     ld->scene.environment = ld->dialect == DIALECT_CGL ? environment_upper_half(color, ld->err)
                                                        : environment_constant(color, ld->err);
-    return ld->scene.environment != NULL ? add_light(ld, &l) : fail_memory(ld);
+    return ld->scene.environment != NULL ? build_add_light(ld, &l) : fail_memory(ld);
 }
 
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
@@ -190,40 +192,43 @@ bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
     xmlNode *technique, *common, *kind;
     rgb radiance;
     double sign, width, height;
-    if (!only_children(ld, instance, "extra") ||
-        !only_children(ld, light, "asset technique_common technique extra") ||
-        !transform_sign(ld, instance, m, &sign) || !own_technique(ld, light, &technique))
+    if (!element_only_children(ld, instance, "extra") ||
+        !element_only_children(ld, light, "asset technique_common technique extra") ||
+        !build_transform_sign(ld, instance, m, &sign) ||
+        !element_own_technique(ld, light, &technique))
         return false;
-    bool is_assay = technique != NULL && strcmp(attribute(technique, "profile"), "ASSAY") == 0;
+    bool is_assay =
+        technique != NULL && strcmp(element_attribute(technique, "profile"), "ASSAY") == 0;
     if (technique == NULL) {
-        if (!one_child(ld, light, "technique_common", &common))
+        if (!element_one_child(ld, light, "technique_common", &common))
             return false;
         if (common == NULL)
             return fail_at(ld, light, "<light> without <technique_common>");
         technique = common;
     }
-    kind = first_child(technique);
+    kind = element_first_child(technique);
     if (kind == NULL)
         return fail_at(ld, technique, "<light> without a kind");
-    if (next_sibling(kind) != NULL)
-        return fail_unexpected(ld, next_sibling(kind));
-    bool is_common = is_element(technique, "technique_common");
-    if (is_assay && is_element(kind, "rectangle"))
-        return only_children(ld, kind, "radiance width height") &&
+    if (element_next_sibling(kind) != NULL)
+        return element_fail_unexpected(ld, element_next_sibling(kind));
+    bool is_common = element_is(technique, "technique_common");
+    if (is_assay && element_is(kind, "rectangle"))
+        return element_only_children(ld, kind, "radiance width height") &&
                required_color(ld, kind, "radiance", &radiance) &&
                required_positive(ld, kind, "width", &width) &&
                required_positive(ld, kind, "height", &height) &&
                add_rectangle(ld, kind, node_name, m, width, height, radiance);
-    if (!is_assay && !is_common && is_element(kind, "area"))
-        return only_children(ld, kind, "color") && required_color(ld, kind, "color", &radiance) &&
+    if (!is_assay && !is_common && element_is(kind, "area"))
+        return element_only_children(ld, kind, "color") &&
+               required_color(ld, kind, "color", &radiance) &&
                add_rectangle(ld, kind, node_name, m, 1, 1, radiance);
-    if (!is_assay && is_element(kind, "point"))
+    if (!is_assay && element_is(kind, "point"))
         return add_point(ld, kind, m);
-    if (!is_assay && is_element(kind, "directional"))
+    if (!is_assay && element_is(kind, "directional"))
         return add_directional(ld, kind, m);
-    if (!is_assay && is_element(kind, "ambient"))
+    if (!is_assay && element_is(kind, "ambient"))
         return add_ambient(ld, kind);
-    if (!is_assay && is_element(kind, "spot"))
+    if (!is_assay && element_is(kind, "spot"))
         return add_spot(ld, kind, m);
     return fail_at(ld, kind, "unknown light tag '%.60s'", (const char *)kind->name);
 }
@@ -238,8 +243,8 @@ static bool read_angle(struct loader *ld, const xmlNode *n, const char *name, fl
     if (!given)
         return true;
     if (!(degrees > 0 && degrees < 180))
-        return fail_at(ld, child_named(n, name), "<%s> of %g degrees is not between 0 and 180",
-                       name, degrees);
+        return fail_at(ld, element_child_named(n, name),
+                       "<%s> of %g degrees is not between 0 and 180", name, degrees);
     *out = (float)(degrees * DEGREE);
     return true;
 }
@@ -248,7 +253,7 @@ static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_c
 {
     bool given;
     double near, far, aspect;
-    if (!only_children(ld, n, "xfov yfov aspect_ratio znear zfar") ||
+    if (!element_only_children(ld, n, "xfov yfov aspect_ratio znear zfar") ||
         !read_angle(ld, n, "xfov", &c->hfov) || !read_angle(ld, n, "yfov", &c->vfov) ||
         !optional_number(ld, n, "aspect_ratio", &given, &aspect) ||
         (given && !required_positive(ld, n, "aspect_ratio", &aspect)) ||
@@ -297,7 +302,7 @@ static bool place(struct loader *ld, const xmlNode *n, const mat4 *m, struct sce
         return true;
     }
     double sign;
-    if (!transform_sign(ld, n, m, &sign))
+    if (!build_transform_sign(ld, n, m, &sign))
         return false;
     dvec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
     if (!d3_normalize(&x) || !d3_normalize(&y) || !d3_normalize(&z))
@@ -319,23 +324,23 @@ bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *
     struct scene_camera c = {.present = true};
     if (ld->num_cameras++ > 0 && ld->dialect == DIALECT_COLLADA)
         return fail_at(ld, instance, "a second camera");
-    if (!only_children(ld, instance, "extra") ||
-        !only_children(ld, camera, "asset optics imager extra") ||
-        !one_child(ld, camera, "optics", &optics))
+    if (!element_only_children(ld, instance, "extra") ||
+        !element_only_children(ld, camera, "asset optics imager extra") ||
+        !element_one_child(ld, camera, "optics", &optics))
         return false;
-    if (optics != NULL && (!only_children(ld, optics, "technique_common technique extra") ||
-                           !one_child(ld, optics, "technique_common", &common)))
+    if (optics != NULL && (!element_only_children(ld, optics, "technique_common technique extra") ||
+                           !element_one_child(ld, optics, "technique_common", &common)))
         return false;
     if (common != NULL)
-        kind = first_child(common);
+        kind = element_first_child(common);
     if (kind == NULL)
         return fail_at(ld, camera, "<camera> without <optics> of a kind");
-    if (next_sibling(kind) != NULL)
-        return fail_unexpected(ld, next_sibling(kind));
-    if (is_element(kind, "orthographic"))
+    if (element_next_sibling(kind) != NULL)
+        return element_fail_unexpected(ld, element_next_sibling(kind));
+    if (element_is(kind, "orthographic"))
         return fail_at(ld, kind, "orthographic cameras are not supported");
-    if (!is_element(kind, "perspective"))
-        return fail_unexpected(ld, kind);
+    if (!element_is(kind, "perspective"))
+        return element_fail_unexpected(ld, kind);
     if (!read_perspective(ld, kind, &c) || !place(ld, instance, m, &c))
         return false;
     ld->scene.camera = c;

@@ -9,38 +9,39 @@ static bool read_channel(struct loader *ld, const xmlNode *shader, const char *n
                          double *alpha)
 {
     xmlNode *channel, *color;
-    if (!one_child(ld, shader, name, &channel))
+    if (!element_one_child(ld, shader, name, &channel))
         return false;
     if (channel == NULL)
         return true;
-    for (const xmlNode *c = first_child(channel); c != NULL; c = next_sibling(c)) {
-        if (is_one_of(c, "texture param"))
+    for (const xmlNode *c = element_first_child(channel); c != NULL; c = element_next_sibling(c)) {
+        if (element_is_one_of(c, "texture param"))
             return fail_at(ld, c, "<%s> by <%s> is not supported%s", name, (const char *)c->name,
                            ld->dialect == DIALECT_COLLADA && strcmp(name, "diffuse") != 0
                                ? " (--dialect cgl ignores it)"
                                : "");
-        if (!is_element(c, "color"))
-            return fail_unexpected(ld, c);
+        if (!element_is(c, "color"))
+            return element_fail_unexpected(ld, c);
     }
-    if (!one_child(ld, channel, "color", &color))
+    if (!element_one_child(ld, channel, "color", &color))
         return false;
     if (color == NULL)
         return fail_at(ld, channel, "<%s> without <color>", name);
-    return read_color(ld, color, value, alpha);
+    return text_read_color(ld, color, value, alpha);
 }
 
 static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
 {
     xmlNode *factor, *number;
-    if (!one_child(ld, shader, name, &factor))
+    if (!element_one_child(ld, shader, name, &factor))
         return false;
     if (factor == NULL)
         return true;
-    if (!only_children(ld, factor, "float") || !one_child(ld, factor, "float", &number))
+    if (!element_only_children(ld, factor, "float") ||
+        !element_one_child(ld, factor, "float", &number))
         return false;
     if (number == NULL)
         return fail_at(ld, factor, "<%s> without <float>", name);
-    return read_exactly(ld, number, value, 1);
+    return text_read_exactly(ld, number, value, 1);
 }
 
 /* COLLADA 1.5 "Determining Transparency (Opacity)". */
@@ -49,11 +50,11 @@ static bool check_opaque(struct loader *ld, const xmlNode *shader)
     xmlNode *transparent;
     rgb color = grey(1);
     double alpha = 1, factor = 1;
-    if (!one_child(ld, shader, "transparent", &transparent) ||
+    if (!element_one_child(ld, shader, "transparent", &transparent) ||
         !read_channel(ld, shader, "transparent", &color, &alpha) ||
         !read_factor(ld, shader, "transparency", &factor))
         return false;
-    const char *mode = transparent != NULL ? attribute(transparent, "opaque") : NULL;
+    const char *mode = transparent != NULL ? element_attribute(transparent, "opaque") : NULL;
     bool opaque;
     if (mode == NULL || strcmp(mode, "A_ONE") == 0)
         opaque = alpha * factor == 1;
@@ -67,7 +68,8 @@ static bool check_opaque(struct loader *ld, const xmlNode *shader)
         return fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
     if (opaque)
         return true;
-    return fail_at(ld, transparent != NULL ? transparent : child_named(shader, "transparency"),
+    return fail_at(ld,
+                   transparent != NULL ? transparent : element_child_named(shader, "transparency"),
                    "transparency is not supported (--dialect cgl ignores it)");
 }
 
@@ -81,23 +83,23 @@ static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
         !read_factor(ld, shader, "reflectivity", &reflectivity))
         return false;
     if (!rgb_is_zero(specular))
-        return fail_at(ld, child_named(shader, "specular"),
+        return fail_at(ld, element_child_named(shader, "specular"),
                        "specular reflection is not supported (--dialect cgl ignores it)");
     if (!rgb_is_zero(reflective) && reflectivity != 0)
-        return fail_at(ld, child_named(shader, "reflective"),
+        return fail_at(ld, element_child_named(shader, "reflective"),
                        "mirror reflection is not supported (--dialect cgl ignores it)");
     return check_opaque(ld, shader);
 }
 
 static bool read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
 {
-    bool is_constant = is_element(shader, "constant");
-    if (!only_children(ld, shader,
-                       is_constant
-                           ? "emission reflective reflectivity transparent transparency "
-                             "index_of_refraction"
-                           : "emission ambient diffuse specular shininess reflective reflectivity "
-                             "transparent transparency index_of_refraction"))
+    bool is_constant = element_is(shader, "constant");
+    if (!element_only_children(
+            ld, shader,
+            is_constant ? "emission reflective reflectivity transparent transparency "
+                          "index_of_refraction"
+                        : "emission ambient diffuse specular shininess reflective reflectivity "
+                          "transparent transparency index_of_refraction"))
         return false;
     m->reflectance = grey(ld->dialect == DIALECT_CGL && !is_constant ? 0.5f : 0);
     m->radiance_both_sides = true;
@@ -105,11 +107,11 @@ static bool read_shader(struct loader *ld, const xmlNode *shader, struct materia
         !read_channel(ld, shader, "emission", &m->radiance, NULL))
         return false;
     if (rgb_max(m->reflectance) > 1)
-        return fail_at(ld, child_named(shader, "diffuse"), "diffuse reflectance above 1");
+        return fail_at(ld, element_child_named(shader, "diffuse"), "diffuse reflectance above 1");
     if (ld->dialect == DIALECT_COLLADA)
         return check_only_diffuse(ld, shader);
     if (!rgb_is_zero(m->radiance))
-        return fail_at(ld, child_named(shader, "emission"),
+        return fail_at(ld, element_child_named(shader, "emission"),
                        "the assignment has no emission in profile_COMMON: use a technique of "
                        "profile CGL");
     return true;
@@ -118,17 +120,18 @@ static bool read_shader(struct loader *ld, const xmlNode *shader, struct materia
 static bool read_common(struct loader *ld, const xmlNode *common, struct material *m)
 {
     xmlNode *technique;
-    if (!only_children(ld, common, "asset image newparam technique extra") ||
-        !one_child(ld, common, "technique", &technique))
+    if (!element_only_children(ld, common, "asset image newparam technique extra") ||
+        !element_one_child(ld, common, "technique", &technique))
         return false;
     if (technique == NULL)
         return fail_at(ld, common, "<profile_COMMON> without <technique>");
     const xmlNode *shader = NULL;
-    for (const xmlNode *c = first_child(technique); c != NULL; c = next_sibling(c)) {
-        if (is_one_of(c, "asset annotate image newparam extra"))
+    for (const xmlNode *c = element_first_child(technique); c != NULL;
+         c = element_next_sibling(c)) {
+        if (element_is_one_of(c, "asset annotate image newparam extra"))
             continue;
-        if (!is_one_of(c, "constant lambert phong blinn") || shader != NULL)
-            return fail_unexpected(ld, c);
+        if (!element_is_one_of(c, "constant lambert phong blinn") || shader != NULL)
+            return element_fail_unexpected(ld, c);
         shader = c;
     }
     if (shader == NULL)
@@ -140,35 +143,36 @@ static bool read_common(struct loader *ld, const xmlNode *common, struct materia
 static bool read_effect(struct loader *ld, const xmlNode *effect, struct material *m)
 {
     xmlNode *technique, *common;
-    for (const xmlNode *c = first_child(effect); c != NULL; c = next_sibling(c))
-        if (!is_one_of(c, "asset annotate image newparam extra") &&
+    for (const xmlNode *c = element_first_child(effect); c != NULL; c = element_next_sibling(c))
+        if (!element_is_one_of(c, "asset annotate image newparam extra") &&
             strncmp((const char *)c->name, "profile_", 8) != 0)
-            return fail_unexpected(ld, c);
-    if (!own_technique(ld, effect, &technique) || !one_child(ld, effect, "profile_COMMON", &common))
+            return element_fail_unexpected(ld, c);
+    if (!element_own_technique(ld, effect, &technique) ||
+        !element_one_child(ld, effect, "profile_COMMON", &common))
         return false;
-    bool is_cgl = technique != NULL && strcmp(attribute(technique, "profile"), "CGL") == 0;
+    bool is_cgl = technique != NULL && strcmp(element_attribute(technique, "profile"), "CGL") == 0;
     if (is_cgl)
-        return read_material_tag(ld, technique, m);
+        return extra_read_material(ld, technique, m);
     if (common == NULL && ld->dialect == DIALECT_COLLADA)
         return fail_at(ld, effect, "<effect> without <profile_COMMON>");
     if (common != NULL && !read_common(ld, common, m))
         return false;
-    return technique == NULL || read_material_tag(ld, technique, m);
+    return technique == NULL || extra_read_material(ld, technique, m);
 }
 
 static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)
 {
     xmlNode *instance, *effect;
-    if (!only_children(ld, material, "asset instance_effect extra") ||
-        !one_child(ld, material, "instance_effect", &instance))
+    if (!element_only_children(ld, material, "asset instance_effect extra") ||
+        !element_one_child(ld, material, "instance_effect", &instance))
         return false;
     if (instance == NULL)
         return fail_at(ld, material, "<material> without <instance_effect>");
-    if (!only_children(ld, instance, "technique_hint extra") ||
-        !follow(ld, instance, "url", "effect", &effect))
+    if (!element_only_children(ld, instance, "technique_hint extra") ||
+        !element_follow(ld, instance, "url", "effect", &effect))
         return false;
-    const char *name = attribute(material, "name"), *id = attribute(material, "id");
-    copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
+    const char *name = element_attribute(material, "name"), *id = element_attribute(material, "id");
+    build_copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
     return read_effect(ld, effect, m);
 }
 
@@ -184,11 +188,12 @@ static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index
     struct material m = {.name = "default", .kind = MATERIAL_DIFFUSE, .reflectance = grey(0.5f)};
     if (material != NULL && !read_material(ld, material, &m))
         return false;
-    struct material_slot *grown = grow(ld, ld->slots, sizeof *grown, ld->num_slots, &ld->cap_slots);
+    struct material_slot *grown =
+        build_grow(ld, ld->slots, sizeof *grown, ld->num_slots, &ld->cap_slots);
     if (grown == NULL)
         return false;
     ld->slots = grown;
-    if (!add_material(ld, &m, index))
+    if (!build_add_material(ld, &m, index))
         return false;
     ld->slots[ld->num_slots++] = (struct material_slot){material, *index};
     return true;
@@ -199,14 +204,14 @@ static bool find_bindings(struct loader *ld, const xmlNode *instance, xmlNode **
 {
     xmlNode *bind;
     *common = NULL;
-    if (!only_children(ld, instance, "bind_material extra") ||
-        !one_child(ld, instance, "bind_material", &bind))
+    if (!element_only_children(ld, instance, "bind_material extra") ||
+        !element_one_child(ld, instance, "bind_material", &bind))
         return false;
     if (bind == NULL)
         return true;
-    return only_children(ld, bind, "param technique_common technique extra") &&
-           one_child(ld, bind, "technique_common", common) &&
-           (*common == NULL || only_children(ld, *common, "instance_material"));
+    return element_only_children(ld, bind, "param technique_common technique extra") &&
+           element_one_child(ld, bind, "technique_common", common) &&
+           (*common == NULL || element_only_children(ld, *common, "instance_material"));
 }
 
 bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
@@ -215,12 +220,12 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
     xmlNode *common, *material = NULL;
     if (!find_bindings(ld, instance, &common))
         return false;
-    const xmlNode *first = common != NULL ? first_child(common) : NULL, *match = NULL;
-    for (const xmlNode *c = first; c != NULL; c = next_sibling(c)) {
-        const char *s = attribute(c, "symbol");
+    const xmlNode *first = common != NULL ? element_first_child(common) : NULL, *match = NULL;
+    for (const xmlNode *c = first; c != NULL; c = element_next_sibling(c)) {
+        const char *s = element_attribute(c, "symbol");
         if (s == NULL)
             return fail_at(ld, c, "<instance_material> without attribute 'symbol'");
-        if (!only_children(ld, c, "bind bind_vertex_input extra"))
+        if (!element_only_children(ld, c, "bind bind_vertex_input extra"))
             return false;
         if (symbol != NULL && strcmp(s, symbol) != 0)
             continue;
@@ -234,9 +239,9 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
     if (match == NULL && ld->dialect == DIALECT_COLLADA)
         return symbol != NULL
                    ? fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld",
-                             symbol, line_of(user))
+                             symbol, element_line(user))
                    : fail_at(ld, instance, "no material bound to <%.60s> of line %ld",
-                             (const char *)user->name, line_of(user));
-    return (match == NULL || follow(ld, match, "target", "material", &material)) &&
+                             (const char *)user->name, element_line(user));
+    return (match == NULL || element_follow(ld, match, "target", "material", &material)) &&
            slot_get(ld, material, index);
 }

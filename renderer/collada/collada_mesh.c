@@ -92,7 +92,8 @@ static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p,
     for (size_t t = 0; t < n - 2; t++) {
         if (m->num_triangles >= MAX_TRIANGLES)
             return fail_at(ld, p, "more than %d triangles", MAX_TRIANGLES);
-        struct corner *c = grow(ld, m->corners, 3 * sizeof *c, m->num_triangles, &m->capacity);
+        struct corner *c =
+            build_grow(ld, m->corners, 3 * sizeof *c, m->num_triangles, &m->capacity);
         if (c == NULL)
             return false;
         m->corners = c;
@@ -111,12 +112,13 @@ static bool read_list(struct loader *ld, struct mesh *m, const xmlNode *primitiv
     struct uints p = {NULL, 0, 0}, sizes = {NULL, 0, 0};
     bool ok = false;
     xmlNode *p_node, *size_node;
-    bool is_polylist = is_element(primitive, "polylist");
-    if (!one_child(ld, primitive, "p", &p_node) || !one_child(ld, primitive, "vcount", &size_node))
+    bool is_polylist = element_is(primitive, "polylist");
+    if (!element_one_child(ld, primitive, "p", &p_node) ||
+        !element_one_child(ld, primitive, "vcount", &size_node))
         goto done;
-    if (p_node != NULL && !read_uints(ld, p_node, &p))
+    if (p_node != NULL && !text_read_uints(ld, p_node, &p))
         goto done;
-    if (is_polylist && size_node != NULL && !read_uints(ld, size_node, &sizes))
+    if (is_polylist && size_node != NULL && !text_read_uints(ld, size_node, &sizes))
         goto done;
     if (is_polylist && sizes.count != count) {
         fail_at(ld, size_node != NULL ? size_node : primitive,
@@ -153,13 +155,14 @@ static bool read_polygons(struct loader *ld, struct mesh *m, const xmlNode *prim
                           uint64_t count)
 {
     uint64_t found = 0;
-    for (const xmlNode *c = first_child(primitive); c != NULL; c = next_sibling(c)) {
-        if (is_element(c, "ph"))
+    for (const xmlNode *c = element_first_child(primitive); c != NULL;
+         c = element_next_sibling(c)) {
+        if (element_is(c, "ph"))
             return fail_at(ld, c, "polygons with holes (<ph>) are not supported");
-        if (!is_element(c, "p"))
+        if (!element_is(c, "p"))
             continue;
         struct uints p = {NULL, 0, 0};
-        bool ok = read_uints(ld, c, &p);
+        bool ok = text_read_uints(ld, c, &p);
         if (ok && p.count % in->stride != 0)
             ok = fail_at(ld, c, "<p> has %zu indices, which is not a multiple of %llu", p.count,
                          (unsigned long long)in->stride);
@@ -181,20 +184,22 @@ static bool read_primitive(struct loader *ld, struct mesh *m, const xmlNode *pri
 {
     struct inputs in;
     uint64_t count;
-    const char *children = is_element(primitive, "polylist")   ? "input vcount p extra"
-                           : is_element(primitive, "polygons") ? "input p ph extra"
+    const char *children = element_is(primitive, "polylist")   ? "input vcount p extra"
+                           : element_is(primitive, "polygons") ? "input p ph extra"
                                                                : "input p extra";
-    if (!only_children(ld, primitive, children) ||
-        !attribute_count(ld, primitive, "count", &count) || !read_inputs(ld, all, primitive, &in))
+    if (!element_only_children(ld, primitive, children) ||
+        !element_attribute_count(ld, primitive, "count", &count) ||
+        !source_read_inputs(ld, all, primitive, &in))
         return false;
     struct mesh_group *g = realloc(m->groups, (m->num_groups + 1) * sizeof *g);
     if (g == NULL)
         return fail_memory(ld);
     m->groups = g;
     g = &g[m->num_groups++];
-    *g = (struct mesh_group){
-        .symbol = attribute(primitive, "material"), .node = primitive, .first = m->num_triangles};
-    bool ok = is_element(primitive, "polygons")
+    *g = (struct mesh_group){.symbol = element_attribute(primitive, "material"),
+                             .node = primitive,
+                             .first = m->num_triangles};
+    bool ok = element_is(primitive, "polygons")
                   ? read_polygons(ld, m, primitive, all, &in, work, count)
                   : read_list(ld, m, primitive, all, &in, work, count);
     g->count = m->num_triangles - g->first;
@@ -206,15 +211,16 @@ static bool read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
     struct sources all = {NULL, 0, 0};
     struct polygon work = {NULL, NULL, NULL, 0};
     bool ok = true;
-    for (const xmlNode *c = first_child(node); ok && c != NULL; c = next_sibling(c)) {
-        if (is_one_of(c, "polylist triangles polygons"))
+    for (const xmlNode *c = element_first_child(node); ok && c != NULL;
+         c = element_next_sibling(c)) {
+        if (element_is_one_of(c, "polylist triangles polygons"))
             ok = read_primitive(ld, m, c, &all, &work);
-        else if (is_one_of(c, "lines linestrips trifans tristrips"))
+        else if (element_is_one_of(c, "lines linestrips trifans tristrips"))
             ok = fail_at(ld, c, "<%s> is not supported", (const char *)c->name);
-        else if (!is_one_of(c, "source vertices extra"))
-            ok = fail_unexpected(ld, c);
+        else if (!element_is_one_of(c, "source vertices extra"))
+            ok = element_fail_unexpected(ld, c);
     }
-    sources_release(&all);
+    source_release(&all);
     free(work.corners);
     free(work.points);
     free(work.index);
@@ -224,19 +230,20 @@ static bool read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
 static bool read_sphere(struct loader *ld, struct mesh *m, const xmlNode *technique)
 {
     xmlNode *sphere;
-    if (!technique_content(ld, technique, &sphere))
+    if (!element_technique_content(ld, technique, &sphere))
         return false;
-    if (!is_element(sphere, "sphere"))
+    if (!element_is(sphere, "sphere"))
         return fail_at(ld, sphere, "unknown geometry tag '%.60s'", (const char *)sphere->name);
-    bool is_assay = strcmp(attribute(technique, "profile"), "ASSAY") == 0;
-    if (!only_children(ld, sphere, is_assay ? "radius facing" : "radius"))
+    bool is_assay = strcmp(element_attribute(technique, "profile"), "ASSAY") == 0;
+    if (!element_only_children(ld, sphere, is_assay ? "radius facing" : "radius"))
         return false;
     xmlNode *radius, *facing;
-    if (!one_child(ld, sphere, "radius", &radius) || !one_child(ld, sphere, "facing", &facing))
+    if (!element_one_child(ld, sphere, "radius", &radius) ||
+        !element_one_child(ld, sphere, "facing", &facing))
         return false;
     if (radius == NULL)
         return fail_at(ld, sphere, "<sphere> without <radius>");
-    if (!read_exactly(ld, radius, &m->radius, 1))
+    if (!text_read_exactly(ld, radius, &m->radius, 1))
         return false;
     if (!(m->radius > 0))
         return fail_at(ld, radius, "a sphere's radius must be positive, not %g", m->radius);
@@ -244,7 +251,7 @@ static bool read_sphere(struct loader *ld, struct mesh *m, const xmlNode *techni
     m->normal_out = 1;
     if (facing == NULL)
         return true;
-    char *word = read_word(ld, facing);
+    char *word = text_read_word(ld, facing);
     if (word == NULL)
         return false;
     bool in = strcmp(word, "in") == 0, ok = in || strcmp(word, "out") == 0;
@@ -258,18 +265,19 @@ static bool read_sphere(struct loader *ld, struct mesh *m, const xmlNode *techni
 static bool read_geometry(struct loader *ld, const xmlNode *geometry, struct mesh *m)
 {
     xmlNode *technique;
-    for (const xmlNode *c = first_child(geometry); c != NULL; c = next_sibling(c)) {
-        if (is_one_of(c, "convex_mesh spline brep"))
+    for (const xmlNode *c = element_first_child(geometry); c != NULL; c = element_next_sibling(c)) {
+        if (element_is_one_of(c, "convex_mesh spline brep"))
             return fail_at(ld, c, "<%s> is not supported", (const char *)c->name);
-        if (!is_one_of(c, "asset mesh extra"))
-            return fail_unexpected(ld, c);
+        if (!element_is_one_of(c, "asset mesh extra"))
+            return element_fail_unexpected(ld, c);
     }
     xmlNode *mesh;
-    if (!own_technique(ld, geometry, &technique) || !one_child(ld, geometry, "mesh", &mesh))
+    if (!element_own_technique(ld, geometry, &technique) ||
+        !element_one_child(ld, geometry, "mesh", &mesh))
         return false;
     if (technique != NULL && mesh != NULL)
         return fail_at(ld, technique, "a <geometry> with both a <mesh> and a technique of '%s'",
-                       attribute(technique, "profile"));
+                       element_attribute(technique, "profile"));
     if (technique != NULL)
         return read_sphere(ld, m, technique);
     if (mesh == NULL)
@@ -285,7 +293,7 @@ bool geometry_get(struct loader *ld, const xmlNode *geometry, const struct mesh 
             return true;
         }
     }
-    struct mesh *grown = grow(ld, ld->meshes, sizeof *grown, ld->num_meshes, &ld->cap_meshes);
+    struct mesh *grown = build_grow(ld, ld->meshes, sizeof *grown, ld->num_meshes, &ld->cap_meshes);
     if (grown == NULL)
         return false;
     ld->meshes = grown;

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-void sources_release(struct sources *all)
+void source_release(struct sources *all)
 {
     for (size_t i = 0; i < all->count; i++)
         free(all->data[i].xyz);
@@ -17,10 +17,11 @@ static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t str
                         uint64_t param[3])
 {
     uint64_t place = 0, named = 0;
-    for (const xmlNode *p = first_child(accessor); p != NULL; p = next_sibling(p), place++) {
-        if (!is_element(p, "param"))
-            return fail_unexpected(ld, p);
-        const char *name = attribute(p, "name"), *type = attribute(p, "type");
+    for (const xmlNode *p = element_first_child(accessor); p != NULL;
+         p = element_next_sibling(p), place++) {
+        if (!element_is(p, "param"))
+            return element_fail_unexpected(ld, p);
+        const char *name = element_attribute(p, "name"), *type = element_attribute(p, "type");
         if (type != NULL && strcmp(type, "float") != 0 && strcmp(type, "double") != 0)
             return fail_at(ld, p, "<param> of type '%.60s' where numbers are needed", type);
         if (name != NULL && name[0] != '\0' && named < 3)
@@ -39,19 +40,20 @@ static bool read_source(struct loader *ld, const xmlNode *node, struct source *o
     struct doubles d = {NULL, 0, 0};
     bool ok = false;
     xmlNode *common, *accessor = NULL;
-    if (!one_child(ld, node, "technique_common", &common) ||
-        (common != NULL && !one_child(ld, common, "accessor", &accessor)))
+    if (!element_one_child(ld, node, "technique_common", &common) ||
+        (common != NULL && !element_one_child(ld, common, "accessor", &accessor)))
         return false;
     if (accessor == NULL)
         return fail_at(ld, node, "<source> without an <accessor>");
     uint64_t count, stride, offset, declared, param[3];
     xmlNode *array;
-    if (!attribute_count(ld, accessor, "count", &count) ||
-        !attribute_count_or(ld, accessor, "stride", 1, &stride) ||
-        !attribute_count_or(ld, accessor, "offset", 0, &offset) ||
+    if (!element_attribute_count(ld, accessor, "count", &count) ||
+        !element_attribute_count_or(ld, accessor, "stride", 1, &stride) ||
+        !element_attribute_count_or(ld, accessor, "offset", 0, &offset) ||
         !read_params(ld, accessor, stride, param) ||
-        !follow(ld, accessor, "source", "float_array", &array) ||
-        !attribute_count(ld, array, "count", &declared) || !read_doubles(ld, array, &d))
+        !element_follow(ld, accessor, "source", "float_array", &array) ||
+        !element_attribute_count(ld, array, "count", &declared) ||
+        !text_read_doubles(ld, array, &d))
         goto done;
     if (d.count != declared) {
         fail_at(ld, array, "<float_array> has %zu numbers, its count says %llu", d.count,
@@ -83,7 +85,7 @@ done:
 static bool get_source(struct loader *ld, struct sources *all, const xmlNode *input, long *index)
 {
     xmlNode *node;
-    if (!follow(ld, input, "source", "source", &node))
+    if (!element_follow(ld, input, "source", "source", &node))
         return false;
     for (size_t i = 0; i < all->count; i++) {
         if (all->data[i].node == node) {
@@ -91,7 +93,7 @@ static bool get_source(struct loader *ld, struct sources *all, const xmlNode *in
             return true;
         }
     }
-    struct source *grown = grow(ld, all->data, sizeof *grown, all->count, &all->capacity);
+    struct source *grown = build_grow(ld, all->data, sizeof *grown, all->count, &all->capacity);
     if (grown == NULL)
         return false;
     all->data = grown;
@@ -126,12 +128,12 @@ static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode 
                           struct inputs *in)
 {
     in->position = -1;
-    for (const xmlNode *c = first_child(vertices); c != NULL; c = next_sibling(c)) {
-        if (is_element(c, "extra"))
+    for (const xmlNode *c = element_first_child(vertices); c != NULL; c = element_next_sibling(c)) {
+        if (element_is(c, "extra"))
             continue;
-        if (!is_element(c, "input"))
-            return fail_unexpected(ld, c);
-        const char *semantic = attribute(c, "semantic");
+        if (!element_is(c, "input"))
+            return element_fail_unexpected(ld, c);
+        const char *semantic = element_attribute(c, "semantic");
         if (semantic == NULL)
             return fail_at(ld, c, "<input> without attribute 'semantic'");
         if (strcmp(semantic, "POSITION") == 0) {
@@ -157,19 +159,20 @@ static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode 
     return true;
 }
 
-bool read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
-                 struct inputs *in)
+bool source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive,
+                        struct inputs *in)
 {
     *in = (struct inputs){.position = -1, .normal = -1};
     bool has_vertex = false;
-    for (const xmlNode *c = first_child(primitive); c != NULL; c = next_sibling(c)) {
-        if (!is_element(c, "input"))
+    for (const xmlNode *c = element_first_child(primitive); c != NULL;
+         c = element_next_sibling(c)) {
+        if (!element_is(c, "input"))
             continue;
-        const char *semantic = attribute(c, "semantic");
+        const char *semantic = element_attribute(c, "semantic");
         uint64_t offset;
         if (semantic == NULL)
             return fail_at(ld, c, "<input> without attribute 'semantic'");
-        if (!attribute_count(ld, c, "offset", &offset))
+        if (!element_attribute_count(ld, c, "offset", &offset))
             return false;
         if (offset > 255)
             return fail_at(ld, c, "<input> offset above 255");
@@ -178,7 +181,7 @@ bool read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitiv
             xmlNode *vertices;
             if (has_vertex)
                 return fail_at(ld, c, "a second <input> of semantic 'VERTEX'");
-            if (!follow(ld, c, "source", "vertices", &vertices) ||
+            if (!element_follow(ld, c, "source", "vertices", &vertices) ||
                 !read_vertices(ld, all, vertices, in))
                 return false;
             has_vertex = true;

@@ -56,7 +56,7 @@ static bool collect(struct loader *ld, const xmlNode *n, struct text *t)
                 if (*s == '\n' && !append(ld, t, s, 1))
                     return false;
         } else if (c->type == XML_ELEMENT_NODE) {
-            return fail_unexpected(ld, c);
+            return element_fail_unexpected(ld, c);
         } else {
             return fail_at(ld, n, "<%.60s> holds something that is not text",
                            (const char *)n->name);
@@ -86,14 +86,14 @@ static int token_length(const char *s)
     return n;
 }
 
-bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
+bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
 {
     struct text t;
     bool ok = collect(ld, n, &t);
     const char *s = t.data;
-    long line = line_of(n);
+    long line = element_line(n);
     while (ok && next_token(&s, &line)) {
-        double v, *grown = grow(ld, out->data, sizeof *grown, out->count, &out->capacity);
+        double v, *grown = build_grow(ld, out->data, sizeof *grown, out->count, &out->capacity);
         ok = grown != NULL;
         if (!ok)
             break;
@@ -110,14 +110,14 @@ bool read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
     return ok;
 }
 
-bool read_uints(struct loader *ld, const xmlNode *n, struct uints *out)
+bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out)
 {
     struct text t;
     bool ok = collect(ld, n, &t);
     const char *s = t.data;
-    long line = line_of(n);
+    long line = element_line(n);
     while (ok && next_token(&s, &line)) {
-        uint32_t *grown = grow(ld, out->data, sizeof *grown, out->count, &out->capacity);
+        uint32_t *grown = build_grow(ld, out->data, sizeof *grown, out->count, &out->capacity);
         ok = grown != NULL;
         if (!ok)
             break;
@@ -141,7 +141,7 @@ static bool read_some(struct loader *ld, const xmlNode *n, double *out, size_t l
                       size_t *count)
 {
     struct doubles d = {NULL, 0, 0};
-    bool ok = read_doubles(ld, n, &d);
+    bool ok = text_read_doubles(ld, n, &d);
     if (ok && (d.count < least || d.count > most))
         ok = fail_at(ld, n, "<%.60s> has %zu numbers instead of %zu", (const char *)n->name,
                      d.count, d.count < least ? least : most);
@@ -153,19 +153,19 @@ static bool read_some(struct loader *ld, const xmlNode *n, double *out, size_t l
     return ok;
 }
 
-bool read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count)
+bool text_read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count)
 {
     return read_some(ld, n, out, count, count, &count);
 }
 
-bool read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most)
+bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most)
 {
     size_t count;
     memset(out, 0, most * sizeof *out);
     return read_some(ld, n, out, 1, most, &count);
 }
 
-bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha)
+bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha)
 {
     double v[4] = {0, 0, 0, 1};
     size_t count;
@@ -181,7 +181,7 @@ bool read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha)
     return true;
 }
 
-char *read_word(struct loader *ld, const xmlNode *n)
+char *text_read_word(struct loader *ld, const xmlNode *n)
 {
     struct text t;
     char *word = NULL;

@@ -139,7 +139,7 @@ static bool is_blank_text(const xmlNode *n)
 
 static bool survey_texts(struct loader *ld, const xmlNode *n)
 {
-    bool has_elements = first_child(n) != NULL;
+    bool has_elements = element_first_child(n) != NULL;
     for (const xmlNode *c = n->children; c != NULL; c = c->next) {
         bool is_text = c->type == XML_TEXT_NODE || c->type == XML_CDATA_SECTION_NODE;
         if (has_elements && is_text && !is_blank_text(c))
@@ -153,14 +153,14 @@ static bool survey_texts(struct loader *ld, const xmlNode *n)
 static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *enter)
 {
     *enter = true;
-    if (is_element(n, "technique")) {
-        const char *profile = attribute(n, "profile");
+    if (element_is(n, "technique")) {
+        const char *profile = element_attribute(n, "profile");
         const xmlNode *owner = n->parent->parent;
         if (profile != NULL && strcmp(profile, "CMU462") == 0)
             return fail_at(ld, n, "profile 'CMU462' is not supported");
-        if (is_own_profile(profile) &&
-            !(is_element(n->parent, "extra") && owner->type == XML_ELEMENT_NODE &&
-              is_one_of(owner, "geometry light effect")))
+        if (element_is_own_profile(profile) &&
+            !(element_is(n->parent, "extra") && owner->type == XML_ELEMENT_NODE &&
+              element_is_one_of(owner, "geometry light effect")))
             return fail_at(ld, n,
                            "profile '%s' has no meaning here: only in the <extra> of a "
                            "geometry, light or effect",
@@ -170,12 +170,13 @@ static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *e
                 return fail_at(ld, n, "profile 'CGL' needs --dialect cgl");
             *has_cgl = true;
         }
-        *enter = profile == NULL || is_own_profile(profile);
+        *enter = profile == NULL || element_is_own_profile(profile);
     } else if (strncmp((const char *)n->name, "profile_", 8) == 0 &&
-               !is_element(n, "profile_COMMON")) {
+               !element_is(n, "profile_COMMON")) {
         *enter = false;
-    } else if (is_element(n, "asset") && n->parent != xmlDocGetRootElement(ld->doc) &&
-               (child_named(n, "unit") != NULL || child_named(n, "up_axis") != NULL)) {
+    } else if (element_is(n, "asset") && n->parent != xmlDocGetRootElement(ld->doc) &&
+               (element_child_named(n, "unit") != NULL ||
+                element_child_named(n, "up_axis") != NULL)) {
         return fail_at(ld, n, "<unit> and <up_axis> are read for the whole document only");
     }
     return !*enter || survey_texts(ld, n);
@@ -183,10 +184,10 @@ static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *e
 
 static bool add_id(struct loader *ld, xmlNode *n, size_t *capacity)
 {
-    const char *id = attribute(n, "id");
+    const char *id = element_attribute(n, "id");
     if (id == NULL)
         return true;
-    struct id_entry *grown = grow(ld, ld->ids, sizeof *grown, ld->num_ids, capacity);
+    struct id_entry *grown = build_grow(ld, ld->ids, sizeof *grown, ld->num_ids, capacity);
     if (grown == NULL)
         return false;
     ld->ids = grown;
@@ -205,11 +206,11 @@ static bool survey(struct loader *ld, bool *has_cgl)
             return fail_at(ld, n, "elements nested deeper than %d", MAX_XML_DEPTH);
         if (!survey_element(ld, n, has_cgl, &enter) || !add_id(ld, n, &capacity))
             return false;
-        xmlNode *next = enter ? first_child(n) : NULL;
+        xmlNode *next = enter ? element_first_child(n) : NULL;
         if (next != NULL)
             depth++;
         while (next == NULL && n != root) {
-            next = next_sibling(n);
+            next = element_next_sibling(n);
             if (next == NULL) {
                 n = n->parent;
                 depth--;
@@ -218,7 +219,7 @@ static bool survey(struct loader *ld, bool *has_cgl)
         n = next;
     }
     if (ld->num_ids > 0)
-        qsort(ld->ids, ld->num_ids, sizeof *ld->ids, compare_ids);
+        qsort(ld->ids, ld->num_ids, sizeof *ld->ids, element_compare_ids);
     return true;
 }
 
@@ -233,7 +234,7 @@ static bool check_root(struct loader *ld)
         strcmp((const char *)root->ns->href, NAMESPACES[1]) != 0)
         return fail_at(ld, root, "unknown COLLADA namespace '%.200s'",
                        (const char *)root->ns->href);
-    const char *version = attribute(root, "version");
+    const char *version = element_attribute(root, "version");
     if (version == NULL || (strncmp(version, "1.4", 3) != 0 && strncmp(version, "1.5", 3) != 0))
         return fail_at(ld, root, "COLLADA version '%.60s' is not supported: only 1.4 and 1.5 are",
                        version != NULL ? version : "(none)");
