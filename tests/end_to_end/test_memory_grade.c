@@ -234,7 +234,7 @@ static bool find_alike(void *ctx, struct err *e)
     alloc_fail_off();
     json_t *grades = a_class(1);
     alloc_fail_on();
-    bool ok = find_same_noise(file(0, "class"), rubric, answers, grades, e);
+    bool ok = same_noise(file(0, "class"), rubric, answers, grades, e);
     alloc_fail_off();
     if (ok)
         assert_int_equal(json_array_size(json_object_get(json_array_get(grades, 0), "alike")), 1);

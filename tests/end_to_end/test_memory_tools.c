@@ -119,7 +119,7 @@ static bool read_rubric(void *ctx, struct err *e)
 static bool hash_a_tree(void *ctx, struct err *e)
 {
     char hex[65], *right = ctx;
-    bool ok = hash_a_tree(file(0, "scenes"), NULL, hex, e);
+    bool ok = hash_tree(file(0, "scenes"), NULL, hex, e);
     alloc_fail_off();
     if (ok && right[0] == '\0')
         strcpy(right, hex);

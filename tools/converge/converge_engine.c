@@ -43,7 +43,7 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                         .timeout_s = job->timeout_s,
                                         .picture = path,
                                         .log = log};
-    bool ok = render_by_pathtracer(&ours, out, cpu_s, NULL, e);
+    bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
     unlink(path);
     unlink(log);
     return ok;
