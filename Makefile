@@ -33,10 +33,12 @@ cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pth
 # OpenImageIO is in oiio.so alone (reference/base/image_oiio.h).
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
-# Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say.
+# Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say, and for one lane.
 ISAS     := sse42 avx2 avx512
 BY_ISA   := renderer/bvh/traverse renderer/bvh/sah_split renderer/transport/integrator_simd
-KERNELS  := $(foreach k,$(BY_ISA),$(ISAS:%=$(k)_%.c))
+ONE_LANE := renderer/transport/integrator_simd
+isas_of   = $(ISAS) $(if $(filter $(ONE_LANE),$(1)),scalar)
+KERNELS  := $(foreach k,$(BY_ISA),$(patsubst %,$(k)_%.c,$(call isas_of,$(k))))
 MAINS    := renderer/pathtracer/pathtracer.c tools/commands/assay.c
 SOURCES  := $(filter-out $(MAINS) $(BY_ISA:=.c),$(wildcard renderer/*/*.c reference/*/*.c tools/*/*.c))
 HEADERS  := $(wildcard renderer/*/*.h reference/*/*.h tools/*/*.h)
@@ -115,7 +117,7 @@ isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
 # -Wno-psabi: no vector of 32 bytes leaves the file.
-isa_flags   = -DISA=$(1) $(isa_$(1)) -Wno-psabi
+isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=8) $(isa_$(1)) -Wno-psabi
 define kernel_object
 $(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
 $(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
@@ -128,7 +130,7 @@ $(1)/%.c.o: %.c | $(2)
 	$$(compile_c)
 $(1)/%.cc.o: %.cc | $(2)
 	$$(compile_cxx)
-$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),$(eval $(call kernel_object,$(1),$(k),$(i)))))
+$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_object,$(1),$(k),$(i)))))
 $(1)/libassay.a: $(call obj,$(1),$(SOURCES) $(KERNELS))
 	$$(archive)
 $(1)/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o $(1)/libassay.a

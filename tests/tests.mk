@@ -110,10 +110,10 @@ define kernel_lint
 $(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
 	$$(call clang_tidy,$(call isa_flags,$(2)))
 endef
-$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),$(eval $(call kernel_lint,$(k),$(i)))))
+$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_lint,$(k),$(i)))))
 # Both are asked about planted faults first: who does not see them sees nothing (cppcheck is silent about a file that it cannot read).
 cppcheck = cppcheck --enable=warning,performance,portability --std=c11 --quiet --inline-suppr --error-exitcode=1 \
-  --suppressions-list=.cppcheck-suppressions -I. -D_XOPEN_SOURCE=700 -DISA=avx2 --include=tests/lint/jansson.h
+  --suppressions-list=.cppcheck-suppressions -I. -D_XOPEN_SOURCE=700 -DISA=avx2 -DLANES=8 --include=tests/lint/jansson.h
 $(BUILD)/lint/planted.ok: tests/lint/planted.c tests/lint/jansson.h .clang-tidy .cppcheck-suppressions | $(BUILD)/deps-lint
 	$(Q)mkdir -p $(@D); ! $(cppcheck) $< 2>/dev/null || { echo 'cppcheck does not see a planted fault' >&2; exit 1; }
 	$(Q)! clang-tidy --quiet $< -- -std=c17 $(pkg_cflags) >/dev/null 2>&1 || { echo 'clang-tidy does not see a planted fault' >&2; exit 1; }
@@ -189,7 +189,7 @@ print-compile:
 print-libs:
 	@echo $(LIBS)
 print-kernels:
-	@$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
+	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 .PHONY: check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz

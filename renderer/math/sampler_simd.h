@@ -1,14 +1,9 @@
-/* sampler_draw() for eight lanes: the same numbers. Part of integrator_simd.c. */
+/* The numbers of sampler.h, lane by lane of their own pixel and sample. */
 #ifndef ASSAY_SAMPLER_SIMD_H
 #define ASSAY_SAMPLER_SIMD_H
 
 #include "sampler.h"
 #include "simd.h"
-
-INLINE vu vu_set(uint32_t x)
-{
-    return (vu)vi_set((int32_t)x);
-}
 
 enum { PHILOX_ROUNDS = 10 };
 
@@ -30,13 +25,12 @@ static inline struct philox_keys philox_keys(uint64_t seed)
     return keys;
 }
 
-/* philox4x32() */
 INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
-                    const struct philox_keys *keys, vu out[4])
+                    const struct philox_keys *keys, int rounds, vu out[4])
 {
     vw c0 = vw_of(pixel), c1 = vw_of(sample), c2 = vw_of(vu_set(vertex));
     vw c3 = vw_of(vu_set(purpose));
-    for (int r = 0; r < PHILOX_ROUNDS; r++) {
+    for (int r = 0; r < rounds; r++) {
         vw p0 = vw_mul(c0, 0xD2511F53u), p1 = vw_mul(c2, 0xCD9E8D57u);
         c0 = vw_xor(vw_high(p1), c1, keys->k[r][0]);
         c1 = p1;
@@ -66,6 +60,8 @@ INLINE vu reverse_bitsv(vu x)
      : (k) == 3 ? 0xFF00FF00u                                                                      \
                 : 0xFFFF0000u)
 
+/* P times a vector whose first element is the top bit. By Lucas' theorem P is a Kronecker product of
+ * five matrices (1 1; 0 1), one for each bit of the place. */
 INLINE vu pascal_2v(vu x)
 {
     for (int k = 0; k < 5; k++)
@@ -73,6 +69,8 @@ INLINE vu pascal_2v(vu x)
     return x;
 }
 
+/* U times a vector of 16 field elements of two bits. The like product of matrices (1 w^(2^k); 0 1),
+ * where the exponents 1, 2, 4, 8 are 1, 2, 1, 2 modulo 3. */
 INLINE vu pascal_4v(vu x)
 {
     for (int k = 0; k < 4; k++) {
@@ -83,6 +81,17 @@ INLINE vu pascal_4v(vu x)
     return x;
 }
 
+/* sobol_point() of the number with these bits from the lowest to the highest. */
+INLINE void sobolv(vu reversed, vu x[4])
+{
+    x[0] = reversed;
+    x[1] = pascal_2v(x[0]);
+    x[2] = pascal_4v(x[0]);
+    x[3] = pascal_2v(x[2]);
+}
+
+/* Flips every bit by a hash of the seed and of the bits below it: a nested scrambling of reversed
+ * numbers [Burley20], with the constants of [Vegdahl21]. */
 INLINE vu scramble_upwardsv(vu x, vu seed)
 {
     x ^= x * 0x3D20ADEAu;
@@ -93,20 +102,18 @@ INLINE vu scramble_upwardsv(vu x, vu seed)
     return x;
 }
 
+/* sampler_draw() */
 INLINE void drawv(enum sampler_kind kind, const struct philox_keys *keys, vu pixel, vu sample,
                   uint32_t vertex, uint32_t purpose, vf u[4])
 {
     vu x[4];
     if (kind == SAMPLER_INDEPENDENT) {
-        philoxv(pixel, sample, vertex, purpose, keys, x);
+        philoxv(pixel, sample, vertex, purpose, keys, PHILOX_ROUNDS, x);
     } else {
         vu order[4], scramble[4];
-        philoxv(pixel, vu_set(0), vertex, purpose, keys, order);
-        philoxv(pixel, vu_set(1), vertex, purpose, keys, scramble);
-        x[0] = scramble_upwardsv(reverse_bitsv(sample), order[0]);
-        x[1] = pascal_2v(x[0]);
-        x[2] = pascal_4v(x[0]);
-        x[3] = pascal_2v(x[2]);
+        philoxv(pixel, vu_set(0), vertex, purpose, keys, PHILOX_ROUNDS, order);
+        philoxv(pixel, vu_set(1), vertex, purpose, keys, PHILOX_ROUNDS, scramble);
+        sobolv(scramble_upwardsv(reverse_bitsv(sample), order[0]), x);
         for (int i = 0; i < 4; i++)
             x[i] = reverse_bitsv(scramble_upwardsv(reverse_bitsv(x[i]), scramble[i]));
     }

@@ -1,19 +1,35 @@
-/* Eight lanes of float or of int32 on the compiler's vector extensions (gcc and clang): + - * / and
- * & | ^ ~ are operators, [] reads a lane, the rest is below. The same source compiles for SSE4.2
- * (two halves), AVX2 and AVX-512, and gives the same bits on each except through mul_sub(). Truth is
- * a lane of ones. This is the one file with intrinsics. */
+/* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each, one or eight as the Makefile says when
+ * it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives every lane the same
+ * bits in either width. Truth is a lane of ones.
+ *
+ * In simd_one.h and simd_eight.h:
+ *   vf_set, vi_set          the same number in all lanes
+ *   vf_of_int, vi_truncate  conversions, the latter towards zero, |a| < 2^31
+ *   vi_numbers              0, 1, 2, ...
+ *   vi_divide               quotient by an int, of numbers from 0 to 2^31 - 1
+ *   vf_min, vf_max          as minf and maxf: if either is NaN the second wins
+ *   vf_hypot                sqrt(a a + b b) by way of double
+ *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq, vf_select
+ *   bits, lanes_of          a mask as an integer, bit k for lane k; and back
+ *   front_order, pick       the lanes of a mask, in order, and the numbers in that order: brings them to the front
+ *   store_flags             a mask as bytes of 0 or 1
+ *   spread_flags            such bytes for the lanes of a mask alone, in order: as bits of these lanes
+ *   vw_of, vu_of, vw_mul, vw_high, vw_xor
+ *                           numbers of 32 bits in lanes of 64, for products of full length: low halves count, high ones
+ *                           may hold anything
+ *   gather_columns          column[k] lane i = base[stride * index[i] + k], k < COLUMNS */
 #ifndef ASSAY_SIMD_H
 #define ASSAY_SIMD_H
 
-#include <immintrin.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
-enum { LANES = 8 };
+#ifndef LANES
+#define LANES 1
+#endif
 
-typedef float vf __attribute__((vector_size(32)));
-typedef int32_t vi __attribute__((vector_size(32)));
-typedef uint32_t vu __attribute__((vector_size(32)));
+enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 
 /* name_avx2, say: the Makefile defines ISA, once for each set. */
 #define FOR_ISA(name)  JOIN(name, ISA)
@@ -22,22 +38,24 @@ typedef uint32_t vu __attribute__((vector_size(32)));
 
 #define INLINE static inline __attribute__((always_inline))
 
-INLINE vf vf_set(float x)
+#if LANES == 1
+#include "simd_one.h"
+#else
+#include "simd_eight.h"
+#endif
+
+/* The same bits as the other type. */
+INLINE vi as_vi(vf a)
 {
-    return (vf){x, x, x, x, x, x, x, x};
+    vi v;
+    memcpy(&v, &a, sizeof v);
+    return v;
 }
-INLINE vi vi_set(int32_t x)
+INLINE vf as_vf(vi a)
 {
-    return (vi){x, x, x, x, x, x, x, x};
-}
-/* p aligned to 32 bytes. */
-INLINE vf vf_load(const float *p)
-{
-    return *(const vf *)p;
-}
-INLINE void vf_store(float *p, vf a)
-{
-    *(vf *)p = a;
+    vf v;
+    memcpy(&v, &a, sizeof v);
+    return v;
 }
 /* p anywhere. */
 INLINE vf vf_load_any(const void *p)
@@ -52,348 +70,32 @@ INLINE void vf_store_any(void *p, vf a)
 }
 INLINE vi vi_load_any(const void *p)
 {
-    return (vi)vf_load_any(p);
+    return as_vi(vf_load_any(p));
 }
-INLINE vf vf_of_int(vi a)
+INLINE void vi_store_any(void *p, vi a)
 {
-    return __builtin_convertvector(a, vf);
+    memcpy(p, &a, sizeof a);
 }
-/* Towards zero; |a| < 2^31. */
-INLINE vi vi_truncate(vf a)
+INLINE vi vi_select(vi mask, vi yes, vi no)
 {
-    return __builtin_convertvector(a, vi);
+    return as_vi(vf_select(mask, as_vf(yes), as_vf(no)));
 }
 INLINE vf vf_abs(vf a)
 {
-    return (vf)((vi)a & vi_set(INT32_MAX));
+    return as_vf(as_vi(a) & INT32_MAX);
 }
-
-/* vf_min, vf_max: as minf and maxf, if either is NaN the second wins. any_bits: bit k is set where
- * lane k is true. mul_sub: a b - c, mul_add: a b + c, rounded once where the machine can. */
-#ifdef __AVX2__
-INLINE vf vf_min(vf a, vf b)
+INLINE vu vu_set(uint32_t x)
 {
-    return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+    return (vu)vi_set((int32_t)x);
 }
-INLINE vf vf_max(vf a, vf b)
+/* f of the lanes of a mask, one by one; the others stay. For what is rare and has no short form in vectors. */
+INLINE vf vf_map(float (*f)(float), unsigned mask, vf a)
 {
-    return (vf)_mm256_max_ps((__m256)a, (__m256)b);
-}
-INLINE vf vf_sqrt(vf a)
-{
-    return (vf)_mm256_sqrt_ps((__m256)a);
-}
-/* sqrt(a a + b b) by way of double. */
-INLINE vf vf_hypot(vf a, vf b)
-{
-    __m128 r[2];
-    for (int i = 0; i < 2; i++) {
-        __m128 ah = i ? _mm256_extractf128_ps((__m256)a, 1) : _mm256_castps256_ps128((__m256)a);
-        __m128 bh = i ? _mm256_extractf128_ps((__m256)b, 1) : _mm256_castps256_ps128((__m256)b);
-        __m256d x = _mm256_cvtps_pd(ah), y = _mm256_cvtps_pd(bh);
-        r[i] = _mm256_cvtpd_ps(_mm256_sqrt_pd(x * x + y * y));
-    }
-    return (vf)_mm256_set_m128(r[1], r[0]);
-}
-INLINE vf mul_sub(vf a, vf b, vf c)
-{
-    return (vf)_mm256_fmsub_ps((__m256)a, (__m256)b, (__m256)c);
-}
-INLINE vf mul_add(vf a, vf b, vf c)
-{
-    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
-}
-INLINE vi vf_lt(vf a, vf b)
-{
-    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LT_OQ);
-}
-INLINE vi vf_le(vf a, vf b)
-{
-    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LE_OQ);
-}
-INLINE vi vf_eq(vf a, vf b)
-{
-    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_EQ_OQ);
-}
-INLINE vi vi_lt(vi a, vi b)
-{
-    return (vi)_mm256_cmpgt_epi32((__m256i)b, (__m256i)a);
-}
-INLINE vi vi_eq(vi a, vi b)
-{
-    return (vi)_mm256_cmpeq_epi32((__m256i)a, (__m256i)b);
-}
-INLINE vf vf_select(vi mask, vf yes, vf no)
-{
-    return (vf)_mm256_blendv_ps((__m256)no, (__m256)yes, (__m256)mask);
-}
-INLINE unsigned bits(vi mask)
-{
-    return (unsigned)_mm256_movemask_ps((__m256)mask);
-}
-/* The lanes of a mask, in order: what pick() wants to bring them to the front. */
-INLINE vi front_order(unsigned mask)
-{
-    uint64_t bytes = _pdep_u64(mask, 0x0101010101010101) * 255;
-    uint64_t order = _pext_u64(0x0706050403020100, bytes);
-    return (vi)_mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)order));
-}
-INLINE vf pick(vf a, vi order)
-{
-    return (vf)_mm256_permutevar8x32_ps((__m256)a, (__m256i)order);
-}
-/* Eight flags of a byte each, 0 or 1, for the lanes of a mask, in order: as bits of these lanes. */
-INLINE unsigned spread_flags(const void *flags, unsigned mask)
-{
-    uint64_t bytes;
-    memcpy(&bytes, flags, sizeof bytes);
-    return _pdep_u32((unsigned)_pext_u64(bytes, 0x0101010101010101), mask);
-}
-#else
-union vf_halves {
-    vf all;
-    __m128 half[2];
-};
-union vi_halves {
-    vi all;
-    __m128i half[2];
-    __m128 as_float[2];
-};
-#define BY_HALVES(op, a, b)                                                                        \
-    union vf_halves x = {a}, y = {b}, r;                                                           \
-    r.half[0] = op(x.half[0], y.half[0]);                                                          \
-    r.half[1] = op(x.half[1], y.half[1])
-#define BY_HALVES_INT(op, a, b)                                                                    \
-    union vi_halves x = {a}, y = {b}, r;                                                           \
-    r.half[0] = op(x.half[0], y.half[0]);                                                          \
-    r.half[1] = op(x.half[1], y.half[1]);                                                          \
-    return r.all
-INLINE vf vf_min(vf a, vf b)
-{
-    BY_HALVES(_mm_min_ps, a, b);
-    return r.all;
-}
-INLINE vf vf_max(vf a, vf b)
-{
-    BY_HALVES(_mm_max_ps, a, b);
-    return r.all;
-}
-INLINE vf vf_sqrt(vf a)
-{
-    union vf_halves x = {a};
-    x.half[0] = _mm_sqrt_ps(x.half[0]);
-    x.half[1] = _mm_sqrt_ps(x.half[1]);
-    return x.all;
-}
-INLINE vf vf_hypot(vf a, vf b)
-{
-    vf r;
-    for (int i = 0; i < LANES; i++)
-        r[i] = (float)__builtin_sqrt((double)a[i] * (double)a[i] + (double)b[i] * (double)b[i]);
-    return r;
-}
-INLINE vf mul_sub(vf a, vf b, vf c)
-{
-    return a * b - c;
-}
-INLINE vf mul_add(vf a, vf b, vf c)
-{
-    return a * b + c;
-}
-INLINE vi vf_lt(vf a, vf b)
-{
-    BY_HALVES(_mm_cmplt_ps, a, b);
-    return (vi)r.all;
-}
-INLINE vi vf_le(vf a, vf b)
-{
-    BY_HALVES(_mm_cmple_ps, a, b);
-    return (vi)r.all;
-}
-INLINE vi vf_eq(vf a, vf b)
-{
-    BY_HALVES(_mm_cmpeq_ps, a, b);
-    return (vi)r.all;
-}
-INLINE vi vi_lt(vi a, vi b)
-{
-    BY_HALVES_INT(_mm_cmpgt_epi32, b, a);
-}
-INLINE vi vi_eq(vi a, vi b)
-{
-    BY_HALVES_INT(_mm_cmpeq_epi32, a, b);
-}
-INLINE vf vf_select(vi mask, vf yes, vf no)
-{
-    return (vf)((mask & (vi)yes) | (~mask & (vi)no));
-}
-INLINE unsigned bits(vi mask)
-{
-    union vi_halves x = {mask};
-    return (unsigned)(_mm_movemask_ps(x.as_float[0]) | _mm_movemask_ps(x.as_float[1]) << 4);
-}
-INLINE vi front_order(unsigned mask)
-{
-    int32_t order[LANES] = {0};
-    for (int n = 0; mask; mask &= mask - 1)
-        order[n++] = __builtin_ctz(mask);
-    return vi_load_any(order);
-}
-INLINE vf pick(vf a, vi order)
-{
-    return (vf){a[order[0]], a[order[1]], a[order[2]], a[order[3]],
-                a[order[4]], a[order[5]], a[order[6]], a[order[7]]};
-}
-INLINE unsigned spread_flags(const void *flags, unsigned mask)
-{
-    const unsigned char *flag = flags;
-    unsigned set = 0;
-    for (; mask; mask &= mask - 1)
-        set |= *flag++ ? mask & -mask : 0;
-    return set;
-}
-#endif
-
-/* A mask of lanes from bits. */
-INLINE vi lanes_of(unsigned mask)
-{
-    const vi bit = {1, 2, 4, 8, 16, 32, 64, 128};
-    return vi_eq(vi_set((int32_t)mask) & bit, bit);
-}
-/* Bits as eight bytes of 0 or 1, the lowest first. */
-INLINE uint64_t bytes_of(unsigned mask)
-{
-    return ((mask & 127) * 0x0002040810204081u & 0x0101010101010101u) | (uint64_t)(mask >> 7) << 56;
-}
-
-/* Eight numbers of 32 bits in lanes of 64, for products of full length: low halves count, high ones may
- * hold anything. */
-#ifdef __AVX512F__
-typedef struct {
-    __m512i v;
-} vw;
-INLINE vw vw_of(vu a)
-{
-    return (vw){_mm512_cvtepu32_epi64((__m256i)a)};
-}
-INLINE vu vu_of(vw a)
-{
-    return (vu)_mm512_cvtepi64_epi32(a.v);
-}
-INLINE vw vw_mul(vw a, uint32_t k)
-{
-    return (vw){_mm512_mul_epu32(a.v, _mm512_set1_epi64(k))};
-}
-INLINE vw vw_high(vw a)
-{
-    return (vw){_mm512_srli_epi64(a.v, 32)};
-}
-INLINE vw vw_xor(vw a, vw b, uint32_t k)
-{
-    return (vw){_mm512_xor_si512(_mm512_xor_si512(a.v, b.v), _mm512_set1_epi64(k))};
-}
-#elif defined __AVX2__
-typedef struct {
-    __m256i even, odd;
-} vw;
-INLINE vw vw_of(vu a)
-{
-    return (vw){(__m256i)a, _mm256_srli_epi64((__m256i)a, 32)};
-}
-INLINE vu vu_of(vw a)
-{
-    return (vu)_mm256_blend_epi32(a.even, _mm256_slli_epi64(a.odd, 32), 0xAA);
-}
-INLINE vw vw_mul(vw a, uint32_t k)
-{
-    const __m256i by = _mm256_set1_epi64x(k);
-    return (vw){_mm256_mul_epu32(a.even, by), _mm256_mul_epu32(a.odd, by)};
-}
-INLINE vw vw_high(vw a)
-{
-    return (vw){_mm256_srli_epi64(a.even, 32), _mm256_srli_epi64(a.odd, 32)};
-}
-INLINE vw vw_xor(vw a, vw b, uint32_t k)
-{
-    const __m256i c = _mm256_set1_epi64x(k);
-    return (vw){_mm256_xor_si256(_mm256_xor_si256(a.even, b.even), c),
-                _mm256_xor_si256(_mm256_xor_si256(a.odd, b.odd), c)};
-}
-#else
-typedef struct {
-    __m128i even[2], odd[2];
-} vw;
-INLINE vw vw_of(vu a)
-{
-    union vi_halves x = {(vi)a};
-    vw w;
-    for (int i = 0; i < 2; i++) {
-        w.even[i] = x.half[i];
-        w.odd[i] = _mm_srli_epi64(x.half[i], 32);
-    }
-    return w;
-}
-INLINE vu vu_of(vw a)
-{
-    union vi_halves x;
-    for (int i = 0; i < 2; i++)
-        x.half[i] = _mm_blend_epi16(a.even[i], _mm_slli_epi64(a.odd[i], 32), 0xCC);
-    return (vu)x.all;
-}
-INLINE vw vw_mul(vw a, uint32_t k)
-{
-    const __m128i by = _mm_set1_epi64x(k);
-    for (int i = 0; i < 2; i++) {
-        a.even[i] = _mm_mul_epu32(a.even[i], by);
-        a.odd[i] = _mm_mul_epu32(a.odd[i], by);
+    for (; mask; mask &= mask - 1) {
+        int i = __builtin_ctz(mask);
+        LANE(a, i) = f(LANE(a, i));
     }
     return a;
-}
-INLINE vw vw_high(vw a)
-{
-    for (int i = 0; i < 2; i++) {
-        a.even[i] = _mm_srli_epi64(a.even[i], 32);
-        a.odd[i] = _mm_srli_epi64(a.odd[i], 32);
-    }
-    return a;
-}
-INLINE vw vw_xor(vw a, vw b, uint32_t k)
-{
-    const __m128i c = _mm_set1_epi64x(k);
-    for (int i = 0; i < 2; i++) {
-        a.even[i] = _mm_xor_si128(_mm_xor_si128(a.even[i], b.even[i]), c);
-        a.odd[i] = _mm_xor_si128(_mm_xor_si128(a.odd[i], b.odd[i]), c);
-    }
-    return a;
-}
-#endif
-
-INLINE vi vi_select(vi mask, vi yes, vi no)
-{
-    return (vi)vf_select(mask, (vf)yes, (vf)no);
-}
-
-/* column[k] lane i = base[stride * index[i] + k]: eight rows of eight, turned. */
-INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
-                           vf column[LANES])
-{
-    vf a[LANES], b[LANES];
-    for (int i = 0; i < LANES; i++)
-        a[i] = vf_load_any(base + stride * (size_t)index[i]);
-    for (int i = 0; i < LANES; i += 2) {
-        b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-        b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    for (int i = 0; i < LANES; i += 4) {
-        a[i] = __builtin_shufflevector(b[i], b[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 1] = __builtin_shufflevector(b[i], b[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        a[i + 2] = __builtin_shufflevector(b[i + 1], b[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 3] = __builtin_shufflevector(b[i + 1], b[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    for (int i = 0; i < 4; i++) {
-        column[i] = __builtin_shufflevector(a[i], a[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        column[i + 4] = __builtin_shufflevector(a[i], a[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
 }
 
 #endif

@@ -1,35 +1,32 @@
-/* Sine and cosine by short polynomials, so that one lane and eight give the same bits; the macros are
- * written for float and for vectors of float. Coefficients: [Moshier92], of single precision. Off by
- * less than 1.5e-7. */
+/* Sine and cosine by short polynomials, so that every lane has the same bits in any width. Coefficients:
+ * [Moshier92], of single precision. Off by less than 1.5e-7. */
 #ifndef ASSAY_TRIG_H
 #define ASSAY_TRIG_H
 
-/* For |x| <= pi/4; xx is x squared. */
-#define TRIG_SIN(x, xx)                                                                            \
-    ((x) + (x) * (xx) * (-1.6666654611e-1f + (xx) * (8.3321608736e-3f + (xx) * -1.9515295891e-4f)))
-#define TRIG_COS(xx)                                                                               \
-    (1 - 0.5f * (xx) +                                                                             \
-     (xx) * (xx) *                                                                                 \
-         (4.166664568298827e-2f + (xx) * (-1.388731625493765e-3f + (xx)*2.443315711809948e-5f)))
+#include "simd.h"
 
 /* Of x radians, |x| <= pi/4. */
-static inline void trig_small(float x, float *sine, float *cosine)
+INLINE void trig_small(vf x, vf *sine, vf *cosine)
 {
-    float xx = x * x;
-    *sine = TRIG_SIN(x, xx);
-    *cosine = TRIG_COS(xx);
+    vf xx = x * x;
+    *sine = x + x * xx * (-1.6666654611e-1f + xx * (8.3321608736e-3f + xx * -1.9515295891e-4f));
+    *cosine =
+        1 - 0.5f * xx +
+        xx * xx *
+            (4.166664568298827e-2f + xx * (-1.388731625493765e-3f + xx * 2.443315711809948e-5f));
 }
 
 /* Of v turns, 0 <= v < 1: the nearest quarter, and what is left. */
-static inline void trig_turn(float v, float *sine, float *cosine)
+INLINE void trig_turn(vf v, vf *sine, vf *cosine)
 {
     const float two_pi = 6.28318530717958647693f;
-    int quarter = (int)(4 * v + 0.5f);
-    float s, c;
-    trig_small(two_pi * (v - 0.25f * (float)quarter), &s, &c);
-    float along = quarter & 1 ? s : c, across = quarter & 1 ? c : s;
-    *cosine = (quarter + 1) & 2 ? -along : along;
-    *sine = quarter & 2 ? -across : across;
+    vi quarter = vi_truncate(4 * v + 0.5f);
+    vf s, c;
+    trig_small(two_pi * (v - 0.25f * vf_of_int(quarter)), &s, &c);
+    vi is_odd = vi_eq(quarter & 1, vi_set(1));
+    vf along = vf_select(is_odd, s, c), across = vf_select(is_odd, c, s);
+    *cosine = as_vf(as_vi(along) ^ (vi)(((vu)(quarter + 1) & 2) << 30));
+    *sine = as_vf(as_vi(across) ^ (vi)(((vu)quarter & 2) << 30));
 }
 
 #endif

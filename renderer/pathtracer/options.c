@@ -329,11 +329,6 @@ static bool complete(struct options *s, int accumulate, struct err *e)
     if (s->starter != 0 && s->direct == DIRECT_MIS && s->kind == INTEGRATE_PATHS)
         return err_set(
             e, "--starter is about programs that sample lights alone: give --direct light too");
-    if (s->starter != 0 && s->isa > ISA_AUTO)
-        return err_set(e, "--starter is in the scalar code alone: not with --isa %s",
-                       isa_names[s->isa]);
-    if (s->starter != 0)
-        s->isa = ISA_SCALAR;
     if (s->isa < 0)
         s->isa = s->accel == BVH_WIDE ? ISA_AUTO : ISA_SCALAR;
     if (s->threads == 0)

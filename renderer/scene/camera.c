@@ -1,6 +1,6 @@
 #include "camera.h"
 
-#include "renderer/math/warp.h"
+#include "camera_simd.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -132,18 +132,7 @@ bool camera_read_file(struct camera *c, const char *path, struct err *e)
 
 ray camera_ray(const struct camera *c, float x, float y, float u, float v)
 {
-    float sx = (2 * x / (float)c->width - 1) * c->tan_h;
-    float sy = (1 - 2 * y / (float)c->height) * c->tan_v;
-    vec3 d = sub(mad(scale(c->right, sx), sy, c->up), c->backward);
-    vec3 o = c->eye;
-    if (c->lens_radius > 0) {
-        float lx, ly;
-        warp_disk(u, v, &lx, &ly);
-        /* Both as seen from the eye: far from the origin their difference would be lost. */
-        vec3 focus = scale(d, c->focal_distance);
-        vec3 lens = mad(scale(c->right, lx * c->lens_radius), ly * c->lens_radius, c->up);
-        o = add(o, lens);
-        d = sub(focus, lens);
-    }
-    return (ray){.o = o, .d = normalize(d), .tmin = c->near, .tmax = c->far};
+    ray r = {.tmin = c->near, .tmax = c->far};
+    camera_rays(c, x, y, u, v, &r.o, &r.d);
+    return r;
 }

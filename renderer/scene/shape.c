@@ -1,5 +1,7 @@
 #include "shape.h"
 
+#include "shape_simd.h"
+
 #include <float.h>
 
 struct shear shape_shear(const ray *r)
@@ -98,11 +100,7 @@ static struct surface triangle_surface(const struct scene *s, uint32_t prim, flo
     const vec3 *p = s->position + 3 * (size_t)prim, *n = s->normal + 3 * (size_t)prim;
     vec3 e1 = sub(p[1], p[0]), e2 = sub(p[2], p[0]);
     vec3 ng = normalize(cross(e1, e2));
-    vec3 ns = mad(mad(scale(n[0], 1 - u - v), u, n[1]), v, n[2]);
-    float l = length(ns);
-    ns = l > 0 ? scale(ns, 1 / l) : ng;
-    if (dot(ns, ng) < 0)
-        ns = neg(ns);
+    vec3 ns = interpolate_normals(n[0], n[1], n[2], ng, u, v);
     float magnitude = maxf(max_abs(p[0]), maxf(max_abs(p[1]), max_abs(p[2])));
     return (struct surface){
         .p = mad(mad(p[0], u, e1), v, e2), .ng = ng, .ns = ns, .eps = coordinate_error(magnitude)};
@@ -114,9 +112,7 @@ struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, fl
     if (prim < s->num_triangles)
         return triangle_surface(s, prim, u, v);
     const struct sphere *sp = &s->spheres[prim - s->num_triangles];
-    vec3 n = normalize(sub(mad(r->o, t, r->d), sp->centre));
-    /* Back onto the sphere: the hit of a distant ray is off by its own rounding. */
-    vec3 p = mad(sp->centre, sp->radius, n);
+    vec3 n, p = sphere_place(sp->centre, sp->radius, r->o, r->d, t, &n);
     n = scale(n, sp->normal_out);
     return (struct surface){
         .p = p, .ng = n, .ns = n, .eps = coordinate_error(max_abs(sp->centre) + sp->radius)};

@@ -35,8 +35,6 @@ struct light_choice {
 struct light_choice light_choose(const struct light_table *t, bool only_delta, float u);
 /* The probability that light_choose(t, false, ..) has for light l. */
 float light_choice_probability(const struct light_table *t, uint32_t l);
-/* By triangle: the area of its light up to and including it. */
-const float *light_table_areas(const struct light_table *t);
 /* How many are no delta lights. */
 uint32_t light_count_areas(const struct light_table *t);
 

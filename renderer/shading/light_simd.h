@@ -1,15 +1,31 @@
-/* light_sample_direction() from eight places: the kinds of lights that come in numbers in vectors, the
- * others lane by lane. Part of integrator_simd.c. */
+/* Sampling lights, and the density of doing so, from the places of several lanes. */
 #ifndef ASSAY_LIGHT_SIMD_H
 #define ASSAY_LIGHT_SIMD_H
 
-#include "renderer/math/vec_simd.h"
-#include "scene_simd.h"
+#include "renderer/math/discrete.h"
+#include "renderer/scene/environment.h"
+#include "light.h"
+#include "renderer/scene/cs184_deviations.h"
+#include "renderer/math/warp.h"
 
-/* Up to so many triangles of a light are looked through one by one. */
-enum { FEW_TRIANGLES = 8 };
+enum {
+    /* Up to so many triangles of a light are looked through one by one. */
+    FEW_TRIANGLES = 8,
+    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and including it. */
+    LAMP_AREA = 12,
+    LAMP_WORDS = 16
+};
 
-/* struct light_sample. */
+struct light_table {
+    const struct scene *scene;
+    float *lamp;     /* records of the triangles of all lights */
+    uint32_t *first; /* by light: its first record */
+    /* Choices among all lights and among the delta lights; NULL where there is nothing to choose. */
+    uint32_t *all, *delta;
+    uint32_t num_areas;
+};
+
+/* struct light_sample */
 struct light_samplev {
     vec3v wi;
     vf distance;
@@ -18,9 +34,53 @@ struct light_samplev {
     vf pdf_w;
 };
 
-/* finish_area_sample(); both_sides: the light emits on both. */
-INLINE void finish_area_samplev(struct light_samplev *s, rgb radiance, bool both_sides, vec3v from,
-                                vec3v to, vec3v normal, float pdf_a)
+INLINE struct light_samplev light_sample_none(void)
+{
+    return (struct light_samplev){.sphere = vi_set(-1), .delta = vi_set(0), .pdf_w = vf_set(0)};
+}
+
+INLINE struct light_samplev light_sample_select(vi mask, const struct light_samplev *yes,
+                                                const struct light_samplev *no)
+{
+    return (struct light_samplev){.wi = v3_select(mask, yes->wi, no->wi),
+                                  .distance = vf_select(mask, yes->distance, no->distance),
+                                  .radiance = rgb_select(mask, yes->radiance, no->radiance),
+                                  .sphere = vi_select(mask, yes->sphere, no->sphere),
+                                  .delta = vi_select(mask, yes->delta, no->delta),
+                                  .pdf_w = vf_select(mask, yes->pdf_w, no->pdf_w)};
+}
+
+/* What samples of an area light have in common. */
+struct lamp {
+    const float *record; /* triangles: of the first */
+    int count;
+    float pdf_a;
+    rgb radiance;
+    bool both_sides;
+};
+
+static inline struct lamp lamp_of(const struct light_table *t, uint32_t l)
+{
+    const struct scene *s = t->scene;
+    const struct light *light = &s->lights[l];
+    const bool flat = light->kind == LIGHT_TRIANGLES;
+    const struct material *m =
+        &s->materials[flat ? s->tri_material[light->first] : s->sphere_material[light->first]];
+    return (struct lamp){.record = t->lamp + LAMP_WORDS * (size_t)t->first[l],
+                         .count = (int)light->count,
+                         .pdf_a = 1 / light->area,
+                         .radiance = m->radiance,
+                         .both_sides = m->radiance_both_sides};
+}
+
+static inline bool is_lamp(const struct light *light)
+{
+    return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES;
+}
+
+/* pdf_w and direction for a place on an area light of density pdf_a there. */
+INLINE void finish_area_sample(const struct lamp *l, vec3v from, vec3v to, vec3v normal,
+                               struct light_samplev *s)
 {
     const vf zero = vf_set(0);
     vec3v w = subv(to, from);
@@ -28,98 +88,133 @@ INLINE void finish_area_samplev(struct light_samplev *s, rgb radiance, bool both
     s->distance = vf_sqrt(d2);
     s->wi = scalev(w, 1 / s->distance);
     vf cosine = dotv(normal, s->wi), cos_l = vf_abs(cosine);
-    vi lit = both_sides ? vi_set(-1) : vf_lt(cosine, zero);
-    s->radiance = rgb_all(radiance);
+    vi lit = l->both_sides ? vi_set(-1) : vf_lt(cosine, zero);
+    s->radiance = rgb_all(l->radiance);
     /* Of d2 = 0 comes NaN, which no comparison lets through. */
     lit &= vf_lt(zero, cos_l);
-    s->pdf_w = vf_select(lit, pdf_a * d2 / cos_l, zero);
+    s->pdf_w = vf_select(lit, l->pdf_a * d2 / cos_l, zero);
 }
 
-/* A light of few triangles: what its samples have in common. */
-struct lamp {
-    const float *record; /* of the first triangle, RECORD_WORDS of each */
-    const float *cdf;    /* area up to and including each */
-    int count;
-    float pdf_a;
-    rgb radiance;
-    bool both_sides;
-};
-
-static inline bool is_lamp(const struct light *light)
+/* q: corner, edges and normal of each lane's triangle. */
+INLINE void sample_triangle(const struct lamp *l, const vf q[LAMP_AREA], vec3v p, const vf u[4],
+                            struct light_samplev *out)
 {
-    return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES;
-}
-
-static inline struct lamp lamp_of(const struct scene *s, const struct lanes_scene *ls,
-                                  const struct light_table *t, const struct light *light)
-{
-    const struct material *m = &s->materials[s->tri_material[light->first]];
-    return (struct lamp){.record = ls->primitive + RECORD_WORDS * (size_t)light->first,
-                         .cdf = light_table_areas(t) + light->first,
-                         .count = (int)light->count,
-                         .pdf_a = 1 / light->area,
-                         .radiance = m->radiance,
-                         .both_sides = m->radiance_both_sides};
-}
-
-INLINE void sample_lampv(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
-{
-    const vf target = u[2] * l->cdf[l->count - 1];
-    const float *r = l->record;
-    vf q[12];
-    for (int k = 0; k < 12; k++)
-        q[k] = vf_set(r[k]);
-    for (int i = 0; i < l->count - 1; i++) {
-        vi beyond = vf_le(vf_set(l->cdf[i]), target);
-        r += RECORD_WORDS;
-        for (int k = 0; k < 12; k++)
-            q[k] = vf_select(beyond, vf_set(r[k]), q[k]);
-    }
-    vf root = vf_sqrt(u[0]), b1 = 1 - root, b2 = u[1] * root;
+    vf b1, b2;
+    warp_triangle(u[0], u[1], &b1, &b2);
     vec3v to =
         madv(madv(v3v(q[0], q[1], q[2]), b1, v3v(q[3], q[4], q[5])), b2, v3v(q[6], q[7], q[8]));
-    finish_area_samplev(out, l->radiance, l->both_sides, p, to, v3v(q[9], q[10], q[11]), l->pdf_a);
+    finish_area_sample(l, p, to, v3v(q[9], q[10], q[11]), out);
 }
 
-/* From outside the cone, else lane by lane. */
-INLINE vi sample_spherev(const struct scene *s, const struct light *light, vec3v p, const vf u[4],
-                         struct light_samplev *out)
+/* Of few triangles. */
+INLINE void sample_lamp(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
+{
+    const float *r = l->record;
+    const vf target = u[2] * r[LAMP_WORDS * (l->count - 1) + LAMP_AREA];
+    vf q[LAMP_AREA];
+    for (int k = 0; k < LAMP_AREA; k++)
+        q[k] = vf_set(r[k]);
+    for (int i = 0; i < l->count - 1; i++, r += LAMP_WORDS) {
+        vi beyond = vf_le(vf_set(r[LAMP_AREA]), target);
+        for (int k = 0; k < LAMP_AREA; k++)
+            q[k] = vf_select(beyond, vf_set(r[LAMP_WORDS + k]), q[k]);
+    }
+    sample_triangle(l, q, p, u, out);
+}
+
+/* The triangle of `count` within whose area the target lies. */
+static inline int lamp_search(const float *record, int count, float target)
+{
+    int lo = 0, hi = count - 1;
+    while (lo < hi) {
+        int mid = lo + (hi - lo) / 2;
+        if (record[LAMP_WORDS * (size_t)mid + LAMP_AREA] > target)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    return lo;
+}
+
+/* Of many triangles. */
+INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
+{
+    const float all = l->record[LAMP_WORDS * ((size_t)l->count - 1) + LAMP_AREA];
+    int32_t number[LANES];
+    vf q[2 * COLUMNS];
+    for (int i = 0; i < LANES; i++)
+        number[i] = lamp_search(l->record, l->count, LANE(u[2], i) * all);
+    for (int i = 0; i < 2; i++)
+        gather_columns(l->record + COLUMNS * i, LAMP_WORDS, number, q + COLUMNS * i);
+    sample_triangle(l, q, p, u, out);
+}
+
+/* 1 - cos of the half angle that a sphere subtends at squared distance d2 > r2, without the
+ * cancellation of forming the cosine. */
+INLINE vf cone_one_minus_cos(vf r2, vf d2)
+{
+    vf sin2 = r2 / d2;
+    return sin2 / (1 + vf_sqrt(vf_max(vf_set(0), 1 - sin2)));
+}
+
+/* Outside and not so near that the cone is a half space: there the cone, else the area. */
+INLINE vi uses_cone(vf radius, vf d2)
+{
+    return vf_lt(1.0001f * radius * radius, d2);
+}
+
+INLINE void sample_sphere(const struct scene *s, const struct light *light, const struct lamp *l,
+                          vec3v p, const vf u[4], unsigned mask, struct light_samplev *out)
 {
     const struct sphere *sp = &s->spheres[light->first];
-    const float r2 = sp->radius * sp->radius;
-    const vf zero = vf_set(0);
+    const vf zero = vf_set(0), radius = vf_set(sp->radius), r2 = radius * radius;
     vec3v to_centre = subv(v3_all(sp->centre), p);
     vf d2 = dotv(to_centre, to_centre);
-    vi outside =
-        sp->normal_out > 0 ? vf_lt(vf_set(1.0001f * sp->radius * sp->radius), d2) : vi_set(0);
-    vf sin2 = r2 / d2, one_minus_cos = sin2 / (1 + vf_sqrt(vf_max(zero, 1 - sin2)));
+    vi cone = sp->normal_out > 0 ? uses_cone(radius, d2) : vi_set(0);
+    vf one_minus_cos = cone_one_minus_cos(r2, d2);
     framev f = frame_from_normalv(normalizev(to_centre));
-    vf h = u[0] * one_minus_cos, sine, cosine;
-    vf r = vf_sqrt(vf_max(zero, h * (2 - h)));
-    trig_turnv(u[1], &sine, &cosine);
-    vec3v local = v3v(r * cosine, r * sine, 1 - h);
+    vec3v local = warp_uniform_cone(u[0], u[1], one_minus_cos);
     out->wi = frame_to_worldv(&f, local);
+    /* Distance to the near side; at the rim rounding may make the root negative. */
     vf along = vf_sqrt(d2) * local.z;
     out->distance = along - vf_sqrt(vf_max(zero, r2 - d2 * (1 - local.z * local.z)));
-    out->radiance = rgb_all(s->materials[s->sphere_material[light->first]].radiance);
+    out->radiance = rgb_all(l->radiance);
     out->sphere = vi_set((int32_t)(s->num_triangles + light->first));
-    out->pdf_w = 0.5f * INV_PI_F / one_minus_cos;
-    return outside;
+    out->pdf_w = warp_uniform_cone_pdf_w(one_minus_cos);
+    if (!(mask & ~bits(cone)))
+        return;
+    struct light_samplev area = light_sample_none();
+    vec3v n = warp_uniform_sphere(u[0], u[1]);
+    finish_area_sample(l, p, madv(v3_all(sp->centre), radius, n), scalev(n, vf_set(sp->normal_out)),
+                       &area);
+    *out = light_sample_select(cone, out, &area);
 }
 
-INLINE void sample_pointv(const struct light *light, vec3v p, struct light_samplev *out)
+/* And spots. */
+INLINE void sample_point(const struct light *light, vec3v p, unsigned mask,
+                         struct light_samplev *out)
 {
     vec3v w = subv(v3_all(light->position), p);
-    vf d = vf_sqrt(dotv(w, w));
+    vf d = vf_sqrt(dotv(w, w)), share = vf_set(1);
     const float *a = light->attenuation;
+    vi dark = vf_eq(d, vf_set(0));
     out->wi = scalev(w, 1 / d);
+    if (light->kind == LIGHT_SPOT) {
+        vf cosine = -dotv(v3_all(light->axis), out->wi);
+        dark |= ~vf_lt(vf_set(light->cos_cutoff), cosine);
+        share = cosine;
+        for (unsigned lit = mask & ~bits(dark); lit; lit &= lit - 1) {
+            int i = __builtin_ctz(lit);
+            LANE(share, i) = powf(LANE(share, i), light->exponent);
+        }
+    }
     out->distance = d;
-    out->radiance = rgb_scalev(rgb_all(light->value), 1 / (a[0] + d * (a[1] + d * a[2])));
-    out->pdf_w = vf_select(vf_eq(d, vf_set(0)), vf_set(0), vf_set(1));
+    out->radiance = rgb_scalev(rgb_all(light->value), share / (a[0] + d * (a[1] + d * a[2])));
+    out->pdf_w = vf_select(dark, vf_set(0), vf_set(1));
     out->delta = vi_set(-1);
 }
 
-INLINE void sample_directionalv(const struct light *light, struct light_samplev *out)
+INLINE void sample_directional(const struct light *light, struct light_samplev *out)
 {
     out->wi = v3_all(light->to_light);
     out->distance = vf_set(INFINITY);
@@ -128,64 +223,92 @@ INLINE void sample_directionalv(const struct light *light, struct light_samplev 
     out->delta = vi_set(-1);
 }
 
-/* Lanes of the mask one by one, each of light number l[lane]. */
-static __attribute__((noinline)) void sample_each_at(const struct light_table *t, const uint32_t *l,
-                                                     const vec3v *p, const vf u[4], unsigned mask,
-                                                     struct light_samplev *out)
+INLINE void sample_environment(const struct environment *env, const vf u[4], unsigned mask,
+                               struct light_samplev *out)
 {
+    out->distance = vf_set(INFINITY);
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
-        const float numbers[4] = {u[0][i], u[1][i], u[2][i], u[3][i]};
-        struct light_sample s =
-            light_sample_direction(t, l[i], v3(p->x[i], p->y[i], p->z[i]), numbers);
-        out->wi.x[i] = s.wi.x;
-        out->wi.y[i] = s.wi.y;
-        out->wi.z[i] = s.wi.z;
-        out->distance[i] = s.distance;
-        out->radiance.r[i] = s.radiance.r;
-        out->radiance.g[i] = s.radiance.g;
-        out->radiance.b[i] = s.radiance.b;
-        out->sphere[i] = (int32_t)s.sphere;
-        out->delta[i] = s.delta ? -1 : 0;
-        out->pdf_w[i] = s.pdf_w;
+        const float numbers[4] = {LANE(u[0], i), LANE(u[1], i), LANE(u[2], i), LANE(u[3], i)};
+        struct environment_sample s = environment_sample_direction(env, numbers);
+        v3_set_lane(&out->wi, i, s.wi);
+        rgb_set_lane(&out->radiance, i, s.radiance);
+        LANE(out->pdf_w, i) = s.pdf_w;
     }
 }
 
-/* By way of copies: what an address is taken of lives in memory for all its life. */
-INLINE void sample_each(const struct light_table *t, const uint32_t *l, vec3v p, const vf u[4],
-                        unsigned mask, struct light_samplev *out)
+/* cs184_deviations.h: the sample as the assignment's starter code makes it of ours. */
+INLINE void as_starter(const struct scene *s, const struct light *light, const struct lamp *l,
+                       vec3v p, struct light_samplev *out)
 {
-    const vf numbers[4] = {u[0], u[1], u[2], u[3]};
-    struct light_samplev each = *out;
-    sample_each_at(t, l, &p, numbers, mask, &each);
-    *out = each;
+    if (starter_has(s, CS184_TURNED_LAMP) && light->count == 2) {
+        vec3v to = madv(p, out->distance, out->wi);
+        for (int i = 0; i < LANES; i++)
+            v3_set_lane(&to, i, cs184_deviations_turn(s, light, v3_lane(&to, i)));
+        const float *ng = l->record + 9;
+        finish_area_sample(l, p, to, v3_all(v3(ng[0], ng[1], ng[2])), out);
+    }
+    if (starter_has(s, CS184_LIGHT_PDF))
+        out->pdf_w =
+            vf_select(vf_lt(vf_set(0), out->pdf_w), out->pdf_w / out->distance, out->pdf_w);
 }
 
-/* The lanes of the mask sample light l. */
-INLINE void sample_lightv(const struct scene *s, const struct lanes_scene *ls,
-                          const struct light_table *t, uint32_t l, vec3v p, const vf u[4],
-                          unsigned mask, struct light_samplev *out)
+/* Samples of light l for the lanes of the mask; the others' are of no use. */
+INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, const vf u[4],
+                              unsigned mask, struct light_samplev *out)
 {
+    const struct scene *s = t->scene;
     const struct light *light = &s->lights[l];
-    vi done = vi_set(0);
+    struct lamp lamp;
+    *out = light_sample_none();
     switch (light->kind) {
     case LIGHT_TRIANGLES:
-        if (is_lamp(light)) {
-            const struct lamp lamp = lamp_of(s, ls, t, light);
-            sample_lampv(&lamp, p, u, out);
-            return;
-        }
-        break;
-    case LIGHT_SPHERE: done = sample_spherev(s, light, p, u, out); break;
-    case LIGHT_POINT: sample_pointv(light, p, out); return;
-    case LIGHT_DIRECTIONAL: sample_directionalv(light, out); return;
-    case LIGHT_SPOT:
-    case LIGHT_ENVIRONMENT: break;
+        lamp = lamp_of(t, l);
+        if (is_lamp(light))
+            sample_lamp(&lamp, p, u, out);
+        else
+            sample_mesh(&lamp, p, u, out);
+        if (s->starter != 0)
+            as_starter(s, light, &lamp, p, out);
+        return;
+    case LIGHT_SPHERE:
+        lamp = lamp_of(t, l);
+        sample_sphere(s, light, &lamp, p, u, mask, out);
+        return;
+    case LIGHT_POINT:
+    case LIGHT_SPOT: sample_point(light, p, mask, out); return;
+    case LIGHT_DIRECTIONAL: sample_directional(light, out); return;
+    case LIGHT_ENVIRONMENT: sample_environment(s->environment, u, mask, out); return;
     }
-    mask &= ~bits(done);
-    const uint32_t same[LANES] = {l, l, l, l, l, l, l, l};
-    if (mask)
-        sample_each(t, same, p, u, mask, out);
+}
+
+/* light_pdf_w() for the lanes of the mask; ng: the normal of the place. */
+INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES], vec3v p, vec3v wi,
+                       vf d, vec3v ng, unsigned mask)
+{
+    const struct scene *s = t->scene;
+    const vf zero = vf_set(0);
+    vf area = vf_set(1), radius = zero;
+    vec3v centre = {zero, zero, zero};
+    unsigned round = 0;
+    for (; mask; mask &= mask - 1) {
+        int i = __builtin_ctz(mask);
+        const struct light *l = &s->lights[light[i]];
+        LANE(area, i) = l->area;
+        if (l->kind == LIGHT_SPHERE && s->spheres[l->first].normal_out > 0) {
+            round |= 1u << i;
+            LANE(radius, i) = s->spheres[l->first].radius;
+            v3_set_lane(&centre, i, s->spheres[l->first].centre);
+        }
+    }
+    vf cos_l = vf_abs(dotv(ng, wi));
+    vf pdf_w = vf_select(vf_lt(zero, cos_l), d * d / (cos_l * area), zero);
+    if (!round)
+        return pdf_w;
+    vec3v to_centre = subv(centre, p);
+    vf d2 = dotv(to_centre, to_centre);
+    vf cone = warp_uniform_cone_pdf_w(cone_one_minus_cos(radius * radius, d2));
+    return vf_select(lanes_of(round) & uses_cone(radius, d2), cone, pdf_w);
 }
 
 #endif

@@ -1,34 +1,128 @@
 /* Rough surfaces as many small mirrors: distribution D of their normals m, Smith shadowing, sampling of
  * the normals that are visible from wo [Heitz14]. Local frame, normal on +Z; alpha at least
- * MICROFACET_MIN_ALPHA, directions above the surface by more than 1e-15. */
+ * MICROFACET_MIN_ALPHA, directions above the surface by more than 1e-15; kind: of enum microfacet_kind. */
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
-#include "renderer/math/vec.h"
+#include "renderer/scene/scene.h"
+#include "renderer/math/warp.h"
 
-/* Smoother than this is a mirror: float32 hardly tells the normals apart. */
-#define MICROFACET_MIN_ALPHA 1e-4f
+#define MICROFACET_SQRT_PI 1.77245385090551602730f
 
-enum microfacet_kind {
-    MICROFACET_GGX,
-    MICROFACET_BECKMANN,
-    MICROFACET_BECKMANN_STARTER /* Beckmann's, but for microfacet_g2() (cs184_deviations.h) */
-};
+/* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at tan(theta) = t sees
+ * of all slopes; t = 0 gives a normal variate of variance 1/2. */
+float microfacet_slope(float t, float u);
+
+INLINE unsigned microfacet_beckmanns(vi kind)
+{
+    return bits(~vi_eq(kind, vi_set(MICROFACET_GGX)));
+}
 
 /* Density of normals per steradian of m and unit of macroscopic area [Walter07 eq. 25, 33]. */
-float microfacet_d(enum microfacet_kind kind, float alpha, vec3 m);
+INLINE vf microfacet_d(vi kind, vf alpha, vec3v m)
+{
+    vf a2 = alpha * alpha, cos2 = m.z * m.z, sin2 = m.x * m.x + m.y * m.y;
+    /* cos^2 (a^2 - 1) + 1 in a form that keeps its digits for small alpha. */
+    vf e = sin2 + a2 * cos2;
+    vf d = a2 * INV_PI_F / (e * e);
+    unsigned beckmann = microfacet_beckmanns(kind);
+    if (beckmann) {
+        e = sin2 / (cos2 * a2);
+        /* expf() is 0 there, and cos2 may be. */
+        vi near = vf_lt(e, vf_set(100));
+        vf b = vf_map(expf, beckmann & bits(near), -e) * INV_PI_F / (a2 * cos2 * cos2);
+        d = vf_select(lanes_of(beckmann), vf_select(near, b, vf_set(0)), d);
+    }
+    return vf_select(vf_le(m.z, vf_set(0)), vf_set(0), d);
+}
 
 /* Smith's auxiliary function; the fraction of facets visible from w is 1/(1 + lambda)
  * [Heitz14 eq. 72; Walter07 eq. 34 for GGX; the exact error function for Beckmann]. */
-float microfacet_lambda(enum microfacet_kind kind, float alpha, vec3 w);
+INLINE vf microfacet_lambda(vi kind, vf alpha, vec3v w)
+{
+    vf tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+    vf l = 0.5f * (vf_sqrt(1 + alpha * alpha * tan2) - 1);
+    vi upright = vf_eq(tan2, vf_set(0));
+    unsigned beckmann = microfacet_beckmanns(kind);
+    if (beckmann) {
+        vf a = 1 / (alpha * vf_sqrt(tan2));
+        unsigned slant = beckmann & ~bits(upright);
+        vf b = vf_map(expf, slant, -a * a) / (a * MICROFACET_SQRT_PI) - vf_map(erfcf, slant, a);
+        l = vf_select(lanes_of(beckmann), 0.5f * b, l);
+    }
+    return vf_select(upright, vf_set(0), l);
+}
+
+/* Lambda of MICROFACET_BECKMANN_STARTER. */
+INLINE vf microfacet_starter_lambda(unsigned lanes, vf alpha, vec3v w)
+{
+    vf tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z), a = 1 / (alpha * vf_sqrt(tan2));
+    vf l = 0.5f * (vf_map(expf, lanes, -a * a) / (a * PI_F) - vf_map(erfcf, lanes, a));
+    return vf_select(vf_lt(vf_set(0), tan2), l, vf_set(0));
+}
 
 /* Both seen from wo and lit from wi: of the whole surface's height at once (correlated), or as if
- * the two were independent (separable). MICROFACET_BECKMANN_STARTER: of the whole surface, with a pi for the
+ * the two were independent (separable, a mask). MICROFACET_BECKMANN_STARTER: of the whole surface, with a pi for the
  * sqrt(pi) of its lambda; more than 1 where the surface is seen and lit from above. */
-float microfacet_g2(enum microfacet_kind kind, float alpha, bool separable, vec3 wo, vec3 wi);
+INLINE vf microfacet_g2(vi kind, vf alpha, vi separable, vec3v wo, vec3v wi)
+{
+    vf lo = microfacet_lambda(kind, alpha, wo), li = microfacet_lambda(kind, alpha, wi);
+    vf g = vf_select(separable, 1 / ((1 + lo) * (1 + li)), 1 / (1 + lo + li));
+    unsigned starter = bits(vi_eq(kind, vi_set(MICROFACET_BECKMANN_STARTER)));
+    if (starter)
+        g = vf_select(lanes_of(starter),
+                      1 / (1 + microfacet_starter_lambda(starter, alpha, wo) +
+                           microfacet_starter_lambda(starter, alpha, wi)),
+                      g);
+    return g;
+}
+
+/* Visible normals of a hemisphere seen from wo, stretched back [Heitz18, section 3]. */
+INLINE vec3v microfacet_sample_ggx(vf alpha, vec3v wo, vf u, vf v)
+{
+    const vf zero = vf_set(0);
+    vec3v w = normalizev(v3v(alpha * wo.x, alpha * wo.y, wo.z));
+    vf x, y;
+    warp_disk(u, v, &x, &y);
+    /* The half of the disk that the hemisphere's rim cuts off is squeezed onto the visible part. */
+    vf s = 0.5f * (1 + w.z);
+    y = (1 - s) * vf_sqrt(vf_max(zero, 1 - x * x)) + s * y;
+    vf z = vf_sqrt(vf_max(zero, 1 - x * x - y * y));
+    vf l2 = w.x * w.x + w.y * w.y;
+    vec3v t1 = v3_select(vf_lt(zero, l2), scalev(v3v(-w.y, w.x, zero), 1 / vf_sqrt(l2)),
+                         v3v(vf_set(1), zero, zero));
+    vec3v t2 = crossv(w, t1);
+    vec3v n = madv(madv(scalev(t1, x), y, t2), z, w);
+    return normalizev(v3v(alpha * n.x, alpha * n.y, vf_max(vf_set(1e-7f), n.z)));
+}
+
+/* Slopes along wo and across. */
+INLINE vec3v microfacet_sample_beckmann(unsigned lanes, vf alpha, vec3v wo, vf u, vf v)
+{
+    const vf zero = vf_set(0);
+    vec3v w = v3v(alpha * wo.x, alpha * wo.y, wo.z);
+    vf sin_w = vf_sqrt(w.x * w.x + w.y * w.y), t = sin_w / w.z;
+    vi slant = vf_lt(zero, sin_w);
+    vf c = vf_select(slant, w.x / sin_w, vf_set(1)), s = vf_select(slant, w.y / sin_w, zero);
+    vf along = zero, across = zero;
+    for (; lanes; lanes &= lanes - 1) {
+        int i = __builtin_ctz(lanes);
+        LANE(along, i) = microfacet_slope(LANE(t, i), LANE(u, i));
+        LANE(across, i) = microfacet_slope(0, LANE(v, i));
+    }
+    return normalizev(
+        v3v(-alpha * (c * along - s * across), -alpha * (s * along + c * across), vf_set(1)));
+}
 
 /* A normal with density D(m) max(0, wo.m) / ((1 + lambda(wo)) wo.z), per steradian: GGX [Heitz18];
  * Beckmann by inverting the distribution of visible slopes numerically. wo.z > 0. */
-vec3 microfacet_sample(enum microfacet_kind kind, float alpha, vec3 wo, float u, float v);
+INLINE vec3v microfacet_sample(vi kind, vf alpha, vec3v wo, vf u, vf v)
+{
+    vec3v m = microfacet_sample_ggx(alpha, wo, u, v);
+    unsigned beckmann = microfacet_beckmanns(kind);
+    if (beckmann)
+        m = v3_select(lanes_of(beckmann), microfacet_sample_beckmann(beckmann, alpha, wo, u, v), m);
+    return m;
+}
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "renderer/base/huge_alloc.h"
 #include "bsdf.h"
+#include "renderer/scene/shape.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +55,7 @@ static void fill_sphere(const struct scene *s, uint32_t i, float *r)
     set_int(r + RECORD_LIGHT, s->sphere_light[i]);
 }
 
-static void fill_material(const struct material *m, float *r)
+void lanes_scene_material(const struct material *m, float r[MATERIAL_WORDS])
 {
     set_rgb(r + MATERIAL_REFLECTANCE, m->reflectance);
     set_rgb(r + MATERIAL_TRANSMITTANCE, m->transmittance);
@@ -62,12 +63,11 @@ static void fill_material(const struct material *m, float *r)
     set_rgb(r + MATERIAL_K, m->k);
     r[MATERIAL_IOR] = m->ior;
     r[MATERIAL_ALPHA] = m->alpha;
-    set_int(r + MATERIAL_BITS,
-            1 << m->kind | (bsdf_is_black(m) ? MATERIAL_IS_BLACK : 0) |
-                (m->schlick ? MATERIAL_IS_SCHLICK : 0) |
-                (m->separable ? MATERIAL_IS_SEPARABLE : 0) |
-                (m->conductor ? MATERIAL_IS_CONDUCTOR : 0) |
-                (m->microfacet == MICROFACET_BECKMANN ? MATERIAL_IS_BECKMANN : 0));
+    set_int(r + MATERIAL_BITS, 1 << m->kind | (bsdf_is_black(m) ? MATERIAL_IS_BLACK : 0) |
+                                   (m->schlick ? MATERIAL_IS_SCHLICK : 0) |
+                                   (m->separable ? MATERIAL_IS_SEPARABLE : 0) |
+                                   (m->conductor ? MATERIAL_IS_CONDUCTOR : 0));
+    set_int(r + MATERIAL_FACETS, (int32_t)m->microfacet);
 }
 
 struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
@@ -91,7 +91,7 @@ struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
     for (uint32_t i = 0; i < s->num_spheres; i++)
         fill_sphere(s, i, l->primitive + RECORD_WORDS * (size_t)(s->num_triangles + i));
     for (uint32_t i = 0; i < s->num_materials; i++) {
-        fill_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
+        lanes_scene_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
         l->only_diffuse = l->only_diffuse && (s->materials[i].kind == MATERIAL_DIFFUSE ||
                                               bsdf_is_black(&s->materials[i]));
     }

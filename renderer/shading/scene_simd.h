@@ -1,8 +1,8 @@
-/* The scene once more, as records that eight lanes fetch in rows of eight words. */
+/* The scene once more, as records that lanes fetch in rows of eight words. */
 #ifndef ASSAY_SCENE_SIMD_H
 #define ASSAY_SCENE_SIMD_H
 
-#include "light.h"
+#include "renderer/scene/scene.h"
 
 /* Words of a primitive's record. A triangle has RECORD_P .. RECORD_N: first corner, the two edges from
  * it, geometric normal, three shading normals; a sphere RECORD_CENTRE .. RECORD_OUT. */
@@ -30,6 +30,7 @@ enum {
     MATERIAL_ALPHA = 8,
     MATERIAL_ETA = 9,
     MATERIAL_K = 12,
+    MATERIAL_FACETS = 15, /* enum microfacet_kind, as an integer's bits */
     MATERIAL_WORDS = 16
 };
 enum {
@@ -37,7 +38,6 @@ enum {
     MATERIAL_IS_SCHLICK = 1 << 9,
     MATERIAL_IS_SEPARABLE = 1 << 10,
     MATERIAL_IS_CONDUCTOR = 1 << 11,
-    MATERIAL_IS_BECKMANN = 1 << 12,
     MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_MICROFACET /* no delta lobe */
 };
 
@@ -47,6 +47,8 @@ struct lanes_scene {
     bool only_diffuse, has_spheres;
 };
 
+/* Fills the record of a material. */
+void lanes_scene_material(const struct material *m, float record[MATERIAL_WORDS]);
 /* NULL if out of memory. Does not refer to the scene. */
 struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));

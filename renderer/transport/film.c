@@ -47,11 +47,11 @@ void film_set_sampler(struct film *f, enum sampler_kind kind)
     strcpy(f->m.unit, kind == SAMPLER_INDEPENDENT ? "sample" : "stratified");
 }
 
-static void add_first_hit(struct first_hit_sums *s, bool is_first_sample,
-                          const struct first_hits *h, int i)
+void film_add_first_hit(struct film *f, size_t pixel, const struct first_hits *h, int i)
 {
+    struct first_hit_sums *s = &f->first[pixel];
     bool hit = h->object[i] != NO_HIT;
-    if (is_first_sample)
+    if (f->m.n[pixel] == 1)
         s->object = hit ? 1 + (double)h->object[i] : 0;
     if (!hit)
         return;
@@ -65,17 +65,6 @@ static void add_first_hit(struct first_hit_sums *s, bool is_first_sample,
     s->albedo[0] += a.r;
     s->albedo[1] += a.g;
     s->albedo[2] += a.b;
-}
-
-void film_add(struct film *f, size_t pixel, const struct batch *b, int i)
-{
-    double x[3] = {b->radiance.r[i], b->radiance.g[i], b->radiance.b[i]};
-    moments_add(&f->m, pixel, x);
-    double illuminance = 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2];
-    f->s1[pixel] += illuminance;
-    f->s2[pixel] += illuminance * illuminance;
-    if (f->first != NULL)
-        add_first_hit(&f->first[pixel], f->m.n[pixel] == 1, &b->first, i);
 }
 
 static void add_first_hits(struct first_hit_sums *dst, const struct first_hit_sums *src)

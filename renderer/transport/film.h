@@ -34,8 +34,8 @@ void film_free(struct film *f);
 
 /* The unit of its moments: samples of any but the independent sampler are stratified. */
 void film_set_sampler(struct film *f, enum sampler_kind kind);
-/* Adds lane i of a batch to a pixel. */
-void film_add(struct film *f, size_t pixel, const struct batch *b, int i);
+/* What the camera ray of lane i met, to a pixel of a film with first hits; after its radiance (film_simd.h). */
+void film_add_first_hit(struct film *f, size_t pixel, const struct first_hits *h, int i);
 
 /* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of these pixels, by moments_merge(). Both are
  * films of the same size, with the same layers; targets and film.num_samples are not looked at. */

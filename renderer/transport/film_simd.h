@@ -8,7 +8,7 @@
 /* Pixels of the film that follow each other, from the first one of the pointers on. */
 enum { FILM_RUN = 16 };
 
-/* moments_add() and the sums of film_add() for `count` pixels, all of which have had the same number of
+/* moments_add() and the sums of luminance for `count` pixels, all of which have had the same number of
  * samples. */
 static void add_run(double *restrict n, double *restrict mean, double *restrict m2,
                     double *restrict m3, double *restrict s1, double *restrict s2,

@@ -53,7 +53,8 @@ struct integrator_options {
     float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
     struct sampler sampler;
     bool first_hits; /* fill the batch's `first`; changes nothing else */
-    enum isa isa;    /* of the stages; ISA_SCALAR: none. Every choice gives the same bits */
+    enum isa
+        isa; /* of the stages; ISA_SCALAR: one path at a time. Every choice gives the same bits */
 };
 
 /* ROULETTE_THROUGHPUT: the chance to go on, over the largest component of the throughput. With nets a coin at every
@@ -69,7 +70,7 @@ struct integrator {
     const struct camera *camera;
     const struct bvh *bvh;
     const struct light_table *lights;
-    /* The stages on eight paths at a time, NULL: one by one; and the scene for them, NULL: not needed. */
+    /* The stages; and the scene for them, NULL: not needed. */
     const struct lanes_kernel *lanes;
     const struct lanes_scene *lanes_scene;
 };
@@ -93,18 +94,17 @@ struct batch {
     bool front[BATCH_ROOM];
     uint32_t material[BATCH_ROOM];
     uint16_t active[BATCH_ROOM], shadow_lane[BATCH_ROOM];
-    struct light_choice choice[BATCH_ROOM];
+    uint32_t choice[BATCH_ROOM]; /* of a light */
     float choice_probability[BATCH_ROOM];
-    uint16_t diffuse[BATCH_ROOM]; /* those of active that light sampling serves */
-    /* Of the stages on eight paths, which keep the paths that go on side by side: whose path a lane
-     * is, and what it has gathered. */
+    /* Paths that go on are kept side by side: whose path a lane is, and what it has gathered. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
-    float numbers[4][BATCH_ROOM]; /* random ones, eight paths and one purpose a row */
+    float numbers
+        [4][BATCH_ROOM]; /* random ones, as many paths as there are lanes and one purpose a row */
     struct rgbs gathered, reflectance;
-    int32_t bits[BATCH_ROOM];        /* of the material's record */
-    uint8_t goes_on[BATCH_ROOM / 8]; /* by eight lanes, a bit each */
-    uint8_t shadow_bits[BATCH_ROOM / 8];
-    uint16_t shadow_first[BATCH_ROOM / 8];
+    int32_t bits[BATCH_ROOM]; /* of the material's record */
+    /* By as many paths as there are lanes, a bit each. */
+    uint8_t goes_on[BATCH_ROOM], shadow_bits[BATCH_ROOM];
+    uint16_t shadow_first[BATCH_ROOM];
     struct bvh_stats stats;
 };
 

@@ -76,15 +76,13 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         }
         integrate(j->it, b, n);
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
-        const bool plain = j->it->lanes != NULL && f->first == NULL;
-        if (plain)
-            j->it->lanes->film_add(f, at, n, b, k == 0);
-        if (plain && f->target == NULL && o->adaptive_batch == 0)
+        j->it->lanes->film_add(f, at, n, b, k == 0);
+        for (int i = 0; f->first != NULL && i < n; i++)
+            film_add_first_hit(f, at[i], &b->first, i);
+        if (f->target == NULL && o->adaptive_batch == 0)
             continue;
         int kept = 0;
         for (int i = 0; i < n; i++) {
-            if (!plain)
-                film_add(f, at[i], b, i);
             at[kept] = at[i];
             pixel[kept] = pixel[i];
             kept += !has_stopped(o, f, at[i], k + 1);

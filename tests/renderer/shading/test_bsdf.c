@@ -10,6 +10,7 @@
  * control in every row. */
 #include "renderer/shading/bsdf.h"
 #include "renderer/shading/fresnel.h"
+#include "renderer/shading/microfacet.h"
 #include "renderer/math/sampler.h"
 #include "tests/support/optics.h"
 

@@ -1,6 +1,7 @@
-/* The stages on eight paths at a time: each sample has the bits that the scalar stages give it, with
+/* The stages on eight paths at a time: each sample has the bits that they give it one at a time, with
  * every set of instructions that this machine has. */
 #include "renderer/transport/render.h"
+#include "renderer/scene/cs184_deviations.h"
 #include "renderer/math/trig.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/sky.h"
@@ -225,14 +226,14 @@ static void complete(struct scene *s, bool image)
     assert_true(scene_add_environment(s, env, &e));
 }
 
-static void bits_are_those_of_the_scalar_stages(void **state)
+static void bits_are_those_of_one_lane(void **state)
 {
     (void)state;
     struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
     for (int which = 0; which < 6; which++) {
         struct scene s = make[which / 2]();
         complete(&s, which % 2);
-        for (int direct = DIRECT_LIGHT; direct <= DIRECT_MIS; direct++)
+        for (int direct = DIRECT_HEMISPHERE; direct <= DIRECT_MIS; direct++)
             for (int sampler = SAMPLER_INDEPENDENT; sampler <= SAMPLER_SOBOL; sampler++) {
                 int lights = direct == DIRECT_LIGHT ? 3 : 1;
                 struct how how = {
@@ -290,6 +291,25 @@ static void small_pictures_with_several_light_samples(void **state)
     scene_free(&s);
 }
 
+/* What the starter code does wrong, to rectangles, to a lamp of many triangles and to rough metals. */
+static void defects_of_the_starter_code(void **state)
+{
+    (void)state;
+    struct scene (*const make[])(void) = {all_kinds, mesh_lamp};
+    for (int which = 0; which < 2; which++) {
+        struct scene s = make[which]();
+        complete(&s, false);
+        cs184_deviations_apply(&s, (1u << NUM_CS184_DEVIATIONS) - 1);
+        compare(&s, (struct how){.opt = {.direct = DIRECT_LIGHT,
+                                         .max_bounces = 3,
+                                         .light_samples = 1,
+                                         .sampler = {SAMPLER_INDEPENDENT, 3}},
+                                 .spp = 2,
+                                 .threads = 1});
+        scene_free(&s);
+    }
+}
+
 /* Triangles and spheres, smooth and flat, seen and missed. */
 static void normals_too(void **state)
 {
@@ -327,9 +347,10 @@ static void sine_and_cosine_are_near(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bits_are_those_of_the_scalar_stages),
+        cmocka_unit_test(bits_are_those_of_one_lane),
         cmocka_unit_test(depths_and_threads_do_not_matter),
         cmocka_unit_test(small_pictures_with_several_light_samples),
+        cmocka_unit_test(defects_of_the_starter_code),
         cmocka_unit_test(normals_too),
         cmocka_unit_test(sine_and_cosine_are_near),
     };

@@ -1,0 +1,378 @@
+/* Eight lanes on the compiler's vector extensions (gcc and clang) and the machine's instructions: the same bits for
+ * SSE4.2 (two halves), AVX2 and AVX-512, except through mul_sub() and mul_add(). Part of simd.h, which says what
+ * each function does. This is the one file with intrinsics. */
+#ifndef ASSAY_SIMD_EIGHT_H
+#define ASSAY_SIMD_EIGHT_H
+
+#include <immintrin.h>
+
+typedef float vf __attribute__((vector_size(32)));
+typedef int32_t vi __attribute__((vector_size(32)));
+typedef uint32_t vu __attribute__((vector_size(32)));
+
+/* Lane i, to read or to write. */
+#define LANE(v, i) ((v)[i])
+
+INLINE vf vf_set(float x)
+{
+    return (vf){x, x, x, x, x, x, x, x};
+}
+INLINE vi vi_set(int32_t x)
+{
+    return (vi){x, x, x, x, x, x, x, x};
+}
+/* p aligned to 32 bytes. */
+INLINE vf vf_load(const float *p)
+{
+    return *(const vf *)p;
+}
+INLINE void vf_store(float *p, vf a)
+{
+    *(vf *)p = a;
+}
+INLINE vf vf_of_int(vi a)
+{
+    return __builtin_convertvector(a, vf);
+}
+INLINE vi vi_truncate(vf a)
+{
+    return __builtin_convertvector(a, vi);
+}
+INLINE vi vi_numbers(void)
+{
+    return (vi){0, 1, 2, 3, 4, 5, 6, 7};
+}
+INLINE vi vi_divide(vi a, int by)
+{
+    typedef double vd __attribute__((vector_size(64)));
+    vd p = __builtin_convertvector(a, vd);
+    return __builtin_convertvector((p + 0.5) * (1.0 / by), vi);
+}
+
+/* mul_sub: a b - c, mul_add: a b + c, rounded once where the machine can. */
+#ifdef __AVX2__
+INLINE vf vf_min(vf a, vf b)
+{
+    return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+}
+INLINE vf vf_max(vf a, vf b)
+{
+    return (vf)_mm256_max_ps((__m256)a, (__m256)b);
+}
+INLINE vf vf_sqrt(vf a)
+{
+    return (vf)_mm256_sqrt_ps((__m256)a);
+}
+INLINE vf vf_hypot(vf a, vf b)
+{
+    __m128 r[2];
+    for (int i = 0; i < 2; i++) {
+        __m128 ah = i ? _mm256_extractf128_ps((__m256)a, 1) : _mm256_castps256_ps128((__m256)a);
+        __m128 bh = i ? _mm256_extractf128_ps((__m256)b, 1) : _mm256_castps256_ps128((__m256)b);
+        __m256d x = _mm256_cvtps_pd(ah), y = _mm256_cvtps_pd(bh);
+        r[i] = _mm256_cvtpd_ps(_mm256_sqrt_pd(x * x + y * y));
+    }
+    return (vf)_mm256_set_m128(r[1], r[0]);
+}
+INLINE vf mul_sub(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fmsub_ps((__m256)a, (__m256)b, (__m256)c);
+}
+INLINE vf mul_add(vf a, vf b, vf c)
+{
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+}
+INLINE vi vf_lt(vf a, vf b)
+{
+    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LT_OQ);
+}
+INLINE vi vf_le(vf a, vf b)
+{
+    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LE_OQ);
+}
+INLINE vi vf_eq(vf a, vf b)
+{
+    return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_EQ_OQ);
+}
+INLINE vi vi_lt(vi a, vi b)
+{
+    return (vi)_mm256_cmpgt_epi32((__m256i)b, (__m256i)a);
+}
+INLINE vi vi_eq(vi a, vi b)
+{
+    return (vi)_mm256_cmpeq_epi32((__m256i)a, (__m256i)b);
+}
+INLINE vf vf_select(vi mask, vf yes, vf no)
+{
+    return (vf)_mm256_blendv_ps((__m256)no, (__m256)yes, (__m256)mask);
+}
+INLINE unsigned bits(vi mask)
+{
+    return (unsigned)_mm256_movemask_ps((__m256)mask);
+}
+INLINE vi front_order(unsigned mask)
+{
+    uint64_t bytes = _pdep_u64(mask, 0x0101010101010101) * 255;
+    uint64_t order = _pext_u64(0x0706050403020100, bytes);
+    return (vi)_mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)order));
+}
+INLINE vf pick(vf a, vi order)
+{
+    return (vf)_mm256_permutevar8x32_ps((__m256)a, (__m256i)order);
+}
+INLINE unsigned spread_flags(const void *flags, unsigned mask)
+{
+    uint64_t bytes;
+    memcpy(&bytes, flags, sizeof bytes);
+    return _pdep_u32((unsigned)_pext_u64(bytes, 0x0101010101010101), mask);
+}
+#else
+union vf_halves {
+    vf all;
+    __m128 half[2];
+};
+union vi_halves {
+    vi all;
+    __m128i half[2];
+    __m128 as_float[2];
+};
+#define BY_HALVES(op, a, b)                                                                        \
+    union vf_halves x = {a}, y = {b}, r;                                                           \
+    r.half[0] = op(x.half[0], y.half[0]);                                                          \
+    r.half[1] = op(x.half[1], y.half[1])
+#define BY_HALVES_INT(op, a, b)                                                                    \
+    union vi_halves x = {a}, y = {b}, r;                                                           \
+    r.half[0] = op(x.half[0], y.half[0]);                                                          \
+    r.half[1] = op(x.half[1], y.half[1]);                                                          \
+    return r.all
+INLINE vf vf_min(vf a, vf b)
+{
+    BY_HALVES(_mm_min_ps, a, b);
+    return r.all;
+}
+INLINE vf vf_max(vf a, vf b)
+{
+    BY_HALVES(_mm_max_ps, a, b);
+    return r.all;
+}
+INLINE vf vf_sqrt(vf a)
+{
+    union vf_halves x = {a};
+    x.half[0] = _mm_sqrt_ps(x.half[0]);
+    x.half[1] = _mm_sqrt_ps(x.half[1]);
+    return x.all;
+}
+INLINE vf vf_hypot(vf a, vf b)
+{
+    vf r;
+    for (int i = 0; i < LANES; i++)
+        r[i] = (float)__builtin_sqrt((double)a[i] * (double)a[i] + (double)b[i] * (double)b[i]);
+    return r;
+}
+INLINE vf mul_sub(vf a, vf b, vf c)
+{
+    return a * b - c;
+}
+INLINE vf mul_add(vf a, vf b, vf c)
+{
+    return a * b + c;
+}
+INLINE vi vf_lt(vf a, vf b)
+{
+    BY_HALVES(_mm_cmplt_ps, a, b);
+    return (vi)r.all;
+}
+INLINE vi vf_le(vf a, vf b)
+{
+    BY_HALVES(_mm_cmple_ps, a, b);
+    return (vi)r.all;
+}
+INLINE vi vf_eq(vf a, vf b)
+{
+    BY_HALVES(_mm_cmpeq_ps, a, b);
+    return (vi)r.all;
+}
+INLINE vi vi_lt(vi a, vi b)
+{
+    BY_HALVES_INT(_mm_cmpgt_epi32, b, a);
+}
+INLINE vi vi_eq(vi a, vi b)
+{
+    BY_HALVES_INT(_mm_cmpeq_epi32, a, b);
+}
+INLINE vf vf_select(vi mask, vf yes, vf no)
+{
+    return (vf)((mask & (vi)yes) | (~mask & (vi)no));
+}
+INLINE unsigned bits(vi mask)
+{
+    union vi_halves x = {mask};
+    return (unsigned)(_mm_movemask_ps(x.as_float[0]) | _mm_movemask_ps(x.as_float[1]) << 4);
+}
+INLINE vi front_order(unsigned mask)
+{
+    int32_t order[LANES] = {0};
+    for (int n = 0; mask; mask &= mask - 1)
+        order[n++] = __builtin_ctz(mask);
+    vi v;
+    memcpy(&v, order, sizeof v);
+    return v;
+}
+INLINE vf pick(vf a, vi order)
+{
+    return (vf){a[order[0]], a[order[1]], a[order[2]], a[order[3]],
+                a[order[4]], a[order[5]], a[order[6]], a[order[7]]};
+}
+INLINE unsigned spread_flags(const void *flags, unsigned mask)
+{
+    const unsigned char *flag = flags;
+    unsigned set = 0;
+    for (; mask; mask &= mask - 1)
+        set |= *flag++ ? mask & -mask : 0;
+    return set;
+}
+#endif
+
+INLINE vi lanes_of(unsigned mask)
+{
+    const vi bit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return vi_eq(vi_set((int32_t)mask) & bit, bit);
+}
+/* Bits as eight bytes of 0 or 1, the lowest first. */
+INLINE uint64_t bytes_of(unsigned mask)
+{
+    return ((mask & 127) * 0x0002040810204081u & 0x0101010101010101u) | (uint64_t)(mask >> 7) << 56;
+}
+INLINE void store_flags(void *flags, vi mask)
+{
+    const uint64_t bytes = bytes_of(bits(mask));
+    memcpy(flags, &bytes, sizeof bytes);
+}
+
+#ifdef __AVX512F__
+typedef struct {
+    __m512i v;
+} vw;
+INLINE vw vw_of(vu a)
+{
+    return (vw){_mm512_cvtepu32_epi64((__m256i)a)};
+}
+INLINE vu vu_of(vw a)
+{
+    return (vu)_mm512_cvtepi64_epi32(a.v);
+}
+INLINE vw vw_mul(vw a, uint32_t k)
+{
+    return (vw){_mm512_mul_epu32(a.v, _mm512_set1_epi64(k))};
+}
+INLINE vw vw_high(vw a)
+{
+    return (vw){_mm512_srli_epi64(a.v, 32)};
+}
+INLINE vw vw_xor(vw a, vw b, uint32_t k)
+{
+    return (vw){_mm512_xor_si512(_mm512_xor_si512(a.v, b.v), _mm512_set1_epi64(k))};
+}
+#elif defined __AVX2__
+typedef struct {
+    __m256i even, odd;
+} vw;
+INLINE vw vw_of(vu a)
+{
+    return (vw){(__m256i)a, _mm256_srli_epi64((__m256i)a, 32)};
+}
+INLINE vu vu_of(vw a)
+{
+    return (vu)_mm256_blend_epi32(a.even, _mm256_slli_epi64(a.odd, 32), 0xAA);
+}
+INLINE vw vw_mul(vw a, uint32_t k)
+{
+    const __m256i by = _mm256_set1_epi64x(k);
+    return (vw){_mm256_mul_epu32(a.even, by), _mm256_mul_epu32(a.odd, by)};
+}
+INLINE vw vw_high(vw a)
+{
+    return (vw){_mm256_srli_epi64(a.even, 32), _mm256_srli_epi64(a.odd, 32)};
+}
+INLINE vw vw_xor(vw a, vw b, uint32_t k)
+{
+    const __m256i c = _mm256_set1_epi64x(k);
+    return (vw){_mm256_xor_si256(_mm256_xor_si256(a.even, b.even), c),
+                _mm256_xor_si256(_mm256_xor_si256(a.odd, b.odd), c)};
+}
+#else
+typedef struct {
+    __m128i even[2], odd[2];
+} vw;
+INLINE vw vw_of(vu a)
+{
+    union vi_halves x = {(vi)a};
+    vw w;
+    for (int i = 0; i < 2; i++) {
+        w.even[i] = x.half[i];
+        w.odd[i] = _mm_srli_epi64(x.half[i], 32);
+    }
+    return w;
+}
+INLINE vu vu_of(vw a)
+{
+    union vi_halves x;
+    for (int i = 0; i < 2; i++)
+        x.half[i] = _mm_blend_epi16(a.even[i], _mm_slli_epi64(a.odd[i], 32), 0xCC);
+    return (vu)x.all;
+}
+INLINE vw vw_mul(vw a, uint32_t k)
+{
+    const __m128i by = _mm_set1_epi64x(k);
+    for (int i = 0; i < 2; i++) {
+        a.even[i] = _mm_mul_epu32(a.even[i], by);
+        a.odd[i] = _mm_mul_epu32(a.odd[i], by);
+    }
+    return a;
+}
+INLINE vw vw_high(vw a)
+{
+    for (int i = 0; i < 2; i++) {
+        a.even[i] = _mm_srli_epi64(a.even[i], 32);
+        a.odd[i] = _mm_srli_epi64(a.odd[i], 32);
+    }
+    return a;
+}
+INLINE vw vw_xor(vw a, vw b, uint32_t k)
+{
+    const __m128i c = _mm_set1_epi64x(k);
+    for (int i = 0; i < 2; i++) {
+        a.even[i] = _mm_xor_si128(_mm_xor_si128(a.even[i], b.even[i]), c);
+        a.odd[i] = _mm_xor_si128(_mm_xor_si128(a.odd[i], b.odd[i]), c);
+    }
+    return a;
+}
+#endif
+
+/* Eight rows of eight, turned. */
+INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
+                           vf column[COLUMNS])
+{
+    vf a[LANES], b[LANES];
+    for (int i = 0; i < LANES; i++) {
+        vf row; /* not a[i]: what an address is taken of stays in memory */
+        memcpy(&row, base + stride * (size_t)index[i], sizeof row);
+        a[i] = row;
+    }
+    for (int i = 0; i < LANES; i += 2) {
+        b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < LANES; i += 4) {
+        a[i] = __builtin_shufflevector(b[i], b[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+        a[i + 1] = __builtin_shufflevector(b[i], b[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+        a[i + 2] = __builtin_shufflevector(b[i + 1], b[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
+        a[i + 3] = __builtin_shufflevector(b[i + 1], b[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    for (int i = 0; i < 4; i++) {
+        column[i] = __builtin_shufflevector(a[i], a[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        column[i + 4] = __builtin_shufflevector(a[i], a[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+}
+
+#endif

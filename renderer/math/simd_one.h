@@ -1,0 +1,128 @@
+/* One lane: plain numbers. Part of simd.h, which says what each function does. */
+#ifndef ASSAY_SIMD_ONE_H
+#define ASSAY_SIMD_ONE_H
+
+typedef float vf;
+typedef int32_t vi;
+typedef uint32_t vu;
+typedef uint64_t vw;
+
+#define LANE(v, i) (*((void)(i), &(v)))
+
+INLINE vf vf_set(float x)
+{
+    return x;
+}
+INLINE vi vi_set(int32_t x)
+{
+    return x;
+}
+INLINE vf vf_of_int(vi a)
+{
+    return (float)a;
+}
+INLINE vi vi_truncate(vf a)
+{
+    return (int32_t)a;
+}
+INLINE vi vi_numbers(void)
+{
+    return 0;
+}
+INLINE vi vi_divide(vi a, int by)
+{
+    return a / by;
+}
+INLINE vf vf_min(vf a, vf b)
+{
+    return a < b ? a : b;
+}
+INLINE vf vf_max(vf a, vf b)
+{
+    return a > b ? a : b;
+}
+INLINE vf vf_sqrt(vf a)
+{
+    return __builtin_sqrtf(a);
+}
+INLINE vf vf_hypot(vf a, vf b)
+{
+    return (float)__builtin_sqrt((double)a * (double)a + (double)b * (double)b);
+}
+INLINE vi vf_lt(vf a, vf b)
+{
+    return -(a < b);
+}
+INLINE vi vf_le(vf a, vf b)
+{
+    return -(a <= b);
+}
+INLINE vi vf_eq(vf a, vf b)
+{
+    return -(a == b);
+}
+INLINE vi vi_lt(vi a, vi b)
+{
+    return -(a < b);
+}
+INLINE vi vi_eq(vi a, vi b)
+{
+    return -(a == b);
+}
+INLINE vf vf_select(vi mask, vf yes, vf no)
+{
+    return mask ? yes : no;
+}
+INLINE unsigned bits(vi mask)
+{
+    return mask & 1;
+}
+INLINE vi lanes_of(unsigned mask)
+{
+    return -(vi)mask;
+}
+INLINE vi front_order(unsigned mask)
+{
+    (void)mask;
+    return 0;
+}
+INLINE vf pick(vf a, vi order)
+{
+    (void)order;
+    return a;
+}
+INLINE unsigned spread_flags(const void *flags, unsigned mask)
+{
+    return mask & *(const unsigned char *)flags;
+}
+INLINE void store_flags(void *flags, vi mask)
+{
+    *(unsigned char *)flags = mask & 1;
+}
+INLINE vw vw_of(vu a)
+{
+    return a;
+}
+INLINE vu vu_of(vw a)
+{
+    return (vu)a;
+}
+INLINE vw vw_mul(vw a, uint32_t k)
+{
+    return (uint64_t)(uint32_t)a * k;
+}
+INLINE vw vw_high(vw a)
+{
+    return a >> 32;
+}
+INLINE vw vw_xor(vw a, vw b, uint32_t k)
+{
+    return a ^ b ^ k;
+}
+INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
+                           vf column[COLUMNS])
+{
+    memcpy(column, base + stride * (size_t)index[0], COLUMNS * sizeof *column);
+}
+
+#endif

@@ -1,0 +1,24 @@
+/* Geometry of hits, by lanes. */
+#ifndef ASSAY_SHAPE_SIMD_H
+#define ASSAY_SHAPE_SIMD_H
+
+#include "renderer/math/vec_simd.h"
+
+/* Shading normals, on the side of ng, at (u, v) between those of three corners. */
+INLINE vec3v interpolate_normals(vec3v n0, vec3v n1, vec3v n2, vec3v ng, vf u, vf v)
+{
+    vec3v ns = madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2);
+    vf l = vf_sqrt(dotv(ns, ns));
+    ns = v3_select(vf_lt(vf_set(0), l), scalev(ns, 1 / l), ng);
+    return v3_negate_if(vf_lt(dotv(ns, ng), vf_set(0)), ns);
+}
+
+/* *n: away from the centre, where a ray meets a sphere. Returns the place, back on the sphere: the hit of a distant
+ * ray is off by its own rounding. */
+INLINE vec3v sphere_place(vec3v centre, vf radius, vec3v o, vec3v d, vf t, vec3v *n)
+{
+    *n = normalizev(subv(madv(o, t, d), centre));
+    return madv(centre, radius, *n);
+}
+
+#endif

@@ -1,0 +1,84 @@
+/* The last stage at a vertex: where the path goes on. */
+#ifndef ASSAY_SCATTER_SIMD_H
+#define ASSAY_SCATTER_SIMD_H
+
+#include "paths_simd.h"
+
+/* surface_origin() */
+INLINE vec3v leaving(const struct batch *b, int k, vec3v wi)
+{
+    vec3v ng = v3_load(&b->ng, k);
+    vf eps = vf_load_any(b->eps + k);
+    return madv(v3_load(&b->p, k), vf_select(vf_lt(dotv(wi, ng), vf_set(0)), -eps, eps), ng);
+}
+
+/* Chance to go on from this vertex (0: the first that the camera sees). */
+INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
+{
+    if (o->roulette == ROULETTE_THROUGHPUT && vertex >= 2)
+        return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
+    return vf_set(o->roulette == ROULETTE_FIXED && vertex >= 1 ? o->survival : 1);
+}
+
+/* The paths of the mask are over. */
+INLINE void finish(struct batch *b, int k, unsigned over)
+{
+    for (; over; over &= over - 1) {
+        int i = k + __builtin_ctz(over);
+        rgbs_set(&b->radiance, (int)b->slot[i], rgbs_get(&b->gathered, i));
+    }
+}
+
+/* Sets up the next ray of every path that goes on, and moves these to the front; how many. only_delta: the last ray of a
+ * path, where light sampling has already dealt with all emitters but those behind a delta lobe. */
+static int scatter(const struct integrator *it, struct batch *b, int n, int vertex, bool only_delta)
+{
+    const vf zero = vf_set(0);
+    int kept = 0;
+    draw_numbers(it, b, 0, n, vertex + 1, PURPOSE_BSDF, 1);
+    for (int k = 0; k < n; k += LANES) {
+        unsigned there = lanes_there(k, n), mask = b->goes_on[k / LANES];
+        if (!mask) {
+            finish(b, k, there);
+            continue;
+        }
+        vf u[4];
+        load_numbers(b, k / LANES, u);
+        framev f = frame_from_normalv(v3_load(&b->ns, k));
+        vec3v wo = frame_to_localv(&f, v3_load(&b->wo, k));
+        struct bsdf_samplev s;
+        sample_lobes(it->lanes_scene->material, (const int32_t *)b->material + k,
+                     vi_load_any(b->bits + k), rgb_load(&b->reflectance, k), b->front + k, mask, wo,
+                     u, &s);
+        vec3v wi = frame_to_worldv(&f, s.wi);
+        /* Both normals have to agree on which side the light leaves. */
+        vi ok = vf_lt(zero, s.pdf_w) & vf_lt(zero, s.wi.z * dotv(v3_load(&b->ng, k), wi));
+        if (only_delta)
+            ok &= s.delta;
+        rgbv throughput = rgb_mulv(rgb_load(&b->throughput, k), s.weight);
+        vf eta2 = vf_load_any(b->eta2 + k) * s.eta2;
+        vf go_on = survival(&it->opt, vertex, throughput, eta2);
+        vi at_risk = vf_lt(go_on, vf_set(1));
+        ok &= ~at_risk | vf_lt(u[3], go_on);
+        throughput = rgb_scalev(throughput, vf_select(at_risk, 1 / go_on, vf_set(1)));
+        mask &= bits(ok);
+        finish(b, k, there & ~mask);
+        vi order = front_order(mask);
+        vec3v o = leaving(b, k, wi);
+        pick_rgb(&b->throughput, kept, throughput, order);
+        pick_rgb(&b->gathered, kept, rgb_load(&b->gathered, k), order);
+        pick_v3(&b->ray.o, kept, o, order);
+        pick_v3(&b->ray.d, kept, wi, order);
+        vf_store_any(b->ray.tmin + kept, zero);
+        vf_store_any(b->ray.tmax + kept, vf_set(INFINITY));
+        vf_store_any(b->pdf_w + kept, pick(vf_select(s.delta, zero, s.pdf_w), order));
+        vf_store_any(b->eta2 + kept, pick(eta2, order));
+        vf_store_any(b->slot_pixel + kept, pick(vf_load_any(b->slot_pixel + k), order));
+        vf_store_any(b->slot_sample + kept, pick(vf_load_any(b->slot_sample + k), order));
+        vf_store_any(b->slot + kept, pick(vf_load_any(b->slot + k), order));
+        kept += __builtin_popcount(mask);
+    }
+    return kept;
+}
+
+#endif
