@@ -99,7 +99,7 @@ static struct surface triangle_surface(const struct scene *s, uint32_t prim, flo
 {
     const vec3 *p = s->position + 3 * (size_t)prim, *n = s->normal + 3 * (size_t)prim;
     vec3 e1 = sub(p[1], p[0]), e2 = sub(p[2], p[0]);
-    vec3 ng = normalize(cross(e1, e2));
+    vec3 ng = triangle_normal(e1, e2);
     vec3 ns = interpolate_normals(n[0], n[1], n[2], ng, u, v);
     float magnitude = maxf(max_abs(p[0]), maxf(max_abs(p[1]), max_abs(p[2])));
     return (struct surface){
@@ -112,8 +112,7 @@ struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, fl
     if (prim < s->num_triangles)
         return triangle_surface(s, prim, u, v);
     const struct sphere *sp = &s->spheres[prim - s->num_triangles];
-    vec3 n, p = sphere_place(sp->centre, sp->radius, r->o, r->d, t, &n);
-    n = scale(n, sp->normal_out);
+    vec3 n, p = sphere_place(sp->centre, sp->radius, sp->normal_out, r->o, r->d, t, &n);
     return (struct surface){
         .p = p, .ng = n, .ns = n, .eps = coordinate_error(max_abs(sp->centre) + sp->radius)};
 }

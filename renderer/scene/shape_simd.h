@@ -4,6 +4,12 @@
 
 #include "renderer/math/vec_simd.h"
 
+/* Unit, of a triangle with these edges. */
+INLINE vec3v triangle_normal(vec3v e1, vec3v e2)
+{
+    return normalizev(crossv(e1, e2));
+}
+
 /* Shading normals, on the side of ng, at (u, v) between those of three corners. */
 INLINE vec3v interpolate_normals(vec3v n0, vec3v n1, vec3v n2, vec3v ng, vf u, vf v)
 {
@@ -13,12 +19,13 @@ INLINE vec3v interpolate_normals(vec3v n0, vec3v n1, vec3v n2, vec3v ng, vf u, v
     return v3_negate_if(vf_lt(dotv(ns, ng), vf_set(0)), ns);
 }
 
-/* *n: away from the centre, where a ray meets a sphere. Returns the place, back on the sphere: the hit of a distant
- * ray is off by its own rounding. */
-INLINE vec3v sphere_place(vec3v centre, vf radius, vec3v o, vec3v d, vf t, vec3v *n)
+/* Where a ray meets a sphere, and the normal there; out as struct sphere has it. */
+INLINE vec3v sphere_place(vec3v centre, vf radius, vf out, vec3v o, vec3v d, vf t, vec3v *normal)
 {
-    *n = normalizev(subv(madv(o, t, d), centre));
-    return madv(centre, radius, *n);
+    vec3v n = normalizev(subv(madv(o, t, d), centre));
+    *normal = scalev(n, out);
+    /* Back onto the sphere: the hit of a distant ray is off by its own rounding. */
+    return madv(centre, radius, n);
 }
 
 #endif

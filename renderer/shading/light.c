@@ -6,12 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void fill_record(const struct scene *s, uint32_t i, double *area, float *r)
+static void fill_record(const vec3 p[3], double *area, float *r)
 {
-    /* What does not depend on the place comes from surface_at() itself. */
-    const ray none = {.d = {0, 0, 1}};
-    const vec3 *p = s->position + 3 * (size_t)i, ng = surface_at(s, i, &none, 0, 0, 0).ng;
-    vec3 e1 = sub(p[1], p[0]), e2 = sub(p[2], p[0]);
+    vec3 e1 = sub(p[1], p[0]), e2 = sub(p[2], p[0]), ng = normalize(cross(e1, e2));
     *area += 0.5 * (double)length(cross(e1, e2));
     const float words[] = {p->x, p->y, p->z, e1.x, e1.y, e1.z,        e2.x,
                            e2.y, e2.z, ng.x, ng.y, ng.z, (float)*area};
@@ -34,7 +31,7 @@ static bool build_records(struct light_table *t, const struct scene *s)
         const struct light *light = &s->lights[l];
         double area = 0;
         for (uint32_t i = 0; light->kind == LIGHT_TRIANGLES && i < light->count; i++)
-            fill_record(s, light->first + i, &area,
+            fill_record(s->position + 3 * (size_t)(light->first + i), &area,
                         t->lamp + LAMP_WORDS * (size_t)(t->first[l] + i));
     }
     return true;

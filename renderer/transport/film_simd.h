@@ -8,6 +8,15 @@
 /* Pixels of the film that follow each other, from the first one of the pointers on. */
 enum { FILM_RUN = 16 };
 
+/* The radiance of a lane; its luminance. */
+INLINE double load_sample(const struct rgbs *radiance, int lane, double x[3])
+{
+    x[0] = radiance->r[lane];
+    x[1] = radiance->g[lane];
+    x[2] = radiance->b[lane];
+    return 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2];
+}
+
 /* moments_add() and the sums of luminance for `count` pixels, all of which have had the same number of
  * samples. */
 static void add_run(double *restrict n, double *restrict mean, double *restrict m2,
@@ -17,11 +26,7 @@ static void add_run(double *restrict n, double *restrict mean, double *restrict 
     double x[3 * FILM_RUN];
     const double samples = n[0] + 1;
     for (int i = 0; i < count; i++) {
-        double r = radiance->r[lane + i], g = radiance->g[lane + i], b = radiance->b[lane + i];
-        double illuminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-        x[3 * i] = r;
-        x[3 * i + 1] = g;
-        x[3 * i + 2] = b;
+        const double illuminance = load_sample(radiance, lane + i, x + 3 * i);
         n[i] = samples;
         s1[i] += illuminance;
         s2[i] += illuminance * illuminance;
@@ -38,13 +43,10 @@ static void add_run(double *restrict n, double *restrict mean, double *restrict 
  * written yet would be mapped twice, the second time with a call to all processors. */
 INLINE void first_of(struct film *f, size_t pixel, const struct rgbs *radiance, int lane)
 {
-    double r = radiance->r[lane], g = radiance->g[lane], b = radiance->b[lane];
-    double illuminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    double *mean = f->m.mean + 3 * pixel;
+    double x[3], illuminance = load_sample(radiance, lane, x);
     f->m.n[pixel] = 1;
-    mean[0] = 0 + r; /* not -0 */
-    mean[1] = 0 + g;
-    mean[2] = 0 + b;
+    for (size_t c = 0; c < 3; c++)
+        f->m.mean[3 * pixel + c] = 0 + x[c]; /* not -0 */
     f->s1[pixel] = 0 + illuminance;
     f->s2[pixel] = illuminance * illuminance;
 }

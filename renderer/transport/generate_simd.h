@@ -51,7 +51,7 @@ INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int 
     vec3v e1 = subv(v3v(w[0][3], w[0][4], w[0][5]), p);
     vec3v e2 = subv(v3v(w[0][6], w[0][7], last[0][7]), p);
     return interpolate_normals(v3v(w[1][0], w[1][1], w[1][2]), v3v(w[1][3], w[1][4], w[1][5]),
-                               v3v(w[1][6], w[1][7], last[1][7]), normalizev(crossv(e1, e2)),
+                               v3v(w[1][6], w[1][7], last[1][7]), triangle_normal(e1, e2),
                                vf_load_any(b->hit.u + k), vf_load_any(b->hit.v + k));
 }
 

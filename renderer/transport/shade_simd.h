@@ -40,9 +40,8 @@ INLINE void surfaces(const struct integrator *it, const struct rays *r, const st
     if (!bits(sphere))
         return;
     vec3v n, centre = v3v(w[0][0], w[0][1], w[0][2]);
-    vec3v p = sphere_place(centre, w[0][RECORD_RADIUS], v3_load(&r->o, k), v3_load(&r->d, k),
-                           vf_load_any(h->t + k), &n);
-    n = scalev(n, w[0][RECORD_OUT]);
+    vec3v p = sphere_place(centre, w[0][RECORD_RADIUS], w[0][RECORD_OUT], v3_load(&r->o, k),
+                           v3_load(&r->d, k), vf_load_any(h->t + k), &n);
     s->p = v3_select(sphere, p, s->p);
     s->ng = v3_select(sphere, n, s->ng);
     s->ns = v3_select(sphere, n, s->ns);
@@ -74,7 +73,7 @@ INLINE rgbv surroundings(const struct scene *s, vec3v d, unsigned mask)
     return le;
 }
 
-/* power_heuristic(): a^2/(a^2 + b^2) by way of b/a: the squares of densities of small lights overflow. */
+/* a^2/(a^2 + b^2) by way of b/a: the squares of densities of small lights overflow. */
 INLINE vf power_heuristic(vf a, vf b)
 {
     vf r = b / a;

@@ -4,7 +4,7 @@
 # Builds each bug of tests/mutants (or those named) into a renderer of its own,
 # BUILD/mutants/NAME/pathtracer (A+B: both in one), and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
-# as there are processors. Mutants run their scalar code; "none" is the renderer as it is, of which nothing may differ.
+# as there are processors. Mutants follow one path at a time; "none" is the renderer as it is, of which nothing may differ.
 #   --build-only   builds, and that is all
 #   --quick        three bugs of different kinds and "none", on two scenes: for `make check`
 #   --table FILE   writes the results as Markdown
@@ -59,9 +59,9 @@ build_mutant() {
         *) changed+=" $file" ;;
         esac
     done
-    # A kernel is as many objects as there are instruction sets.
+    # A kernel is as many objects as there are instruction sets; those of eight lanes never run.
     changed=$(for file in $changed; do
-        awk -v file="$file" '$2 == file { print $1; found = 1 } END { if (!found) print file }' <<<"$kernels"
+        awk -v file="$file" '$1 == file || $2 == file { found = 1; if (!/-DLANES/) print $1 } END { if (!found) print file }' <<<"$kernels"
     done | sort -u)
     [ -n "$changed" ] || return 1
     case " $(echo $changed) " in
@@ -74,7 +74,7 @@ build_mutant() {
         objects+=("$dir/$(basename "$file").o")
     done
     g++ -o "$dir/mutant" "${objects[@]}" "$build/libassay.a" $libs || return 1
-    # The bugs are in the scalar code, which is what a student writes; vectors of paths would go round it.
+    # One path at a time, as a student's program; only that width has been compiled with the bug.
     printf '#!/bin/sh\nexec "${0%%/*}/mutant" --accel sah --isa scalar "$@"\n' >"$dir/pathtracer"
     chmod +x "$dir/pathtracer"
 }
