@@ -22,7 +22,6 @@ static const struct {
     {"converge", command_converge, "measure variance, convergence and efficiency of engines"},
     {"grade", command_grade, "grade students' pictures and programs by a rubric"},
     {"report", command_report, "make the HTML page of a results.json"},
-    {"watch", command_watch, "show the latest page of a folder in a browser while runs go on"},
     {"golden", command_golden, "render, inspect and approve the stored references"},
     {"reference", command_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"import-check", command_import_check, "hold our COLLADA loader against Blender's"},

@@ -80,8 +80,8 @@ static const struct cli_option options[] = {
                    "a job for each scene on a Slurm cluster (assay slurm --by claim\n"
                    "validate: for each claim)"},
     [OPT_PAGE_EVERY] = {0, "page-every", 1, "S",
-                        "seconds after which the page of what is judged so far is\n"
-                        "written, again and again, for assay watch (off)"},
+                        "write the page every S seconds, with what is judged so far;\n"
+                        "open in a browser it reloads itself until the run ends (off)"},
     [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};

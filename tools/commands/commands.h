@@ -14,7 +14,6 @@ int command_export(int argc, char **argv, struct err *e);
 int command_import_check(int argc, char **argv, struct err *e);
 int command_merge(int argc, char **argv, struct err *e);
 int command_diagnose(int argc, char **argv, struct err *e);
-int command_watch(int argc, char **argv, struct err *e);
 int command_grade(int argc, char **argv, struct err *e);
 int command_reproduce(int argc, char **argv, struct err *e);
 int command_report(int argc, char **argv, struct err *e);

@@ -11,6 +11,7 @@
 #include "tools/plots/plot_rays.h"
 #include "report_table.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,7 +60,7 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
     if (left > 0)
         fprintf(f,
                 "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
-                " more are to be judged.</p>\n",
+                " more are to be judged. This page reloads itself until it has ended.</p>\n",
                 left);
     fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
             left > 0 ? "So far " : "");
@@ -211,6 +212,9 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
             "<meta name=\"color-scheme\" content=\"light dark\">\n",
             html_script_hash(page_js).s);
+    double every = member_number(root, "page_every_s");
+    if (every > 0) /* browsers read whole seconds */
+        fprintf(f, "<meta http-equiv=\"refresh\" content=\"%.0f\">\n", ceil(every));
     write_origin(f, root, converge);
     fputs("<title>Assay report, ", f);
     html_text(f, member_text(root, "date"));

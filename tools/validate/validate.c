@@ -112,8 +112,9 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
     int left = v->num_tasks;
     for (int i = 0; i < v->num_tasks; i++)
         left -= v->task[i].result != NULL;
-    if (ok && json_array_size(claims) > 0) {
+    if (ok && left > 0 && json_array_size(claims) > 0) {
         json_object_set_new(copy, "unfinished", json_integer(left));
+        json_object_set_new(copy, "page_every_s", json_real(v->opt->show_every_s));
         ok = v->opt->show(copy, v->opt, e);
     }
     json_decref(claims);
