@@ -7,7 +7,6 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 
-#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>

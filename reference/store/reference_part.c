@@ -2,8 +2,6 @@
 #include "reference/replicates/engine_driver.h"
 #include "reference/base/json_file.h"
 
-#include "renderer/base/fs.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,6 @@
  * student's picture differs from it. */
 #include "student_page.h"
 
-#include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
 #include "tools/images/image_file.h"
 #include "tools/html/html.h"

@@ -4,7 +4,6 @@
 #include "report_statistics.h"
 #include "tools/results/results.h"
 
-#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,6 @@
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "tools/results/claim_result.h"
-#include "stated_error_claims.h"
 #include "import_result.h"
 #include "tools/results/results.h"
 #include "validate_internal.h"
