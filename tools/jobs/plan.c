@@ -7,7 +7,6 @@
 #include "job_kinds.h"
 #include "tools/results/results.h"
 #include "tools/base/hash_tree.h"
-#include "tools/base/utf8.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -51,11 +50,10 @@ char **plan_words(const json_t *array, int *num)
     return words;
 }
 
-/* A text that jansson would not take. */
+/* A text that jansson would not take; without memory it has ended the program. */
 static bool refuse(const char *text, struct err *e)
 {
-    return utf8_is_valid(text) ? err_set(e, "out of memory for the plan")
-                               : err_set(e, "'%s' is no UTF-8 and cannot be planned", text);
+    return err_set(e, "'%s' is no UTF-8 and cannot be planned", text);
 }
 
 static bool add_words(json_t *array, const char *const *word, int num, struct err *e)
