@@ -24,7 +24,6 @@ static const struct {
     {"report", command_report, "make the HTML page of a results.json"},
     {"golden", command_golden, "render, inspect and approve the stored references"},
     {"reference", command_reference, "the same as golden render: with Cycles and POV-Ray"},
-    {"import-check", command_import_check, "hold our COLLADA loader against Blender's"},
     {"merge", command_merge, "add renders of cells or sample ranges of one picture"},
     {"reproduce", command_reproduce, "render again what made a picture, and compare bits"},
     {"plan", command_plan, "cut a render, a batch, a validation or references into jobs"},

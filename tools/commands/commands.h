@@ -11,7 +11,6 @@ int command_converge(int argc, char **argv, struct err *e);
 int command_reference(int argc, char **argv, struct err *e);
 int command_golden(int argc, char **argv, struct err *e);
 int command_export(int argc, char **argv, struct err *e);
-int command_import_check(int argc, char **argv, struct err *e);
 int command_merge(int argc, char **argv, struct err *e);
 int command_diagnose(int argc, char **argv, struct err *e);
 int command_grade(int argc, char **argv, struct err *e);
