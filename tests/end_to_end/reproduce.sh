@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/end_to_end/reproduce.sh BUILD: `assay reproduce` makes pictures, stored references, results and exported scenes again, and sees what is not the same.
+# tests/end_to_end/reproduce.sh BUILD: `assay reproduce` makes pictures, stored references and results again, and sees what is not the same.
 # Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/reproduce.sh BUILD}")
@@ -242,83 +242,6 @@ if [ -e "$tmp/grades/grades.json" ]; then
     rm "$tmp/grades/grades.json"
     expect "of grades: they are gone" 3 "grades.csv: cannot read" "$tmp/grades/grades.csv"
 fi
-
-# Exported scenes: as they were, by other names, by names that must not get out of their comment; then with a byte changed.
-export_to() { # FILE ARGUMENT...
-    local out=$1
-    shift
-    "$assay" export -o "$out" "$@" >/dev/null 2>"$tmp/err" || { echo "not ok reproduce: cannot export: $(cat "$tmp/err")" && failures=$((failures + 1)); }
-}
-mkdir "$tmp/x" "$tmp/kept" "$tmp/odd"
-change='s/"depth":5/"depth":4/; s/^#version 3.7/#version 3.6/; s/"rr_depth" value="1/"rr_depth" value="2/; s/"integer maxdepth" \[5/"integer maxdepth" [4/'
-for kind in json pov xml pbrt; do
-    lens=0.125
-    [ $kind != pov ] || lens=0
-    export_to "$tmp/x/one.$kind" -r 64 48 -m 5 -b $lens -d 2.5 $scene
-    expect "an export: .$kind" 0 "the same bits in all" --keep "$tmp/kept/one.$kind" "$tmp/x/one.$kind"
-    tell "an export: .$kind is kept" "$(cmp "$tmp/x/one.$kind" "$tmp/kept/one.$kind" 2>&1)"
-    sed -i "$change" "$tmp/kept/one.$kind"
-    expect "an export with a byte changed: .$kind" 1 "the bytes DIFFER, first at line [0-9]*, byte [0-9]* of it$" "$tmp/kept/one.$kind"
-    [ $kind = xml ] && continue
-    export_to "$tmp/x/another.$kind" -d2.50 -b ${lens/0.125/1.25e-1} --resolution 64 48 -- $scene
-    tell "an export: .$kind is the same by another name, its options otherwise" "$(cmp "$tmp/x/one.$kind" "$tmp/x/another.$kind" 2>&1)"
-done
-for kind in json xml; do
-    export_to "$tmp/x/sky.$kind" -r 64 48 -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae
-    expect "an export with a picture beside it: .$kind" 0 "the same bits in all" "$tmp/x/sky.$kind"
-done
-mv "$tmp/x/one.xml" "$tmp/x/renamed.xml"
-expect "an export that was renamed, but not its meshes" 0 "made again by: assay export .* -o one.xml " "$tmp/x/renamed.xml"
-mesh=$tmp/x/one_object_0.ply
-printf X | dd of="$mesh" bs=1 seek=220 conv=notrunc 2>/dev/null
-expect "an export of which a mesh was changed" 1 "the bytes DIFFER, first in 'one_object_0.ply' at line [0-9]*, byte [0-9]* of it$" "$tmp/x/renamed.xml"
-truncate -s 200 "$mesh"
-expect "an export of which a mesh was cut short" 1 "first in 'one_object_0.ply' at line [0-9]*, byte [0-9]* of it: there it ends" "$tmp/x/renamed.xml"
-rm "$mesh"
-expect "an export of which a mesh is gone" 3 "'one_object_0.ply' is not beside it" "$tmp/x/renamed.xml"
-cp reference/scenes/46_sky.dae reference/scenes/46_sky.exr "$tmp/odd"
-export_to "$tmp/odd/sky.json" -e "$tmp/odd/46_sky.exr" "$tmp/odd/46_sky.dae"
-sed -i 's/0\.8/0.7/; s/<up_axis>/ &/' "$tmp/odd/46_sky.dae"
-expect "an export of which the scene was changed" 3 "46_sky.dae is not the file that it was made of" "$tmp/odd/sky.json"
-rm "$tmp/odd/46_sky.dae"
-expect "an export of which the scene is gone" 3 "its scene '.*46_sky.dae' is not here: give --scene" "$tmp/odd/sky.json"
-expect "an export of which the scene is elsewhere" 0 "the same bits" --scene reference/scenes/46_sky.dae "$tmp/odd/sky.json"
-printf X >>"$tmp/odd/46_sky.exr"
-expect "an export of which the environment was changed" 3 "46_sky.exr is not the file that it was made of" --scene reference/scenes/46_sky.dae "$tmp/odd/sky.json"
-rm "$tmp/odd/46_sky.exr"
-expect "an export of which the environment is gone" 3 "its environment '.*46_sky.exr' is not here: go" --scene reference/scenes/46_sky.dae "$tmp/odd/sky.json"
-# Names that would end the comment that tells them, or be no text, or be acted on; each is read back as one word of one line.
-for name in $'two\n#error "out"\n' $'two\r#error "out"' "it's 50%" '--><scene>' 'b--c---' $'\033[2J\377 ü' '$(reboot) "`id`' '-o x'; do
-    cp $scene "$tmp/odd/$name.dae"
-    for kind in json pov xml pbrt; do
-        (cd "$tmp/odd" && "$assay" export -o odd.$kind -- "$name.dae" && "$assay" reproduce odd.$kind) >"$tmp/out" 2>&1 &&
-            grep -q "the same bits in all" "$tmp/out" && why="" || why=$(head -c 1000 "$tmp/out")
-        [ "$(grep -c 'assay:command' "$tmp/odd/odd.$kind")" -eq 1 ] || why="$why, its command is not in one line"
-        ! LC_ALL=C grep -q '[^ -~]' "$tmp/odd/odd.$kind" || why="$why, has more than printable ASCII"
-        [ $kind != xml ] || why="$why$(xmllint --noout "$tmp/odd/odd.xml" 2>&1)"
-        [ $kind != pov ] || [ "${name#two}" = "$name" ] || ! command -v povray >/dev/null ||
-            povray +I"$tmp/odd/odd.pov" +W4 +H3 -D -P -F +WT1 >"$tmp/err" 2>&1 || why="$why, POV-Ray: $(tail -n 3 "$tmp/err")"
-        tell "an export of $(printf %q "$name"): .$kind" "$why"
-    done
-    # A shell reads the same words.
-    said=$(sed -n 's/^# assay:command assay export //p' "$tmp/odd/odd.pbrt")
-    tell "an export of $(printf %q "$name"): what a shell makes of it" "$(cd "$tmp/odd" && eval "\"$assay\" export -o shell.pbrt $said" 2>&1 >/dev/null; cmp "$tmp/odd/odd.pbrt" "$tmp/odd/shell.pbrt" 2>&1)"
-done
-pov() { # NAME STATUS PATTERN SED: of one.pov with that done to it
-    sed "$4" "$tmp/x/one.pov" >"$tmp/other.pov"
-    expect "an export: $1" "$2" "$3" "$tmp/other.pov"
-}
-pov "of another program" 3 "other.pov: does not say by what command it was made" '/assay:/d'
-pov "a command that a shell would act on" 3 "not a plain command" 's/export/export $(reboot)/'
-pov "another command of this program" 3 "its command is no export" 's/export/merge/'
-pov "another seed is claimed" 3 "its command is no export: .*--seed" 's/export/export --seed 2/'
-pov "other settings are claimed" 1 "the bytes DIFFER" 's/-m 5/-m 4/'
-pov "another scene is claimed" 3 "is not the file that it was made of" 's/assay:scene ./&0/'
-pov "an output elsewhere" 3 "is no plain name" 's/export/export -o ..\/x.pov/'
-pov "no hash of its scene" 3 "does not say the hash of its scene" '/assay:scene/d'
-echo '{"assay_cycles": 2}' >"$tmp/other.json" && printf '<?xml version="1.0"?>\n<scene version="3.0.0">\n</scene>\n' >"$tmp/other.xml"
-for kind in json xml; do expect "an export: of another program: .$kind" 3 "other.$kind: does not say by what command it was made" "$tmp/other.$kind"; done
-expect "an export and the renderer of a picture" 3 "is for pictures" --pathtracer "$pathtracer" "$tmp/x/one.pov"
 
 # Stored references, by their engines.
 mkdir -p "$tmp/golden/12_point_plane" && cp golden/12_point_plane/* "$tmp/golden/12_point_plane"

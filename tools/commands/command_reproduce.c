@@ -24,7 +24,6 @@ static void print_help(void)
         "  a picture of pathtracer or of `assay merge` (EXR): all values bit by bit\n"
         "  a PNG of pathtracer: image, sampling rates, heat map: all 8-bit codes\n"
         "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine; it must be installed\n"
-        "  a scene of `assay export` (.json, .pov, .xml, .pbrt): all bytes, those of the files beside it too\n"
         "  results.json of validate, compare, converge, grades.json and ID/grade.json: all values but dates and times\n"
         "  a page or junit.xml of these, a history, beside its results: all bytes\n"
         "  grades.csv, grades.tap, junit.xml and pages of a class and its submissions, beside the grades: all bytes\n"

@@ -8,7 +8,6 @@
 #include "tools/jobs/merge.h"
 #include "tools/jobs/job_kinds.h"
 #include "reproduce_class.h"
-#include "reproduce_export.h"
 #include "reproduce_golden.h"
 #include "reproduce_page.h"
 #include "reproduce_internal.h"
@@ -259,29 +258,23 @@ static bool is_results(const char *path)
     return first == '{' || first == '[';
 }
 
-enum kind { EXPORT, OF_CLASS, PAGE, RESULTS, PICTURE };
+enum kind { OF_CLASS, PAGE, RESULTS, PICTURE };
 
-static bool kind_of(const char *path, enum kind *kind, struct err *e)
+static enum kind kind_of(const char *path)
 {
-    bool is_export = false;
-    if (!reproduce_is_export(path, &is_export, e))
-        return false;
-    *kind = is_export                     ? EXPORT
-            : reproduce_is_of_class(path) ? OF_CLASS
-            : reproduce_is_page(path)     ? PAGE
-            : is_results(path)            ? RESULTS
-                                          : PICTURE;
-    return true;
+    return reproduce_is_of_class(path) ? OF_CLASS
+           : reproduce_is_page(path)   ? PAGE
+           : is_results(path)          ? RESULTS
+                                       : PICTURE;
 }
 
 static bool remake_kind(enum kind kind, const char *path, const struct reproduce_options *opt,
                         const char *dir, struct reproduced *out, struct err *e)
 {
     bool for_picture = opt->scene != NULL || opt->pathtracer != NULL;
-    if (for_picture && kind != EXPORT && kind != PICTURE)
+    if (for_picture && kind != PICTURE)
         return err_set(e, "%s: --scene and --pathtracer are for pictures", path);
     switch (kind) {
-    case EXPORT: return reproduce_export(path, opt, dir, out, e);
     case OF_CLASS: return reproduce_class(path, opt, dir, out, e);
     case PAGE: return reproduce_page(path, opt, dir, out, e);
     case RESULTS: return reproduce_results(path, opt, dir, out, e);
@@ -295,11 +288,10 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
 {
     struct err ignored;
     struct temp_dir dir;
-    enum kind kind;
     *out = (struct reproduced){0};
-    if (!kind_of(path, &kind, e) || !temp_dir_open(&dir, "reproduce", e))
+    if (!temp_dir_open(&dir, "reproduce", e))
         return false;
-    bool ok = remake_kind(kind, path, opt, dir.path, out, e);
+    bool ok = remake_kind(kind_of(path), path, opt, dir.path, out, e);
     if (!ok)
         reproduced_free(out);
     bool removed = temp_dir_close(&dir, &ignored);

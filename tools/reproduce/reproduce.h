@@ -26,7 +26,7 @@ void reproduced_free(struct reproduced *r);
 
 /* A picture with moments, of pathtracer or of `assay merge`, whose shares are then made again in turn, all channels bit by bit; a
  * PNG of pathtracer (reproduce_png.h); a stored reference (reproduce_golden.h); results (reproduce_results.h); pages and JUnit
- * (reproduce_page.h); what is made of grades (reproduce_class.h); an exported scene (reproduce_export.h). False if it cannot be judged: no provenance, a scene, camera or environment file that is not
+ * (reproduce_page.h); what is made of grades (reproduce_class.h). False if it cannot be judged: no provenance, a scene, camera or environment file that is not
  * the one of then, a program that fails. That bits differ is no failure but num_different > 0. */
 bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
                struct err *e) __attribute__((warn_unused_result));
