@@ -139,6 +139,41 @@ for file in index.html junit.xml; do
     expect "a page, a table: $file" 3 "$file: cannot read: " "$tmp/report/$file"
 done
 
+# Results may name programs and come from anybody.
+cat >"$tmp/evil" <<END
+#!/bin/sh
+touch "$tmp/it_ran"
+exit 1
+END
+chmod +x "$tmp/evil" && mkdir -p "$tmp/share/engines" && cp reference/cycles/cycles.py "$tmp/share"
+foreign() { # NAME WORDS [OPTION...]: results of the validation, by a command with these words
+    local name=$1 words=$2
+    shift 2
+    rm -f "$tmp/it_ran"
+    sed "s,\"command\": \"assay [a-z]* ,&$words ," "$from" >"$tmp/other.json"
+    if [ $# -gt 0 ]; then
+        "$assay" reproduce "$@" "$tmp/other.json" >"$tmp/out" 2>&1
+        [ -e "$tmp/it_ran" ] && why="" || why="did not run: $(cat "$tmp/out")"
+    else
+        expect "$name" 3 "runs a program of '.*', which is not ours: look at it, then give --run-foreign" "$tmp/other.json"
+        [ ! -e "$tmp/it_ran" ] && [ "$(wc -l <"$tmp/out")" -eq 1 ] && why="" || why="it ran, or says more than a line"
+    fi
+    tell "$name: what ran" "$why"
+}
+from=$tmp/report/results.json
+"$assay" validate -q --only 12_point_plane --pathtracer "$pathtracer" --share ./reference -o "$tmp/report" >/dev/null
+expect "a validation by our own renderer and scripts, named" 0 "the same bits in all" "$tmp/report/results.json"
+"$assay" validate -q --only 12_point_plane -o "$tmp/report" >/dev/null
+foreign "results with a program" "--pathtracer $tmp/evil"
+foreign "results with a program, in one word" "--pathtracer=$tmp/evil"
+foreign "results with a program, in a disguise" "-qq-pathtracer $tmp/evil"
+foreign "results with an engine" "--engine $tmp/evil.json"
+foreign "results with scripts for Blender" "--share $tmp/share"
+foreign "results with a program, which is wished" "--pathtracer $tmp/evil" --run-foreign
+from=$tmp/converge/results.json
+foreign "a convergence with a program" "--pathtracer $tmp/evil"
+foreign "a convergence with a program, which is wished" "--pathtracer $tmp/evil" --run-foreign
+
 # Stored references, by their engines.
 mkdir -p "$tmp/golden/12_point_plane" && cp golden/12_point_plane/* "$tmp/golden/12_point_plane"
 cp golden/12_point_plane/cycles.exr "$tmp/moved.exr"

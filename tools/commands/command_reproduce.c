@@ -6,13 +6,16 @@
 
 #include <string.h>
 
-enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_HELP };
+enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_RUN_FOREIGN, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_SCENE] = {0, "scene", 1, "FILE", "where the scene is now (as the file says)"},
     [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the renderer (the one beside this program)"},
     [OPT_KEEP] = {0, "keep", 1, "FILE", "write what was made again"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
+    [OPT_RUN_FOREIGN] = {0, "run-foreign", 0, "",
+                         "run other programs than ours that results.json names, too:\n"
+                         "--pathtracer, --engine FILE, --share; refused otherwise"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
@@ -46,6 +49,8 @@ int command_reproduce(int argc, char **argv, struct err *e)
             opt.pathtracer = c.value[0];
         } else if (i == OPT_KEEP) {
             opt.keep = c.value[0];
+        } else if (i == OPT_RUN_FOREIGN) {
+            opt.run_foreign = true;
         } else if (i == OPT_THREADS) {
             ok = cli_int("--threads", c.value[0], 0, 1024, &opt.threads, e);
         } else {

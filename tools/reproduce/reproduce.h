@@ -9,6 +9,7 @@ struct reproduce_options {
     const char *scene;      /* NULL: where the command says, from the current directory */
     const char *keep;       /* file that gets what was made again; NULL: none */
     int threads;            /* 0: all processors */
+    bool run_foreign;       /* run programs that results name, too */
 };
 
 struct reproduced {
@@ -23,7 +24,8 @@ struct reproduced {
 /* Also of one that is zero. */
 void reproduced_free(struct reproduced *r);
 
-/* False if it cannot be judged: no provenance, a scene, camera or environment file that is not the one of then, a program that fails. That values differ is no failure but num_different > 0. */
+/* False if it cannot be judged: no provenance, a scene, camera or environment file that is not the one of then, a program that fails
+ * or is not ours. That values differ is no failure but num_different > 0. */
 bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
                struct err *e) __attribute__((warn_unused_result));
 

@@ -16,7 +16,8 @@ bool rerender(const char *path, const struct reproduce_options *opt, const char 
 
 /* The JSON that validate, compare and converge write: runs its command again from the current directory, with its outputs in `dir`, and
  * compares every value but those of the run itself: command, date, machine, version, and what was timed. False also where its
- * --budget was over before all was decided, then or now. */
+ * --budget was over before all was decided, then or now, and where the command runs a program that is not ours without
+ * opt->run_foreign. */
 bool reproduce_results(const char *path, const struct reproduce_options *opt, const char *dir,
                        struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
 

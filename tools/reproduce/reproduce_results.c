@@ -3,12 +3,14 @@
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/shell_quote.h"
+#include "tools/base/data_dirs.h"
 #include "reproduce_internal.h"
 #include "tools/results/results.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { MAX_PATH = 4096 + 64, MORE_WORDS = 8 };
 
@@ -93,6 +95,39 @@ static bool choose_output(const char *path, const char *verb, const char *dir, c
            err_set(e, "%s: made by 'assay %s', which is not made again", path, verb);
 }
 
+/* The value of a long option that `word` is, there or in the next word; NULL: it is another word. */
+static const char *value_of(const char *const *word, const char *name)
+{
+    size_t n = strlen(name);
+    if (strncmp(word[0], name, n) != 0)
+        return NULL;
+    return word[0][n] == '=' ? word[0] + n + 1 : word[0][n] == '\0' ? word[1] : NULL;
+}
+
+static bool same_file(const char *a, const char *b)
+{
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
+/* Does the command run nothing but what validate and converge find by themselves? It may name our renderer, a description of
+ * another program, or the directory of cycles.py, which Blender runs; a description named without its path is one of ours. */
+static bool check_programs(const char *path, const char *const *word, struct err *e)
+{
+    char ours[4096], share[4096];
+    fs_beside_program(ours, sizeof ours, "pathtracer");
+    const char *dir = data_dir(share, sizeof share, "reference", "../share/assay"), *value;
+    for (; *word != NULL; word++)
+        if (((value = value_of(word, "--pathtracer")) != NULL && !same_file(value, ours)) ||
+            ((value = value_of(word, "--share")) != NULL && !same_file(value, dir)) ||
+            ((value = value_of(word, "--engine")) != NULL && strpbrk(value, "./") != NULL))
+            return err_set(e,
+                           "%s: its command runs a program of '%s', which is not ours: look at "
+                           "it, then give --run-foreign",
+                           path, value);
+    return true;
+}
+
 /* Leaves out words of `how` in options written together, "-qt2": of the verbs' letters only -q, which is given anyway, stands before
  * others. */
 static int together_kept(int num, char **word)
@@ -113,8 +148,9 @@ static int together_kept(int num, char **word)
 }
 
 /* Runs the command with its outputs in `dir`. product: gets the path of the results there. */
-static bool run_again(const char *path, const json_t *then, int num, char **word, const char *dir,
-                      char product[MAX_PATH], struct reproduced *out, struct err *e)
+static bool run_again(const char *path, const struct reproduce_options *opt, const json_t *then,
+                      int num, char **word, const char *dir, char product[MAX_PATH],
+                      struct reproduced *out, struct err *e)
 {
     static const struct option_words seed[] = {{"--reference-seed", 1}, {0}};
     char assay[4096], log[MAX_PATH], file[MAX_PATH], number[24];
@@ -143,7 +179,8 @@ static bool run_again(const char *path, const json_t *then, int num, char **word
     memcpy(argv + more, word + 2, (size_t)n * sizeof *argv);
     struct err why = {""};
     const struct process p = {.argv = argv, .log = log};
-    bool ok = reproduced_command(out, argv, e);
+    bool ok =
+        reproduced_command(out, argv, e) && (opt->run_foreign || check_programs(path, argv, e));
     if (ok && !process_run(&p, &usage, &why) &&
         (usage.exit_status < EXIT_DIFFERENT || usage.exit_status > EXIT_INCONCLUSIVE))
         ok = err_set(e, "%s: made again: %s", path, why.msg);
@@ -169,7 +206,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
             path);
     if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
-    ok = ok && run_again(path, then, num, word, dir, product, out, e);
+    ok = ok && run_again(path, opt, then, num, word, dir, product, out, e);
     if (ok && (now = json_load_file(product, 0, &je)) == NULL)
         ok = err_set(e, "%s: made again: %s:%d: %s", path, product, je.line, je.text);
     if (ok && results_lack_time(now))
