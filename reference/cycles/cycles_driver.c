@@ -158,7 +158,7 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
     snprintf(dump, sizeof dump, "%s/scene.json", job->dir);
     snprintf(log, sizeof log, "%s/blender.log", job->dir);
     if (!sha256_file(blender, sha256, e) ||
-        !export_cycles(job->scene, job->camera, job->suite->depth, NULL, dump, e) ||
+        !export_cycles(job->scene, job->camera, job->suite->depth, dump, e) ||
         !write_seeds(job, first, last, e))
         goto out;
 

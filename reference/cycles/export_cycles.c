@@ -108,10 +108,9 @@ static bool write_json(const json_t *root, const char *path, struct err *e)
     return out_commit(&o, e);
 }
 
-bool export_cycles(const struct scene *s, const struct camera *c, int depth,
-                   const struct export_origin *origin, const char *path, struct err *e)
+bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
+                   struct err *e)
 {
-    const struct export_origin none = {.version = NULL}, *o = origin != NULL ? origin : &none;
     assert(depth >= 0 && c->width > 0 && c->height > 0);
     double extent = d3_length(d3_sub(cycles_wide(s->bounds_max), cycles_wide(s->bounds_min)));
     json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL, *root = NULL;
@@ -128,13 +127,11 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth,
               (meshes = cycles_meshes(s, &why)) != NULL &&
               (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
     if (ok) {
-        root = json_pack("{si,ss*,ss*,ss*,ss*,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2,
-                         "assay:version", o->version, "assay:command",
-                         image_written ? o->named : o->command, "assay:scene", o->scene,
-                         "assay:environment", o->environment, "depth", depth, "width", c->width,
-                         "height", c->height, "extent", extent, "camera", camera, "materials",
-                         materials, "meshes", meshes, "spheres", cycles_spheres(s, c->eye),
-                         "lights", cycles_lights(s), "environment", environment);
+        root = json_pack("{si,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2, "depth", depth,
+                         "width", c->width, "height", c->height, "extent", extent, "camera", camera,
+                         "materials", materials, "meshes", meshes, "spheres",
+                         cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
+                         environment);
         ok = root != NULL && write_json(root, path, &why);
     }
     if (!ok && image_written)

@@ -25,7 +25,7 @@ static const struct {
     {"golden", command_golden, "render, inspect and approve the stored references"},
     {"reference", command_reference, "the same as golden render: with Cycles and POV-Ray"},
     {"merge", command_merge, "add renders of cells or sample ranges of one picture"},
-    {"reproduce", command_reproduce, "render again what made a picture, and compare bits"},
+    {"reproduce", command_reproduce, "make a render or results again, and compare bits"},
     {"plan", command_plan, "cut a render, a batch, a validation or references into jobs"},
     {"run-job", command_run_job, "make some of the jobs of a plan"},
     {"gather", command_gather, "put the jobs of a plan together"},

@@ -180,28 +180,11 @@ static void write_keys(FILE *f)
         f);
 }
 
-/* For `assay reproduce` (reproduce_page.h). converge: NULL, or the second results.json. */
-static void write_origin(FILE *f, const json_t *root, const char *converge)
-{
-    for (int i = 0; report_origin[i] != NULL; i++) {
-        const char *text = strcmp(report_origin[i], "converge") == 0
-                               ? converge
-                               : member_text(root, report_origin[i]);
-        if (text == NULL)
-            continue;
-        fprintf(f, "<meta name=\"assay:%s\" content=\"", report_origin[i]);
-        html_text(f, text);
-        fputs("\">\n", f);
-    }
-}
-
-const char *const report_origin[] = {"command", "version", "date", "machine", "converge", NULL};
-
 /* On a page of more claims the evidence of those as expected is folded. */
 enum { FOLD_FROM = 8 };
 
-static bool write_page(struct page *p, const json_t *root, const char *converge,
-                       struct claim_ref *claim, size_t num, struct err *e)
+static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
+                       struct err *e)
 {
     FILE *f = p->f;
     p->folded = num > FOLD_FROM;
@@ -215,7 +198,6 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
     double every = member_number(root, "page_every_s");
     if (every > 0) /* browsers read whole seconds */
         fprintf(f, "<meta http-equiv=\"refresh\" content=\"%.0f\">\n", ceil(every));
-    write_origin(f, root, converge);
     fputs("<title>Assay report, ", f);
     html_text(f, member_text(root, "date"));
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
@@ -300,7 +282,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     if (!fs_make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
         goto done;
     page.f = out.f;
-    if (write_page(&page, root, converge_path, claim, num, e))
+    if (write_page(&page, root, claim, num, e))
         ok = out_commit(&out, e);
     else
         out_abandon(&out);
