@@ -205,9 +205,3 @@ out:
 
 const struct engine_driver cycles_driver = {
     .engine = "cycles", .prefix = "replicate", .count = count, .render = render, .fold = fold};
-
-bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
-                   struct err *e)
-{
-    return engine_driver_render(&cycles_driver, job, out, manifest, e);
-}

@@ -1,4 +1,4 @@
-#include "reference/replicates/engine_driver.h"
+#include "reference_render.h"
 
 #include "reference/cycles/export_cycles.h"
 #include "reference/povray/povray_replicate_parts.h"

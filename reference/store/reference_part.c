@@ -1,5 +1,6 @@
 /* A reference in parts (reference_render.h). */
-#include "reference/replicates/engine_driver.h"
+#include "reference_internal.h"
+
 #include "reference/base/json_file.h"
 
 #include <stdio.h>
