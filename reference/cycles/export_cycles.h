@@ -1,6 +1,6 @@
 /* The scene as a neutral dump that cycles.py builds in Blender: world space, linear Rec. 709, our
  * units, nothing left to interpret. Why each of its numbers gives the same picture in Cycles, and
- * the probe that shows it, is in MATCH_CYCLES.md.
+ * the probe that shows it, is in README.md.
  *
  * JSON, in one object:
  *   "assay_cycles": 2           version of this format

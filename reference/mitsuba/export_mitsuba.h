@@ -1,5 +1,5 @@
 /* The scene as Mitsuba 3 XML, for its rgb variants (scalar_rgb, llvm_ad_rgb, ...), with the files it
- * names beside it. What stands for what, and what is known of it, is in ENGINES.md. */
+ * names beside it. What stands for what, and what is known of it, is in README.md. */
 #ifndef ASSAY_EXPORT_MITSUBA_H
 #define ASSAY_EXPORT_MITSUBA_H
 

@@ -304,7 +304,7 @@ static void emitter_that_stands_on_the_wall(void **state)
      * cut is sampled wrongly. The view is narrow enough not to see the emitter, whose near edge is at .5 / 1.3 = .38. */
     build_camera(&f->s, v3(0, 0, 0), (float)(2 * atan(.36) * 180 / M_PI));
     probe_render(f, &m);
-    /* the midpoint rule, and the strip of 1.5e-5 of the emitter's edge of MATCH_CYCLES.md */
+    /* the midpoint rule, and the strip of 1.5e-5 of the emitter's edge of reference/cycles/README.md */
     probe_judge(f, &m, probe_expect(f, .36, 16, standing_emitter_radiance, NULL), 1e-4, false);
 }
 
