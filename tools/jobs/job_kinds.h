@@ -7,7 +7,10 @@
 
 /* A plan in the making. Texts are copied; what is no UTF-8 makes it fail at the end. */
 
-/* First of all: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
+/* What is planned: a kind, with the command argv. */
+bool plan_head(struct plan *p, const char *kind, int argc, char **argv, struct err *e)
+    __attribute__((warn_unused_result));
+/* What a kind does first: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
 bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
     __attribute__((warn_unused_result));
 /* Words of all jobs, from the program on, which is an input. user: from the user's command, where "{job}" and "{out}" are
