@@ -13,12 +13,12 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev zlib1g-dev libdeflate-dev libmicrohttpd-dev bubblewrap
+  nettle-dev zlib1g-dev libdeflate-dev bubblewrap
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
-PKGS    := libxml-2.0 OpenEXR libpng jansson gsl nettle zlib libdeflate libmicrohttpd
+PKGS    := libxml-2.0 OpenEXR libpng jansson gsl nettle zlib libdeflate
 
 # Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
 pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')

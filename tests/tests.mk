@@ -147,7 +147,7 @@ scale-live: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-live
 #: make large      an image of 16384 x 16384 in jobs, within 2 GiB (30 GB of disk; SIDE=16384)
 large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 	tests/studies/scale/large.sh $(BUILD) $(or $(SIDE),16384)
-#: make scale      simulate a class, a suite and a large image on up to 1000 nodes (tools/SCALE.md)
+#: make scale      simulate a class, a suite and a large image on up to 1000 nodes (tools/docs/background/scale.md)
 scale: $(BUILD)/tests/make_scale
 	$<
 

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE
 #include "process.h"
 
+#include "renderer/base/progress.h"
+
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -13,7 +15,6 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum {
@@ -30,13 +31,6 @@ struct tail {
     char data[TAIL_SIZE];
     size_t size;
 };
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 bool process_find(const char *argv0, char *path, size_t size)
 {
@@ -294,7 +288,7 @@ static bool watch(const struct process *p, struct run *r, double t0, int *status
         drain(r);
         if (wait_for(r->child, status, WNOHANG, usage) == r->child)
             return late;
-        double t = now_s();
+        double t = now_seconds();
         if (!late && p->timeout_s > 0 && t - t0 >= p->timeout_s) {
             late = true;
             kill_at = t + GRACE_S;
@@ -320,7 +314,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     if (p->log != NULL &&
         (r.log = open(p->log, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666)) < 0)
         return err_set(e, "%s: cannot write: %s", p->log, strerror(errno));
-    double t0 = now_s();
+    double t0 = now_seconds();
     if (!start(p, path, &r, e)) {
         close_if_open(&r.log);
         return false;
@@ -334,7 +328,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     close_if_open(&r.out);
     if (r.log >= 0 && close(r.log) != 0 && r.log_errno == 0)
         r.log_errno = errno;
-    double wall = now_s() - t0;
+    double wall = now_seconds() - t0;
     if (usage != NULL)
         *usage = (struct process_usage){
             .wall_s = wall,

@@ -7,7 +7,6 @@
 #include "reference/base/process.h"
 
 #include "renderer/base/sha256.h"
-#include "renderer/base/fs.h"
 #include "reference/base/json_file.h"
 
 #include <assert.h>
@@ -65,23 +64,13 @@ static bool read_report(const char *log, json_t **report, struct err *e)
     return err_set(e, "blender: ended without the OK line of cycles.py");
 }
 
-static bool is_constant(const float *pixels_rgb, size_t pixels)
-{
-    for (size_t i = 3; i < 3 * pixels; i++)
-        if (pixels_rgb[i] != pixels_rgb[i - 3])
-            return false;
-    return true;
-}
-
-/* All replicates into *out. Two that are the same betray a seed that was ignored. The exception is
- * light without noise: every pixel has random numbers of its own, so if all pixels of all
- * replicates agree to the bit, no random number matters, and the answer is exact. */
+/* All replicates into *out. */
 static bool fold_replicates(const struct reference_job *job,
                             const struct replicate_images *pictures, struct moments *out,
                             json_t *manifest, struct err *e)
 {
     int width = job->suite->width, height = job->suite->height;
-    int count = job->ref->replicates, num_constant = 0, num_first = 0, same = -1;
+    int count = job->ref->replicates;
     size_t pixels = (size_t)width * (size_t)height;
     struct moments m = {0};
     struct replicates all = {0};
@@ -97,24 +86,21 @@ static bool fold_replicates(const struct reference_job *job,
         ok = px != NULL;
         if (!ok)
             break;
-        int first = replicate_repeats_add(&repeats, px, 3 * pixels);
-        same = first < k ? k : same;
-        num_first += first == 0;
-        num_constant += is_constant(px, pixels);
+        replicate_repeats_add(&repeats, px, pixels);
         moments_add_image(&m, px);
         if (job->opt->on_replicate != NULL)
             job->opt->on_replicate(job->opt->on_replicate_ctx, k, px);
         replicates_add(&all, px);
         free(px);
     }
-    if (ok && num_constant == count && num_first == count) {
+    if (ok && repeats.without_noise) {
         strcpy(m.unit, "exact");
         for (size_t p = 0; p < pixels; p++)
             m.n[p] = 1;
-    } else if (ok && same >= 0) {
+    } else if (ok && repeats.same >= 0) {
         ok = err_set(
             e, "Cycles: replicate %d is the same image as an earlier one: the seed has no effect",
-            same);
+            repeats.same);
     } else if (ok) {
         ok = independence_check(&all, manifest, e) || err_prefix(e, "Cycles");
     }
@@ -172,7 +158,7 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
     snprintf(dump, sizeof dump, "%s/scene.json", job->dir);
     snprintf(log, sizeof log, "%s/blender.log", job->dir);
     if (!sha256_file(blender, sha256, e) ||
-        !export_cycles(job->scene, job->camera, job->suite->depth, NULL, dump, e) ||
+        !export_cycles(job->scene, job->camera, job->suite->depth, dump, e) ||
         !write_seeds(job, first, last, e))
         goto out;
 
@@ -219,9 +205,3 @@ out:
 
 const struct engine_driver cycles_driver = {
     .engine = "cycles", .prefix = "replicate", .count = count, .render = render, .fold = fold};
-
-bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
-                   struct err *e)
-{
-    return engine_driver_render(&cycles_driver, job, out, manifest, e);
-}

@@ -16,38 +16,6 @@ enum { MAX_DEPTH = 1025 }; /* Blender's limit of 1024 bounces is one less than o
 #define LENS_MIN 1.0
 #define LENS_MAX 5000.0
 
-static json_t *numbers3(double x, double y, double z)
-{
-    return json_pack("[fff]", x, y, z);
-}
-json_t *cycles_vec3(vec3 v)
-{
-    return numbers3(v.x, v.y, v.z);
-}
-json_t *cycles_rgb(rgb c)
-{
-    return numbers3(c.r, c.g, c.b);
-}
-
-json_t *cycles_name(const char *name)
-{
-    /* A name that was cut may end inside a UTF-8 sequence. */
-    char ascii[64];
-    size_t n = strnlen(name, sizeof ascii - 1);
-    for (size_t i = 0; i < n; i++)
-        ascii[i] = name[i] >= ' ' && name[i] <= '~' ? name[i] : '?';
-    ascii[n] = '\0';
-    return json_string(ascii);
-}
-
-void cycles_push(json_t **array, json_t *value)
-{
-    if (json_array_append_new(*array, value) == 0)
-        return;
-    json_decref(*array);
-    *array = NULL;
-}
-
 static json_t *camera_json(const struct scene *s, const struct camera *c, struct err *e)
 {
     if (c->lens_radius > 0 && !(c->focal_distance > 0)) {
@@ -108,10 +76,9 @@ static bool write_json(const json_t *root, const char *path, struct err *e)
     return out_commit(&o, e);
 }
 
-bool export_cycles(const struct scene *s, const struct camera *c, int depth,
-                   const struct export_origin *origin, const char *path, struct err *e)
+bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
+                   struct err *e)
 {
-    const struct export_origin none = {.version = NULL}, *o = origin != NULL ? origin : &none;
     assert(depth >= 0 && c->width > 0 && c->height > 0);
     double extent = d3_length(d3_sub(cycles_wide(s->bounds_max), cycles_wide(s->bounds_min)));
     json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL, *root = NULL;
@@ -128,13 +95,11 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth,
               (meshes = cycles_meshes(s, &why)) != NULL &&
               (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
     if (ok) {
-        root = json_pack("{si,ss*,ss*,ss*,ss*,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2,
-                         "assay:version", o->version, "assay:command",
-                         image_written ? o->named : o->command, "assay:scene", o->scene,
-                         "assay:environment", o->environment, "depth", depth, "width", c->width,
-                         "height", c->height, "extent", extent, "camera", camera, "materials",
-                         materials, "meshes", meshes, "spheres", cycles_spheres(s, c->eye),
-                         "lights", cycles_lights(s), "environment", environment);
+        root = json_pack("{si,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2, "depth", depth,
+                         "width", c->width, "height", c->height, "extent", extent, "camera", camera,
+                         "materials", materials, "meshes", meshes, "spheres",
+                         cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
+                         environment);
         ok = root != NULL && write_json(root, path, &why);
     }
     if (!ok && image_written)

@@ -1,11 +1,9 @@
 /* The scene as a neutral dump that cycles.py builds in Blender: world space, linear Rec. 709, our
  * units, nothing left to interpret. Why each of its numbers gives the same picture in Cycles, and
- * the probe that shows it, is in MATCH_CYCLES.md.
+ * the probe that shows it, is in README.md.
  *
  * JSON, in one object:
  *   "assay_cycles": 2           version of this format
- *   "assay:version", "assay:command", "assay:scene", "assay:environment": how it was made (export_provenance.h), where that
- *                               was given; nothing reads them but `assay reproduce`
  *   "depth": m                  as the assignment counts: 0 = emission seen directly
  *   "width", "height"           pixels
  *   "extent"                    diagonal of the box around the scene
@@ -36,16 +34,14 @@
 #define ASSAY_EXPORT_CYCLES_H
 
 #include "renderer/scene/camera.h"
-#include "reference/base/export_provenance.h"
 
-/* Writes the dump, with its origin unless that is NULL, and an environment's image to <path>.exr, each by rename. Fails on a write error,
+/* Writes the dump, and an environment's image to <path>.exr, each by rename. Fails on a write error,
  * and with a line that starts with "Cycles: " on what our recipe for Cycles cannot express: pixels
  * that are not square, an angle of view out of Blender's range, clipping planes that cut geometry, a
  * depth above 1025, shading normals of one triangle on both of its sides, a microfacet that takes
  * facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
  * no ray runs into: point, spot, directional, the assignment's ambient light. */
-bool export_cycles(const struct scene *s, const struct camera *c, int depth,
-                   const struct export_origin *origin, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
+                   struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -131,8 +131,9 @@ static bool read_features(const struct json_node *n, struct engine *en, struct e
         const char *text = json_string_value(value);
         int at = text != NULL ? find(feature_names, text, strlen(text)) : -1;
         if (at < 0)
-            return err_set(e, "%s: 'expresses' [%zu]: '%s' is no feature (see ENGINES.md)", n->file,
-                           index, text != NULL ? text : "not a text");
+            return err_set(
+                e, "%s: 'expresses' [%zu]: '%s' is no feature (see tools/docs/formats/engine.md)",
+                n->file, index, text != NULL ? text : "not a text");
         en->feature |= 1u << at;
     }
     return true;

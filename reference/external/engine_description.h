@@ -1,4 +1,4 @@
-/* Any renderer, by a small JSON file that says how to call it and what it can do (ENGINES.md):
+/* Any renderer, by a small JSON file that says how to call it and what it can do (tools/docs/formats/engine.md):
  *
  *   {
  *     "name": "mitsuba",            a-z, 0-9, _ and -; names files and claims

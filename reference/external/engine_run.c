@@ -3,6 +3,7 @@
 #include "engine_internal.h"
 
 #include "reference/replicates/engine_driver.h"
+#include "reference/replicates/replicate_images.h"
 #include "reference/base/process.h"
 
 #include "reference/base/image_oiio.h"
@@ -13,7 +14,6 @@
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
-#include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -120,14 +120,6 @@ static float *read_picture(struct engine_job *j, const char *path, struct err *e
     return out;
 }
 
-static bool is_constant(const float *rgb_values, size_t pixels)
-{
-    for (size_t i = 3; i < 3 * pixels; i++)
-        if (rgb_values[i] != rgb_values[i - 3])
-            return false;
-    return true;
-}
-
 static void make_exact(struct moments *m)
 {
     strcpy(m->unit, "exact");
@@ -136,14 +128,12 @@ static void make_exact(struct moments *m)
         m->n[p] = 1;
 }
 
-/* Runs, reads and folds. Equal pictures betray a seed that was ignored, unless all pixels are equal as
- * well: each has random numbers of its own, so then none of them mattered. */
+/* Runs, reads and folds. */
 static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
-    uint8_t(*digest)[SHA256_DIGEST_SIZE] = malloc((size_t)j->replicates * sizeof *digest);
-    int same = -1, num_constant = 0, num_first = 0;
-    bool ok = digest != NULL || err_set(e, "out of memory");
+    struct replicate_repeats repeats;
+    bool ok = replicate_repeats_alloc(&repeats, j->replicates, e);
     for (int k = 0; ok && k < j->replicates; k++) {
         char path[PATH_SIZE];
         snprintf(path, sizeof path, "%s/replicate_%04d.%s", j->dir, k, j->en->image);
@@ -153,27 +143,18 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
         ok = px != NULL;
         if (!ok)
             break;
-        struct sha256_ctx ctx;
-        sha256_init(&ctx);
-        sha256_update(&ctx, 3 * pixels * sizeof *px, (const uint8_t *)px);
-        sha256_digest(&ctx, SHA256_DIGEST_SIZE, digest[k]);
-        for (int i = 0; i < k && same < 0; i++)
-            if (memcmp(digest[i], digest[k], sizeof digest[k]) == 0)
-                same = k;
-        num_first += memcmp(digest[0], digest[k], sizeof digest[k]) == 0;
-        num_constant += is_constant(px, pixels);
-        bool alike = num_constant == k + 1 && num_first == k + 1;
-        if (j->en->output == OUTPUT_MEAN && same >= 0 && !alike)
+        replicate_repeats_add(&repeats, px, pixels);
+        if (j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
             ok = err_set(
                 e, "replicate %d is the same picture as an earlier one: the seed has no effect",
-                same);
+                repeats.same);
         moments_add_image(m, px);
         free(px);
         unlink(path);
     }
-    free(digest);
-    if (ok && (j->en->output == OUTPUT_EXACT || num_first == j->replicates))
+    if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
         make_exact(m);
+    replicate_repeats_free(&repeats);
     return ok;
 }
 

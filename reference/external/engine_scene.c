@@ -65,8 +65,8 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
     if (ok && snprintf(path, PATH_SIZE, "%s/scene.%s", dir, ending_of(en->format)) >= PATH_SIZE)
         ok = err_set(e, "%.64s...: path too long", dir);
     switch (en->format) {
-    case FORMAT_MITSUBA: ok = ok && export_mitsuba(&s, &c, suite->depth, NULL, path, e); break;
-    case FORMAT_CYCLES: ok = ok && export_cycles(&s, &c, suite->depth, NULL, path, e); break;
+    case FORMAT_MITSUBA: ok = ok && export_mitsuba(&s, &c, suite->depth, path, e); break;
+    case FORMAT_CYCLES: ok = ok && export_cycles(&s, &c, suite->depth, path, e); break;
     case FORMAT_PBRT:
     case FORMAT_POVRAY: ok = ok && write_text(en, &s, &c, suite->depth, path, e); break;
     case FORMAT_DAE:

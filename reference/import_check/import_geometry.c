@@ -34,7 +34,7 @@ struct check {
     bool *found;                    /* per triangle of ours; the caller's */
 };
 
-/* Blender turns each file to Z up, we turn it to Y up (DIALECT.md); from its axes to ours:
+/* Blender turns each file to Z up, we turn it to Y up (renderer/docs/dialect.md); from its axes to ours:
  * file (x,y,z)    Blender     ours
  *   Y_UP         (x,-z,y)   (x,y,z)
  *   Z_UP         (x,y,z)    (-x,z,y)

@@ -22,7 +22,6 @@ struct writer {
     const struct camera *c;
     const char *stem; /* path without its ending */
     const char *base; /* the same without its directory */
-    bool named;       /* the scene names files beside it */
 };
 
 /* The reference to a file beside the scene. */
@@ -31,7 +30,6 @@ static void filename(struct writer *w, const char *ending)
     char name[PATH_SIZE];
     snprintf(name, sizeof name, "%s_%s", w->base, ending);
     mitsuba_text(w->xml, "string", "filename", name);
-    w->named = true;
 }
 
 static bool write_picture(const struct writer *w, const char *ending, const struct image *im,
@@ -353,8 +351,8 @@ static bool put_scene(struct writer *w, int depth, struct err *e)
     return ok;
 }
 
-bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
-                    const struct export_origin *origin, const char *path, struct err *e)
+bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, const char *path,
+                    struct err *e)
 {
     assert(depth >= 0);
     char stem[PATH_SIZE];
@@ -368,8 +366,7 @@ bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
         .xml = &xml, .s = s, .c = c, .stem = stem, .base = slash != NULL ? slash + 1 : stem};
     if (!features_check_exportable("Mitsuba", s, c, e))
         return false;
-    bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) &&
-              mitsuba_write(&xml, path, origin, w.named, e);
+    bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) && mitsuba_write(&xml, path, e);
     mitsuba_free(&xml);
     return ok;
 }

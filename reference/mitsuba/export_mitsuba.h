@@ -1,19 +1,17 @@
 /* The scene as Mitsuba 3 XML, for its rgb variants (scalar_rgb, llvm_ad_rgb, ...), with the files it
- * names beside it. What stands for what, and what is known of it, is in ENGINES.md. */
+ * names beside it. What stands for what, and what is known of it, is in README.md. */
 #ifndef ASSAY_EXPORT_MITSUBA_H
 #define ASSAY_EXPORT_MITSUBA_H
 
 #include "renderer/scene/camera.h"
-#include "reference/base/export_provenance.h"
 
 /* Writes path (by rename, last) and, before it, STEM_object_I.ply, STEM_material_I_eta.exr, .._k.exr
  * and STEM_environment.exr as needed, STEM being path without its ending. Samples and seed are the
- * parameters $spp and $seed. The scene says its origin in comments unless that is NULL; the files beside it do not. Fails with one line on what Mitsuba cannot express: a boundary that only
+ * parameters $spp and $seed. Fails with one line on what Mitsuba cannot express: a boundary that only
  * refracts, Schlick's approximation, correlated shadowing, emission on both sides, smooth emitters
  * that reflect, a falloff that is not the inverse square, spot lights that are brighter in the
  * middle, the ambient light of the assignment, and what features_check_exportable() refuses. */
-bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
-                    const struct export_origin *origin, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, const char *path,
+                    struct err *e) __attribute__((warn_unused_result));
 
 #endif

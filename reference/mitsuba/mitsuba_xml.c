@@ -28,27 +28,20 @@ bool mitsuba_new(struct mitsuba_xml *x, struct err *e)
     check(x, xmlTextWriterStartDocument(x->w, NULL, "utf-8", NULL));
     check(x, xmlTextWriterWriteComment(
                  x->w, BAD_CAST " mitsuba -m scalar_rgb -D spp=64 -D seed=1 -o OUT.exr THIS "));
-    check(x, xmlTextWriterFlush(x->w));
-    x->head = xmlBufferLength(x->buffer);
     mitsuba_begin(x, "scene", NULL, "version", "3.0.0");
     return true;
 }
 
-bool mitsuba_write(struct mitsuba_xml *x, const char *path, const struct export_origin *origin,
-                   bool named, struct err *e)
+bool mitsuba_write(struct mitsuba_xml *x, const char *path, struct err *e)
 {
     struct out_file out;
-    size_t head = (size_t)x->head;
     check(x, xmlTextWriterEndDocument(x->w));
     check(x, xmlTextWriterFlush(x->w));
     if (x->failed)
         return err_set(e, "%s: out of memory", path);
     if (!out_open(&out, path, e))
         return false;
-    fwrite(xmlBufferContent(x->buffer), 1, head, out.f);
-    if (origin != NULL)
-        export_origin_write(out.f, COMMENT_XML, origin, named);
-    fwrite(xmlBufferContent(x->buffer) + head, 1, (size_t)xmlBufferLength(x->buffer) - head, out.f);
+    fwrite(xmlBufferContent(x->buffer), 1, (size_t)xmlBufferLength(x->buffer), out.f);
     return out_commit(&out, e);
 }
 

@@ -4,7 +4,6 @@
 
 #include "renderer/base/err.h"
 #include "renderer/math/vec.h"
-#include "reference/base/export_provenance.h"
 
 #include <libxml/xmlwriter.h>
 
@@ -13,14 +12,13 @@ struct mitsuba_xml {
     xmlBufferPtr buffer;
     xmlTextWriterPtr w;
     bool failed;
-    int head; /* bytes of the buffer before <scene> */
 };
 
 /* Opens <scene>; free with mitsuba_free(), also on failure. */
 bool mitsuba_new(struct mitsuba_xml *x, struct err *e) __attribute__((warn_unused_result));
-/* Closes it and writes the file, by rename, before <scene> its origin unless that is NULL (named: as export_origin_write()). */
-bool mitsuba_write(struct mitsuba_xml *x, const char *path, const struct export_origin *origin,
-                   bool named, struct err *e) __attribute__((warn_unused_result));
+/* Closes it and writes the file, by rename. */
+bool mitsuba_write(struct mitsuba_xml *x, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
 void mitsuba_free(struct mitsuba_xml *x);
 
 /* <tag type="type" key="value">, without the attributes that are NULL; up to mitsuba_end(). */

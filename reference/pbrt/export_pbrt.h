@@ -1,5 +1,5 @@
 /* The scene as one pbrt-v4 text file. pbrt renders spectra, so what is equal and what is only near is
- * said in ENGINES.md. */
+ * said in README.md. */
 #ifndef ASSAY_EXPORT_PBRT_H
 #define ASSAY_EXPORT_PBRT_H
 

@@ -13,6 +13,7 @@
 /* Of the extent: the distance of the black sheet behind a one-sided emitter. mesh2 vertices are
  * float32, 1e-7 of the extent. */
 #define BACKING 2e-5
+
 struct povray_variant povray_variant_plain(void)
 {
     return (struct povray_variant){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
@@ -20,21 +21,6 @@ struct povray_variant povray_variant_plain(void)
                                    .indirect = true,
                                    .roulette = 0.1,
                                    .scale = 1};
-}
-
-/* The last zero is there so that no coordinate reads -0. */
-void povray_put(const struct povray_writer *w, struct povray_point p)
-{
-    const double(*r)[3] = w->v->rotation;
-    fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z + 0.0,
-            r[1][0] * p.x + r[1][1] * p.y + r[1][2] * p.z + 0.0,
-            r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z + 0.0);
-}
-
-void povray_put_rgb(const struct povray_writer *w, const char *before, double r, double g, double b,
-                    const char *after)
-{
-    fprintf(w->f, "%s<%.9g,%.9g,%.9g>%s", before, r, g, b, after);
 }
 
 /* Emission is multiplied by the pigment, so it is divided by it here. */

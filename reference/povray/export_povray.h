@@ -1,6 +1,6 @@
 /* The scene as POV-Ray 3.7 scene description language, written so that POV-Ray's picture is the
  * same radiance as ours. Which setting stands for what, and the measurement behind each, is in
- * MATCH_POVRAY.md. What POV-Ray cannot express is an error with one line, never left out. */
+ * README.md. What POV-Ray cannot express is an error with one line, never left out. */
 #ifndef ASSAY_EXPORT_POVRAY_H
 #define ASSAY_EXPORT_POVRAY_H
 

@@ -32,11 +32,20 @@ static inline struct povray_point povray_moved(struct povray_point p, double s, 
                                  p.z + s * (double)d.z};
 }
 
-/* "<x,y,z>", turned by the variant's rotation. */
-void povray_put(const struct povray_writer *w, struct povray_point p);
+/* "<x,y,z>", turned by the variant's rotation. The last zero is there so that no coordinate reads -0. */
+static inline void povray_put(const struct povray_writer *w, struct povray_point p)
+{
+    const double(*r)[3] = w->v->rotation;
+    fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z + 0.0,
+            r[1][0] * p.x + r[1][1] * p.y + r[1][2] * p.z + 0.0,
+            r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z + 0.0);
+}
 /* before "<r,g,b>" after. */
-void povray_put_rgb(const struct povray_writer *w, const char *before, double r, double g, double b,
-                    const char *after);
+static inline void povray_put_rgb(const struct povray_writer *w, const char *before, double r,
+                                  double g, double b, const char *after)
+{
+    fprintf(w->f, "%s<%.9g,%.9g,%.9g>%s", before, r, g, b, after);
+}
 
 /* All light sources of the pass. */
 void povray_put_lights(const struct povray_writer *w);

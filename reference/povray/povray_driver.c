@@ -7,7 +7,6 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 
-#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
@@ -246,9 +245,3 @@ const struct engine_driver povray_driver = {.engine = "povray",
                                             .count = count,
                                             .render = render,
                                             .fold = povray_fold};
-
-bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
-                   struct err *e)
-{
-    return engine_driver_render(&povray_driver, job, out, manifest, e);
-}

@@ -2,7 +2,6 @@
 
 #include "renderer/shading/bsdf.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -131,7 +131,7 @@ static bool add_replicate(const struct povray_replicates *s,
     float *px = replicate_images_read(path, m->width, m->height, true, e);
     if (px == NULL)
         return false;
-    int first = replicate_repeats_add(repeats, px, s->size);
+    int first = replicate_repeats_add(repeats, px, s->size / 3);
     if (first < k) {
         free(px);
         return err_set(e, "POV-Ray: replicates %d and %d are the same", first, k);

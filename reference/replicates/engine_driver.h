@@ -2,9 +2,25 @@
 #ifndef ASSAY_ENGINE_DRIVER_H
 #define ASSAY_ENGINE_DRIVER_H
 
-#include "renderer/scene/camera.h"
 #include "replicate_images.h"
-#include "reference/store/reference_render.h"
+#include "reference/suite/suite.h"
+#include "renderer/image/moments.h"
+
+struct reference_options {
+    uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
+    /* k of the first of ref->replicates: more of what an earlier call began, or, far from all that
+     * has been used, a fresh start. */
+    int first_replicate;
+    int threads;
+    double timeout_s; /* of one engine process; it is killed (whole process group) after that */
+    const char
+        *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
+    const char *share_dir; /* where cycles.py is */
+    /* NULL, or called with each replicate (RGB, 3 floats a pixel) in their order, by the calling
+     * thread; not where the engine's answer is exact. */
+    void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
+    void *on_replicate_ctx;
+};
 
 struct reference_job {
     const struct suite_scene *suite;
@@ -37,19 +53,11 @@ struct engine_driver {
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
 };
 extern const struct engine_driver cycles_driver, povray_driver;
-/* NULL if there is none of that name. */
-const struct engine_driver *engine_driver_of(const char *engine);
 
 /* All of it here: count, render, fold. */
 bool engine_driver_render(const struct engine_driver *driver, const struct reference_job *job,
                           struct moments *out, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
-bool cycles_render(const struct reference_job *job, struct moments *out, json_t *manifest,
-                   struct err *e) __attribute__((warn_unused_result));
-bool povray_render(const struct reference_job *job, struct moments *out, json_t *manifest,
-                   struct err *e) __attribute__((warn_unused_result));
-
-/* What reference_render() and the parts of reference_part.c have in common. */
 
 /* Date (UTC), and the seconds since the start once it is stopped; CPU: of this process and all children that were waited for. */
 struct timing {
@@ -58,17 +66,5 @@ struct timing {
 };
 struct timing timing_start(void);
 void timing_stop(struct timing *t);
-
-/* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
-bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
-                            const struct reference_options *opt,
-                            bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
-                            void *ctx, struct err *e) __attribute__((warn_unused_result));
-
-/* Adds what every reference's manifest says; false out of memory. */
-bool reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
-                        const struct reference_options *opt, const struct timing *t,
-                        const struct moments *m, json_t *manifest)
-    __attribute__((warn_unused_result));
 
 #endif

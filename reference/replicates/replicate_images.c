@@ -74,22 +74,33 @@ bool replicate_images_write(const char *path, int width, int height, const float
 
 bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
 {
-    *r = (struct replicate_repeats){.capacity = capacity};
+    *r = (struct replicate_repeats){.capacity = capacity, .same = -1, .without_noise = true};
     r->digest = malloc((size_t)capacity * sizeof *r->digest);
     return r->digest != NULL || err_set(e, "hashes of pictures: out of memory");
 }
 
-int replicate_repeats_add(struct replicate_repeats *r, const float *pixels, size_t size)
+static bool is_constant(const float *pixels_rgb, size_t pixels)
+{
+    for (size_t i = 3; i < 3 * pixels; i++)
+        if (pixels_rgb[i] != pixels_rgb[i - 3])
+            return false;
+    return true;
+}
+
+int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels)
 {
     struct sha256_ctx ctx;
     int k = 0;
     assert(r->num < r->capacity);
     static_assert(sizeof *r->digest == SHA256_DIGEST_SIZE, "a digest");
     sha256_init(&ctx);
-    sha256_update(&ctx, size * sizeof *pixels, (const uint8_t *)pixels);
+    sha256_update(&ctx, 3 * pixels * sizeof *pixels_rgb, (const uint8_t *)pixels_rgb);
     sha256_digest(&ctx, SHA256_DIGEST_SIZE, r->digest[r->num]);
     while (memcmp(r->digest[k], r->digest[r->num], sizeof *r->digest) != 0)
         k++;
+    if (k < r->num && r->same < 0)
+        r->same = r->num;
+    r->without_noise = r->without_noise && k == 0 && is_constant(pixels_rgb, pixels);
     r->num++;
     return k;
 }

@@ -28,15 +28,19 @@ float *replicate_images_read(const char *path, int width, int height, bool below
 bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,
                             struct err *e) __attribute__((warn_unused_result));
 
-/* Pictures that repeat betray a seed without effect, and would make a standard error that is too small. */
+/* Pictures that repeat betray a seed without effect, and would make a standard error that is too small. The exception is
+ * light without noise: every pixel has random numbers of its own, so if all pixels of all pictures agree to the bit, no
+ * random number matters, and the answer is exact. */
 struct replicate_repeats {
     int num, capacity;
+    int same;           /* the first that repeats an earlier one; -1: none */
+    bool without_noise; /* all pixels of all so far agree */
     uint8_t (*digest)[32];
 };
 bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
     __attribute__((warn_unused_result));
-/* Takes the next picture, `size` floats; the number of the first that was the same, its own if there is none. */
-int replicate_repeats_add(struct replicate_repeats *r, const float *pixels, size_t size);
+/* Takes the next picture; the number of the first that was the same, its own if there is none. */
+int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels);
 void replicate_repeats_free(struct replicate_repeats *r);
 
 #endif

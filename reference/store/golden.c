@@ -22,6 +22,19 @@ static bool golden_path(char out[PATH_SIZE], const char *golden_dir, const char 
     return (n > 0 && n < PATH_SIZE) || err_set(e, "%.64s...: path too long", golden_dir);
 }
 
+/* Of one engine's reference. next: of an image that the manifest may not describe yet. */
+struct place {
+    char exr[PATH_SIZE], next[PATH_SIZE], manifest[PATH_SIZE];
+};
+
+static bool find_place(struct place *out, const char *golden_dir, const char *scene,
+                       const char *engine, struct err *e)
+{
+    return golden_path(out->exr, golden_dir, scene, engine, ".exr", e) &&
+           golden_path(out->next, golden_dir, scene, engine, ".exr.next", e) &&
+           golden_path(out->manifest, golden_dir, scene, "manifest", ".json", e);
+}
+
 /* The manifest's object; an empty one if there is no file. */
 static json_t *load_manifest(const char *path, struct err *e)
 {
@@ -98,18 +111,16 @@ static bool settle(const json_t *entry, const char *exr, const char *next, struc
 
 bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
 {
-    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
-    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
-        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
-        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+    struct place at;
+    if (!find_place(&at, golden_dir, scene, engine, e))
         return false;
-    if (access(next, F_OK) != 0)
+    if (access(at.next, F_OK) != 0)
         return true;
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(path, e);
-    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
+    json_t *all = load_manifest(at.manifest, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr, at.next, e);
     json_decref(all);
     close(lock);
     return ok;
@@ -120,28 +131,27 @@ bool golden_settle(const char *golden_dir, const char *scene, const char *engine
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
 {
-    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], sha256[65];
-    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
-        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
-        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+    struct place at;
+    char sha256[65];
+    if (!find_place(&at, golden_dir, scene, engine, e))
         return false;
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(path, e), *entry = json_copy(manifest);
+    json_t *all = load_manifest(at.manifest, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
-    bool ok = all != NULL && settle(json_object_get(all, engine), exr, next, e);
-    bool waits = ok && moments_write(next, m, attrs, 2, e);
-    ok = waits && sha256_file(next, sha256, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr, at.next, e);
+    bool waits = ok && moments_write(at.next, m, attrs, 2, e);
+    ok = waits && sha256_file(at.next, sha256, e);
     if (ok) {
         ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
              json_object_set(all, engine, entry) == 0;
-        ok = ok ? json_write(path, all, e) : err_set(e, "%s: out of memory", path);
+        ok = ok ? json_write(at.manifest, all, e) : err_set(e, "%s: out of memory", at.manifest);
     }
     if (waits && !ok)
-        unlink(next); /* no manifest names it */
-    if (ok && rename(next, exr) != 0)
-        ok = err_set(e, "%s: cannot write: %s", exr, strerror(errno));
+        unlink(at.next); /* no manifest names it */
+    if (ok && rename(at.next, at.exr) != 0)
+        ok = err_set(e, "%s: cannot write: %s", at.exr, strerror(errno));
     json_decref(entry);
     json_decref(all);
     close(lock);
@@ -150,22 +160,21 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
 
 bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
 {
-    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE];
-    if (!golden_path(exr, golden_dir, scene, engine, ".exr", e) ||
-        !golden_path(next, golden_dir, scene, engine, ".exr.next", e) ||
-        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
+    struct place at;
+    if (!find_place(&at, golden_dir, scene, engine, e))
         return false;
-    if (access(path, F_OK) != 0 && access(exr, F_OK) != 0)
+    if (access(at.manifest, F_OK) != 0 && access(at.exr, F_OK) != 0)
         return true;
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(path, e);
+    json_t *all = load_manifest(at.manifest, e);
     bool ok = all != NULL;
     if (ok && json_object_del(all, engine) == 0)
-        ok = json_write(path, all, e);
-    if (ok && ((unlink(exr) != 0 && errno != ENOENT) || (unlink(next) != 0 && errno != ENOENT)))
-        ok = err_set(e, "%s: cannot remove: %s", exr, strerror(errno));
+        ok = json_write(at.manifest, all, e);
+    if (ok &&
+        ((unlink(at.exr) != 0 && errno != ENOENT) || (unlink(at.next) != 0 && errno != ENOENT)))
+        ok = err_set(e, "%s: cannot remove: %s", at.exr, strerror(errno));
     json_decref(all);
     close(lock);
     return ok;
@@ -254,25 +263,24 @@ static bool read_pair(const char *exr, const json_t *entry, struct moments *out,
 void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out)
 {
-    char exr[PATH_SIZE], next[PATH_SIZE], path[PATH_SIZE], where[PATH_SIZE + 32];
+    struct place at;
+    char where[PATH_SIZE + 32];
     *out = (struct golden){.state = GOLDEN_DAMAGED};
     struct err *e = &out->why;
-    if (!golden_path(exr, golden_dir, scene->name, ref->engine, ".exr", e) ||
-        !golden_path(next, golden_dir, scene->name, ref->engine, ".exr.next", e) ||
-        !golden_path(path, golden_dir, scene->name, "manifest", ".json", e))
+    if (!find_place(&at, golden_dir, scene->name, ref->engine, e))
         return;
-    json_t *all = load_manifest(path, e);
+    json_t *all = load_manifest(at.manifest, e);
     if (all == NULL)
         return;
-    snprintf(where, sizeof where, "%s: %s", path, ref->engine);
+    snprintf(where, sizeof where, "%s: %s", at.manifest, ref->engine);
     json_t *entry = json_object_get(all, ref->engine);
     struct err stale = {0};
     if (!json_is_object(entry)) {
         out->state = GOLDEN_MISSING;
-        err_set(e, "%s: no golden of %s: make it with `make golden`", exr, ref->engine);
+        err_set(e, "%s: no golden of %s: make it with `make golden`", at.exr, ref->engine);
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
-        if (read_pair(image_of(entry, exr, next), entry, &out->m, e)) {
+        if (read_pair(image_of(entry, at.exr, at.next), entry, &out->m, e)) {
             out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
             out->manifest = json_incref(entry);
         }

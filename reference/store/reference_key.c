@@ -1,4 +1,4 @@
-#include "reference/replicates/engine_driver.h"
+#include "reference_render.h"
 
 #include "reference/cycles/export_cycles.h"
 #include "reference/povray/povray_replicate_parts.h"
@@ -39,7 +39,7 @@ static bool hash_cycles(const struct reference_job *job, const char *path, char 
     }
     sha256_text(all, hex[1]);
     return hash_binary("blender", hex[0], e) &&
-           export_cycles(job->scene, job->camera, job->suite->depth, NULL, path, e) &&
+           export_cycles(job->scene, job->camera, job->suite->depth, path, e) &&
            sha256_file(path, hex[2], e);
 }
 

@@ -1,8 +1,7 @@
 /* A reference in parts (reference_render.h). */
-#include "reference/replicates/engine_driver.h"
-#include "reference/base/json_file.h"
+#include "reference_internal.h"
 
-#include "renderer/base/fs.h"
+#include "reference/base/json_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>

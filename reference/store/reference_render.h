@@ -3,24 +3,7 @@
 #ifndef ASSAY_REFERENCE_RENDER_H
 #define ASSAY_REFERENCE_RENDER_H
 
-#include "renderer/image/moments.h"
-#include "reference/suite/suite.h"
-
-struct reference_options {
-    uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
-    /* k of the first of ref->replicates: more of what an earlier call began, or, far from all that
-     * has been used, a fresh start. */
-    int first_replicate;
-    int threads;
-    double timeout_s; /* of one engine process; it is killed (whole process group) after that */
-    const char
-        *work_dir; /* exists; gets one sub-directory per scene and engine, removed on success */
-    const char *share_dir; /* where cycles.py is */
-    /* NULL, or called with each replicate (RGB, 3 floats a pixel) in their order, by the calling
-     * thread; not where the engine's answer is exact. */
-    void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
-    void *on_replicate_ctx;
-};
+#include "reference/replicates/engine_driver.h"
 
 /* *out and *manifest (a new jansson reference) belong to the caller. The manifest holds
  *   scene, scene_sha256, engine, date (UTC), unit, spp_of_unit, width, height, depth, replicates,

@@ -1,4 +1,4 @@
-/* What a scene asks of a renderer, as names that an engine's description lists (ENGINES.md). Triangles
+/* What a scene asks of a renderer, as names that an engine's description lists (tools/docs/formats/engine.md). Triangles
  * and a pinhole camera with square pixels are asked of every engine and have no name. */
 #ifndef ASSAY_FEATURES_H
 #define ASSAY_FEATURES_H

@@ -13,27 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const verdict_names[] = {
-    [VERDICT_EQUIVALENT] = "EQUIVALENT",
-    [VERDICT_DIFFERENT] = "DIFFERENT",
-    [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
-};
-
-const char *verdict_name(enum verdict v)
-{
-    return verdict_names[v];
-}
-
-bool verdict_parse(const char *name, enum verdict *out)
-{
-    for (size_t i = 0; i < sizeof verdict_names / sizeof *verdict_names; i++)
-        if (strcmp(name, verdict_names[i]) == 0) {
-            *out = (enum verdict)i;
-            return true;
-        }
-    return false;
-}
-
 /* "NN_name": a family digit, a digit, an underscore, then a-z, 0-9 and underscores. */
 static bool is_scene_name(const char *s)
 {

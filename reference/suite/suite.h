@@ -111,6 +111,8 @@ bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera 
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);
 const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine);
+/* Closed forms for which truth_noise.h has the noise, too. */
+bool suite_noise_is_known(const char *kind);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
 bool verdict_parse(const char *name, enum verdict *out);

@@ -1,10 +1,35 @@
 #include "suite_json.h"
 
 #include "reference/base/json_node.h"
-#include "reference/truth/truth_noise.h"
 
 #include <stdio.h>
 #include <string.h>
+
+static const char *const verdict_names[] = {
+    [VERDICT_EQUIVALENT] = "EQUIVALENT",
+    [VERDICT_DIFFERENT] = "DIFFERENT",
+    [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
+};
+
+const char *verdict_name(enum verdict v)
+{
+    return verdict_names[v];
+}
+
+bool verdict_parse(const char *name, enum verdict *out)
+{
+    for (size_t i = 0; i < sizeof verdict_names / sizeof *verdict_names; i++)
+        if (strcmp(name, verdict_names[i]) == 0) {
+            *out = (enum verdict)i;
+            return true;
+        }
+    return false;
+}
+
+bool suite_noise_is_known(const char *kind)
+{
+    return strcmp(kind, "rectangle_over_plane") == 0;
+}
 
 /* The keys that every reference has and those of its engine. */
 static bool read_reference(const char *file, const char *engine, json_t *object,
@@ -166,7 +191,7 @@ static bool read_consistency(const struct json_node *n, struct suite_scene *s, s
 static bool check_noise(const char *file, const struct suite_scene *s, struct err *e)
 {
     for (int i = 0; i < s->num_references; i++)
-        if (truth_noise_has(s->reference[i].kind))
+        if (suite_noise_is_known(s->reference[i].kind))
             return true;
     return s->consistency.noise_margin == 0 ||
            err_set(e, "%s: 'consistency.noise_margin' needs a truth whose noise is known", file);

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <gsl/gsl_sort.h>
+
 double truth_fresnel(double cos_i, double n, double *cos_t)
 {
     double sin_t2 = (1 - cos_i * cos_i) / (n * n), c = sin_t2 < 1 ? sqrt(1 - sin_t2) : 0;
@@ -14,7 +16,10 @@ double truth_fresnel(double cos_i, double n, double *cos_t)
     return 0.5 * (s * s + p * p);
 }
 
-double truth_glass_weight(double f, int j, int depth)
+/* Of a slab or any other body in which every internal reflection is like the first: weights of
+ * light that comes out after j = 0, 1, .. internal reflections, j + 2 bounces. F: reflectance on entry.
+ * (1 - F)^2 F^j, or 0 if that is more than `depth` bounces. */
+static double glass_weight(double f, int j, int depth)
 {
     return j + 2 <= depth ? (1 - f) * (1 - f) * pow(f, j) : 0;
 }
@@ -66,12 +71,6 @@ void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, doub
     }
 }
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Slopes between -tan_half and tan_half at which a mirror or the panels' border begins, in any of the
  * arrivals, and the borders of `pixels` pixels; sorted. The caller frees; NULL without memory. */
 static double *breaks(const struct truth_mirror_box *b, int depth, int axis, int pixels, int *num)
@@ -99,7 +98,7 @@ static double *breaks(const struct truth_mirror_box *b, int depth, int axis, int
             }
         }
     }
-    qsort(s, (size_t)n, sizeof *s, ascending);
+    gsl_sort(s, 1, (size_t)n);
     *num = n;
     return s;
 }
@@ -181,7 +180,7 @@ void truth_slab_shares(double cos_i, double n, int depth, double *front, double 
 {
     double f = truth_fresnel(cos_i, n, NULL), share[2] = {0, 0};
     for (int j = 0; j + 2 <= depth; j++)
-        share[j % 2] += truth_glass_weight(f, j, depth);
+        share[j % 2] += glass_weight(f, j, depth);
     *behind = share[0];
     *front = share[1] + (depth >= 1 ? f : 0);
 }
@@ -272,7 +271,7 @@ int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const d
             p[k] = s->centre[k] + s->radius * (cos(polar) * normal[k] + sin(polar) * along[k]);
             w[k] = cos(out) * normal[k] + sin(out) * along[k];
         }
-        double weight = j < 0 ? f : truth_glass_weight(f, j, s->depth);
+        double weight = j < 0 ? f : glass_weight(f, j, s->depth);
         id = 6 * id + add_wall(s, p, w, weight, light);
     }
     return id;

@@ -38,11 +38,6 @@ struct truth_mirror_box {
 void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, double sx, double sy,
                                double light[3]);
 
-/* Of a slab or any other body in which every internal reflection is like the first: weights of
- * light that comes out after j = 0, 1, .. internal reflections, j + 2 bounces. F: reflectance on entry.
- * (1 - F)^2 F^j, or 0 if that is more than `depth` bounces. */
-double truth_glass_weight(double f, int j, int depth);
-
 /* Light from in front of the slab and from behind it, as shares of the radiance seen under cos_i. */
 void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind);
 

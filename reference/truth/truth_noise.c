@@ -4,14 +4,8 @@
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 static const double max_quadrature_error = 1e-3;
-
-bool truth_noise_has(const char *kind)
-{
-    return strcmp(kind, "rectangle_over_plane") == 0;
-}
 
 /* With p_l = d^2/(A cos_l) and p_b = cos_p/pi the two densities of a direction to the rectangle, and
  * w_l = p_l^2/(p_l^2 + p_b^2), w_b = 1 - w_l, a sample is Y_l + Y_b: Y_l = cos_p/pi w_l/p_l at a place
@@ -93,7 +87,7 @@ bool truth_noise(const struct suite_scene *scene, const struct suite_reference *
     double radiance[3], albedo[3];
     struct image_file p = {.width = scene->width, .height = scene->height};
     json_error_t why;
-    if (!truth_noise_has(ref->kind))
+    if (!suite_noise_is_known(ref->kind))
         return err_set(e, "%s: the noise of '%s' has no closed form", scene->name, ref->kind);
     if (json_unpack_ex(ref->values, &why, JSON_STRICT,
                        "{s:[F,F,F], s:[F,F,F], s:F, s:{s:[F,F], s:[F,F]}, s:{s:[F,F], s:[F,F]}}",

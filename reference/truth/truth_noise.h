@@ -27,7 +27,4 @@ void truth_sample_moments(const struct truth_lamp *lamp, double x, double z, int
 bool truth_noise(const struct suite_scene *scene, const struct suite_reference *ref,
                  double **variance, struct err *e) __attribute__((warn_unused_result));
 
-/* The kinds above. */
-bool truth_noise_has(const char *kind);
-
 #endif

@@ -9,17 +9,8 @@ const struct option_words cli_rewrite_render[] = {
     {"--resume", 1}, {"--heatmap", 1}, {"--keep-state", 0},
     {"-q", 0},       {"--quiet", 0},   {0}};
 
-bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
-                          const char *long_name)
-{
-    const struct option_words table[] = {{short_name, 0}, {long_name, 0}, {0}};
-    for (int i = 1; i < argc; i++)
-        if (cli_rewrite_to_drop(table, &argv[i], 1) > 0)
-            return true;
-    return false;
-}
-
-int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left)
+/* How many words from word[0] on to leave out by the table: 0, or an option and its arguments, `left` at most. */
+static int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left)
 {
     for (const struct option_words *o = table; o->name != NULL; o++) {
         size_t n = strlen(o->name);
@@ -29,6 +20,16 @@ int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int
             return 1;
     }
     return 0;
+}
+
+bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
+                          const char *long_name)
+{
+    const struct option_words table[] = {{short_name, 0}, {long_name, 0}, {0}};
+    for (int i = 1; i < argc; i++)
+        if (cli_rewrite_to_drop(table, &argv[i], 1) > 0)
+            return true;
+    return false;
 }
 
 int cli_rewrite_kept(const struct option_words *table, int num, char *const *word, char **kept)

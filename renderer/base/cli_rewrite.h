@@ -16,9 +16,6 @@ extern const struct option_words cli_rewrite_render[];
 bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
                           const char *long_name);
 
-/* How many words from word[0] on to leave out by the table: 0, or an option and its arguments, `left` at most. */
-int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left);
-
 /* Into kept[], with room for num, the words that the table does not leave out; how many. kept may be word. */
 int cli_rewrite_kept(const struct option_words *table, int num, char *const *word, char **kept);
 

@@ -39,49 +39,6 @@ char *shell_quote_join(const char *first, const char *const *word)
     return text;
 }
 
-char *shell_quote_ascii(const char *text)
-{
-    enum { WORST = 9 }; /* of a byte: '$'\012'' */
-    char *ascii = malloc(WORST * strlen(text) + 1), *to = ascii;
-    if (ascii == NULL)
-        return NULL;
-    for (const unsigned char *c = (const unsigned char *)text; *c != '\0';) {
-        if (*c >= ' ' && *c <= '~') {
-            *to++ = (char)*c++;
-            continue;
-        }
-        to = stpcpy(to, "'$'");
-        for (; *c != '\0' && (*c < ' ' || *c > '~'); c++) {
-            *to++ = '\\';
-            *to++ = (char)('0' + (*c >> 6));
-            *to++ = (char)('0' + (*c >> 3 & 7));
-            *to++ = (char)('0' + (*c & 7));
-        }
-        to = stpcpy(to, "''");
-    }
-    *to = '\0';
-    return ascii;
-}
-
-/* $'\012\377', of which *text is behind the quote; false on anything else within it. */
-static bool take_octal(const char **text, char **to)
-{
-    const char *c = *text;
-    for (; *c == '\\'; c += 4) {
-        int byte = 0;
-        for (int i = 1; i <= 3; i++) {
-            if (c[i] < '0' || c[i] > '7')
-                return false;
-            byte = 8 * byte + (c[i] - '0');
-        }
-        if (byte == 0 || byte > 255)
-            return false;
-        *(*to)++ = (char)byte;
-    }
-    *text = c + 1;
-    return *c == '\'';
-}
-
 /* One word from *text on, unquoted to *to with its zero; false on what is not accepted. */
 static bool take_word(const char **text, char **to)
 {
@@ -94,10 +51,6 @@ static bool take_word(const char **text, char **to)
             memcpy(*to, c + 1, (size_t)(end - c - 1));
             *to += end - c - 1;
             c = end + 1;
-        } else if (c[0] == '$' && c[1] == '\'') {
-            c += 2;
-            if (!take_octal(&c, to))
-                return false;
         } else if (*c == '\\' && c[1] != '\0') {
             *(*to)++ = c[1];
             c += 2;

@@ -9,11 +9,7 @@
 char *shell_quote_join(const char *first, const char *const *word)
     __attribute__((warn_unused_result));
 
-/* A text of shell_quote_join() in printable ASCII alone, and so in one line, as a comment or a header takes it: any other byte, which
- * is within quotes there, as $'\012', which bash, ksh and zsh read, and shell_quote_split(). To free(); NULL if out of memory. */
-char *shell_quote_ascii(const char *text) __attribute__((warn_unused_result));
-
-/* The words of a text that shell_quote_join() or shell_quote_ascii() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated
+/* The words of a text that shell_quote_join() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated
  * array, one block of memory, to free(). NULL with a line on anything else that a shell would act on, on an open quote,
  * and out of memory. */
 char **shell_quote_split(const char *text, int *num, struct err *e)

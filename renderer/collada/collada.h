@@ -1,5 +1,5 @@
 /* COLLADA 1.4/1.5 -> scene, through libxml2. What is read, the assignment's profile="CGL" extras
- * and our own profile="ASSAY" extras are listed in renderer/DIALECT.md. Whatever is not understood
+ * and our own profile="ASSAY" extras are listed in renderer/docs/dialect.md. Whatever is not understood
  * is an error that names file and line; nothing is skipped in silence. */
 #ifndef ASSAY_COLLADA_H
 #define ASSAY_COLLADA_H

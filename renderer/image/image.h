@@ -81,16 +81,10 @@ bool image_write_png(const char *path, int width, int height, const uint8_t *rgb
     __attribute__((warn_unused_result));
 bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes, size_t *size,
                       struct err *e) __attribute__((warn_unused_result));
-/* The file with texts (tEXt; iTXt where one has other letters than ASCII) before its pixels. */
+/* The file with texts (tEXt, of ASCII) before its pixels. */
 bool image_write_png_texts(const char *path, int width, int height, const uint8_t *rgb8,
                            const struct image_attr *attr, int num_attrs, struct err *e)
     __attribute__((warn_unused_result));
-/* Reads a PNG as these write it, 8-bit RGB in rows, and its texts. data has the codes as they are, 0 .. 255, as R G B.
- * Fails with a line on any other and on a damaged one. */
-bool image_read_png(const char *path, struct image *out, struct err *e)
-    __attribute__((warn_unused_result));
-/* By its first bytes; false too where it cannot be read. */
-bool image_is_png(const char *path);
 
 /* Text that names the libraries: "OpenEXR 3.1.5, libpng 1.6.39". */
 const char *image_library_version(void);

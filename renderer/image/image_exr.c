@@ -7,7 +7,6 @@
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <openexr.h>
 #include <stdlib.h>
 #include <string.h>

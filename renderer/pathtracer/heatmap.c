@@ -21,8 +21,7 @@ void heatmap_colour(double t, uint8_t rgb8[3])
 }
 
 bool heatmap_write(const char *path, const struct bvh *bvh, const struct camera *c, int x, int y,
-                   int width, int height, const struct image_attr *text, int num_texts,
-                   uint64_t *most, struct err *e)
+                   int width, int height, uint64_t *most, struct err *e)
 {
     bool ok = false;
     size_t pixels = (size_t)width * (size_t)height;
@@ -49,7 +48,7 @@ bool heatmap_write(const char *path, const struct bvh *bvh, const struct camera 
     }
     for (size_t p = 0; p < pixels; p++)
         heatmap_colour(*most > 0 ? (double)visits[p] / (double)*most : 0, bytes + 3 * p);
-    ok = image_write_png_texts(path, width, height, bytes, text, num_texts, e);
+    ok = image_write_png(path, width, height, bytes, e);
 done:
     free(visits);
     free(bytes);

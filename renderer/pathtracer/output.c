@@ -1,6 +1,5 @@
 #include "output.h"
 
-#include "png_metadata.h"
 #include "renderer/base/shell_quote.h"
 #include "renderer/image/tone.h"
 #include "renderer/base/version.h"
@@ -132,26 +131,27 @@ bool output_rows(struct output_writer *w, const struct film *band, struct err *e
     for (size_t i = 0; w->rgb8 != NULL && i < 3 * pixels; i++)
         w->rgb8[at + i] = tone_map(curve, band->m.mean[i]);
     for (size_t p = 0; p < pixels; p++)
-        w->most = band->m.n[p] > w->most ? band->m.n[p] : w->most;
+        w->most = fmax(w->most, band->m.n[p]);
     for (size_t p = 0; w->rates != NULL && p < pixels; p++)
         rate_colour(band->m.n[p] / (w->o->opt->last - w->o->opt->first), w->rates + at + 3 * p);
     w->y += band->m.height;
     return true;
 }
 
-/* A render alone and one in jobs look at other times whether all pixels of an adaptive picture have enough, so it is said how many
- * samples were taken. Of ranges, how they were cut counts. */
-static bool write_png(const struct output_writer *w, const char *path, enum picture_kind kind,
-                      const uint8_t *rgb8, struct err *e)
+/* Nothing in it depends on the file's name, the threads or the jobs: the same pixels are the same file. */
+static bool write_png(const struct output_writer *w, const char *path, const uint8_t *rgb8,
+                      struct err *e)
 {
-    struct png_metadata t;
-    bool cut = kind == PICTURE_IMAGE && w->o->ranges != NULL;
-    uint32_t num = cut || w->most == 0 ? w->num_samples : (uint32_t)w->most;
-    if (!png_metadata_make(w->o, kind, num, &t))
-        return err_set(e, "%s: out of memory", path);
-    bool ok = image_write_png_texts(path, w->width, w->height, rgb8, t.attr, t.num, e);
-    png_metadata_free(&t);
-    return ok;
+    const struct render_id *id = w->o->id;
+    char samples[64];
+    snprintf(samples, sizeof samples, "%d:%.0f", w->o->opt->first, w->o->opt->first + w->most);
+    const struct image_attr text[] = {
+        {"assay:version", assay_version}, {"assay:scene", id->scene},
+        {"assay:settings", id->settings}, {"assay:adaptive", id->adaptive},
+        {"assay:seed", id->seed},         {"assay:cell", id->cell},
+        {"assay:samples", samples}};
+    return image_write_png_texts(path, w->width, w->height, rgb8, text, sizeof text / sizeof *text,
+                                 e);
 }
 
 static bool write_rates(const struct output_writer *w, const char *png, struct err *e)
@@ -160,7 +160,7 @@ static bool write_rates(const struct output_writer *w, const char *png, struct e
     if (strlen(png) + sizeof "_rate" > sizeof path)
         return err_set(e, "%.64s...: path too long", png);
     snprintf(path, sizeof path, "%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
-    return write_png(w, path, PICTURE_RATES, w->rates, e);
+    return write_png(w, path, w->rates, e);
 }
 
 bool output_close(struct output_writer *w, struct err *e)
@@ -173,7 +173,7 @@ bool output_close(struct output_writer *w, struct err *e)
             w->exr[i] = NULL;
             continue;
         }
-        ok = write_png(w, opt->output[i], PICTURE_IMAGE, w->rgb8, e) &&
+        ok = write_png(w, opt->output[i], w->rgb8, e) &&
              (w->rates == NULL || write_rates(w, opt->output[i], e));
     }
     output_abandon(w);

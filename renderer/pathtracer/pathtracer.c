@@ -4,7 +4,6 @@
 #include "heatmap.h"
 #include "options.h"
 #include "output.h"
-#include "png_metadata.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "checkpoint.h"
 
@@ -162,16 +161,11 @@ static bool write_heatmap(const struct output *out, const struct bvh *bvh, const
                           const struct render_options *opt, struct err *e)
 {
     const char *path = out->opt->heatmap;
-    struct png_metadata t;
     uint64_t most;
-    if (!png_metadata_make(out, PICTURE_HEATMAP, 0, &t))
-        return err_set(e, "%s: out of memory", path);
-    bool ok = heatmap_write(path, bvh, c, opt->x, opt->y, opt->width, opt->height, t.attr, t.num,
-                            &most, e);
-    if (ok)
-        printf("%s: at most %llu nodes visited\n", path, (unsigned long long)most);
-    png_metadata_free(&t);
-    return ok;
+    if (!heatmap_write(path, bvh, c, opt->x, opt->y, opt->width, opt->height, &most, e))
+        return false;
+    printf("%s: at most %llu nodes visited\n", path, (unsigned long long)most);
+    return true;
 }
 
 static bool run(struct session *s, struct err *e)

@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Whose conventions a file follows (renderer/DIALECT.md). */
+/* Whose conventions a file follows (renderer/docs/dialect.md). */
 enum dialect {
     DIALECT_AUTO,    /* as an option only: CGL if the file has a profile="CGL" technique */
     DIALECT_COLLADA, /* the file is taken at its word */

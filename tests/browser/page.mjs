@@ -1,11 +1,12 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS [--values-only]: the page of one scene of four pictures, in Debian's chromium.
+// node page.mjs MODULES PAGE RESULTS SHOTS GOING|--values-only: the page of one scene of four pictures, in Debian's chromium, and
+// GOING, one of a run that has not ended.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
 import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { readExr, pixelOf, grey, srgb } from "./files.mjs";
 
-const [modules, pagePath, resultsPath, shots] = process.argv.slice(2);
+const [modules, pagePath, resultsPath, shots, goingPath] = process.argv.slice(2);
 const { chromium } = createRequire(resolve(modules) + "/")("playwright-core");
 const results = JSON.parse(readFileSync(resultsPath, "utf8"));
 const directory = dirname(resultsPath) + "/", claims = results.claims.filter((c) => c.files);
@@ -318,6 +319,20 @@ await paper.evaluate(`window.dispatchEvent(new Event("beforeprint"))`);
 const printed = await blank();
 check("pictures out of sight are drawn for paper, and only then", unseen > 0 && printed === 0, unseen + " and " + printed + " are blank");
 await paper.context().close();
+// The page of a run that goes on gives way to the next one where it was scrolled to, up to the last one, which stays.
+const reloads = /<meta http-equiv="refresh" content="1">/, goes = readFileSync(goingPath, "utf8");
+writeFileSync(shots + "/going.html", goes);
+const going = await open(shots + "/going.html", 1280, 300);
+await going.evaluate("window.scrollTo(0, 250)");
+writeFileSync(shots + "/going.html", goes.replace(reloads, "").replace("The run goes on", "The run is over"));
+const replaced = going.waitForFunction(() => /The run is over/.test(document.querySelector("header").textContent), null, { timeout: 30000 });
+check("a page of a run that goes on reloads itself", reloads.test(goes) && await replaced.then(() => true, () => false));
+await going.evaluate("loadAll()");
+check("it stays where it was scrolled to", await going.evaluate("window.scrollY") === 250, await going.evaluate("window.scrollY"));
+await going.evaluate("window.stays = true");
+await going.waitForTimeout(2500);
+check("the last page does not reload", await going.evaluate("window.stays === true"));
+await going.context().close();
 const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true });
 check("it prints", pdf.length > 20000, pdf.length + " bytes");
 const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>

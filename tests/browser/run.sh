@@ -15,7 +15,20 @@ look() {
 }
 
 "$build/assay" validate -q --out "$tmp/report" --only 31_spot_plane >/dev/null
-look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots"
+
+# While a run goes on its page tells what is judged so far, and nothing else is left of that.
+"$build/assay" validate -q --out "$tmp/going" --page-every 0.1 --only 10_furnace_one --only 12_point_plane --only 31_spot_plane >/dev/null &
+run=$! seen=no
+while [ $seen = no ] && kill -0 $run 2>/dev/null; do
+    cp "$tmp/going/index.html" "$tmp/going.html" 2>/dev/null && grep -q 'The run goes on: [1-9][0-9]* more' "$tmp/going.html" && seen=yes
+    sleep 0.02
+done
+wait $run
+if [ $? = 0 ] && [ $seen = yes ] && ! grep -q 'The run goes on\|http-equiv="refresh"' "$tmp/going/index.html" && [ ! -e "$tmp/going/so_far.json" ]; then
+    echo "ok page: it is there while the run goes on"; else
+    echo "not ok page: it is there while the run goes on: seen $seen, $(ls "$tmp/going" | tr '\n' ' ')"; fi
+
+look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots" "$tmp/going.html"
 
 # Control: with two pictures exchanged nothing but the values is wrong, and that is found.
 sed 's/id="layer-0"/id="layer-x"/; s/id="layer-1"/id="layer-0"/; s/id="layer-x"/id="layer-1"/' "$tmp/report/index.html" >"$tmp/exchanged.html"
@@ -33,18 +46,3 @@ done
 sed -i "s|\"reason\": \".*\"|\"reason\": \"</script><script>alert(2)</script>\", \"notes\": [\"$evil\"]|" "$tmp/evil.json"
 "$build/assay" report -o "$tmp/evil.html" "$tmp/evil.json" >/dev/null
 for page in evil compared; do look names.mjs "$tmp/$page.html"; done
-
-# While a run goes on its page tells what is judged so far, and nothing else is left of that.
-"$build/assay" validate -q --out "$tmp/going" --page-every 0.1 --only 10_furnace_one --only 12_point_plane --only 31_spot_plane >/dev/null &
-run=$! seen=no
-while [ $seen = no ] && kill -0 $run 2>/dev/null; do
-    grep -q 'The run goes on: [1-9][0-9]* more' "$tmp/going/index.html" 2>/dev/null && seen=yes
-    sleep 0.02
-done
-wait $run
-if [ $? = 0 ] && [ $seen = yes ] && ! grep -q 'The run goes on' "$tmp/going/index.html" && [ ! -e "$tmp/going/so_far.json" ]; then
-    echo "ok page: it is there while the run goes on"; else
-    echo "not ok page: it is there while the run goes on: seen $seen, $(ls "$tmp/going" | tr '\n' ' ')"; fi
-
-mkdir "$tmp/watched"
-look watch.mjs "$build/san/assay" "$tmp/watched" "$tmp/compared.html" "$tmp/report/index.html"

@@ -658,8 +658,6 @@ expect "grade: references and no submission" 3 "takes no submissions" "$san_assa
 part tests/end_to_end/grading.sh "$build"
 part tests/end_to_end/autograder.sh "$build"
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
-expect "watch: no directory" 3 "nowhere" "$san_assay" watch "$tmp/nowhere"
-expect "watch: no port" 3 "65535" "$san_assay" watch --port 70000 "$tmp"
 
 # The same bits on any number of threads.
 part tests/end_to_end/threads.sh "$pathtracer"

@@ -1,10 +1,9 @@
-/* Every allocation fails in turn in what keeps the catalogue of known bugs and names one, and in the server of pages. */
+/* Every allocation fails in turn in what keeps the catalogue of known bugs and names one. */
 #include "tests/support/alloc_fail.h"
 
 #include "renderer/base/fs.h"
 #include "tools/diagnose/catalogue.h"
 #include "tools/diagnose/diagnose.h"
-#include "tools/report/watch.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -117,30 +116,10 @@ static void bugs(void **state)
     alloc_fail_each("diagnose", ALLOC_ALL, name_bug, &c);
 }
 
-static bool start_watch(void *ctx, struct err *e)
-{
-    (void)ctx;
-    int port = 0;
-    struct watch *w = NULL;
-    bool ok = watch_start(dir, &port, &w, e);
-    alloc_fail_off();
-    assert_int_equal(ok, port > 0);
-    if (ok)
-        watch_stop(w);
-    return ok;
-}
-
-static void watching(void **state)
-{
-    (void)state;
-    alloc_fail_each("watch_start", ALLOC_OURS, start_watch, NULL);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_teardown(bugs, alloc_fail_tell),
-        cmocka_unit_test_teardown(watching, alloc_fail_tell),
     };
     return cmocka_run_group_tests(tests, make_place, remove_place);
 }

@@ -80,13 +80,12 @@ static bool export_scene(void *ctx, struct err *e)
     struct export *x = ctx;
     struct out_file o = {.f = NULL};
     const struct povray_variant plain = povray_variant_plain();
-    const struct export_origin origin = {"1", "assay export", "assay export -o x", "12", NULL};
     bool stream = x->format == FORMAT_PBRT || x->format == FORMAT_POVRAY;
     alloc_fail_off();
     assert_true(!stream || out_open(&o, out, e));
     alloc_fail_on();
-    bool ok = x->format == FORMAT_MITSUBA  ? export_mitsuba(&x->s, &x->c, 3, &origin, out, e)
-              : x->format == FORMAT_CYCLES ? export_cycles(&x->s, &x->c, 3, &origin, out, e)
+    bool ok = x->format == FORMAT_MITSUBA  ? export_mitsuba(&x->s, &x->c, 3, out, e)
+              : x->format == FORMAT_CYCLES ? export_cycles(&x->s, &x->c, 3, out, e)
               : x->format == FORMAT_PBRT   ? export_pbrt(&x->s, &x->c, 3, o.f, e)
                                            : export_povray(&x->s, &x->c, 3, &plain, o.f, e);
     alloc_fail_off();

@@ -64,10 +64,7 @@ expect "reference: another seed" 0 "3 x replicate" "${reference[@]}" -o "$tmp/ne
 right "reference: another seed, other bits" test "$(sum "$image")" != "$first"
 expect "reference: what is stored is up to date" 0 "store/13_square_patch/cycles.exr: up to date" "${reference[@]}" -o "$tmp/new" --golden "$tmp/store"
 right "reference: an older candidate goes" test ! -e "$image"
-expect "import-check: help" 0 "usage: assay import-check" "$assay" import-check --help
-expect "import-check: unknown scene" 3 "no scene 'x'" "$assay" import-check --work "$tmp/work" --only x
-expect "import-check: an argument" 3 "takes no argument 'x'" "$assay" import-check x
-expect "import-check: no program" 3 "blender" env PATH=/nowhere "$assay" import-check --work "$tmp/work" --suite "$tmp/suite"
+expect "validate: no program" 3 "blender: no such program" env PATH=/nowhere "$assay" validate -q --live --only 13_square_patch -o "$tmp/live"
 
 # A validation that looks again where 16 samples do not decide: what was rendered before counts.
 expect "validate: looks" 0 "33_sphere_light" "$assay" validate -q --budget 5m --only 33_sphere_light --out "$tmp/report"

@@ -1,4 +1,4 @@
-/* Descriptions of other renderers (reference/ENGINES.md). */
+/* Descriptions of other renderers (tools/docs/formats/engine.md). */
 #include "reference/external/engine_description.h"
 #include "fuzz.h"
 

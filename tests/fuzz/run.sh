@@ -27,7 +27,6 @@ fixed_executions() {
     collada) echo 20000 ;;
     picture) echo 4000 ;;
     plan) echo 10000 ;;
-    origin) echo 15000 ;;
     rubric) echo 30000 ;;
     results) echo 50000 ;;
     moments) echo 200000 ;;

@@ -439,7 +439,7 @@ int main(int argc, char **argv)
     if (ok)
         printf(
             "# How often a bug is named rightly\n\nWritten by `make diagnose-rates` (`tests/mutants/diagnose_rates.c`); "
-            "%d bugs, %d views. How: \"How a bug is named\" in tools/README.md.\n",
+            "%d bugs, %d views. How: tools/docs/background/diagnosis.md.\n",
             r.c.num_bugs, r.c.num_views);
     if (ok && (*part == '\0' || strcmp(part, "same") == 0))
         ok = rate_bugs(&r, 100, 100, 74, &e);

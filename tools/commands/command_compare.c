@@ -70,7 +70,7 @@ static const char help_head[] =
     "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (--spp-a, --spp-b)\n"
     "  a picture without moments: EXR, HDR, PFM; its noise is then told by its neighbours\n"
     "  a PNG of 8 or 16 bits (--curve)\n"
-    "What had to be assumed is printed with the verdict. Procedure: tools/README.md.\n";
+    "What had to be assumed is printed with the verdict. Procedure: tools/docs/background/verdict.md.\n";
 
 struct settings {
     struct compare_job job;

@@ -142,7 +142,7 @@ static bool is_current(const struct settings *s, const struct suite_scene *scene
 }
 
 /* What the suite no longer has is not for approval. */
-static bool count_orphans(const char *dir, const struct suite *suite, bool print, size_t *num,
+static bool print_orphans(const char *dir, const struct suite *suite, size_t *num,
                           const char **first, json_t **names, struct err *e)
 {
     if (!golden_orphans(dir, suite, names, e))
@@ -153,8 +153,7 @@ static bool count_orphans(const char *dir, const struct suite *suite, bool print
     *first = *num > 0 ? json_object_iter_key(json_object_iter(*names)) : "";
     json_object_foreach(*names, name, value)
     {
-        if (print)
-            printf("%-8s %s/%s: not in the suite\n", "orphan", dir, name);
+        printf("%-8s %s/%s: not in the suite\n", "orphan", dir, name);
     }
     return true;
 }
@@ -176,7 +175,7 @@ static int status(const struct settings *s, const struct suite *suite, struct er
     }
     json_t *names;
     const char *first;
-    if (!count_orphans(s->opt.golden_dir, suite, true, &orphans, &first, &names, e))
+    if (!print_orphans(s->opt.golden_dir, suite, &orphans, &first, &names, e))
         return EXIT_NOT_JUDGED;
     json_decref(names);
     if (bad + orphans == 0)
@@ -227,7 +226,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     size_t orphans = 0;
     struct err why = {0};
     if (s->num_names == 0 &&
-        !count_orphans(s->opt.from_dir, suite, true, &orphans, &first, &names, &why) &&
+        !print_orphans(s->opt.from_dir, suite, &orphans, &first, &names, &why) &&
         count[APPROVE_IMPOSSIBLE]++ == 0)
         *e = why;
     printf(

@@ -1,180 +1,23 @@
-#include "renderer/base/cli.h"
-#include "renderer/base/fs.h"
-#include "tools/gradebook/grade_batch.h"
-#include "tools/gradebook/same_noise.h"
 #include "tools/gradebook/grade_options.h"
 #include "tools/results/results.h"
 #include "commands.h"
 
-#include <limits.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-static bool print_mistakes(const struct rubric *r, const struct rubric_mistakes *m, struct err *e)
-{
-    int kept = (int)(sizeof m->at / sizeof *m->at);
-    for (int i = 0; i < m->num && i < kept; i++)
-        printf("%s:%d: %s\n", r->path, m->at[i].line, m->at[i].text);
-    if (m->num == 1)
-        return err_set(e, "%s:%d: %s", r->path, m->at[0].line, m->at[0].text);
-    return m->num == 0 || err_set(e, "%s: %d mistakes, the first in line %d: %s", r->path, m->num,
-                                  m->at[0].line, m->at[0].text);
-}
-
-struct progress {
-    int num;
-    bool quiet;
-};
-
-static void tell(void *ctx, int num, const char *path, const json_t *grade)
-{
-    const struct progress *p = ctx;
-    const char *trouble = json_string_value(json_object_get(grade, "trouble")),
-               *wrong = json_string_value(json_object_get(grade, "wrong"));
-    (void)path;
-    if (p->quiet)
-        return;
-    printf("[%d/%d] %-32s ", num, p->num, json_string_value(json_object_get(grade, "id")));
-    if (trouble != NULL)
-        printf("NOT GRADED: %s\n", trouble);
-    else
-        printf("%6.2f of %g%s%s\n", member_number(grade, "points"), member_number(grade, "of"),
-               wrong != NULL ? "  " : "", wrong != NULL ? wrong : "");
-    fflush(stdout);
-}
-
-static bool needs_staff(const json_t *grades)
-{
-    size_t i, k;
-    json_t *g, *c;
-    json_array_foreach(grades, i, g)
-    {
-        if (json_is_string(json_object_get(g, "trouble")))
-            return true;
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
-            if (!json_is_true(json_object_get(c, "judged")))
-                return true;
-        }
-    }
-    return false;
-}
-
-static int run_batch(const struct grade_settings *s, const struct rubric *r,
-                     const struct suite *suite, const struct answer_key *answers,
-                     const char *const *word, const struct sandbox *box, struct err *e)
-{
-    char stage[sizeof box->dir.path + 16], views[sizeof stage];
-    struct progress p = {s->num, s->quiet};
-    struct grade_diagnosis diagnosis = {0};
-    struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
-    struct grade_job job = {.rubric = r,
-                            .answers = answers,
-                            .sandbox = box,
-                            .stage = stage,
-                            .out = s->out,
-                            .path = s->submission,
-                            .word = word,
-                            .num = s->num,
-                            .jobs = s->jobs == 0 ? cli_processors() : s->jobs,
-                            .threads = s->threads,
-                            .alpha = s->alpha,
-                            .seed = s->seed,
-                            .again = s->again,
-                            .done = tell,
-                            .ctx = &p};
-    json_t *grades = NULL;
-    int code = EXIT_NOT_JUDGED;
-    snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
-    snprintf(views, sizeof views, "%s/views", box->dir.path);
-    bool ok = (bugs != NULL || err_set(e, "out of memory")) && submission_stage(r, stage, e);
-    if (ok && r->bugs[0] != '\0') {
-        ok = rubric_bugs_open(r, answers, bugs, e);
-        job.bugs = bugs;
-    }
-    if (ok && r->diagnose[0] != '\0') {
-        ok = grade_diagnose_open(r, s->catalogue, suite, views, &diagnosis, e);
-        job.diagnosis = &diagnosis;
-    }
-    ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
-    if (ok && grade_write(s->out, grades, e))
-        code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
-    json_decref(grades);
-    grade_diagnose_close(&diagnosis);
-    if (bugs != NULL)
-        rubric_bugs_close(bugs);
-    free(bugs);
-    return code;
-}
-
-static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
-                 int argc, char **argv, struct err *e)
-{
-    char cache[4400], pathtracer[PATH_MAX];
-    struct answer_key *answers = calloc(1, sizeof *answers);
-    struct sandbox box;
-    int code = EXIT_NOT_JUDGED;
-    if (answers == NULL) {
-        err_set(e, "out of memory");
-        return code;
-    }
-    if (realpath(s->pathtracer, pathtracer) == NULL)
-        snprintf(pathtracer, sizeof pathtracer, "%s", s->pathtracer);
-    snprintf(cache, sizeof cache, "%.4000s%s", s->references != NULL ? s->references : s->out,
-             s->references != NULL ? "" : "/.references");
-    const struct answer_options opt = {.golden_dir = s->golden,
-                                       .pathtracer = pathtracer,
-                                       .cache = cache,
-                                       .threads = cli_processors(),
-                                       .timeout_s = 3600};
-    if (s->prepare) {
-        code = fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
-        if (code == 0 && !s->quiet)
-            printf("references of %s: %s\n", r->path, cache);
-    } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
-                            &box, e)) {
-        int num;
-        char **word = grade_options_words(argc, argv, s, &num);
-        bool ok = word != NULL || err_set(e, "out of memory");
-        if (ok && fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
-            code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
-        free(word);
-        sandbox_close(&box);
-    } else if (!s->unsafe) {
-        err_prefix(e, "programs are not run (--unsafe-no-sandbox)");
-    }
-    answer_key_free(answers);
-    free(answers);
-    return code;
-}
 
 int command_grade(int argc, char **argv, struct err *e)
 {
     struct grade_paths at;
     struct grade_settings s = grade_options_default(argc, &at);
-    struct suite suite = {0};
-    struct rubric *r = calloc(1, sizeof *r);
-    struct rubric_mistakes m;
     int code = EXIT_NOT_JUDGED;
-    if (r == NULL || s.submission == NULL) {
+    if (s.submission == NULL) {
         err_set(e, "out of memory");
     } else if (grade_options_parse(argc, argv, &s, e)) {
-        if (s.help) {
+        if (s.help)
             grade_options_help();
-            code = 0;
-        } else if (s.slurm) {
-            code = slurm_command(NULL, argc, argv, NULL, e);
-        } else if (suite_load(s.suite, &suite, e) && rubric_read(s.rubric, &suite, r, &m, e) &&
-                   print_mistakes(r, &m, e)) {
-            if (s.only_check)
-                printf("%s: %d checks in %d parts, %g points\n", r->path, r->num_checks,
-                       r->num_parts, rubric_points(r));
-            code = s.only_check ? 0 : grade(&s, r, &suite, argc, argv, e);
-        }
+        code = s.help    ? 0
+               : s.slurm ? slurm_command(NULL, argc, argv, NULL, e)
+                         : grade_command(&s, argc, argv, e);
     }
-    suite_free(&suite);
-    free(r);
     free(s.submission);
     return code;
 }

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { OPT_DIR, OPT_PARTS, OPT_RANGES, OPT_BY, OPT_HELP };
 

@@ -5,8 +5,6 @@
 #include "commands.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
                      struct err *e)
@@ -53,32 +51,20 @@ static bool make_pictures(const struct reference_command *c, struct err *e)
            reference_render_part(one.scene, one.ref, &c->opt, c->first, c->last, c->out, e);
 }
 
-/* Also as `golden render`. */
-static int on_slurm(int argc, char **argv, struct err *e)
-{
-    char name[] = "reference";
-    char **word = calloc((size_t)argc + 1, sizeof *word);
-    if (word == NULL) {
-        err_set(e, "out of memory");
-        return EXIT_NOT_JUDGED;
-    }
-    memcpy(word, argv, (size_t)argc * sizeof *word);
-    word[0] = name;
-    int code = slurm_command(NULL, argc, word, NULL, e);
-    free(word);
-    return code;
-}
-
 int command_reference(int argc, char **argv, struct err *e)
 {
     struct reference_command c;
     int code = EXIT_NOT_JUDGED;
     bool ok = reference_options_read(argc, argv, &c, e);
-    if (ok && c.slurm && !c.help)
-        code = on_slurm(argc, argv, e);
-    else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
-                                          : reference_options_each(&c, make_one, &c, e))))
+    if (ok && c.slurm && !c.help) {
+        char name[] = "reference", *word = argv[0]; /* or "render", of `golden render` */
+        argv[0] = name;
+        code = slurm_command(NULL, argc, argv, NULL, e);
+        argv[0] = word;
+    } else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
+                                            : reference_options_each(&c, make_one, &c, e)))) {
         code = 0;
+    }
     reference_options_free(&c);
     return code;
 }

@@ -91,6 +91,9 @@ static bool print_matrix(const char *path, struct err *e)
     return true;
 }
 
+/* Family-wise, over all claims of the page. */
+static const double history_alpha = 1e-3;
+
 static int write_history(const char *dir, const char *out, struct err *e)
 {
     struct history h;

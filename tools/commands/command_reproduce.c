@@ -6,13 +6,16 @@
 
 #include <string.h>
 
-enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_HELP };
+enum { OPT_SCENE, OPT_PATHTRACER, OPT_KEEP, OPT_THREADS, OPT_RUN_FOREIGN, OPT_HELP };
 
 static const struct cli_option options[] = {
     [OPT_SCENE] = {0, "scene", 1, "FILE", "where the scene is now (as the file says)"},
     [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the renderer (the one beside this program)"},
     [OPT_KEEP] = {0, "keep", 1, "FILE", "write what was made again"},
     [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
+    [OPT_RUN_FOREIGN] = {0, "run-foreign", 0, "",
+                         "run other programs than ours that results.json names, too:\n"
+                         "--pathtracer, --engine FILE, --share; refused otherwise"},
     [OPT_HELP] = {'h', "help", 0, "", "print this"},
     {0}};
 
@@ -20,14 +23,10 @@ static void print_help(void)
 {
     puts(
         "usage: assay reproduce [options] FILE\n\n"
-        "Makes an output again by what it says of its origin, and compares.\n"
-        "  a picture of pathtracer or of `assay merge` (EXR): all values bit by bit\n"
-        "  a PNG of pathtracer: image, sampling rates, heat map: all 8-bit codes\n"
+        "Makes a file again by what it says of its origin, and compares.\n"
+        "  a render of pathtracer or of `assay merge` (EXR): all values bit by bit\n"
         "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine; it must be installed\n"
-        "  a scene of `assay export` (.json, .pov, .xml, .pbrt): all bytes, those of the files beside it too\n"
-        "  results.json of validate, compare, converge, grades.json and ID/grade.json: all values but dates and times\n"
-        "  a page or junit.xml of these, a history, beside its results: all bytes\n"
-        "  grades.csv, grades.tap, junit.xml and pages of a class and its submissions, beside the grades: all bytes\n"
+        "  results.json of validate, compare and converge: all values but dates and times\n"
         "Exit code: 0 the same, 1 not, 3 cannot be made again (one line on stderr).\n");
     cli_print_options(stdout, options);
 }
@@ -50,6 +49,8 @@ int command_reproduce(int argc, char **argv, struct err *e)
             opt.pathtracer = c.value[0];
         } else if (i == OPT_KEEP) {
             opt.keep = c.value[0];
+        } else if (i == OPT_RUN_FOREIGN) {
+            opt.run_foreign = true;
         } else if (i == OPT_THREADS) {
             ok = cli_int("--threads", c.value[0], 0, 1024, &opt.threads, e);
         } else {
@@ -68,12 +69,11 @@ int command_reproduce(int argc, char **argv, struct err *e)
         return EXIT_NOT_JUDGED;
     err_hide_controls(r.command); /* these are texts of the file */
     err_hide_controls(r.made_by);
+    err_hide_controls(r.first);
+    err_hide_controls(r.note);
     bool same = r.num_different == 0;
     if (same)
-        printf("%s: the same bits in all %.0f %s\n", path, r.num_values,
-               r.is_text ? "bytes" : "values");
-    else if (r.is_text)
-        printf("%s: the bytes DIFFER, first %s\n", path, r.first);
+        printf("%s: the same bits in all %.0f values\n", path, r.num_values);
     else
         printf("%s: %.0f of %.0f values DIFFER, first %s\n", path, r.num_different, r.num_values,
                r.first);

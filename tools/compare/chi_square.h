@@ -1,4 +1,4 @@
-/* Many small differences together: the sum of squares over disjoint regions (tools/README.md, "Dense").
+/* Many small differences together: the sum of squares over disjoint regions (tools/docs/background/verdict.md, "Dense").
  * Used by compare.c only. */
 #ifndef ASSAY_CHI_SQUARE_H
 #define ASSAY_CHI_SQUARE_H

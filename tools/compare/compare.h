@@ -1,5 +1,5 @@
 /* Two moments images -> a verdict with its error rates and what it could have missed.
- * Procedure, formulas, sources and limits: tools/README.md. */
+ * Procedure, formulas, sources and limits: tools/docs/background/verdict.md. */
 #ifndef ASSAY_COMPARE_H
 #define ASSAY_COMPARE_H
 

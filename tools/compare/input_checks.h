@@ -1,4 +1,5 @@
-/* What must hold before anything is compared (tools/README.md, "Hygiene"). Used by compare.c and two_stage.c. */
+/* What must hold before anything is compared (tools/docs/background/verdict.md, "Hygiene").
+ * Used by compare.c and two_stage.c. */
 #ifndef ASSAY_INPUT_CHECKS_H
 #define ASSAY_INPUT_CHECKS_H
 

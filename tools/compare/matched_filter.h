@@ -1,4 +1,4 @@
-/* Tests against known kinds of error (tools/README.md, "Directed"). Used by compare.c only. */
+/* Tests against known kinds of error (tools/docs/background/verdict.md, "Directed"). Used by compare.c only. */
 #ifndef ASSAY_MATCHED_FILTER_H
 #define ASSAY_MATCHED_FILTER_H
 

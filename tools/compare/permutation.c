@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_sort.h>
+
 enum { MOST_LABELLINGS = 200000 };
 static const double regression_mdb = 0.05; /* as in verdict.c */
 static const double tie = 1e-9;            /* relative: the same sum in another order is the same */
@@ -96,12 +98,6 @@ static void random_subset(int *row, int num_a, int rows, uint64_t *state)
     }
 }
 
-static int upwards(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* t of a sum of standardised rows: difference of means s (1/na + 1/nb), within groups a sum of
  * squares of 1 - s^2 (1/na + 1/nb). */
 static double t_of_sum(const struct permutation_table *t, double s)
@@ -135,7 +131,7 @@ static bool run_labellings(const struct permutation_table *t, struct permutation
             assert(ok);
             (*largest)[i] = largest_sum(t, row, sum, NULL);
         }
-        qsort(*largest, (size_t)out->num_labellings, sizeof **largest, upwards);
+        gsl_sort(*largest, 1, (size_t)out->num_labellings);
     } else {
         err_set(e, "out of memory for %d labellings", out->num_labellings);
     }
@@ -254,7 +250,6 @@ bool permutation_test(const struct replicate_dir *a, const struct replicate_dir 
         out->p = (double)count_reaching(largest, n, observed) / n;
         describe(&t, where, out);
         out->t = t_of_sum(&t, copysign(observed, t.mean[0][where] - t.mean[1][where]));
-        out->image_difference = t.mean[0][image] / t.mean[1][image] - 1;
         out->mdb = most > 0 && out->smallest_p <= opt->alpha ? image_mdb(&t, largest[n - most])
                                                              : region_mdb_none;
         decide(opt, a->num, b->num, a->width, a->height, out);

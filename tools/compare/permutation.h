@@ -32,9 +32,8 @@ struct permutation {
     /* Where |t| is largest: */
     int x, y, width, height, channel; /* 0..2 RGB, 3 luminance */
     double t;
-    double difference;       /* of the means there, over that of B */
-    double image_difference; /* luminance of the image, over that of B */
-    double mdb;              /* relative, luminance of the image: found with about 95 % */
+    double difference; /* of the means there, over that of B */
+    double mdb;        /* relative, luminance of the image: found with about 95 % */
 };
 
 /* Fails with a line if sizes differ, a picture is in both, none varies, or B is black. */

@@ -1,4 +1,4 @@
-/* The test of one region of a claim (tools/README.md, "One region"). Used by compare.c only. */
+/* The test of one region of a claim (tools/docs/background/verdict.md, "One region"). Used by compare.c only. */
 #ifndef ASSAY_REGION_H
 #define ASSAY_REGION_H
 

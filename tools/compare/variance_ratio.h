@@ -1,4 +1,4 @@
-/* What the moments of both sides say about the noise itself (tools/README.md, "Noise"). Used by compare.c
+/* What the moments of both sides say about the noise itself (tools/docs/background/verdict.md, "Noise"). Used by compare.c
  * and input_checks.c only. */
 #ifndef ASSAY_VARIANCE_RATIO_H
 #define ASSAY_VARIANCE_RATIO_H

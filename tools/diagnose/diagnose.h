@@ -1,5 +1,4 @@
-/* Which known bug explains these pictures? Method, formulas and limits: tools/README.md, "How a bug is
- * named". */
+/* Which known bug explains these pictures? Method, formulas and limits: tools/docs/background/diagnosis.md. */
 #ifndef ASSAY_DIAGNOSE_H
 #define ASSAY_DIAGNOSE_H
 

@@ -3,7 +3,6 @@
 #include "diagnose_render.h"
 #include "tools/results/results.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -7,12 +7,11 @@
 #include "renderer/base/cli.h"
 #include "renderer/collada/collada.h"
 #include "renderer/base/fs.h"
-#include "renderer/base/sha256.h"
-#include "renderer/base/shell_quote.h"
-#include "renderer/base/version.h"
 
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
+
+enum { EXPORT_CYCLES, EXPORT_POVRAY, EXPORT_MITSUBA, EXPORT_PBRT, EXPORT_UNKNOWN };
 
 enum option {
     OPT_OUT,
@@ -87,62 +86,23 @@ bool export_job_parse(int argc, char **argv, struct export_job *s, struct err *e
         }
     }
     engine_of_ending(s);
-    return ok;
+    if (!ok)
+        return false;
+    if (s->scene == NULL || s->out == NULL)
+        return err_set(e, "export needs a scene and --out (see --help)");
+    return s->engine != EXPORT_UNKNOWN ||
+           err_set(e, "--out: '%s' ends in neither of .json, .pov, .xml and .pbrt; give --engine",
+                   s->out);
 }
 
-enum { NUMBER = 32 };
-
-/* As few digits as are needed to read the same number back. */
-static const char *shortest(double x, char text[NUMBER])
-{
-    enum { MOST_DIGITS = 17 };
-    for (int digits = 1; digits <= MOST_DIGITS; digits++) {
-        snprintf(text, NUMBER, "%.*g", digits, x);
-        if (strtod(text, NULL) == x)
-            break;
-    }
-    return text;
-}
-
-char *export_job_command(const struct export_job *s, const char *name)
-{
-    char width[NUMBER], height[NUMBER], depth[NUMBER], lens[NUMBER], focus[NUMBER];
-    const char *word[24] = {"assay", "export", "--engine", engine_names[s->engine],
-                            "-r",    width,    height,     "-m",
-                            depth,   "-b",     lens,       "-d",
-                            focus};
-    int n = 13;
-    snprintf(width, sizeof width, "%d", s->width);
-    snprintf(height, sizeof height, "%d", s->height);
-    snprintf(depth, sizeof depth, "%d", s->depth);
-    shortest(s->lens_radius, lens);
-    shortest(s->focal_distance, focus);
-    if (s->environment != NULL) {
-        word[n++] = "-e";
-        word[n++] = s->environment;
-    }
-    if (name != NULL) {
-        word[n++] = "-o";
-        word[n++] = name;
-    }
-    if (s->scene[0] == '-')
-        word[n++] = "--";
-    word[n] = s->scene;
-    char *text = shell_quote_join(NULL, word),
-         *ascii = text != NULL ? shell_quote_ascii(text) : NULL;
-    free(text);
-    return ascii;
-}
-
-static bool write_text(const struct export_job *s, const struct export_origin *origin,
-                       const struct scene *scene, const struct camera *camera, struct err *e)
+static bool write_text(const struct export_job *s, const struct scene *scene,
+                       const struct camera *camera, struct err *e)
 {
     struct out_file out;
     struct povray_variant plain = povray_variant_plain();
     bool povray = s->engine == EXPORT_POVRAY;
     if (!out_open(&out, s->out, e))
         return false;
-    export_origin_write(out.f, povray ? COMMENT_POVRAY : COMMENT_PBRT, origin, false);
     if (povray ? !export_povray(scene, camera, s->depth, &plain, out.f, e)
                : !export_pbrt(scene, camera, s->depth, out.f, e)) {
         out_abandon(&out);
@@ -151,35 +111,14 @@ static bool write_text(const struct export_job *s, const struct export_origin *o
     return out_commit(&out, e);
 }
 
-static bool write_scene(const struct export_job *s, const struct export_origin *origin,
-                        const struct scene *scene, const struct camera *camera, struct err *e)
-{
-    if (s->engine == EXPORT_CYCLES)
-        return export_cycles(scene, camera, s->depth, origin, s->out, e);
-    if (s->engine == EXPORT_MITSUBA)
-        return export_mitsuba(scene, camera, s->depth, origin, s->out, e);
-    return write_text(s, origin, scene, camera, e);
-}
-
-static bool with_origin(const struct export_job *s, const struct scene *scene,
+static bool write_scene(const struct export_job *s, const struct scene *scene,
                         const struct camera *camera, struct err *e)
 {
-    char hash[65], environment[65];
-    if (!sha256_file(s->scene, hash, e) ||
-        (s->environment != NULL && !sha256_file(s->environment, environment, e)))
-        return false;
-    char *command = export_job_command(s, NULL), *named = export_job_command(s, fs_base(s->out));
-    const struct export_origin origin = {.version = s->version != NULL ? s->version : assay_version,
-                                         .command = s->command != NULL ? s->command : command,
-                                         .named = s->command != NULL ? s->command : named,
-                                         .scene = hash,
-                                         .environment =
-                                             s->environment != NULL ? environment : NULL};
-    bool ok = ((command != NULL && named != NULL) || err_set(e, "out of memory")) &&
-              write_scene(s, &origin, scene, camera, e);
-    free(command);
-    free(named);
-    return ok;
+    if (s->engine == EXPORT_CYCLES)
+        return export_cycles(scene, camera, s->depth, s->out, e);
+    if (s->engine == EXPORT_MITSUBA)
+        return export_mitsuba(scene, camera, s->depth, s->out, e);
+    return write_text(s, scene, camera, e);
 }
 
 bool export_job_run(const struct export_job *s, struct err *e)
@@ -193,7 +132,7 @@ bool export_job_run(const struct export_job *s, struct err *e)
     if (ok) {
         camera.lens_radius = (float)s->lens_radius;
         camera.focal_distance = (float)s->focal_distance;
-        ok = with_origin(s, &scene, &camera, e);
+        ok = write_scene(s, &scene, &camera, e);
     }
     scene_free(&scene);
     return ok;

@@ -3,7 +3,6 @@
 #include "reference/base/process.h"
 #include "reference/store/reference_render.h"
 #include "reference/truth/truth.h"
-#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/version.h"
 

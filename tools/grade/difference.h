@@ -35,7 +35,7 @@ struct difference {
  * from the residuals, times 4 for r that overlap (noise_estimate.h) and 3 for channels that one lamp makes alike, gives
  * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide.
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
- * a tile (tools/README.md, "EQUIVALENT").
+ * a tile (tools/docs/background/verdict.md, "EQUIVALENT").
  *
  * Differences are relative to B's mean in the same place, but to no less than a quarter of the picture's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails

@@ -13,8 +13,6 @@
 #include "tools/diagnose/diagnose.h"
 #include "grade_checks.h"
 
-#include <jansson.h>
-
 struct rubric_bugs {
     struct catalogue catalogue;
     int view[RUBRIC_SETS][RUBRIC_PICTURES]; /* -1: none */

@@ -17,12 +17,6 @@ const char *const submission_kind_name[] = {"images", "program", "source"};
 static const char *const endings[] = {".png", ".exr", ".pfm", ".hdr"};
 enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
 
-static const char *last_part(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 /* Copies a file of ours; everybody may read it. */
 static bool copy_file(const char *from, const char *to, struct err *e)
 {
@@ -43,7 +37,7 @@ static bool copy_file(const char *from, const char *to, struct err *e)
 static bool stage_file(const char *from, const char *dir, struct err *e)
 {
     char to[2 * MAX_PATH];
-    snprintf(to, sizeof to, "%.4000s/%.4000s", dir, last_part(from));
+    snprintf(to, sizeof to, "%.4000s/%.4000s", dir, fs_base(from));
     return copy_file(from, to, e);
 }
 
@@ -105,7 +99,7 @@ static void add_scene_options(struct words *w, const struct rubric_picture *p)
     const struct suite_scene *s = p->suite;
     if (p->environment[0] != '\0' || (s != NULL && s->environment[0] != '\0')) {
         snprintf(text, sizeof text, "-e scene/%.500s",
-                 p->environment[0] != '\0' ? p->environment : last_part(s->environment));
+                 p->environment[0] != '\0' ? p->environment : fs_base(s->environment));
         add_words(w, text);
     }
     if (s != NULL && s->lens_radius > 0) {
@@ -121,7 +115,7 @@ bool submission_command(const struct rubric *r, const struct rubric_picture *p, 
     struct words w = {.text = text, .size = size, .argv = argv, .most = most};
     char scene[300], number[7][24];
     snprintf(scene, sizeof scene, "scene/%.280s",
-             p->suite != NULL ? last_part(p->suite->dae) : p->scene);
+             p->suite != NULL ? fs_base(p->suite->dae) : p->scene);
     snprintf(number[0], sizeof *number, "%d", p->width);
     snprintf(number[1], sizeof *number, "%d", p->height);
     snprintf(number[2], sizeof *number, "%d", p->spp);
@@ -233,7 +227,7 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
     snprintf(out->path, sizeof out->path, "%s", path);
     for (size_t n = strlen(out->path); n > 1 && out->path[n - 1] == '/';)
         out->path[--n] = '\0';
-    snprintf(out->id, sizeof out->id, "%.127s", last_part(out->path));
+    snprintf(out->id, sizeof out->id, "%.127s", fs_base(out->path));
     if (stat(out->path, &st) != 0)
         return err_set(e, "%s: %s", path, strerror(errno));
     if (!fs_make_dirs(work, e))
@@ -316,10 +310,10 @@ static bool take_image(const struct rubric *r, const struct submission *s, const
         return true;
     }
     if (stat(from, &st) != 0 || (size_t)st.st_size > r->limit.file) {
-        snprintf(why, size, "%s is larger than %zu MiB", last_part(from), r->limit.file >> 20);
+        snprintf(why, size, "%s is larger than %zu MiB", fs_base(from), r->limit.file >> 20);
         return true;
     }
-    snprintf(to, MAX_PATH, "%.4000s/%.300s", out_dir, last_part(from));
+    snprintf(to, MAX_PATH, "%.4000s/%.300s", out_dir, fs_base(from));
     return copy_file(from, to, e);
 }
 

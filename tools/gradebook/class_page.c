@@ -279,9 +279,7 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
         return err_set(e, "out of memory for the page of the class");
     }
     fputs(student_page_head, f);
-    fputs("<meta name=\"generator\" content=\"" GRADE_CLASS_ORIGIN
-          "\">\n<title>Grades</title>\n<h1>",
-          f);
+    fputs("<title>Grades</title>\n<h1>", f);
     html_text(f, student_page_text(json_array_get(grades, 0), "rubric"));
     fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
     histogram(f, grades);

@@ -6,13 +6,11 @@
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
 
-#include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { MAX_PATH = 4400 };
 

@@ -49,18 +49,10 @@ struct grade_job {
 bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e)
     __attribute__((warn_unused_result));
 
-/* What is made of the grades, by itself and without the submissions: of the class, OUT/grades.csv, junit.xml, grades.tap and
- * index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, and index.html. The pages need no
- * other file to be read. Each of the lists ends with NULL. */
-extern const char *const grade_write_class[], *const grade_write_files[];
-
-/* All of these, and OUT/grades.json, the array. */
+/* What is made of the grades, without the submissions: of the class, OUT/grades.json, the array, grades.csv, junit.xml, grades.tap
+ * and index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, and index.html. The pages need
+ * no other file to be read. */
 bool grade_write(const char *out, const json_t *grades, struct err *e)
     __attribute__((warn_unused_result));
-
-/* One of these, into the file `to`, by rename. grades: the array, of a class; one grade, of a submission, whose pictures are in
- * out/ID. The same bytes of the same grades. */
-bool grade_write_file(const char *out, const json_t *grades, const char *name, const char *to,
-                      struct err *e) __attribute__((warn_unused_result));
 
 #endif

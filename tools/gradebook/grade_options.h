@@ -31,4 +31,8 @@ char **grade_options_words(int argc, char **argv, const struct grade_settings *s
     __attribute__((warn_unused_result));
 void grade_options_help(void);
 
+/* What they ask for but --help and --slurm; argv: where they were read from. The exit code (results.h); with EXIT_NOT_JUDGED, e has
+ * the line. */
+int grade_command(const struct grade_settings *s, int argc, char **argv, struct err *e);
+
 #endif

@@ -96,7 +96,6 @@ static json_t *gradescope(const json_t *grade)
     json_object_set_new(root, "test_output_format", json_string("text"));
     json_object_set_new(root, "visibility", json_string("visible"));
     json_object_set_new(root, "stdout_visibility", json_string("hidden"));
-    json_object_set_new(root, "extra_data", json_pack("{ss}", "assay", GRADE_ORIGIN));
     if (json_array_size(tests) > 0) {
         json_object_set_new(root, "tests", tests);
     } else {
@@ -168,7 +167,7 @@ static void write_tap(FILE *f, const json_t *grades)
         size_t checks = json_array_size(json_object_get(g, "checks"));
         num += checks > 0 ? checks : 1;
     }
-    fprintf(f, "TAP version 13\n# " GRADE_CLASS_ORIGIN "\n1..%zu\n", num);
+    fprintf(f, "TAP version 13\n1..%zu\n", num);
     num = 0;
     json_array_foreach(grades, i, g)
     {
@@ -202,9 +201,7 @@ static void write_junit(FILE *f, const json_t *grades)
 {
     size_t i, k;
     json_t *g, *c;
-    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- " GRADE_CLASS_ORIGIN
-          " -->\n<testsuites>\n",
-          f);
+    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
     json_array_foreach(grades, i, g)
     {
         size_t failures = 0, errors = student_page_text(g, "trouble")[0] != '\0',
@@ -268,12 +265,13 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
     return true;
 }
 
-const char *const grade_write_class[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
-                                         NULL};
-const char *const grade_write_files[] = {"results.json", "index.html", NULL};
+static const char *const class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
+                                          NULL};
+static const char *const files[] = {"results.json", "index.html", NULL};
 
-bool grade_write_file(const char *dir, const json_t *grades, const char *name, const char *to,
-                      struct err *e)
+/* One of these into the file `to`. grades: the array, of a class; one grade, of a submission. */
+static bool write_file(const char *dir, const json_t *grades, const char *name, const char *to,
+                       struct err *e)
 {
     struct out_file o;
     if (strcmp(name, "results.json") == 0)
@@ -295,17 +293,16 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
     bool ok = true;
     json_array_foreach(grades, i, g)
     {
-        for (int k = 0; ok && grade_write_files[k] != NULL; k++) {
-            snprintf(path, sizeof path, "%.4000s/%s/%s", out, student_page_text(g, "id"),
-                     grade_write_files[k]);
-            ok = grade_write_file(out, g, grade_write_files[k], path, e);
+        for (int k = 0; ok && files[k] != NULL; k++) {
+            snprintf(path, sizeof path, "%.4000s/%s/%s", out, student_page_text(g, "id"), files[k]);
+            ok = write_file(out, g, files[k], path, e);
         }
     }
     snprintf(path, sizeof path, "%.4000s/grades.json", out);
     ok = ok && json_write(path, grades, e);
-    for (int k = 0; ok && grade_write_class[k] != NULL; k++) {
-        snprintf(path, sizeof path, "%.4000s/%s", out, grade_write_class[k]);
-        ok = grade_write_file(out, grades, grade_write_class[k], path, e);
+    for (int k = 0; ok && class_files[k] != NULL; k++) {
+        snprintf(path, sizeof path, "%.4000s/%s", out, class_files[k]);
+        ok = write_file(out, grades, class_files[k], path, e);
     }
     return ok;
 }

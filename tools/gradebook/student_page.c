@@ -3,7 +3,6 @@
  * student's picture differs from it. */
 #include "student_page.h"
 
-#include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
 #include "tools/images/image_file.h"
 #include "tools/html/html.h"
@@ -203,7 +202,7 @@ bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     json_t *p, *c;
     bool ok = true, left_out = false;
     fputs(student_page_head, f);
-    fputs("<meta name=\"generator\" content=\"" GRADE_ORIGIN "\">\n<title>", f);
+    fputs("<title>", f);
     html_text(f, student_page_text(grade, "id"));
     fputs("</title>\n<h1>", f);
     html_text(f, student_page_text(grade, "id"));

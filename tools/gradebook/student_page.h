@@ -11,10 +11,6 @@ enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
 
 extern const char student_page_head[]; /* up to the title */
 
-/* What files made of grades say of their origin; grades.json and grade.json say their commands, which may name paths of staff. */
-#define GRADE_CLASS_ORIGIN "made of grades.json, beside it, by assay grade"
-#define GRADE_ORIGIN       "made of grade.json, beside it, by assay grade"
-
 /* "" where there is none. */
 const char *student_page_text(const json_t *object, const char *key);
 

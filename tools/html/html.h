@@ -3,9 +3,6 @@
 #ifndef ASSAY_HTML_H
 #define ASSAY_HTML_H
 
-#include "renderer/base/err.h"
-
-#include <stdint.h>
 #include <stdio.h>
 
 /* A short formatted number, returned by value so that it can stand in a fprintf call. */

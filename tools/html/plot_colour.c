@@ -6,21 +6,19 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include <gsl/gsl_sort.h>
+
 double luminance(const double rgb[3])
 {
     return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double percentile(double *value, size_t n, double fraction)
+/* The smallest of n > 0 values that at least that fraction of them, in (0, 1], do not exceed. Sorts
+ * them. */
+static double percentile(double *value, size_t n, double fraction)
 {
     assert(n > 0 && fraction > 0 && fraction <= 1);
-    qsort(value, n, sizeof *value, compare_doubles);
+    gsl_sort(value, 1, n);
     return value[(size_t)ceil(fraction * (double)n) - 1];
 }
 

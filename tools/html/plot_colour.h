@@ -10,10 +10,6 @@
 /* Rec. 709 luminance of a linear RGB triple. */
 double luminance(const double rgb[3]);
 
-/* The smallest of n > 0 values that at least that fraction of them, in (0, 1], do not exceed. Sorts
- * them. */
-double percentile(double *value, size_t n, double fraction);
-
 /* The radiance that is shown as white: the 99th percentile of the n luminances is shown at 0.8 of
  * white. Where a lamp fills so much of the picture that this would leave all else black (it is over
  * 6 times the median of the positive luminances), 6 times that median takes its place and *capped is

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_sort.h>
+
 /* (x^2 c[0] + x c[1] + c[2]) / (x^2 c[3] + x c[4] + c[5]) */
 static const double aces[6] = {0.6 * 0.6 * 2.51, 0.6 * 0.03, 0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14};
 
@@ -21,12 +23,6 @@ static double tone_inverse(double t)
     return (-b + sqrt(b * b - 4 * a * c)) / (2 * a);
 }
 
-static int compare_double(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 bool flip_exposures(const double *reference, size_t pixels, struct flip_exposures *out,
                     struct err *e)
 {
@@ -36,7 +32,7 @@ bool flip_exposures(const double *reference, size_t pixels, struct flip_exposure
     for (size_t i = 0; i < pixels; i++)
         y[i] = fmax(0, 0.2126 * reference[3 * i] + 0.7152 * reference[3 * i + 1] +
                            0.0722 * reference[3 * i + 2]);
-    qsort(y, pixels, sizeof *y, compare_double);
+    gsl_sort(y, 1, pixels);
     double brightest = y[pixels - 1], median = (y[(pixels - 1) / 2] + y[pixels / 2]) / 2;
     if (brightest > 0 && !(y[(pixels - 1) / 2] > 0)) {
         size_t first = 0;

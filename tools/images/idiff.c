@@ -38,13 +38,6 @@ bool idiff_differs(const size_t count[256], size_t pixels, double fail, double p
     return (double)failing(count, fail) > percent / 100 * (double)pixels;
 }
 
-int idiff_fail_score(const size_t count[256], size_t pixels, double percent)
-{
-    for (int d = 0;; d++)
-        if (!idiff_differs(count, pixels, d / 255.0, percent))
-            return d;
-}
-
 double idiff_percent_score(const size_t count[256], size_t pixels, double fail)
 {
     return 100 * (double)failing(count, fail) / (double)pixels;

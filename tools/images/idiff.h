@@ -17,9 +17,6 @@ void idiff_quantise(const struct moments *m, double white, uint8_t *rgb8);
 /* How many pixels have which largest difference of a channel, in steps of 1/255. */
 void idiff_histogram(const uint8_t *a, const uint8_t *b, size_t pixels, size_t count[256]);
 bool idiff_differs(const size_t count[256], size_t pixels, double fail, double percent);
-/* The smallest difference in 1/255 such that no more than `percent` of the pixels differ by more: the
- * picture passes with any `fail` of at least that. */
-int idiff_fail_score(const size_t count[256], size_t pixels, double percent);
 /* Percentage of the pixels that fail. */
 double idiff_percent_score(const size_t count[256], size_t pixels, double fail);
 

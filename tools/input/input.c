@@ -4,7 +4,6 @@
 #include "tools/images/replicate_dir.h"
 #include "tools/stats/noise_estimate.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>

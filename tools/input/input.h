@@ -1,4 +1,4 @@
-/* What `assay compare` takes for a side, turned into moments (tools/README.md, "Inputs"):
+/* What `assay compare` takes for a side, turned into moments (tools/docs/background/inputs.md):
  *   a moments EXR; a directory of replicates; the output of Mitsuba 3's moment integrator, or its
  *   reference with a variance image beside it; a plain picture: EXR, HDR, PFM of floats; a PNG of
  *   known tone curve.

@@ -6,7 +6,6 @@
 #include "job_kinds.h"
 #include "tools/results/results.h"
 #include "tools/grade/rubric.h"
-#include "tools/commands/commands.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -15,14 +14,13 @@
 #include <unistd.h>
 
 /* The references are made here and now: all jobs need the same. */
-static bool prepare(const char *references, char *const *words, int num, struct err *e)
+static bool prepare(const struct grade_settings *s, const char *references, int argc, char **argv,
+                    struct err *e)
 {
-    enum { MOST = 64 };
-    const char *argv[MOST + 5] = {"grade", "-q", "--prepare", "--references", references};
-    if (num > MOST - 1)
-        return err_set(e, "too many options for a plan");
-    memcpy(argv + 5, words, (size_t)num * sizeof *words);
-    return command_grade(5 + num, (char **)argv, e) == 0;
+    struct grade_settings only = *s;
+    only.prepare = only.quiet = true;
+    only.references = references;
+    return grade_command(&only, argc, argv, e) == 0;
 }
 
 static bool beside_rubric(struct plan *p, const struct rubric *r, const char *name, struct err *e)
@@ -70,7 +68,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
     snprintf(references, sizeof references, "%s/references", p->dir);
     const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
-    ok = ok && prepare(references, words + 1, num - 1, e) &&
+    ok = ok && prepare(s, references, argc, argv, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
          plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
          plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
@@ -136,23 +134,14 @@ int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
     struct grade_paths at;
     struct grade_settings s = grade_options_default(argc, &at);
     char references[PLAN_PATH + 16];
-    int num = 0;
-    const char **words = calloc((size_t)argc + 4, sizeof *words);
-    bool ok = (s.submission != NULL && words != NULL) || err_set(e, "out of memory");
+    bool ok = s.submission != NULL || err_set(e, "out of memory");
     ok = ok && grade_options_parse(argc, argv, &s, e) && fs_make_dirs(s.out, e);
     for (int k = 0; ok && k < p->num; k++)
         ok = place(p, k, s.out, s.submission[k], e);
-    if (ok) {
-        snprintf(references, sizeof references, "%s/references", p->dir);
-        words[num++] = "grade";
-        words[num++] = "--references";
-        words[num++] = references;
-        for (int i = 1; i < argc; i++)
-            if (strcmp(argv[i], "--slurm") != 0)
-                words[num++] = argv[i];
-    }
-    int code = ok ? command_grade(num, (char **)words, e) : EXIT_NOT_JUDGED;
+    snprintf(references, sizeof references, "%s/references", p->dir);
+    if (s.references == NULL)
+        s.references = references;
+    int code = ok ? grade_command(&s, argc, argv, e) : EXIT_NOT_JUDGED;
     free(s.submission);
-    free(words);
     return code;
 }

@@ -5,11 +5,12 @@
 #include "renderer/base/cli_rewrite.h"
 #include "plan.h"
 
-#include <stdint.h>
-
 /* A plan in the making. Texts are copied; what is no UTF-8 makes it fail at the end. */
 
-/* First of all: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
+/* What is planned: a kind, with the command argv. */
+bool plan_head(struct plan *p, const char *kind, int argc, char **argv, struct err *e)
+    __attribute__((warn_unused_result));
+/* What a kind does first: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
 bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
     __attribute__((warn_unused_result));
 /* Words of all jobs, from the program on, which is an input. user: from the user's command, where "{job}" and "{out}" are
@@ -23,11 +24,6 @@ bool plan_user_words(struct plan *p, const struct option_words *leave_out, int n
 void plan_may_end(struct plan *p, int code);
 /* A file or directory that all jobs read. */
 bool plan_input(struct plan *p, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
-/* What "cycles" or "povray" is besides its scene: the program, cycles.py and its modules in share_dir. *sha256 (may be
- * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
-bool job_reference_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
-                                 const char **sha256, struct err *e)
     __attribute__((warn_unused_result));
 /* What a validation with --live runs: Blender, and POV-Ray where it is in PATH, since not every scene needs that. */
 bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e)

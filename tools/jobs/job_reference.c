@@ -36,8 +36,10 @@ static bool add_words(struct plan *p, int argc, char **argv, int threads, struct
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }
 
-bool job_reference_engine_inputs(struct plan *p, const char *engine, const char *share_dir,
-                                 const char **sha256, struct err *e)
+/* What "cycles" or "povray" is besides its scene: the program, cycles.py and its modules in share_dir. *sha256 (may be
+ * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
+static bool engine_inputs(struct plan *p, const char *engine, const char *share_dir,
+                          const char **sha256, struct err *e)
 {
     static const char *const scripts[] = {"cycles", "cycles_blender", "cycles_geometry",
                                           "cycles_light", "cycles_material"};
@@ -60,9 +62,9 @@ bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err
 {
     char path[PLAN_PATH + 64];
     snprintf(path, sizeof path, "%.4000s/import_check/blender_import.py", share_dir);
-    return plan_input(p, path, e) && job_reference_engine_inputs(p, "cycles", share_dir, NULL, e) &&
+    return plan_input(p, path, e) && engine_inputs(p, "cycles", share_dir, NULL, e) &&
            (!process_find("povray", path, sizeof path) ||
-            job_reference_engine_inputs(p, "povray", share_dir, NULL, e));
+            engine_inputs(p, "povray", share_dir, NULL, e));
 }
 
 /* A reference that has to be rendered. */
@@ -145,7 +147,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     for (int k = 0; ok && k < 2; k++)
         for (int i = 0; ok && binary[k] == NULL && i < g->num; i++)
             if (strcmp(g->wanted[i].ref->engine, engines[k]) == 0)
-                ok = job_reference_engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
+                ok = engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
     json_object_set_new(p->head, "references", json_array());
     for (int i = 0; ok && i < g->num; i++) {
         const struct wanted *w = &g->wanted[i];

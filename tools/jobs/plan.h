@@ -1,5 +1,5 @@
 /* Work cut into jobs that can run anywhere, in any order, again: each is a program with its words, knows its inputs by
- * hash and leaves one artefact, a directory that appears by rename. tools/SCALE.md is the manual.
+ * hash and leaves one artefact, a directory that appears by rename. tools/docs/guide-cluster.md is the manual.
  *
  * DIR/plan.jsonl: a line of JSON for the whole, then one for each job.
  *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate" | "reference", "version": , "cwd": , "jobs": 64,

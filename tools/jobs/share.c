@@ -16,7 +16,8 @@ const char *const share_common[NUM_COMMON][2] = {{"assay:version", "version of t
                                                  {"assay:adaptive", "adaptive mode"},
                                                  {"assay:seed", "seed"}};
 
-const char *share_part_channel(int value)
+/* Of one of PART_VALUES. */
+static const char *share_part_channel(int value)
 {
     static const char *const moments[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                             "M2.B", "M3.R", "M3.G", "M3.B", "n"};

@@ -1,7 +1,6 @@
 #include "slurm.h"
 
 #include "reference/base/process.h"
-#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "renderer/base/sha256.h"

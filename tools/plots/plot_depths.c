@@ -97,7 +97,7 @@ static void write_caption(FILE *f, const json_t *depths)
         if (json_object_get(g, "truth") == NULL)
             continue;
         double d = member_number(g, "mean") - member_number(g, "truth");
-        /* Single precision, as everywhere (README.md, 1). */
+        /* Single precision, as everywhere (tools/docs/background/verdict.md, 1). */
         double se = member_number(g, "se") + 1e-5 * member_number(g, "truth");
         largest = fmax(largest, se > 0 ? fabs(d) / se : 0);
         known++;

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include <gsl/gsl_cdf.h>
+#include <gsl/gsl_sort.h>
 
 enum { LEFT = 44, TOP = 8, WIDTH = 300, HEIGHT = 200, BOTTOM = TOP + HEIGHT };
 
@@ -47,12 +48,6 @@ void qq_band(int i, int n, double *low, double *high)
 {
     *low = beta_quantile(0.025, i, n);
     *high = beta_quantile(0.975, i, n);
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 /* Ends of the axes of a QQ plot of n tiles, in -log10 p. */
@@ -128,7 +123,7 @@ bool plot_qq(FILE *f, const json_t *claim, struct err *e)
         if (json_is_number(json_array_get(list, i)))
             v[n++] = fmin(json_number_value(json_array_get(list, i)), 0);
     if (n >= 4) {
-        qsort(v, (size_t)n, sizeof *v, compare_doubles);
+        gsl_sort(v, 1, (size_t)n);
         /* What is far out must not flatten the rest. */
         double chance = -log10(1 / (n + 1.0));
         struct qq_axes a = {n, 1.05 * chance, fmin(fmax(-v[0], 1.6 * chance), 2.5 * chance)};

@@ -17,7 +17,7 @@ bool plot_qq(FILE *f, const json_t *claim, struct err *e) __attribute__((warn_un
 
 /* The chance that a bias of the image's mean (relative) comes out DIFFERENT, by the statistic of the image
  * alone: Phi((bias - margin)/SE - c), c the normal quantile at the level of its tests, SE from the MDB, which
- * is where this is 95 % (tools/README.md, 7). The other statistics only add to it. */
+ * is where this is 95 % (tools/docs/background/verdict.md, 7). The other statistics only add to it. */
 struct power {
     double margin, error, critical; /* error 0: not known */
 };

@@ -11,6 +11,7 @@
 #include "tools/plots/plot_rays.h"
 #include "report_table.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,7 +60,7 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
     if (left > 0)
         fprintf(f,
                 "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
-                " more are to be judged.</p>\n",
+                " more are to be judged. This page reloads itself until it has ended.</p>\n",
                 left);
     fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
             left > 0 ? "So far " : "");
@@ -179,28 +180,11 @@ static void write_keys(FILE *f)
         f);
 }
 
-/* For `assay reproduce` (reproduce_page.h). converge: NULL, or the second results.json. */
-static void write_origin(FILE *f, const json_t *root, const char *converge)
-{
-    for (int i = 0; report_origin[i] != NULL; i++) {
-        const char *text = strcmp(report_origin[i], "converge") == 0
-                               ? converge
-                               : member_text(root, report_origin[i]);
-        if (text == NULL)
-            continue;
-        fprintf(f, "<meta name=\"assay:%s\" content=\"", report_origin[i]);
-        html_text(f, text);
-        fputs("\">\n", f);
-    }
-}
-
-const char *const report_origin[] = {"command", "version", "date", "machine", "converge", NULL};
-
 /* On a page of more claims the evidence of those as expected is folded. */
 enum { FOLD_FROM = 8 };
 
-static bool write_page(struct page *p, const json_t *root, const char *converge,
-                       struct claim_ref *claim, size_t num, struct err *e)
+static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
+                       struct err *e)
 {
     FILE *f = p->f;
     p->folded = num > FOLD_FROM;
@@ -211,7 +195,9 @@ static bool write_page(struct page *p, const json_t *root, const char *converge,
             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
             "<meta name=\"color-scheme\" content=\"light dark\">\n",
             html_script_hash(page_js).s);
-    write_origin(f, root, converge);
+    double every = member_number(root, "page_every_s");
+    if (every > 0) /* browsers read whole seconds */
+        fprintf(f, "<meta http-equiv=\"refresh\" content=\"%.0f\">\n", ceil(every));
     fputs("<title>Assay report, ", f);
     html_text(f, member_text(root, "date"));
     fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
@@ -296,7 +282,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     if (!fs_make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
         goto done;
     page.f = out.f;
-    if (write_page(&page, root, converge_path, claim, num, e))
+    if (write_page(&page, root, claim, num, e))
         ok = out_commit(&out, e);
     else
         out_abandon(&out);

@@ -13,8 +13,4 @@ bool report_write(const char *results_path, const char *out_path, struct err *e)
 bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
                        struct err *e) __attribute__((warn_unused_result));
 
-/* What a page says of its origin, in elements <meta name="assay:NAME" content="TEXT">, for each that there is: members of its
- * results.json, and "converge": converge_path. Ends with NULL. */
-extern const char *const report_origin[];
-
 #endif

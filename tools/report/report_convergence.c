@@ -5,7 +5,6 @@
 #include "tools/plots/plot_convergence.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
-#include "report_internal.h"
 
 #include <math.h>
 #include <string.h>

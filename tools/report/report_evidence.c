@@ -4,7 +4,6 @@
 #include "report_statistics.h"
 #include "tools/results/results.h"
 
-#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -164,15 +163,6 @@ static void write_provenance(FILE *f, const json_t *claim)
     }
 }
 
-static void write_command(FILE *f, const char *what, const char *command)
-{
-    if (command == NULL)
-        return;
-    fprintf(f, "<p class=\"caption\">%s</p>\n<pre tabindex=\"0\"><code>", what);
-    html_text(f, command);
-    fputs("</code></pre>\n", f);
-}
-
 /* Of a stored reference (it has seeds): how to replace it. */
 static void write_approval(FILE *f, const json_t *claim)
 {
@@ -203,7 +193,11 @@ void report_evidence(FILE *f, const json_t *claim, bool open)
     write_provenance(f, claim);
     fputs("</dl>\n", f);
     report_statistics(f, claim);
-    write_command(f, "To run this claim again:", member_text(claim, "rerun"));
+    if (member_text(claim, "rerun") != NULL) {
+        fputs("<p class=\"caption\">To run this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
+        html_text(f, member_text(claim, "rerun"));
+        fputs("</code></pre>\n", f);
+    }
     write_approval(f, claim);
     fputs("</details>\n", f);
 }

@@ -234,8 +234,7 @@ bool report_history(const struct history *h, const char *path, struct err *e)
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
             "http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
             "'unsafe-inline'\">\n<meta name=\"viewport\" content=\"width=device-width, "
-            "initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<meta "
-            "name=\"assay:command\" content=\"assay report --history .\">\n<title>Assay "
+            "initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>Assay "
             "history</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n<header>\n<p "
             "class=\"kicker\">Assay history</p>\n",
             page_css);

@@ -3,7 +3,6 @@
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* Makes an output again from what it says of its origin, and compares. */
+/* Makes a render, a golden or a results.json again from what the file says of its origin, and compares. */
 #ifndef ASSAY_REPRODUCE_H
 #define ASSAY_REPRODUCE_H
 
@@ -9,14 +9,14 @@ struct reproduce_options {
     const char *scene;      /* NULL: where the command says, from the current directory */
     const char *keep;       /* file that gets what was made again; NULL: none */
     int threads;            /* 0: all processors */
+    bool run_foreign;       /* run programs that results name, too */
 };
 
 struct reproduced {
     char *command; /* that was run, or "assay merge ..." */
     char made_by
-        [128]; /* version and commit of our program that wrote the file; "" if it does not say */
+        [128]; /* version and commit of the program that wrote the file; "" if it does not say */
     double num_values, num_different;
-    bool is_text;    /* values are bytes */
     char first[300]; /* where and what, of the first value that differs */
     char note[300];  /* "", or what else may be why */
 };
@@ -24,10 +24,8 @@ struct reproduced {
 /* Also of one that is zero. */
 void reproduced_free(struct reproduced *r);
 
-/* A picture with moments, of pathtracer or of `assay merge`, whose shares are then made again in turn, all channels bit by bit; a
- * PNG of pathtracer (reproduce_png.h); a stored reference (reproduce_golden.h); results (reproduce_results.h); pages and JUnit
- * (reproduce_page.h); what is made of grades (reproduce_class.h); an exported scene (reproduce_export.h). False if it cannot be judged: no provenance, a scene, camera or environment file that is not
- * the one of then, a program that fails. That bits differ is no failure but num_different > 0. */
+/* False if it cannot be judged: no provenance, a scene, camera or environment file that is not the one of then, a program that fails
+ * or is not ours. That values differ is no failure but num_different > 0. */
 bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
                struct err *e) __attribute__((warn_unused_result));
 

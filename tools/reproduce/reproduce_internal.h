@@ -1,25 +1,24 @@
-/* What the kinds of files that are made again (reproduce.h) share. */
+/* What `assay reproduce` (reproduce.h) does with each kind of file. `dir` is a directory of its own, which exists. */
 #ifndef ASSAY_REPRODUCE_INTERNAL_H
 #define ASSAY_REPRODUCE_INTERNAL_H
 
 #include "reproduce.h"
 
-/* out->command, of NULL-terminated words. False with a line out of memory. */
+/* Sets out->command to NULL-terminated words. False with a line out of memory. */
 bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Whether what `path` was made of, its `what` ("scene"), is here, with the SHA-256 of `then`. otherwise: what to do where it is not, "" or
- * "give --scene, or ". */
-bool reproduce_input(const char *path, const char *what, const char *file, const char *then,
-                     const char *otherwise, struct err *e) __attribute__((warn_unused_result));
+/* An EXR: renders again what pathtracer made, whose scene has to have the hash that it says, and the shares that `assay merge` put
+ * together; a golden, SCENE/ENGINE.exr with the scene's manifest.json beside it, by its engine with the seed of the manifest, the
+ * scene that of the suite. Compares every channel bit by bit, and first the metadata that says what was rendered. */
+bool rerender(const char *path, const struct reproduce_options *opt, const char *dir,
+              struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
 
-/* Counts the bytes of `path`, and those that are others in `again` or that only one of the two has, and tells the first of these by
- * its line and place. */
-bool reproduce_bytes(const char *path, const char *again, struct reproduced *out, struct err *e)
-    __attribute__((warn_unused_result));
-
-/* Copies `from` to opt->keep, by rename, if there is one. */
-bool reproduce_keep(const char *from, const struct reproduce_options *opt, struct err *e)
-    __attribute__((warn_unused_result));
+/* The JSON that validate, compare and converge write: runs its command again from the current directory, with its outputs in `dir`, and
+ * compares every value but those of the run itself: command, date, machine, version, and what was timed. False also where its
+ * --budget was over before all was decided, then or now, and where the command runs a program that is not ours without
+ * opt->run_foreign. */
+bool reproduce_results(const char *path, const struct reproduce_options *opt, const char *dir,
+                       struct reproduced *out, struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -1,7 +1,5 @@
 #include "claim_result.h"
 
-#include "tools/base/utf8.h"
-
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
 
@@ -145,11 +143,14 @@ json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err
 {
     char date[32], machine[192];
     assert(argv[argc] == NULL);
-    for (int i = 0; i < argc; i++)
-        if (!utf8_is_valid(argv[i])) {
+    for (int i = 0; i < argc; i++) {
+        json_t *text = json_string(argv[i]);
+        if (text == NULL) {
             err_set(e, "argument '%s' is no UTF-8, and results hold nothing else", argv[i]);
             return NULL;
         }
+        json_decref(text);
+    }
     char *command = shell_quote_join("assay", (const char *const *)argv);
     if (command == NULL) {
         err_set(e, "out of memory");

@@ -3,7 +3,6 @@
 #include "reference/suite/suite.h"
 #include "tools/converge/depth_ladder.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -45,9 +45,6 @@ struct history {
     size_t moved;
 };
 
-/* Of a page, family-wise. */
-static const double history_alpha = 1e-3;
-
 /* Reads every file named results.json below dir (8 levels, no links). Fails with a line on one that cannot
  * be read, if there is none, and on more than 400. The caller frees with history_free(). */
 bool history_read(const char *dir, double alpha, struct history *out, struct err *e)

@@ -114,12 +114,6 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results)
               number_attribute(w, "errors", "%.0f", (double)count[OUTCOME_NOT_JUDGED]) &&
               number_attribute(w, "time", "%.3f", member_number(results, "seconds")) &&
               attribute(w, "timestamp", member_text(results, "date"));
-    /* For `assay reproduce`. */
-    ok = ok && xmlTextWriterStartElement(w, BAD_CAST "properties") >= 0 &&
-         xmlTextWriterStartElement(w, BAD_CAST "property") >= 0 &&
-         attribute(w, "name", "assay:command") &&
-         attribute(w, "value", member_text(results, "command")) &&
-         xmlTextWriterEndElement(w) >= 0 && xmlTextWriterEndElement(w) >= 0;
     for (size_t i = 0; ok && i < num; i++)
         ok = write_testcase(w, json_array_get(claims, i));
     return ok && xmlTextWriterEndDocument(w) >= 0;

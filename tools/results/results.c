@@ -1,12 +1,10 @@
 #include "results.h"
 
 #include "reference/suite/suite.h"
-#include "renderer/base/fs.h"
 #include "tools/validate/stated_error_claims.h"
 #include "convergence_results.h"
 
 #include <assert.h>
-#include <math.h>
 #include <string.h>
 
 enum member_type { STRING, NUMBER, COUNT, BOOLEAN, INTERVAL, TRIPLE, COUNTS, OBJECT };

@@ -9,6 +9,7 @@
  *     "convergence": [ ... ],             convergence_results.h; absent where `assay converge` has not run
  *     "unfinished": 87,               only in what `assay validate --page-every` shows while it runs: how many
  *                                     claims and scenes of "consistency" are still to be judged
+ *     "page_every_s": 30,             only there: when the next such page comes
  *     "loader": [...],                only where "live": what import_check() says (import_check.h)
  *     "claims": [ {
  *         "scene": "41_cornell", "title": "...", "detects": "...", "blind_to": "...",

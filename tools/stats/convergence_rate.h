@@ -1,5 +1,5 @@
 /* Convergence and variance of an engine, from K replicates at each rung of a ladder of sample counts.
- * Statistics only: no engine, no file. README.md, "How convergence is measured", has the procedure.
+ * Statistics only: no engine, no file. The procedure: tools/docs/background/convergence.md.
  *
  * A picture is `size` values (3 a pixel, linear radiance). Each is divided by a unit of its own, the
  * reference's value there or 5 % of its mean if that is more, so that all errors are relative and a few

@@ -2,24 +2,7 @@
 
 #include "tools/results/results.h"
 
-#include <stdlib.h>
 #include <string.h>
-
-bool import_result_check_suite(const struct suite *suite, const char *const *only, int num_only,
-                               const struct import_options *opt, json_t **reports, struct err *e)
-{
-    int num = num_only > 0 ? num_only : suite->num_scenes;
-    /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
-    const struct suite_scene **scene = malloc((size_t)num * sizeof *scene);
-    bool ok = scene != NULL || err_set(e, "out of memory");
-    for (int i = 0; ok && i < num; i++) {
-        scene[i] = num_only > 0 ? suite_find(suite, only[i]) : &suite->scene[i];
-        ok = scene[i] != NULL || err_set(e, "no scene '%s' in the suite", only[i]);
-    }
-    ok = ok && import_check(scene, num, opt, reports, e);
-    free(scene);
-    return ok;
-}
 
 static long long number(const json_t *report, const char *key)
 {

@@ -1,12 +1,10 @@
 #include "validate_internal.h"
 
-#include "renderer/base/progress.h"
 #include "tools/results/claim_result.h"
 #include "stated_error_claims.h"
 #include "tools/results/results.h"
 
 #include <assert.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

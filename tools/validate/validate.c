@@ -1,10 +1,9 @@
 #include "validate.h"
 
+#include "reference/import_check/import_check.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "tools/results/claim_result.h"
-#include "stated_error_claims.h"
-#include "import_result.h"
 #include "tools/results/results.h"
 #include "validate_internal.h"
 
@@ -112,8 +111,9 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
     int left = v->num_tasks;
     for (int i = 0; i < v->num_tasks; i++)
         left -= v->task[i].result != NULL;
-    if (ok && json_array_size(claims) > 0) {
+    if (ok && left > 0 && json_array_size(claims) > 0) {
         json_object_set_new(copy, "unfinished", json_integer(left));
+        json_object_set_new(copy, "page_every_s", json_real(v->opt->show_every_s));
         ok = v->opt->show(copy, v->opt, e);
     }
     json_decref(claims);
@@ -195,13 +195,14 @@ static void validation_free(struct validation *v)
 static bool check_loader(const struct validation *v, const struct import_options *io,
                          json_t **loader, struct err *e)
 {
-    const char **scene = calloc((size_t)v->suite.num_scenes, sizeof *scene);
+    /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
+    const struct suite_scene **scene = malloc((size_t)v->suite.num_scenes * sizeof *scene);
     int num = 0;
     for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
         if (scene_is_selected(v->opt, v->suite.scene[i].name))
-            scene[num++] = v->suite.scene[i].name;
+            scene[num++] = &v->suite.scene[i];
     bool ok = scene != NULL || err_set(e, "out of memory");
-    ok = ok && import_result_check_suite(&v->suite, scene, num, io, loader, e);
+    ok = ok && import_check(scene, num, io, loader, e);
     free(scene);
     return ok;
 }

@@ -41,7 +41,7 @@ struct validate_options {
      * bounds the error. 1: one stage. 0: 2 below alpha 1e-5, where no tail is known well enough, else 1. */
     int stages;
     /* Every so many seconds (0: never), between two looks, what is judged so far: a document as validate() returns, with
-     * "unfinished". False with a line in e ends the run. */
+     * "unfinished" and "page_every_s". False with a line in e ends the run. */
     double show_every_s;
     bool (*show)(const json_t *so_far, const struct validate_options *opt, struct err *e);
 };

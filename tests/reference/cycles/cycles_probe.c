@@ -130,7 +130,7 @@ void probe_run(struct probe *f, int spp, struct moments *m)
     json_t *manifest = json_object();
     f->ref.replicates = 8;
     f->ref.spp = spp;
-    bool ok = cycles_render(&f->job, m, manifest, &e);
+    bool ok = engine_driver_render(&cycles_driver, &f->job, m, manifest, &e);
     json_decref(manifest);
     probe_ok(ok, &e);
 }

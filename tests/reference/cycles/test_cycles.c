@@ -61,7 +61,7 @@ static void assert_fails(struct probe *f, const char *why)
     struct err e = {""};
     struct moments m;
     json_t *manifest = json_object();
-    if (cycles_render(&f->job, &m, manifest, &e))
+    if (engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e))
         fail_msg("succeeded, although: %s", why);
     if (strstr(e.msg, why) == NULL)
         fail_msg("'%s' does not say '%s'", e.msg, why);
@@ -79,7 +79,7 @@ static void replicates_are_folded_and_described(void **state)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, (float)(k * k), 9);
     stand_in(f, "echo \"$@\" > args; " OK);
-    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e);
+    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e), &e);
     assert_string_equal(m.unit, "replicate");
     assert_true(m.spp == 16);
     /* 0, 1, 4: mean 5/3, M2 = 26/3 by hand. */
@@ -116,7 +116,7 @@ static void light_without_noise_is_exact(void **state)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, .25f, .25f);
     stand_in(f, OK);
-    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e);
+    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e), &e);
     assert_string_equal(m.unit, "exact");
     for (int p = 0; p < 16; p++)
         assert_true(m.n[p] == 1 && m.mean[3 * p] == .25 && m.m2[3 * p] == 0);
@@ -169,7 +169,8 @@ static void replicates_that_share_their_noise_are_refused(void **state)
     probe_ok(image_alloc(&im, 16, 16, 3, names, &e), &e);
     for (int k = 0; k < 4; k++)
         write_noise(f, k, 256, &random, &im);
-    probe_ok(cycles_render(&f->job, &m, manifest, &e), &e); /* these are independent */
+    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e),
+             &e); /* these are independent */
     const json_t *test = json_object_get(manifest, "independence");
     assert_true(json_is_true(json_object_get(test, "tested")));
     assert_true(json_is_true(json_object_get(test, "passed")));
@@ -303,7 +304,7 @@ static void emitter_that_stands_on_the_wall(void **state)
      * cut is sampled wrongly. The view is narrow enough not to see the emitter, whose near edge is at .5 / 1.3 = .38. */
     build_camera(&f->s, v3(0, 0, 0), (float)(2 * atan(.36) * 180 / M_PI));
     probe_render(f, &m);
-    /* the midpoint rule, and the strip of 1.5e-5 of the emitter's edge of MATCH_CYCLES.md */
+    /* the midpoint rule, and the strip of 1.5e-5 of the emitter's edge of reference/cycles/README.md */
     probe_judge(f, &m, probe_expect(f, .36, 16, standing_emitter_radiance, NULL), 1e-4, false);
 }
 

@@ -75,7 +75,7 @@ static json_t *dump(struct fixture *f, int depth)
 {
     struct err e = {"untouched"};
     json_error_t je;
-    if (!export_cycles(&f->s, &f->c, depth, NULL, f->path, &e))
+    if (!export_cycles(&f->s, &f->c, depth, f->path, &e))
         fail_msg("%s", e.msg);
     assert_string_equal(e.msg, "untouched");
     json_t *root = json_load_file(f->path, JSON_REJECT_DUPLICATES, &je);
@@ -87,7 +87,7 @@ static json_t *dump(struct fixture *f, int depth)
 static void assert_refused(struct fixture *f, int depth, const char *why)
 {
     struct err e = {""};
-    if (export_cycles(&f->s, &f->c, depth, NULL, f->path, &e))
+    if (export_cycles(&f->s, &f->c, depth, f->path, &e))
         fail_msg("accepted, although: %s", why);
     if (strstr(e.msg, why) == NULL)
         fail_msg("'%s' does not say '%s'", e.msg, why);
@@ -420,7 +420,7 @@ static void a_sky(void **state)
     assert_int_equal(unlink(path), 0);
     assert_int_equal(unlink(f->path), 0);
     assert_int_equal(mkdir(f->path, 0777), 0); /* in the dump's way */
-    assert_false(export_cycles(&f->s, &f->c, 1, NULL, f->path, &e));
+    assert_false(export_cycles(&f->s, &f->c, 1, f->path, &e));
     assert_int_equal(access(path, F_OK), -1);
 }
 

@@ -22,7 +22,7 @@ struct fixture {
     json_t *dump;
 };
 
-/* What Blender has where we have p: the file's axes by DIALECT.md, then turned to Z up as Blender's
+/* What Blender has where we have p: the file's axes by renderer/docs/dialect.md, then turned to Z up as Blender's
  * manual says (Y_UP: about x by 90 degrees; X_UP: about y by -90 degrees). */
 static json_t *blender(const struct fixture *f, vec3 p)
 {

@@ -164,7 +164,7 @@ static void check_references(xmlNode *root, xmlNode *n)
 static xmlDoc *export(const struct scene *s, const struct camera *c, int depth)
 {
     struct err e;
-    if (!export_mitsuba(s, c, depth, NULL, path_of("scene.xml"), &e))
+    if (!export_mitsuba(s, c, depth, path_of("scene.xml"), &e))
         fail_msg("%s", e.msg);
     xmlDoc *doc = xmlReadFile(path_of("scene.xml"), NULL, XML_PARSE_NONET);
     assert_non_null(doc);
@@ -562,7 +562,7 @@ static void refuse(struct scene *s, struct camera *c, const char *pattern)
 {
     struct err e = {0};
     struct camera built = c != NULL ? *c : finish(s);
-    assert_false(export_mitsuba(s, &built, 3, NULL, path_of("refused.xml"), &e));
+    assert_false(export_mitsuba(s, &built, 3, path_of("refused.xml"), &e));
     if (strstr(e.msg, pattern) == NULL)
         fail_msg("'%s' instead of '%s'", e.msg, pattern);
     assert_int_not_equal(access(path_of("refused.xml"), F_OK), 0);

@@ -44,7 +44,7 @@ struct moments must_render(struct fixture *f, json_t *manifest)
 {
     struct err e;
     struct moments m;
-    if (!povray_render(&f->job, &m, manifest, &e))
+    if (!engine_driver_render(&povray_driver, &f->job, &m, manifest, &e))
         fail_msg("%s", e.msg);
     return m;
 }

@@ -1,4 +1,4 @@
-/* What tests of the POV-Ray driver share: a job for povray_render(), and our own picture of it. */
+/* What tests of the POV-Ray driver share: a job for povray_driver, and our own picture of it. */
 #ifndef ASSAY_POVRAY_FIXTURE_H
 #define ASSAY_POVRAY_FIXTURE_H
 
@@ -7,7 +7,7 @@
 /* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
 enum { THREADS = 8 };
 
-/* What povray_render() is given, in a directory that goes with it. */
+/* What povray_driver is given, in a directory that goes with it. */
 struct fixture {
     char dir[64];
     struct scene s;

@@ -265,7 +265,7 @@ static void test_not_a_lamp(void **state)
 
 /* The 2-point Gauss rule in each pair of cells is exact for cubics, so over the rectangle
  * [-1/4, 1/4] x [-1/8, 1/8] the points' mean is 0 and their mean squares are (1/4)^2/3, (1/8)^2/3.
- * Colour x points = radiance x area / (2 pi d^2), see MATCH_POVRAY.md. */
+ * Colour x points = radiance x area / (2 pi d^2), see reference/povray/README.md. */
 static void test_lamp_points(void **state)
 {
     (void)state;

@@ -202,7 +202,7 @@ static void engine_fails(const char *script, double timeout_s, const char *const
     fixture_init(&f, corner(), 4, 2);
     f.opt.timeout_s = timeout_s;
     fake_begin(&k, script);
-    assert_false(povray_render(&f.job, &m, manifest, &e));
+    assert_false(engine_driver_render(&povray_driver, &f.job, &m, manifest, &e));
     fake_end(&k);
     for (; *says != NULL; says++)
         if (strstr(e.msg, *says) == NULL)

@@ -1,6 +1,6 @@
 /* Stored references: what was written comes back, and nothing else is accepted. Seeds of replicates.
  */
-#include "reference/replicates/engine_driver.h"
+#include "reference/store/reference_render.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 #include "reference/base/json_file.h"

@@ -44,36 +44,6 @@ static void what_was_joined_is_split(void **state)
     free(text);
 }
 
-static char *ascii_of(const char *const *word)
-{
-    char *text = shell_quote_join(NULL, word), *ascii = shell_quote_ascii(text);
-    free(text);
-    assert_non_null(ascii);
-    for (const char *c = ascii; *c != '\0'; c++)
-        assert_in_range(*c, ' ', '~');
-    return ascii;
-}
-
-/* Every byte but zero, in one word and each in its own. */
-static void any_bytes_become_ascii_and_are_read_back(void **state)
-{
-    (void)state;
-    enum { BYTES = 255 };
-    char all[BYTES + 1] = "", one[BYTES][2];
-    const char *each[BYTES + 2] = {all};
-    for (int i = 0; i < BYTES; i++) {
-        all[i] = one[i][0] = (char)(i + 1);
-        one[i][1] = '\0';
-        each[i + 1] = one[i];
-    }
-    char *text = ascii_of(each);
-    expect_words(text, each);
-    free(text);
-    text = ascii_of((const char *const[]){"it's", "a\nb\r\377", NULL});
-    assert_string_equal(text, "'it'\\''s' 'a'$'\\012''b'$'\\015\\377'''");
-    free(text);
-}
-
 /* Three quarters of a megabyte, each word of it as long in quotes as a word can get. */
 static void no_word_is_lost_however_many(void **state)
 {
@@ -102,11 +72,11 @@ static void the_command_of_results_is_read_back(void **state)
 }
 
 /* The shell is another reader: printf prints each of its arguments and a bar. */
-static void expect_of_a_shell(const char *before, char *text, const char *after)
+static void a_shell_reads_the_same_words(void **state)
 {
-    char command[1200], got[1024] = "", want[1024] = "";
-    int length = snprintf(command, sizeof command, "%sprintf '%%s|' %s%s", before, text, after);
-    assert_in_range(length, 1, sizeof command - 1);
+    (void)state;
+    char command[1200], got[1024] = "", want[1024] = "", *text = shell_quote_join(NULL, words);
+    snprintf(command, sizeof command, "printf '%%s|' %s", text);
     free(text);
     FILE *f = popen(command, "r");
     assert_non_null(f);
@@ -120,20 +90,11 @@ static void expect_of_a_shell(const char *before, char *text, const char *after)
     assert_string_equal(got, want);
 }
 
-static void a_shell_reads_the_same_words(void **state)
-{
-    (void)state;
-    expect_of_a_shell("", shell_quote_join(NULL, words), "");
-    expect_of_a_shell("bash <<'END'\n", ascii_of(words), "\nEND\n");
-}
-
 static void what_a_shell_would_act_on_is_refused(void **state)
 {
     (void)state;
-    static const char *const bad[] = {"a; b",    "a | b",   "$HOME",  "`id`",     "a > b",
-                                      "'open",   "\"a\"",   "a & b",  "*",        "a\nb",
-                                      "~",       "$'a'",    "$'\\n'", "$'\\000'", "$'\\400'",
-                                      "$'\\08'", "$'\\012", "$'",     "$'\\1'"};
+    static const char *const bad[] = {"a; b",  "a | b", "$HOME", "`id`", "a > b", "'open",
+                                      "\"a\"", "a & b", "*",     "a\nb", "~"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         int num;
         struct err e = {""};
@@ -147,7 +108,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_was_joined_is_split),
-        cmocka_unit_test(any_bytes_become_ascii_and_are_read_back),
         cmocka_unit_test(no_word_is_lost_however_many),
         cmocka_unit_test(the_command_of_results_is_read_back),
         cmocka_unit_test(a_shell_reads_the_same_words),

@@ -577,7 +577,7 @@ static void heatmap_of_one_triangle(void **state)
     struct image im;
     uint64_t most;
     snprintf(path, sizeof path, "%s/heat.png", dir);
-    if (!heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, NULL, 0, &most, &e) ||
+    if (!heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) ||
         !image_read(path, &im, NULL, &e))
         fail_msg("%s", e.msg);
     uint8_t top[3];

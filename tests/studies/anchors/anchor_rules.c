@@ -103,3 +103,10 @@ double welch_log10_p(const struct moments *a, const struct moments *b)
         return smallest + log10((double)tested);
     return log10(-expm1((double)tested * log1p(-pow(10, smallest))));
 }
+
+int idiff_fail_score(const size_t count[256], size_t pixels, double percent)
+{
+    for (int d = 0;; d++)
+        if (!idiff_differs(count, pixels, d / 255.0, percent))
+            return d;
+}

@@ -46,4 +46,8 @@ double mitsuba_score(double *z, size_t pixels, size_t allowed);
 /* log10 of the family p of all pixels and channels; 0 if nothing can be tested. */
 double welch_log10_p(const struct moments *a, const struct moments *b);
 
+/* The smallest difference in 1/255 such that no more than `percent` of the pixels differ by more: the
+ * picture passes with any `fail` of at least that. */
+int idiff_fail_score(const size_t count[256], size_t pixels, double percent);
+
 #endif

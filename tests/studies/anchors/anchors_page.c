@@ -164,7 +164,7 @@ static void method(FILE *f, const struct anchor_results *r)
         s->num_pairs, smallest_power(r), s->num_pairs, s->reference_spp);
     fputs(
         "The rules, in our words:\n\n"
-        "- **Ours**: `compare_moments()` with margins 0 ([tools/README.md](../../../tools/README.md)); "
+        "- **Ours**: `compare_moments()` with margins 0 ([procedure](../../../tools/docs/background/verdict.md)); "
         "alpha bounds the chance of any\n  wrong DIFFERENT.\n"
         "- **Mitsuba 3**, `src/render/tests/test_renders.py`: per pixel and XYZ channel z of A against "
         "a long reference,\n  with the reference's variance per sample, at least 1e-4, over A's "

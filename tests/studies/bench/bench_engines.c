@@ -86,8 +86,8 @@ static bool render_cycles(const struct bench_view *v, int spp, int count, uint32
     const struct reference_job job = {&suite, &ref, &opt, &v->scene, &v->camera, dir};
     struct moments m;
     json_t *manifest = json_object();
-    bool ok =
-        fs_remove_tree(dir, e) && fs_make_dirs(dir, e) && cycles_render(&job, &m, manifest, e);
+    bool ok = fs_remove_tree(dir, e) && fs_make_dirs(dir, e) &&
+              engine_driver_render(&cycles_driver, &job, &m, manifest, e);
     json_decref(manifest);
     if (!ok)
         return false;

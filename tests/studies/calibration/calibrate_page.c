@@ -204,7 +204,7 @@ static void power(FILE *f, const struct settings *s, const struct results *r)
         "pairs without a bias; alpha 0.001, %zu pairs a\npoint, 32 x 32 pixels, tiles of 16. Asked: "
         "at the MDB at least 95 %%; at 1.1 of it proved to be more, at 0.9 proved to be less, so\n"
         "that the bias found with 95 %% is within 10 %% of the MDB. With independent channels the MDB "
-        "is only an upper bound (tools/README.md).\n\n"
+        "is only an upper bound (tools/docs/background/verdict.md).\n\n"
         "| n and bias | MDB | at 0.9 | at the MDB | at 1.1 | found with 95 %% | |\n"
         "|---|--:|---|---|---|--:|---|\n",
         s->power_pairs);

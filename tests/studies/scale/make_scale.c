@@ -1,5 +1,5 @@
 /* make_scale: what plans of thousands of jobs would do on a cluster, simulated event by event, with what a job, a start and a byte cost as
- * measured on one machine (tools/SCALE.md, whose table this prints). A task is a line of jobs one after the other, as
+ * measured on one machine (tools/docs/background/scale.md, whose table this prints). A task is a line of jobs one after the other, as
  * tools/jobs/slurm.c deals them; the controller starts tasks one at a time; nodes fail at random, are noticed after a while, and
  * what they had not finished is submitted again. */
 #include <assert.h>
@@ -10,7 +10,7 @@
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
-/* Measured; see SCALE.md for how. */
+/* Measured; see background/scale.md for how. */
 static const double start_s =
     0.012; /* CPU s of a job that does nothing: run-job, hashes, the program's start */
 static const double controller_s = 0.0021; /* of slurmctld for a task */

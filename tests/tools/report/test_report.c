@@ -61,8 +61,10 @@ static void run_write_results(const struct run *r)
                   "version", "0.1 (abc)", "date", "2026-01-02T03:04:05Z", "alpha", 1e-3, "machine",
                   "2 x CPU", "mode", "golden", "seconds", 98.0, "claims", r->claims);
     assert_non_null(root);
-    if (r->left > 0)
+    if (r->left > 0) {
         json_object_set_new(root, "unfinished", json_integer(r->left));
+        json_object_set_new(root, "page_every_s", json_real(2.5));
+    }
     if (!json_write(r->results, root, &e))
         fail_msg("%s", e.msg);
     json_decref(root);
@@ -606,6 +608,7 @@ static void much_evidence_is_folded(void **state)
     assert_int_equal(count_nodes(doc, "//details[@class='evidence' and @open]"), 8);
     assert_int_equal(count_nodes(doc, "//a[@class='up']"), 0);
     assert_int_equal(count_nodes(doc, "//p[@class='error-line']"), 1); /* without a script */
+    assert_int_equal(count_nodes(doc, "//meta[@http-equiv='refresh']"), 0);
     xmlFreeDoc(doc);
 
     add_claim(&r, "91_wrong", "cycles", "EQUIVALENT", "DIFFERENT", small_files);
@@ -616,6 +619,7 @@ static void much_evidence_is_folded(void **state)
     assert_int_equal(count_nodes(doc, "//details[@class='evidence' and @open]"), 1);
     assert_text_has(doc, "//details[@class='evidence' and @open]/../@id", 0, "claim-8");
     assert_int_equal(count_nodes(doc, "//a[@class='up' and @href='#table']"), 2);
+    assert_text_has(doc, "//meta[@http-equiv='refresh']/@content", 0, "3");
     assert_text_has(doc, "//header/p[@class='error-line']", 0, "31 more are to be judged");
     assert_text_has(doc, "//h1", 0, "So far 1 of 9 claims did not come out as expected.");
     xmlFreeDoc(doc);

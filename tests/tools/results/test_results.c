@@ -4,7 +4,6 @@
 
 #include "renderer/base/fs.h"
 #include "tools/results/claim_result.h"
-#include "tools/base/utf8.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -566,39 +565,6 @@ static void junit_reads_back(void **state)
     remove_place(&p);
 }
 
-/* By the table of well-formed byte sequences, Unicode 15 table 3-7. */
-static void what_is_utf8(void **state)
-{
-    (void)state;
-    static const char *const good[] = {"",
-                                       "plain",
-                                       "\xc2\x80 \xdf\xbf",
-                                       "\xe0\xa0\x80",
-                                       "\xed\x9f\xbf \xee\x80\x80",
-                                       "\xf0\x90\x80\x80 \xf4\x8f\xbf\xbf"};
-    static const char *const bad[] = {"\x80",
-                                      "\xc1\xbf",
-                                      "\xc2",
-                                      "\xc2x",
-                                      "\xe0\x9f\xbf",
-                                      "\xe2\x82",
-                                      "\xed\xa0\x80",
-                                      "\xf0\x8f\xbf\xbf",
-                                      "\xf4\x90\x80\x80",
-                                      "\xf5\x80\x80\x80",
-                                      "\xff"};
-    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
-        json_t *v = json_string(good[i]);
-        assert_non_null(v); /* jansson agrees */
-        json_decref(v);
-        assert_true(utf8_is_valid(good[i]));
-    }
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        assert_null(json_string(bad[i]));
-        assert_false(utf8_is_valid(bad[i]));
-    }
-}
-
 /* A file name in Latin-1, say. */
 static void an_argument_that_is_no_utf8_is_named(void **state)
 {
@@ -627,7 +593,6 @@ int main(void)
         cmocka_unit_test(values_out_of_order),
         cmocka_unit_test(bad_file),
         cmocka_unit_test(exit_codes),
-        cmocka_unit_test(what_is_utf8),
         cmocka_unit_test(an_argument_that_is_no_utf8_is_named),
         cmocka_unit_test(table_for_a_terminal),
         cmocka_unit_test(table_in_markdown),

@@ -1,0 +1,22 @@
+/* What reference_render() and the parts of reference_part.c have in common. */
+#ifndef ASSAY_REFERENCE_INTERNAL_H
+#define ASSAY_REFERENCE_INTERNAL_H
+
+#include "reference_render.h"
+
+/* NULL if there is none of that name. */
+const struct engine_driver *engine_driver_of(const char *engine);
+
+/* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
+bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
+                            const struct reference_options *opt,
+                            bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
+                            void *ctx, struct err *e) __attribute__((warn_unused_result));
+
+/* Adds what every reference's manifest says; false out of memory. */
+bool reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
+                        const struct reference_options *opt, const struct timing *t,
+                        const struct moments *m, json_t *manifest)
+    __attribute__((warn_unused_result));
+
+#endif

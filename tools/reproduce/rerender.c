@@ -1,0 +1,346 @@
+#include "reference/base/process.h"
+#include "reference/store/reference_render.h"
+#include "renderer/base/cli.h"
+#include "renderer/base/cli_rewrite.h"
+#include "renderer/base/fs.h"
+#include "renderer/pathtracer/options.h"
+#include "renderer/base/sha256.h"
+#include "renderer/base/shell_quote.h"
+#include "tools/jobs/merge.h"
+#include "tools/base/data_dirs.h"
+#include "tools/jobs/job_kinds.h"
+#include "reproduce_internal.h"
+#include "tools/results/results.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_PATH = 4096 };
+
+static const char *attr(const struct image *im, const char *name)
+{
+    const char *value = image_get_attr(im, name);
+    return value != NULL ? value : "";
+}
+
+enum { MORE_WORDS = 12, NUMBER = 16 };
+
+/* The scene has to be here, with the hash that the image says. */
+static bool check_scene(const char *path, const struct image *im, const char *scene, struct err *e)
+{
+    const char *then = attr(im, "assay:scene");
+    char now[65];
+    if (access(scene, R_OK) != 0)
+        return err_set(e, "%s: its scene '%s' is not here: give --scene, or go where it was made",
+                       path, scene);
+    return sha256_file(scene, now, e) &&
+           (strcmp(now, then) == 0 ||
+            err_set(e,
+                    "%s: %s is not the file that it was made of (SHA-256 %.12s... then, %.12s... "
+                    "now)",
+                    path, scene, then, now));
+}
+
+/* The words of the render, as they are to be run; argv: room for as many as `word` has and MORE_WORDS more. Ours come
+ * first, as "--" may end the options. spp: room for a number, to live as long. */
+static bool command_of(const char *path, const struct image *im,
+                       const struct reproduce_options *opt, char **word, int num,
+                       const char *threads, const char *out, char spp[NUMBER], const char **argv,
+                       struct err *e)
+{
+    struct options o;
+    struct err why = {""};
+    if (!options_parse(num, word, &o, &why) || o.action != ACTION_RENDER)
+        return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
+    if (!check_scene(path, im, opt->scene != NULL ? opt->scene : o.scene, e))
+        return false;
+    const char *ours[] = {opt->pathtracer,           "-q", "-t", threads, "--samples",
+                          attr(im, "assay:samples"), "-f", out};
+    int n = (int)(sizeof ours / sizeof *ours);
+    memcpy(argv, ours, sizeof ours);
+    /* Where it was the default, the most that a pilot grants would now be the last of the samples. */
+    if (o.pilot_tolerance >= 0) {
+        snprintf(spp, NUMBER, "%d", o.spp);
+        argv[n++] = "-s";
+        argv[n++] = spp;
+    }
+    int kept = cli_rewrite_kept(cli_rewrite_render, num - 1, word + 1, word + 1);
+    for (int i = 1; i <= kept; i++)
+        argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
+    return true;
+}
+
+/* The same render by metadata: another camera file, say, is another render. */
+static bool check_same(const char *path, const struct image *a, const struct image *b,
+                       struct err *e)
+{
+    static const char *const same[] = {"assay:unit",     "assay:spp",      "assay:scene",
+                                       "assay:settings", "assay:adaptive", "assay:seed",
+                                       "assay:cell",     "assay:samples",  "assay:ranges"};
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
+        if (strcmp(attr(a, same[i]), attr(b, same[i])) != 0)
+            return err_set(e, "%s: %s was '%.300s', and is '%.300s' of what its command makes now",
+                           path, same[i], attr(a, same[i]), attr(b, same[i]));
+    return true;
+}
+
+/* Bit by bit. False if size or channels are others. */
+static bool compare(const char *path, const struct image *a, const struct image *b,
+                    struct reproduced *out, struct err *e)
+{
+    if (a->width != b->width || a->height != b->height || a->channels != b->channels)
+        return err_set(e, "%s: %d x %d x %d values, made again %d x %d x %d", path, a->width,
+                       a->height, a->channels, b->width, b->height, b->channels);
+    size_t num = (size_t)a->width * (size_t)a->height * (size_t)a->channels;
+    for (int c = 0; c < a->channels; c++)
+        if (image_channel(b, a->names[c]) != c)
+            return err_set(e, "%s: made again its channel %d is no %s", path, c, a->names[c]);
+    for (size_t i = 0; i < num; i++) {
+        size_t c = i % (size_t)a->channels, p = i / (size_t)a->channels;
+        const float *x = &a->data[i], *y = &b->data[i];
+        uint32_t bits[2];
+        memcpy(&bits[0], x, sizeof *x);
+        memcpy(&bits[1], y, sizeof *y);
+        if (bits[0] != bits[1] && out->num_different++ == 0)
+            snprintf(out->first, sizeof out->first, "%s at pixel %zu,%zu: %.9g there, %.9g now",
+                     a->names[c], p % (size_t)a->width, p / (size_t)a->width, (double)*x,
+                     (double)*y);
+    }
+    out->num_values += (double)num;
+    return true;
+}
+
+/* Into the file `to`, by the words of a command. */
+static bool remake_render(const char *path, const struct image *im, char **word, int num,
+                          const struct reproduce_options *opt, const char *to,
+                          struct reproduced *out, struct err *e)
+{
+    char threads[NUMBER], spp[NUMBER], log[MAX_PATH];
+    snprintf(threads, sizeof threads, "%d", opt->threads);
+    snprintf(log, sizeof log, "%s.log", to);
+    const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
+    bool ok = (argv != NULL || err_set(e, "out of memory")) &&
+              command_of(path, im, opt, word, num, threads, to, spp, argv, e);
+    ok = ok && reproduced_command(out, argv, e);
+    const struct process p = {.argv = argv, .log = log};
+    ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
+    free(argv);
+    return ok;
+}
+
+/* The same of sums of sample ranges: their jobs, run here one after the other and added up as they were. */
+static bool remake_ranges(const char *path, const struct image *im, char **word, int num,
+                          const struct reproduce_options *opt, const char *to,
+                          struct reproduced *out, struct err *e)
+{
+    enum { BEFORE = 6 }; /* words that plan it */
+    char threads[NUMBER], spp[NUMBER], ranges[NUMBER], dir[MAX_PATH];
+    struct plan p = {.dir = ""};
+    struct plan_wishes w = {.parts = 1, .ranges = 1, .pathtracer = opt->pathtracer};
+    for (const char *c = attr(im, "assay:ranges"); *c != '\0'; c++)
+        w.ranges += *c == ',';
+    snprintf(threads, sizeof threads, "%d", opt->threads);
+    snprintf(ranges, sizeof ranges, "%d", w.ranges);
+    snprintf(dir, sizeof dir, "%.4000s.plan", to);
+    const char **argv = calloc((size_t)num + BEFORE + MORE_WORDS, sizeof *argv);
+    if (argv == NULL)
+        return err_set(e, "out of memory");
+    const char *plan[BEFORE] = {"assay", "plan", "--parts", "1", "--ranges", ranges};
+    memcpy(argv, plan, sizeof plan);
+    const char **render = argv + BEFORE;
+    bool ok = command_of(path, im, opt, word, num, threads, to, spp, render, e);
+    render[0] = "pathtracer";
+    char **words = (char **)render;
+    int count = 0;
+    while (render[count] != NULL)
+        count++;
+    ok = ok && reproduced_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
+    for (int k = 0; ok && k < p.num; k++) {
+        bool made;
+        ok = job_run(&p, k, &made, e);
+    }
+    ok = ok && job_render_gather_quietly(&p, count, words, e);
+    plan_free(&p);
+    free(argv);
+    return ok || err_prefix(e, "%s: made again", path);
+}
+
+static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
+                   struct reproduced *out, struct err *e);
+
+/* Shares are made again each and then put together; their paths are those of the command. */
+static bool remake_merge(const char *path, char **word, int num,
+                         const struct reproduce_options *opt, const char *to, int depth,
+                         struct reproduced *out, struct err *e)
+{
+    int shares = num - 3, read = 0;
+    struct share whole = {0}, *share = calloc((size_t)(shares > 0 ? shares : 1), sizeof *share);
+    bool ok = share != NULL || err_set(e, "out of memory");
+    if (ok && shares < 2)
+        ok = err_set(e, "%s: its command names no shares", path);
+    for (int i = 0; ok && i < shares; i++) {
+        char part[MAX_PATH];
+        snprintf(part, sizeof part, "%.4000s.%d.exr", to, i);
+        ok = access(word[3 + i], R_OK) == 0 ||
+             err_set(e, "%s: its share '%s' is not here: go where it was made", path, word[3 + i]);
+        ok = ok && remake(word[3 + i], opt, part, depth + 1, out, e) &&
+             share_read(part, &share[i], e);
+        read += ok;
+    }
+    ok = ok && merge_shares(share, shares, &whole, e) && share_write(to, &whole, "assay merge", e);
+    for (int i = 0; i < read; i++)
+        share_free(&share[i]);
+    free(share);
+    share_free(&whole);
+    return ok && reproduced_command(out, (const char *const *)word, e);
+}
+
+/* Into the file `to`. */
+static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
+                   struct reproduced *out, struct err *e)
+{
+    enum { MOST_DEPTH = 16 };
+    struct image im = {0};
+    int num = 0;
+    if (depth > MOST_DEPTH)
+        return err_set(e, "%s: merged from itself", path);
+    if (!image_read_exr(path, &im, NULL, e))
+        return false;
+    const char *command = image_get_attr(&im, "assay:command");
+    char **word = NULL;
+    bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
+    if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
+        ok = err_prefix(e, "%s", path);
+    if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
+        ok = remake_merge(path, word, num, opt, to, depth, out, e);
+    else if (ok && image_get_attr(&im, "assay:ranges") != NULL)
+        ok = remake_ranges(path, &im, word, num, opt, to, out, e);
+    else if (ok)
+        ok = remake_render(path, &im, word, num, opt, to, out, e);
+    free(word);
+    image_free(&im);
+    return ok;
+}
+
+/* DIR of DIR/SCENE/ENGINE.exr; "." where that is the current one. */
+static bool directory_of(const char *path, const char *scene, const char *engine,
+                         char dir[MAX_PATH], struct err *e)
+{
+    char end[512];
+    int n = snprintf(end, sizeof end, "%.200s/%.200s.exr", scene, engine);
+    size_t length = strlen(path);
+    if (length < (size_t)n || length >= MAX_PATH || strcmp(path + length - (size_t)n, end) != 0 ||
+        (length > (size_t)n && path[length - (size_t)n - 1] != '/'))
+        return err_set(e, "%s: a stored reference is made again where it is stored, as .../%s",
+                       path, end);
+    snprintf(dir, MAX_PATH, "%.*s", (int)(length - (size_t)n), path);
+    if (dir[0] == '\0')
+        strcpy(dir, ".");
+    return true;
+}
+
+static const struct suite_reference *reference_of(const struct suite_scene *s, const char *engine)
+{
+    for (int i = 0; i < s->num_references; i++)
+        if (strcmp(s->reference[i].engine, engine) == 0)
+            return &s->reference[i];
+    return NULL;
+}
+
+/* By which engine it was made then, where it is another one now: that may be why it differs. */
+static void compare_engines(const json_t *then, const json_t *now, struct reproduced *out)
+{
+    const char *a = member_text(then, "version"), *b = member_text(now, "version");
+    if (strcmp(a, b) != 0)
+        snprintf(out->note, sizeof out->note, "the reference is by %.100s, this is %.100s", a, b);
+    else if (strcmp(member_text(then, "binary_sha256"), member_text(now, "binary_sha256")) != 0)
+        snprintf(out->note, sizeof out->note, "the reference is by another build of %.100s", a);
+}
+
+static bool render_golden(const struct suite_scene *scene, const struct suite_reference *ref,
+                          const struct reproduce_options *opt, const char *golden_dir,
+                          const char *dir, const char *to, struct reproduced *out, struct err *e)
+{
+    char share[4096], again[MAX_PATH], seed[24];
+    struct moments then, now;
+    json_t *was = NULL, *is = NULL;
+    if (!golden_read(golden_dir, scene, ref, &then, &was, e))
+        return false;
+    moments_free(&then);
+    const struct reference_options how = {
+        .seed = (uint32_t)member_number(was, "seed"),
+        .threads = opt->threads == 0 ? cli_processors() : opt->threads,
+        .timeout_s = 7200,
+        .work_dir = dir,
+        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
+    snprintf(seed, sizeof seed, "%u", (unsigned)how.seed);
+    snprintf(again, sizeof again, "%.3000s/%.200s/%.200s.exr", dir, scene->name, ref->engine);
+    const char *const word[] = {"assay",    "reference", "--fresh", "--only", scene->name,
+                                "--engine", ref->engine, "--seed",  seed,     NULL};
+    bool ok = reproduced_command(out, word, e);
+    if (ok && reference_render(scene, ref, &how, &now, &is, e)) {
+        compare_engines(was, is, out);
+        ok = golden_write(dir, scene->name, ref->engine, &now, is, e) &&
+             (rename(again, to) == 0 || err_set(e, "%s: %s", to, strerror(errno)));
+        moments_free(&now);
+        json_decref(is);
+    } else {
+        ok = false;
+    }
+    json_decref(was);
+    return ok;
+}
+
+static bool remake_golden(const char *path, const struct image *im,
+                          const struct reproduce_options *opt, const char *dir, const char *to,
+                          struct reproduced *out, struct err *e)
+{
+    char suite_dir[4096], golden_dir[MAX_PATH];
+    const char *name = image_get_attr(im, "assay:scene"),
+               *engine = image_get_attr(im, "assay:engine");
+    struct suite suite = {0};
+    if (name == NULL)
+        return err_set(e, "%s: does not say of what scene it is", path);
+    if (opt->scene != NULL || opt->pathtracer != NULL)
+        return err_set(e, "%s: --scene and --pathtracer are for renders of pathtracer", path);
+    const char *from =
+        data_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes");
+    if (!directory_of(path, name, engine, golden_dir, e) || !suite_load(from, &suite, e))
+        return false;
+    const struct suite_scene *scene = suite_find(&suite, name);
+    const struct suite_reference *ref = scene != NULL ? reference_of(scene, engine) : NULL;
+    bool ok = ref != NULL || err_set(e, "%s: %s has no scene '%.100s' with a reference by '%.100s'",
+                                     path, from, name, engine);
+    ok = ok && render_golden(scene, ref, opt, golden_dir, dir, to, out, e);
+    suite_free(&suite);
+    return ok;
+}
+
+bool rerender(const char *path, const struct reproduce_options *opt, const char *dir,
+              struct reproduced *out, struct err *e)
+{
+    struct image then = {0}, now = {0};
+    struct reproduce_options with = *opt;
+    char to[MAX_PATH], beside[4096];
+    fs_beside_program(beside, sizeof beside, "pathtracer");
+    if (with.pathtracer == NULL)
+        with.pathtracer = beside;
+    if (!image_read_exr(path, &then, NULL, e))
+        return false;
+    snprintf(to, sizeof to, "%s/again.exr", dir);
+    bool golden = image_get_attr(&then, "assay:engine") != NULL;
+    if (!golden)
+        snprintf(out->made_by, sizeof out->made_by, "%s", attr(&then, "assay:version"));
+    bool ok = golden ? remake_golden(path, &then, opt, dir, to, out, e)
+                     : remake(path, &with, to, 0, out, e);
+    ok = ok && image_read_exr(to, &now, NULL, e) && check_same(path, &then, &now, e) &&
+         compare(path, &then, &now, out, e);
+    if (ok && opt->keep != NULL)
+        ok = image_write_exr(opt->keep, &now, e);
+    image_free(&then);
+    image_free(&now);
+    return ok;
+}
