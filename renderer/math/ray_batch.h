@@ -62,12 +62,6 @@ static inline void rgbs_set(struct rgbs *a, int i, rgb v)
     a->g[i] = v.g;
     a->b[i] = v.b;
 }
-static inline void rgbs_add(struct rgbs *a, int i, rgb v)
-{
-    a->r[i] += v.r;
-    a->g[i] += v.g;
-    a->b[i] += v.b;
-}
 static inline ray rays_get(const struct rays *a, int i)
 {
     return (ray){vec3s_get(&a->o, i), vec3s_get(&a->d, i), a->tmin[i], a->tmax[i]};

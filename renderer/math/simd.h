@@ -1,6 +1,6 @@
 /* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each, one or eight as the Makefile says when
- * it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives every lane the same
- * bits in either width. Truth is a lane of ones.
+ * it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives
+ * every lane the same bits in either width. Truth is a lane of ones.
  *
  * In simd_one.h and simd_eight.h:
  *   vf_set, vi_set          the same number in all lanes

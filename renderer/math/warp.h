@@ -3,8 +3,8 @@
 #ifndef ASSAY_WARP_H
 #define ASSAY_WARP_H
 
-#include "vec_simd.h"
 #include "trig.h"
+#include "vec_simd.h"
 
 /* Point of the unit disk, density 1/pi; concentric map [Shirley97]. */
 INLINE void warp_disk(vf u, vf v, vf *x, vf *y)

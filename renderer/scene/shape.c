@@ -119,5 +119,5 @@ struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, fl
 
 vec3 surface_origin(const struct surface *s, vec3 w)
 {
-    return mad(s->p, dot(w, s->ng) < 0 ? -s->eps : s->eps, s->ng);
+    return leave_surface(s->p, s->ng, s->eps, w);
 }

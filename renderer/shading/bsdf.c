@@ -6,7 +6,7 @@ static struct materialv material_of(const struct material *m)
 {
     float record[MATERIAL_WORDS] = {0};
     struct materialv v;
-    lanes_scene_material(m, record);
+    scene_simd_material(m, record);
     materials_gather(record, (const int32_t[]){0}, &v);
     return v;
 }
@@ -16,7 +16,7 @@ rgb bsdf_eval(const struct material *m, vec3 wo, vec3 wi)
     const struct materialv v = material_of(m);
     float pdf_w;
     if (m->kind == MATERIAL_DIFFUSE)
-        return wo.z > 0 && wi.z > 0 ? rgb_scale(m->reflectance, INV_PI_F) : grey(0);
+        return wo.z > 0 && wi.z > 0 ? eval_diffuse(m->reflectance) : grey(0);
     return bsdf_is_delta(m) ? grey(0) : eval_lobes(&v, -1, wo, wi, &pdf_w);
 }
 
@@ -36,7 +36,7 @@ struct bsdf_sample bsdf_sample_direction(const struct material *m, bool front, v
 {
     float record[MATERIAL_WORDS] = {0};
     struct bsdf_samplev s;
-    lanes_scene_material(m, record);
+    scene_simd_material(m, record);
     sample_lobes(record, (const int32_t[]){0}, 1 << m->kind, m->reflectance, &front, 1, wo,
                  (const float[]){u, v, lobe, 0}, &s);
     return (struct bsdf_sample){
@@ -45,14 +45,7 @@ struct bsdf_sample bsdf_sample_direction(const struct material *m, bool front, v
 
 bool bsdf_is_delta(const struct material *m)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MICROFACET: return false;
-    case MATERIAL_MIRROR:
-    case MATERIAL_REFRACTION:
-    case MATERIAL_GLASS: break;
-    }
-    return true;
+    return !(1 << m->kind & MATERIAL_SCATTERS);
 }
 
 bool bsdf_is_black(const struct material *m)

@@ -1,11 +1,11 @@
-/* Scattering (bsdf.h) by lanes, which may be of different materials. Directions in the local frame. A new material adds its lines to
- * eval_lobes() and sample_lobes(). */
+/* Scattering (bsdf.h) by lanes, which may be of different materials. Directions in the local frame. A new material has
+ * a header of its own, its lines in eval_lobes() and sample_lobes() and, if it scatters, its bit in MATERIAL_SCATTERS. */
 #ifndef ASSAY_BSDF_SIMD_H
 #define ASSAY_BSDF_SIMD_H
 
 #include "fresnel.h"
-#include "scene_simd.h"
 #include "microfacet.h"
+#include "scene_simd.h"
 
 /* Closer to the surface than this, squares of cosines leave the range of float32. */
 #define LOWEST_COS 1e-15f
@@ -132,6 +132,12 @@ INLINE void sample_dielectric(const struct materialv *m, vi lanes, vi front, vec
     sample_mirror(back, wo, m->reflectance, s);
     sample_delta(through, v3v(-wo.x / eta, -wo.y / eta, -cos_t),
                  rgb_scalev(m->transmittance, 1 / eta2), eta2, s);
+}
+
+/* f of a diffuse surface, wo and wi above it; the density of wi is warp_cosine_hemisphere_pdf_w(). */
+INLINE rgbv eval_diffuse(rgbv reflectance)
+{
+    return rgb_scalev(reflectance, vf_set(INV_PI_F));
 }
 
 /* f of the lanes that scatter other than evenly, and the density of wi. */

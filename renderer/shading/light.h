@@ -62,10 +62,4 @@ static inline bool light_is_delta(const struct light *l)
     return l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT || l->kind == LIGHT_DIRECTIONAL;
 }
 
-/* Emitted radiance towards w (any length) of material m at a surface with geometric normal ng. */
-static inline rgb emitted_radiance(const struct material *m, vec3 ng, vec3 w)
-{
-    return m->radiance_both_sides || dot(ng, w) > 0 ? m->radiance : grey(0);
-}
-
 #endif

@@ -2,11 +2,11 @@
 #ifndef ASSAY_LIGHT_SIMD_H
 #define ASSAY_LIGHT_SIMD_H
 
-#include "renderer/math/discrete.h"
-#include "renderer/scene/environment.h"
 #include "light.h"
-#include "renderer/scene/cs184_deviations.h"
+#include "renderer/math/discrete.h"
 #include "renderer/math/warp.h"
+#include "renderer/scene/cs184_deviations.h"
+#include "renderer/scene/environment.h"
 
 enum {
     /* Up to so many triangles of a light are looked through one by one. */

@@ -4,8 +4,8 @@
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
-#include "renderer/scene/scene.h"
 #include "renderer/math/warp.h"
+#include "renderer/scene/scene.h"
 
 #define MICROFACET_SQRT_PI 1.77245385090551602730f
 

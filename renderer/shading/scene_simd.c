@@ -1,7 +1,7 @@
 #include "scene_simd.h"
 
-#include "renderer/base/huge_alloc.h"
 #include "bsdf.h"
+#include "renderer/base/huge_alloc.h"
 #include "renderer/scene/shape.h"
 
 #include <stdlib.h>
@@ -55,7 +55,7 @@ static void fill_sphere(const struct scene *s, uint32_t i, float *r)
     set_int(r + RECORD_LIGHT, s->sphere_light[i]);
 }
 
-void lanes_scene_material(const struct material *m, float r[MATERIAL_WORDS])
+void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
 {
     set_rgb(r + MATERIAL_REFLECTANCE, m->reflectance);
     set_rgb(r + MATERIAL_TRANSMITTANCE, m->transmittance);
@@ -70,16 +70,16 @@ void lanes_scene_material(const struct material *m, float r[MATERIAL_WORDS])
     set_int(r + MATERIAL_FACETS, (int32_t)m->microfacet);
 }
 
-struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
+struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
 {
-    struct lanes_scene *l = calloc(1, sizeof *l);
+    struct scene_simd *l = calloc(1, sizeof *l);
     const size_t words = RECORD_WORDS * (size_t)scene_num_primitives(s);
     if (l != NULL) {
         l->primitive = huge_alloc(words * sizeof *l->primitive);
         l->material = calloc(s->num_materials + 1, MATERIAL_WORDS * sizeof *l->material);
     }
     if (l == NULL || l->primitive == NULL || l->material == NULL) {
-        lanes_scene_free(l);
+        scene_simd_free(l);
         err_set(e, "out of memory for the records of %u primitives", scene_num_primitives(s));
         return NULL;
     }
@@ -91,14 +91,14 @@ struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
     for (uint32_t i = 0; i < s->num_spheres; i++)
         fill_sphere(s, i, l->primitive + RECORD_WORDS * (size_t)(s->num_triangles + i));
     for (uint32_t i = 0; i < s->num_materials; i++) {
-        lanes_scene_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
+        scene_simd_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
         l->only_diffuse = l->only_diffuse && (s->materials[i].kind == MATERIAL_DIFFUSE ||
                                               bsdf_is_black(&s->materials[i]));
     }
     return l;
 }
 
-void lanes_scene_free(struct lanes_scene *l)
+void scene_simd_free(struct scene_simd *l)
 {
     if (l == NULL)
         return;

@@ -41,17 +41,17 @@ enum {
     MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_MICROFACET /* no delta lobe */
 };
 
-struct lanes_scene {
+struct scene_simd {
     float *primitive; /* RECORD_WORDS of each; triangles, then spheres */
     float *material;  /* MATERIAL_WORDS of each */
     bool only_diffuse, has_spheres;
 };
 
 /* Fills the record of a material. */
-void lanes_scene_material(const struct material *m, float record[MATERIAL_WORDS]);
+void scene_simd_material(const struct material *m, float record[MATERIAL_WORDS]);
 /* NULL if out of memory. Does not refer to the scene. */
-struct lanes_scene *lanes_scene_build(const struct scene *s, struct err *e)
+struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));
-void lanes_scene_free(struct lanes_scene *l);
+void scene_simd_free(struct scene_simd *l);
 
 #endif

@@ -8,10 +8,10 @@
 /* Samples of a light at a vertex whose rays go to the kernel together. */
 enum { TOGETHER = 4 };
 
-/* Eight vertices as samples of lights want them. */
+/* Vertices as samples of lights want them. */
 struct vertexv {
     vec3v p, ng, ns, wo, off; /* off: where rays leave on the side of ng */
-    rgbv throughput, diffuse; /* diffuse: reflectance / pi */
+    rgbv throughput, diffuse; /* diffuse: f, if it is that */
     vf eps;
     vi bits;
 };
@@ -25,7 +25,7 @@ INLINE void load_vertex(const struct batch *b, int k, struct vertexv *v)
     v->eps = vf_load_any(b->eps + k);
     v->off = madv(v->p, v->eps, v->ng);
     v->throughput = rgb_load(&b->throughput, k);
-    v->diffuse = rgb_scalev(rgb_load(&b->reflectance, k), vf_set(INV_PI_F));
+    v->diffuse = eval_diffuse(rgb_load(&b->reflectance, k));
     v->bits = vi_load_any(b->bits + k);
 }
 
@@ -35,8 +35,8 @@ INLINE unsigned scattering(const struct batch *b, int k)
     return b->goes_on[k / LANES] & bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
 }
 
-/* f(wo, wi) cos(theta_i) and the BSDF's own density of wi for the lanes of the mask; which of them scatter some. None does
- * unless wi leaves on wo's side of the true surface. */
+/* f(wo, wi) cos(theta_i) and the BSDF's own density of wi for the lanes of the mask; which of them scatter some. None
+ * does unless wi leaves on wo's side of the true surface. */
 INLINE unsigned scatter_towards(const struct integrator *it, const struct batch *b, int k,
                                 const struct vertexv *v, unsigned mask, vec3v wi, bool only_diffuse,
                                 rgbv *f, vf *pdf_w)
@@ -55,7 +55,7 @@ INLINE unsigned scatter_towards(const struct integrator *it, const struct batch 
     unsigned other = mask & ~bits(diffuse), black = bits(diffuse & below);
     if (other) {
         struct materialv m;
-        materials_gather(it->lanes_scene->material, (const int32_t *)b->material + k, &m);
+        materials_gather(it->records->material, (const int32_t *)b->material + k, &m);
         framev local = frame_from_normalv(v->ns);
         vf pdf_lobes;
         rgbv lobes = eval_lobes(&m, lanes_of(other), frame_to_localv(&local, v->wo),
@@ -224,7 +224,7 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
 {
     const struct light *light = &it->scene->lights[what.light];
     const bool simple =
-        !what.chosen && is_lamp(light) && it->lanes_scene->only_diffuse && it->scene->starter == 0;
+        !what.chosen && is_lamp(light) && it->records->only_diffuse && it->scene->starter == 0;
     if (simple)
         what.lamp = lamp_of(it->lights, what.light);
     const int most = BATCH_LANES / LANES / what.num * LANES;
@@ -255,8 +255,8 @@ static void choose(const struct integrator *it, struct batch *b, int n, int vert
         }
 }
 
-/* One uniform direction of the hemisphere from every lane that is not mirror-like, as one of `count` each; counts if it meets an emitter. Rays
- * and what they bring stand in the lanes of their vertices. */
+/* One uniform direction of the hemisphere from every lane that is not mirror-like, as one of `count` each; counts if it
+ * meets an emitter. Rays and what they bring stand in the lanes of their vertices. */
 static __attribute__((noinline)) void connect_hemisphere(const struct integrator *it,
                                                          struct batch *b, int n, int vertex,
                                                          uint32_t purpose, int count)

@@ -2,8 +2,8 @@
 #ifndef ASSAY_GENERATE_SIMD_H
 #define ASSAY_GENERATE_SIMD_H
 
-#include "renderer/scene/camera_simd.h"
 #include "paths_simd.h"
+#include "renderer/scene/camera_simd.h"
 #include "renderer/scene/shape_simd.h"
 
 /* Camera rays for all lanes. */

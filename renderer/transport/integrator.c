@@ -8,28 +8,28 @@ const char *const direct_kind_names[] = {"hemisphere", "light", "bsdf", "mis", N
 
 bool integrator_prepare(struct integrator *it, struct err *e)
 {
-    static const struct lanes_kernel *const kernel[] = {[ISA_SCALAR] = &lanes_kernel_scalar,
-                                                        [ISA_SSE42] = &lanes_kernel_sse42,
-                                                        [ISA_AVX2] = &lanes_kernel_avx2,
-                                                        [ISA_AVX512] = &lanes_kernel_avx512};
+    static const struct integrator_simd *const kernel[] = {[ISA_SCALAR] = &integrator_simd_scalar,
+                                                           [ISA_SSE42] = &integrator_simd_sse42,
+                                                           [ISA_AVX2] = &integrator_simd_avx2,
+                                                           [ISA_AVX512] = &integrator_simd_avx512};
     enum isa isa = it->opt.isa;
-    it->lanes = NULL;
-    it->lanes_scene = NULL;
+    it->stages = NULL;
+    it->records = NULL;
     if (!isa_choose(&isa, e))
         return false;
-    it->lanes = kernel[isa];
+    it->stages = kernel[isa];
     return it->opt.kind == INTEGRATE_NORMALS ||
-           (it->lanes_scene = lanes_scene_build(it->scene, e)) != NULL;
+           (it->records = scene_simd_build(it->scene, e)) != NULL;
 }
 
 void integrator_free(struct integrator *it)
 {
-    lanes_scene_free((struct lanes_scene *)it->lanes_scene);
-    it->lanes_scene = NULL;
-    it->lanes = NULL;
+    scene_simd_free((struct scene_simd *)it->records);
+    it->records = NULL;
+    it->stages = NULL;
 }
 
 void integrate(const struct integrator *it, struct batch *b, int num_lanes)
 {
-    it->lanes->integrate(it, b, num_lanes);
+    it->stages->integrate(it, b, num_lanes);
 }

@@ -4,12 +4,12 @@
 #ifndef ASSAY_INTEGRATOR_H
 #define ASSAY_INTEGRATOR_H
 
-#include "renderer/math/ray_batch.h"
-#include "renderer/bvh/bvh.h"
-#include "renderer/scene/camera.h"
 #include "renderer/base/isa.h"
-#include "renderer/shading/light.h"
+#include "renderer/bvh/bvh.h"
+#include "renderer/math/ray_batch.h"
 #include "renderer/math/sampler.h"
+#include "renderer/scene/camera.h"
+#include "renderer/shading/light.h"
 
 enum integrator_kind {
     INTEGRATE_PATHS,
@@ -71,8 +71,8 @@ struct integrator {
     const struct bvh *bvh;
     const struct light_table *lights;
     /* The stages; and the scene for them, NULL: not needed. */
-    const struct lanes_kernel *lanes;
-    const struct lanes_scene *lanes_scene;
+    const struct integrator_simd *stages;
+    const struct scene_simd *records;
 };
 
 /* The working memory of one thread. In: lanes 0 .. num_lanes-1 of pixel (number in the full
@@ -121,7 +121,7 @@ static inline bool chooses_light(const struct integrator *it)
     return it->scene->num_lights > MANY_LIGHTS;
 }
 
-/* Fills it->lanes and it->lanes_scene as it->opt.isa asks, for the scene in *it; false if out of
+/* Fills it->stages and it->records as it->opt.isa asks, for the scene in *it; false if out of
  * memory or if the machine lacks the instructions. integrator_free() afterwards, in either case. */
 bool integrator_prepare(struct integrator *it, struct err *e) __attribute__((warn_unused_result));
 void integrator_free(struct integrator *it);

@@ -1,12 +1,12 @@
-/* generate, shade, connect and scatter on as many paths at a time as there are lanes, compiled once for each instruction set.
- * Paths that go on are moved to the front of the batch after each vertex, so vectors stay full; rays
- * that light sampling casts lie side by side too. */
+/* The stages on as many paths at a time as there are lanes, compiled once for each instruction set. Paths that go on
+ * move to the front of the batch after each vertex, so vectors stay full; rays that light sampling casts lie side by
+ * side too. */
 #include "integrator_simd.h"
 
-#include "connect_simd.h"
 #include "aov.h"
-#include "generate_simd.h"
+#include "connect_simd.h"
 #include "film_simd.h"
+#include "generate_simd.h"
 #include "scatter_simd.h"
 #include "shade_simd.h"
 
@@ -35,5 +35,5 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
     }
 }
 
-const struct lanes_kernel FOR_ISA(lanes_kernel) = {.integrate = integrate_lanes,
-                                                   .film_add = film_add_lanes};
+const struct integrator_simd FOR_ISA(integrator_simd) = {.integrate = integrate_lanes,
+                                                         .film_add = film_add_lanes};

@@ -1,5 +1,5 @@
 /* The stages of the integrator on as many paths at a time as there are lanes, compiled once for each instruction set: one
- * for ISA_SCALAR, else eight. Every path gets the same bits. */
+ * lane for ISA_SCALAR, else eight. Every path has the same bits. */
 #ifndef ASSAY_INTEGRATOR_SIMD_H
 #define ASSAY_INTEGRATOR_SIMD_H
 
@@ -7,7 +7,7 @@
 #include "integrator.h"
 #include "renderer/base/isa.h"
 
-struct lanes_kernel {
+struct integrator_simd {
     /* integrate() */
     void (*integrate)(const struct integrator *it, struct batch *b, int num_lanes);
     /* Adds the radiance of lane i of a batch to pixel[i]. first: these pixels have no sample yet. */
@@ -15,7 +15,7 @@ struct lanes_kernel {
                      bool first);
 };
 
-extern const struct lanes_kernel lanes_kernel_scalar, lanes_kernel_sse42, lanes_kernel_avx2,
-    lanes_kernel_avx512;
+extern const struct integrator_simd integrator_simd_scalar, integrator_simd_sse42,
+    integrator_simd_avx2, integrator_simd_avx512;
 
 #endif

@@ -3,9 +3,9 @@
 #define ASSAY_PATHS_SIMD_H
 
 #include "integrator.h"
+#include "renderer/math/sampler_simd.h"
 #include "renderer/shading/bsdf_simd.h"
 #include "renderer/shading/light_simd.h"
-#include "renderer/math/sampler_simd.h"
 
 static inline bool counts(const struct integrator *it, int bounces)
 {

@@ -76,7 +76,7 @@ static void render_tile(struct job *j, struct batch *b, int tile)
         }
         integrate(j->it, b, n);
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
-        j->it->lanes->film_add(f, at, n, b, k == 0);
+        j->it->stages->film_add(f, at, n, b, k == 0);
         for (int i = 0; f->first != NULL && i < n; i++)
             film_add_first_hit(f, at[i], &b->first, i);
         if (f->target == NULL && o->adaptive_batch == 0)

@@ -3,14 +3,7 @@
 #define ASSAY_SCATTER_SIMD_H
 
 #include "paths_simd.h"
-
-/* surface_origin() */
-INLINE vec3v leaving(const struct batch *b, int k, vec3v wi)
-{
-    vec3v ng = v3_load(&b->ng, k);
-    vf eps = vf_load_any(b->eps + k);
-    return madv(v3_load(&b->p, k), vf_select(vf_lt(dotv(wi, ng), vf_set(0)), -eps, eps), ng);
-}
+#include "renderer/scene/shape_simd.h"
 
 /* Chance to go on from this vertex (0: the first that the camera sees). */
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
@@ -29,8 +22,8 @@ INLINE void finish(struct batch *b, int k, unsigned over)
     }
 }
 
-/* Sets up the next ray of every path that goes on, and moves these to the front; how many. only_delta: the last ray of a
- * path, where light sampling has already dealt with all emitters but those behind a delta lobe. */
+/* Sets up the next ray of every path that goes on, and moves these to the front; how many. only_delta: the last ray of
+ * a path, where light sampling has already dealt with all emitters but those behind a delta lobe. */
 static int scatter(const struct integrator *it, struct batch *b, int n, int vertex, bool only_delta)
 {
     const vf zero = vf_set(0);
@@ -47,7 +40,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         framev f = frame_from_normalv(v3_load(&b->ns, k));
         vec3v wo = frame_to_localv(&f, v3_load(&b->wo, k));
         struct bsdf_samplev s;
-        sample_lobes(it->lanes_scene->material, (const int32_t *)b->material + k,
+        sample_lobes(it->records->material, (const int32_t *)b->material + k,
                      vi_load_any(b->bits + k), rgb_load(&b->reflectance, k), b->front + k, mask, wo,
                      u, &s);
         vec3v wi = frame_to_worldv(&f, s.wi);
@@ -63,8 +56,8 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         throughput = rgb_scalev(throughput, vf_select(at_risk, 1 / go_on, vf_set(1)));
         mask &= bits(ok);
         finish(b, k, there & ~mask);
+        vec3v o = leave_surface(v3_load(&b->p, k), v3_load(&b->ng, k), vf_load_any(b->eps + k), wi);
         vi order = front_order(mask);
-        vec3v o = leaving(b, k, wi);
         pick_rgb(&b->throughput, kept, throughput, order);
         pick_rgb(&b->gathered, kept, rgb_load(&b->gathered, k), order);
         pick_v3(&b->ray.o, kept, o, order);

@@ -16,7 +16,7 @@ struct surfacev {
 INLINE void surfaces(const struct integrator *it, const struct rays *r, const struct hits *h, int k,
                      struct surfacev *s)
 {
-    const struct lanes_scene *ls = it->lanes_scene;
+    const struct scene_simd *ls = it->records;
     int32_t row[LANES];
     vi prim = vi_load_any(h->prim + k);
     prim = vi_select(vi_lt(prim, vi_set(0)), vi_set(0), prim);
@@ -133,7 +133,7 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
 /* Adds emission, sets up the surfaces, and says which paths go on. */
 static void shade(const struct integrator *it, struct batch *b, int n, int vertex)
 {
-    const struct lanes_scene *ls = it->lanes_scene;
+    const struct scene_simd *ls = it->records;
     const bool lights_count = counts(it, vertex), last = vertex == it->opt.max_bounces;
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n);

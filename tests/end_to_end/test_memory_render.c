@@ -92,13 +92,13 @@ static void hierarchies(void **state)
 static bool make_tables(void *ctx, struct err *e)
 {
     struct light_table *lights = light_table_build(ctx, e);
-    struct lanes_scene *lanes = lights != NULL ? lanes_scene_build(ctx, e) : NULL;
+    struct scene_simd *lanes = lights != NULL ? scene_simd_build(ctx, e) : NULL;
     alloc_fail_off();
     bool ok = lights != NULL && lanes != NULL;
     if (ok)
         assert_true(light_choice_probability(lights, 0) == 1 && lanes->has_spheres);
     light_table_free(lights);
-    lanes_scene_free(lanes);
+    scene_simd_free(lanes);
     return ok;
 }
 
