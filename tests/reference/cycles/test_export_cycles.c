@@ -5,18 +5,10 @@
 #include "reference/cycles/export_cycles.h"
 #include "reference/base/image_oiio.h"
 #include "renderer/base/fs.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <cmocka.h>
 #include <jansson.h>
 
 struct fixture {
@@ -75,8 +67,7 @@ static json_t *dump(struct fixture *f, int depth)
 {
     struct err e = {"untouched"};
     json_error_t je;
-    if (!export_cycles(&f->s, &f->c, depth, f->path, &e))
-        fail_msg("%s", e.msg);
+    MUST(export_cycles(&f->s, &f->c, depth, f->path, &e));
     assert_string_equal(e.msg, "untouched");
     json_t *root = json_load_file(f->path, JSON_REJECT_DUPLICATES, &je);
     if (root == NULL)
@@ -122,7 +113,7 @@ static double number(const json_t *object, const char *key)
     return json_number_value(json_object_get(object, key));
 }
 
-static void frame_and_camera(void **state)
+TEST_WITH(frame_and_camera, setup, teardown)
 {
     struct fixture *f = *state;
     json_t *root = dump(f, 5);
@@ -149,7 +140,7 @@ static void frame_and_camera(void **state)
     json_decref(root);
 }
 
-static void materials(void **state)
+TEST_WITH(materials, setup, teardown)
 {
     struct fixture *f = *state;
     strcpy(f->s.materials[0].name, "fl\303\266or\"");
@@ -167,7 +158,7 @@ static void materials(void **state)
     json_decref(root);
 }
 
-static void meshes(void **state)
+TEST_WITH(meshes, setup, teardown)
 {
     struct fixture *f = *state;
     json_t *root = dump(f, 1);
@@ -185,7 +176,7 @@ static void meshes(void **state)
 
 /* The floor's second triangle becomes smooth: it moves to a mesh of its own. Normals all on the
  * wrong side are turned as the renderer turns them; on both sides they are refused. */
-static void shading_normals(void **state)
+TEST_WITH(shading_normals, setup, teardown)
 {
     struct fixture *f = *state;
     for (int k = 3; k < 6; k++)
@@ -212,7 +203,7 @@ static void shading_normals(void **state)
     assert_refused(f, 1, "object 'o': triangle 1 has shading normals on both of its sides");
 }
 
-static void spheres(void **state)
+TEST_WITH(spheres, setup, teardown)
 {
     struct fixture *f = *state;
     json_t *root = dump(f, 1);
@@ -231,7 +222,7 @@ static void spheres(void **state)
 }
 
 /* Nothing is divided out: it is for Blender's nodes to form value / (a + b d + c d^2). */
-static void delta_lights(void **state)
+TEST_WITH(delta_lights, setup, teardown)
 {
     struct fixture *f = *state;
     f->s.lights[1].kind = LIGHT_SPOT;
@@ -258,7 +249,7 @@ static void delta_lights(void **state)
     json_decref(root);
 }
 
-static void specular_materials(void **state)
+TEST_WITH(specular_materials, setup, teardown)
 {
     struct fixture *f = *state;
     struct material *m = &f->s.materials[0];
@@ -302,7 +293,7 @@ static void put_out_delta_lights(struct fixture *f)
 
 /* Only what the Glossy BSDF is (GGX, separable, one colour for all angles) may meet lights that no ray
  * runs into. */
-static void microfacets(void **state)
+TEST_WITH(microfacets, setup, teardown)
 {
     struct fixture *f = *state;
     struct material *m = &f->s.materials[0];
@@ -360,7 +351,7 @@ static void set_environment(struct fixture *f, struct environment *env)
         fail_msg("%s", e.msg);
 }
 
-static void a_constant_environment(void **state)
+TEST_WITH(a_constant_environment, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -372,7 +363,7 @@ static void a_constant_environment(void **state)
     json_decref(root);
 }
 
-static void ambient_light(void **state)
+TEST_WITH(ambient_light, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -390,7 +381,7 @@ static void ambient_light(void **state)
 }
 
 /* The map goes beside the dump, to the bit, and nothing of it stays if the dump fails. */
-static void a_sky(void **state)
+TEST_WITH(a_sky, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -404,8 +395,7 @@ static void a_sky(void **state)
     assert_string_equal(json_string_value(json_object_get(env, "file")), "scene.json.exr");
     snprintf(path, sizeof path, "%s.exr", f->path);
     bool half = true;
-    if (!image_read(path, &got, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read(path, &got, &half, &e));
     struct image want = sky_image(&sky);
     assert_true(!half && got.width == 8 && got.height == 4 && got.channels == 3);
     for (int i = 0; i < 8 * 4; i++)
@@ -424,7 +414,7 @@ static void a_sky(void **state)
     assert_int_equal(access(path, F_OK), -1);
 }
 
-static void a_lens(void **state)
+TEST_WITH(a_lens, setup, teardown)
 {
     struct fixture *f = *state;
     f->c.lens_radius = .25f;
@@ -444,7 +434,7 @@ static void a_lens(void **state)
     assert_refused(f, 1, "the far plane is at 6.6");
 }
 
-static void cameras_that_cycles_lacks_are_refused(void **state)
+TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
 {
     struct fixture *f = *state;
     const struct camera c = f->c;
@@ -471,7 +461,7 @@ static void cameras_that_cycles_lacks_are_refused(void **state)
     assert_refused(f, 1, "geometry at distance 0 from the eye");
 }
 
-static void depth_is_limited_and_files_appear_whole(void **state)
+TEST_WITH(depth_is_limited_and_files_appear_whole, setup, teardown)
 {
     struct fixture *f = *state;
     assert_refused(f, 1026, "Cycles: depth 1026, at most 1025 are possible");
@@ -479,26 +469,4 @@ static void depth_is_limited_and_files_appear_whole(void **state)
     assert_int_equal(unlink(f->path), 0);
     snprintf(f->path, sizeof f->path, "%s/none/scene.json", f->dir);
     assert_refused(f, 1, "/none/scene.json: cannot write: ");
-}
-
-int main(void)
-{
-#define WITH_SCENE(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
-    const struct CMUnitTest tests[] = {
-        WITH_SCENE(frame_and_camera),
-        WITH_SCENE(materials),
-        WITH_SCENE(meshes),
-        WITH_SCENE(shading_normals),
-        WITH_SCENE(spheres),
-        WITH_SCENE(delta_lights),
-        WITH_SCENE(specular_materials),
-        WITH_SCENE(microfacets),
-        WITH_SCENE(a_constant_environment),
-        WITH_SCENE(ambient_light),
-        WITH_SCENE(a_sky),
-        WITH_SCENE(a_lens),
-        WITH_SCENE(cameras_that_cycles_lacks_are_refused),
-        WITH_SCENE(depth_is_limited_and_files_appear_whole),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,16 +10,7 @@
 #include "reference/replicates/engine_driver.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/shell_quote.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { W = 4, H = 3, PIXELS = W * H, K = 3, SEED = 5 };
 
@@ -33,8 +24,7 @@ static int set_up(void **state)
     struct err e;
     strcpy(dir, "/tmp/assay_engine_XXXXXX");
     assert_non_null(mkdtemp(dir));
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     const struct suite_scene *s = suite_find(&suite, "12_point_plane");
     assert_non_null(s);
     point_plane = *s;
@@ -77,8 +67,7 @@ static bool load(const char *json, struct engine *en, struct err *e)
 static void must_load(const char *json, struct engine *en)
 {
     struct err e;
-    if (!load(json, en, &e))
-        fail_msg("%s", e.msg);
+    MUST(load(json, en, &e));
 }
 
 /* Red is red(pixel), green 2, blue 0. PFM goes from the bottom row up. */
@@ -131,9 +120,8 @@ static bool render(const struct engine *en, const struct suite_scene *s, struct 
     return engine_render(en, s, &opt, m, manifest, e);
 }
 
-static void shipped_descriptions_load(void **state)
+TEST(shipped_descriptions_load)
 {
-    (void)state;
     static const char *const names[] = {"mitsuba", "pbrt", "povray_plain", "student",
                                         "pathtracer_again"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
@@ -141,16 +129,14 @@ static void shipped_descriptions_load(void **state)
         struct engine en;
         struct err e;
         snprintf(path, sizeof path, "reference/engines/%s.json", names[i]);
-        if (!engine_load(path, &en, &e))
-            fail_msg("%s", e.msg);
+        MUST(engine_load(path, &en, &e));
         assert_string_equal(en.name, names[i]);
         engine_free(&en);
     }
 }
 
-static void members_are_read(void **state)
+TEST(members_are_read)
 {
-    (void)state;
     struct engine en;
     must_load(
         "{\"name\": \"a-1\", \"format\": \"cycles\", \"output\": \"mean\", \"image\": \"hdr\","
@@ -169,9 +155,8 @@ static void members_are_read(void **state)
 }
 
 /* Each replaces one member of a good description, or adds one; NULL: leaves it out. */
-static void bad_descriptions_are_refused(void **state)
+TEST(bad_descriptions_are_refused)
 {
-    (void)state;
     static const char *const good[][2] = {
         {"name", "\"x\""},
         {"format", "\"pbrt\""},
@@ -246,9 +231,8 @@ static void bad_descriptions_are_refused(void **state)
     assert_non_null(strstr(e.msg, "nothing.json: cannot read"));
 }
 
-static void a_dae_needs_its_lens_on_the_command_line(void **state)
+TEST(a_dae_needs_its_lens_on_the_command_line)
 {
-    (void)state;
     const char *const head =
         "{\"name\": \"x\", \"format\": \"dae\", \"output\": \"mean\", \"command\": "
         "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": ";
@@ -276,9 +260,8 @@ static void a_dae_needs_its_lens_on_the_command_line(void **state)
     }
 }
 
-static void placeholders_are_filled_in(void **state)
+TEST(placeholders_are_filled_in)
 {
-    (void)state;
     struct engine en;
     struct err e;
     char **argv;
@@ -286,8 +269,7 @@ static void placeholders_are_filled_in(void **state)
               "\"command\": [\"run\", \"\", \"{{{seed}}}\", \"{out}{out}\", \"a b;$(c) {scene}\"]}",
               &en);
     const char *const values[] = {"scene", "s", "out", "/o", "seed", "12", NULL};
-    if (!engine_argv(&en, "command", values, &argv, &e))
-        fail_msg("%s", e.msg);
+    MUST(engine_argv(&en, "command", values, &argv, &e));
     const char *const want[] = {"run", "", "{12}", "/o/o", "a b;$(c) s"};
     for (int i = 0; i < 5; i++)
         assert_string_equal(argv[i], want[i]);
@@ -301,9 +283,8 @@ static void placeholders_are_filled_in(void **state)
     engine_free(&en);
 }
 
-static void scenes_know_what_they_need(void **state)
+TEST(scenes_know_what_they_need)
 {
-    (void)state;
     static const struct {
         const char *name;
         unsigned features;
@@ -319,8 +300,7 @@ static void scenes_know_what_they_need(void **state)
         struct camera camera;
         struct err e;
         assert_non_null(s);
-        if (!suite_open(s, &scene, &camera, &e))
-            fail_msg("%s", e.msg);
+        MUST(suite_open(s, &scene, &camera, &e));
         assert_int_equal(features_of_scene(&scene, &camera), cases[i].features);
         camera.lens_radius = 0.01f;
         assert_int_equal(features_of_scene(&scene, &camera),
@@ -334,9 +314,8 @@ static void scenes_know_what_they_need(void **state)
 }
 
 /* The features that no scene above has, one material or light at a time. */
-static void materials_and_lights_have_features(void **state)
+TEST(materials_and_lights_have_features)
 {
-    (void)state;
     const struct material materials[] = {
         {.kind = MATERIAL_MIRROR, .reflectance = {1, 1, 1}},
         {.kind = MATERIAL_GLASS, .ior = 1.5f},
@@ -381,9 +360,8 @@ static void materials_and_lights_have_features(void **state)
     }
 }
 
-static void what_cannot_be_expressed_is_said(void **state)
+TEST(what_cannot_be_expressed_is_said)
 {
-    (void)state;
     struct engine en;
     struct err e;
     must_load("{\"name\": \"x\", \"format\": \"povray\", \"output\": \"mean\", \"expresses\": "
@@ -403,9 +381,8 @@ static void what_cannot_be_expressed_is_said(void **state)
 
 /* Three pictures whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
  * sum (x - 8/3)^2 = 1 + 4 + 25 - 64/3 = 26/3, M3 = (-5/3)^3 + (-2/3)^3 + (7/3)^3 = 210/27. */
-static void replicates_are_folded(void **state)
+TEST(replicates_are_folded)
 {
-    (void)state;
     struct engine en;
     struct moments m;
     json_t *manifest;
@@ -419,8 +396,7 @@ static void replicates_are_folded(void **state)
                      ", \"version\": [\"sh\", \"-c\", \"echo; echo Fake 3.1; echo more\"], "
                      "\"depth_offset\": 1",
                      &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "replicate");
     assert_true(m.spp == 7);
     for (int p = 0; p < PIXELS; p++) {
@@ -466,17 +442,15 @@ static void replicates_are_folded(void **state)
     engine_free(&en);
 }
 
-static void pictures_without_noise_are_exact(void **state)
+TEST(pictures_without_noise_are_exact)
 {
-    (void)state;
     struct engine en;
     struct moments m;
     json_t *manifest;
     struct err e;
     write_pfm("constant.pfm", W, H, constant, 0);
     engine_of_script("cp {here}/constant.pfm $2", "", &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[0] == 1 && m.mean[0] == 0.25 && m.m2[0] == 0 && m.m3[0] == 0);
     json_decref(manifest);
@@ -488,8 +462,7 @@ static void pictures_without_noise_are_exact(void **state)
               "\"expresses\": [\"diffuse\", \"point\"], \"command\": [\"sh\", \"-c\", \"cp "
               "{here}/ramp.pfm {out} # {scene}\"]}",
               &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
     assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
@@ -498,9 +471,8 @@ static void pictures_without_noise_are_exact(void **state)
     engine_free(&en);
 }
 
-static void programs_that_misbehave_are_errors(void **state)
+TEST(programs_that_misbehave_are_errors)
 {
-    (void)state;
     write_pfm("ramp.pfm", W, H, ramp, 0);
     write_pfm("large.pfm", W + 1, H, ramp, 0);
     write_pfm("nan.pfm", W, H, not_a_number, 0);
@@ -545,20 +517,4 @@ static void programs_that_misbehave_are_errors(void **state)
     engine_free(&en);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shipped_descriptions_load),
-        cmocka_unit_test(members_are_read),
-        cmocka_unit_test(bad_descriptions_are_refused),
-        cmocka_unit_test(a_dae_needs_its_lens_on_the_command_line),
-        cmocka_unit_test(placeholders_are_filled_in),
-        cmocka_unit_test(scenes_know_what_they_need),
-        cmocka_unit_test(materials_and_lights_have_features),
-        cmocka_unit_test(what_cannot_be_expressed_is_said),
-        cmocka_unit_test(replicates_are_folded),
-        cmocka_unit_test(pictures_without_noise_are_exact),
-        cmocka_unit_test(programs_that_misbehave_are_errors),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -10,19 +10,11 @@
 #include "renderer/scene/environment.h"
 #include "renderer/base/fs.h"
 #include "renderer/image/image.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
 #include <libxml/parser.h>
 #include <libxml/tree.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
 
 #define assert_near(a, b, epsilon) assert_true(fabs((double)(a) - (double)(b)) <= (epsilon))
 
@@ -164,8 +156,7 @@ static void check_references(xmlNode *root, xmlNode *n)
 static xmlDoc *export(const struct scene *s, const struct camera *c, int depth)
 {
     struct err e;
-    if (!export_mitsuba(s, c, depth, path_of("scene.xml"), &e))
-        fail_msg("%s", e.msg);
+    MUST(export_mitsuba(s, c, depth, path_of("scene.xml"), &e));
     xmlDoc *doc = xmlReadFile(path_of("scene.xml"), NULL, XML_PARSE_NONET);
     assert_non_null(doc);
     xmlNode *root = xmlDocGetRootElement(doc);
@@ -254,9 +245,8 @@ static struct sums sums_of(const struct scene *s, uint32_t object, bool smooth)
     return sums;
 }
 
-static void meshes_and_spheres(void **state)
+TEST(meshes_and_spheres)
 {
-    (void)state;
     struct scene s = build_scene();
     uint32_t grey_half = build_material(&s, grey(.5f), grey(0));
     uint32_t lamp = build_material(&s, (rgb){.1f, .2f, .3f}, (rgb){4, 5, 6});
@@ -297,9 +287,8 @@ static void meshes_and_spheres(void **state)
 }
 
 /* Rays of the file's camera: +X is left, +Z forward, the angle is that of the width. */
-static void camera_rays(void **state)
+TEST(camera_rays)
 {
-    (void)state;
     for (int lens = 0; lens < 2; lens++) {
         struct scene s = build_scene();
         build_quad(&s, v3(-50, -50, -20), v3(100, 0, 0), v3(0, 100, 0),
@@ -347,9 +336,8 @@ static void camera_rays(void **state)
     }
 }
 
-static void materials(void **state)
+TEST(materials)
 {
-    (void)state;
     static const struct material all[] = {
         {.kind = MATERIAL_DIFFUSE, .reflectance = {.1f, .2f, .3f}},
         {.kind = MATERIAL_MIRROR, .reflectance = {.9f, .8f, .7f}},
@@ -410,8 +398,7 @@ static void materials(void **state)
     struct image im;
     struct err e;
     bool half;
-    if (!image_read(path_of(name), &im, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read(path_of(name), &im, &half, &e));
     assert_false(half);
     for (int i = 0; i < im.width * im.height; i++)
         assert_true(im.data[3 * i] == .2f && im.data[3 * i + 1] == 1.5f &&
@@ -433,9 +420,8 @@ static struct scene lit_by(struct light l)
     return s;
 }
 
-static void lights(void **state)
+TEST(lights)
 {
-    (void)state;
     const struct light all[] = {
         {.kind = LIGHT_POINT, .value = {2, 4, 6}, .position = {1, 2, 3}, .attenuation = {0, 0, 2}},
         {.kind = LIGHT_DIRECTIONAL, .value = {2, 4, 6}, .to_light = {0, .6f, .8f}},
@@ -499,9 +485,8 @@ static double mitsuba_sky(const struct image *im, const double m[16], vec3 w, in
     return sum;
 }
 
-static void environment_pictures(void **state)
+TEST(environment_pictures)
 {
-    (void)state;
     static const char *const names[3] = {"R", "G", "B"};
     struct err e;
     struct image im, got;
@@ -520,8 +505,7 @@ static void environment_pictures(void **state)
     matrix(n, m);
     char name[512];
     get(child(n, "string", "filename"), "value", name);
-    if (!image_read(path_of(name), &got, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read(path_of(name), &got, &half, &e));
     assert_false(half);
     for (int i = 0; i < 2000; i++) {
         double y = 1 - 2 * (i + .5) / 2000, phi = 2.399963 * i, r = sqrt(1 - y * y);
@@ -569,9 +553,8 @@ static void refuse(struct scene *s, struct camera *c, const char *pattern)
     scene_free(s);
 }
 
-static void what_it_has_not_is_refused(void **state)
+TEST(what_it_has_not_is_refused)
 {
-    (void)state;
     const struct {
         struct material m;
         const char *pattern;
@@ -616,15 +599,4 @@ static void what_it_has_not_is_refused(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(meshes_and_spheres),
-        cmocka_unit_test(camera_rays),
-        cmocka_unit_test(materials),
-        cmocka_unit_test(lights),
-        cmocka_unit_test(environment_pictures),
-        cmocka_unit_test(what_it_has_not_is_refused),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

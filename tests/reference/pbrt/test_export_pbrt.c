@@ -6,16 +6,10 @@
 
 #include "reference/pbrt/export_pbrt.h"
 #include "renderer/scene/environment.h"
+#include "tests/support/test.h"
 
 #include <ctype.h>
 #include <gsl/gsl_math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
 
 #define assert_near(a, b, epsilon) assert_true(fabs((double)(a) - (double)(b)) <= (epsilon))
 
@@ -238,8 +232,7 @@ static void export(const struct scene *s, const struct camera *c, int depth)
     bool quoted;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
-    if (!export_pbrt(s, c, depth, f, &e))
-        fail_msg("%s", e.msg);
+    MUST(export_pbrt(s, c, depth, f, &e));
     fclose(f);
     statements = 0;
     for (const char *at = text; token(&at, t, &quoted);) {
@@ -271,9 +264,8 @@ static struct scene triangle_of(struct material m)
 
 static const struct material GREY = {.kind = MATERIAL_DIFFUSE, .reflectance = {.5f, .5f, .5f}};
 
-static void shapes(void **state)
+TEST(shapes)
 {
-    (void)state;
     struct scene s = build_scene();
     uint32_t m = build_material(&s, (rgb){.1f, .2f, .3f}, grey(0));
     uint32_t lamp = build_material(&s, grey(0), (rgb){4, 5, 6});
@@ -341,9 +333,8 @@ static void shapes(void **state)
 
 /* Points along camera_ray()'s rays, through the file's world-to-camera matrix, must fall on the screen
  * at the pixel: x from the left of the window, y from its top, z forward. */
-static void camera_rays(void **state)
+TEST(camera_rays)
 {
-    (void)state;
     struct scene s = build_scene();
     build_quad(&s, v3(-50, -50, -20), v3(100, 0, 0), v3(0, 100, 0),
                build_material(&s, grey(.5f), grey(0)));
@@ -382,9 +373,8 @@ static void camera_rays(void **state)
     scene_free(&s);
 }
 
-static void materials(void **state)
+TEST(materials)
 {
-    (void)state;
     static const struct {
         struct material m;
         const char *type, *parameter;
@@ -436,9 +426,8 @@ static void materials(void **state)
     }
 }
 
-static void lights(void **state)
+TEST(lights)
 {
-    (void)state;
     const struct light all[] = {
         {.kind = LIGHT_POINT, .value = {2, 4, 6}, .position = {1, 2, 3}, .attenuation = {0, 0, 2}},
         {.kind = LIGHT_DIRECTIONAL, .value = {2, 4, 6}, .to_light = {0, .6f, .8f}},
@@ -496,9 +485,8 @@ static void refuse(struct scene *s, const char *pattern)
     scene_free(s);
 }
 
-static void what_it_has_not_is_refused(void **state)
+TEST(what_it_has_not_is_refused)
 {
-    (void)state;
     static const struct {
         struct material m;
         const char *pattern;
@@ -535,16 +523,4 @@ static void what_it_has_not_is_refused(void **state)
     s = triangle_of(GREY);
     s.camera.near = 10;
     refuse(&s, "may cut");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shapes),
-        cmocka_unit_test(camera_rays),
-        cmocka_unit_test(materials),
-        cmocka_unit_test(lights),
-        cmocka_unit_test(what_it_has_not_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,15 +1,7 @@
 /* Command lines as getopt's users write them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/base/cli.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "tests/support/test.h"
 
 static const struct cli_option options[] = {{'j', "jobs", 1, "N", "jobs"},
                                             {'q', "quiet", 0, "", "quiet"},
@@ -43,9 +35,8 @@ static void read_all(char *text, char out[512])
     }
 }
 
-static void words_are_read_as_by_getopt(void **state)
+TEST(words_are_read_as_by_getopt)
 {
-    (void)state;
     static const struct {
         const char *words, *read, *error; /* a part of it */
     } cases[] = {
@@ -82,9 +73,8 @@ static void words_are_read_as_by_getopt(void **state)
     }
 }
 
-static void words_are_set_apart(void **state)
+TEST(words_are_set_apart)
 {
-    (void)state;
     static const char *const cases[][2] = {
         {"-j2 x", "-j 2 x"},
         {"-qHj4 -s 5 --jobs=2", "-q -H -j 4 -s 5 --jobs=2"},
@@ -108,11 +98,4 @@ static void words_are_set_apart(void **state)
         assert_string_equal(out, cases[i][1]);
         free(apart);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(words_are_read_as_by_getopt),
-                                       cmocka_unit_test(words_are_set_apart)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #define ASSAY_TEST_DAE_H
 
 #include "renderer/collada/collada.h"
+#include "tests/support/test.h"
 
 #include <stdio.h>
 #include <stdlib.h>

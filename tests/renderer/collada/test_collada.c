@@ -1,13 +1,8 @@
 /* Transforms, meshes and spheres of the COLLADA loader. Expected numbers are derived by hand beside
  * each test. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "dae.h"
+#include "tests/support/test.h"
 
 /* One node around the triangle (0,0,0) (1,0,0) (0,1,0). */
 #define NODE(transforms) "<node name=\"n\">" transforms INSTANCE("tri") "</node>"
@@ -16,9 +11,8 @@
  * T R S: (1,0,0) -S-> (2,0,0) -R-> (0,2,0) -T-> (1,4,3); (0,1,0) -> (0,1,0) -> (-1,0,0) -> (0,2,3).
  * S R T: (0,0,0) -T-> (1,2,3) -R-> (-2,1,3) -S-> (-4,1,3); (1,0,0) -> (2,2,3) -> (-2,2,3) ->
  * (-4,2,3). */
-static void transforms_compose_in_document_order(void **state)
+TEST(transforms_compose_in_document_order)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.nodes = NODE("<translate>1 2 3</translate><rotate>0 0 1 90</rotate>"
                                    "<scale>2 1 1</scale>")},
@@ -36,9 +30,8 @@ static void transforms_compose_in_document_order(void **state)
 }
 
 /* A third of a turn about (1,1,1), whatever its length, takes x to y and y to z. */
-static void rotation_about_a_skew_axis(void **state)
+TEST(rotation_about_a_skew_axis)
 {
-    (void)state;
     struct scene s =
         dae_must_load((struct dae){.nodes = NODE("<rotate>3 3 3 120</rotate>")}, DIALECT_AUTO);
     assert_vec(s.position[1], 0, 1, 0);
@@ -47,9 +40,8 @@ static void rotation_about_a_skew_axis(void **state)
 }
 
 /* Row-major, column vectors: (1,0,0) -> column 1 + column 4 = (1+10, 4+20, 7+30). */
-static void matrix_is_row_major(void **state)
+TEST(matrix_is_row_major)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.nodes = NODE("<matrix>1 2 3 10  4 5 6 20  7 8 -9 30  0 0 0 1</matrix>")},
         DIALECT_AUTO);
@@ -63,9 +55,8 @@ static void matrix_is_row_major(void **state)
 
 /* From (5,0,0) at the origin: backward = +x, right = up x backward = y x x = -z, up = y.
  * (1,0,0) -> eye + right = (5,0,-1); (0,1,0) -> (5,1,0). */
-static void lookat_places_the_node(void **state)
+TEST(lookat_places_the_node)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.nodes = NODE("<lookat>5 0 0  0 0 0  0 2 0</lookat>")}, DIALECT_AUTO);
     assert_vec(s.position[0], 5, 0, 0);
@@ -76,9 +67,8 @@ static void lookat_places_the_node(void **state)
 
 /* Outer translation, inner rotation: (1,0,0) -> (0,1,0) -> (10,1,0). The same through an instance of
  * a node of a library, which brings (0,0,4) of its own: -> (10,1,4). */
-static void nodes_nest(void **state)
+TEST(nodes_nest)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = "<library_nodes><node id=\"part\"><translate>0 0 4</translate>"
                                   "<node name=\"deep\">" INSTANCE("tri") "</node></node>"
@@ -101,9 +91,8 @@ static void nodes_nest(void **state)
 /* The three conventions, and metres: (1,2,3) of the file. Z_UP (x,y,z) -> (-x,z,y), X_UP -> (y,x,-z):
  * both turn without mirroring, so the front of a triangle that looks to +Z turns with it, to +Y and
  * to -Z. */
-static void up_axis_and_unit(void **state)
+TEST(up_axis_and_unit)
 {
-    (void)state;
     static const struct {
         const char *asset;
         double p[3], n[3];
@@ -132,9 +121,8 @@ static void up_axis_and_unit(void **state)
 
 /* A mirror image keeps its front: mirrored in x the front of the triangle is still +Z, mirrored in z
  * it is -Z, turned by two mirrors it is +Z again. */
-static void mirrors_keep_the_front_side(void **state)
+TEST(mirrors_keep_the_front_side)
 {
-    (void)state;
     static const struct {
         const char *nodes;
         double z;
@@ -182,9 +170,8 @@ static void check_l(const struct scene *s, uint32_t first)
     }
 }
 
-static void concave_polygon_is_covered_once(void **state)
+TEST(concave_polygon_is_covered_once)
 {
-    (void)state;
     static const char *const BODIES[] = {
         "<polylist material=\"m\" count=\"1\">" VERTEX "<vcount>6</vcount><p>0 1 2 3 4 5</p>"
         "</polylist>",
@@ -208,9 +195,8 @@ static void concave_polygon_is_covered_once(void **state)
 }
 
 /* Triangle, L and quadrilateral in one list. */
-static void polygons_of_different_sizes_share_a_list(void **state)
+TEST(polygons_of_different_sizes_share_a_list)
 {
-    (void)state;
     struct scene s =
         dae_must_load((struct dae){.libraries = MESH("<polylist material=\"m\" count=\"3\">" VERTEX
                                                      "<vcount>3 6 4</vcount>"
@@ -224,9 +210,8 @@ static void polygons_of_different_sizes_share_a_list(void **state)
     scene_free(&s);
 }
 
-static void triangles_without_area_are_counted(void **state)
+TEST(triangles_without_area_are_counted)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = MESH("<triangles material=\"m\" count=\"4\">" VERTEX
                                        "<p>0 1 5 0 0 1 1 1 1 0 1 1</p></triangles>"
@@ -241,9 +226,8 @@ static void triangles_without_area_are_counted(void **state)
 
 /* Offset 2, stride 6, the second number of each triple unnamed: x = number 0, y = 2, z = 3 after the
  * offset. */
-static void accessor_offset_stride_and_unnamed_params(void **state)
+TEST(accessor_offset_stride_and_unnamed_params)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){
             .libraries =
@@ -268,9 +252,8 @@ static void accessor_offset_stride_and_unnamed_params(void **state)
  * scale (2,1,1) a normal (a,b,c) becomes (a/2, b, c): (1,1,0) -> (1,2,0)/sqrt 5. The zero one is
  * replaced by the geometric normal (0,-1,0). Sum = (0.447, 0.894-1, 1), and its y is negative: it is on
  * the front side, so nothing is turned. */
-static void normals_go_by_the_inverse_transpose(void **state)
+TEST(normals_go_by_the_inverse_transpose)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = MESH("<triangles material=\"m\" count=\"1\">" VERTEX NORMAL
                                        "<p>0 0 1 1 6 2</p></triangles>"),
@@ -286,9 +269,8 @@ static void normals_go_by_the_inverse_transpose(void **state)
 
 /* Winding says +Z, the file's normals say -Z, as on the walls of the assignment's Cornell boxes: the
  * winding wins and the normals are turned. */
-static void normals_against_the_winding_are_turned(void **state)
+TEST(normals_against_the_winding_are_turned)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = MESH("<triangles material=\"m\" count=\"1\">" VERTEX NORMAL
                                        "<p>0 3 1 3 2 3</p></triangles>"),
@@ -302,9 +284,8 @@ static void normals_against_the_winding_are_turned(void **state)
 
 /* Mirrored in x the triangle still looks to +Z, and so do its two file normals and the geometric one
  * that stands in for the third, which is zero in the file. */
-static void normals_are_mirrored_with_their_triangle(void **state)
+TEST(normals_are_mirrored_with_their_triangle)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = MESH("<triangles material=\"m\" count=\"1\">" VERTEX NORMAL
                                        "<p>0 0 1 0 2 2</p></triangles>"),
@@ -316,9 +297,8 @@ static void normals_are_mirrored_with_their_triangle(void **state)
 }
 
 /* Normals that come with the vertices, unless the primitive has its own. */
-static void normals_by_vertex(void **state)
+TEST(normals_by_vertex)
 {
-    (void)state;
 #define BY_VERTEX                                                                                  \
     "<library_geometries><geometry id=\"g\"><mesh>" SOURCE("p", 9, 3, "0 0 0 1 0 0 0 1 0") SOURCE( \
         "n", 9, 3,                                                                                 \
@@ -348,9 +328,8 @@ static void normals_by_vertex(void **state)
         profile, "<sphere>" body "</sphere>") "</geometry></library_geometries>"
 
 /* Radius 0.5 times 3, also where two axes are mirrored and turned; centre by the translation. */
-static void spheres(void **state)
+TEST(spheres)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = SPHERE("ASSAY", "<radius>.5</radius><facing> in </facing>"),
                      .nodes =
@@ -374,9 +353,8 @@ static void spheres(void **state)
 }
 
 /* 2^40 instances of a node, each level of a chain naming the next one twice. */
-static void explosion_of_instances_is_an_error(void **state)
+TEST(explosion_of_instances_is_an_error)
 {
-    (void)state;
     char libraries[8192] = "<library_nodes>";
     for (int i = 0; i < 40; i++) {
         char node[160];
@@ -398,9 +376,8 @@ static void repeat(char *out, const char *s, int times)
         out = stpcpy(out, s);
 }
 
-static void deep_nesting_is_an_error(void **state)
+TEST(deep_nesting_is_an_error)
 {
-    (void)state;
     enum { DEEP = 30000 };
     char *nodes = calloc(16 * DEEP + 1, 1);
     assert_non_null(nodes);
@@ -411,9 +388,8 @@ static void deep_nesting_is_an_error(void **state)
 }
 
 /* The parser counts lines up to 65535 only; the document's own 5th line is where `nodes` starts. */
-static void lines_are_right_far_down(void **state)
+TEST(lines_are_right_far_down)
 {
-    (void)state;
     enum { LINES = 100000 };
     char *nodes = calloc(LINES + 200, 1);
     assert_non_null(nodes);
@@ -432,9 +408,8 @@ static void lines_are_right_far_down(void **state)
     free(nodes);
 }
 
-static void failure_leaves_the_scene_alone(void **state)
+TEST(failure_leaves_the_scene_alone)
 {
-    (void)state;
     struct scene s, before;
     struct err e = {""};
     memset(&s, 0x5a, sizeof s);
@@ -445,9 +420,8 @@ static void failure_leaves_the_scene_alone(void **state)
 }
 
 /* Names end at a whole character of UTF-8 and hold no control characters. */
-static void names_are_cut_and_cleaned(void **state)
+TEST(names_are_cut_and_cleaned)
 {
-    (void)state;
     /* 62 letters and one character of two bytes need 64 bytes; 63 fit before the end. */
     struct scene s = dae_must_load(
         (struct dae){
@@ -458,32 +432,4 @@ static void names_are_cut_and_cleaned(void **state)
     assert_int_equal(strlen(s.objects[0].name), 62);
     assert_string_equal(s.objects[1].name, "two_lines");
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(transforms_compose_in_document_order),
-        cmocka_unit_test(rotation_about_a_skew_axis),
-        cmocka_unit_test(matrix_is_row_major),
-        cmocka_unit_test(lookat_places_the_node),
-        cmocka_unit_test(nodes_nest),
-        cmocka_unit_test(up_axis_and_unit),
-        cmocka_unit_test(mirrors_keep_the_front_side),
-        cmocka_unit_test(concave_polygon_is_covered_once),
-        cmocka_unit_test(polygons_of_different_sizes_share_a_list),
-        cmocka_unit_test(triangles_without_area_are_counted),
-        cmocka_unit_test(accessor_offset_stride_and_unnamed_params),
-        cmocka_unit_test(normals_go_by_the_inverse_transpose),
-        cmocka_unit_test(normals_against_the_winding_are_turned),
-        cmocka_unit_test(normals_are_mirrored_with_their_triangle),
-        cmocka_unit_test(normals_by_vertex),
-        cmocka_unit_test(spheres),
-        cmocka_unit_test(explosion_of_instances_is_an_error),
-        cmocka_unit_test(deep_nesting_is_an_error),
-        cmocka_unit_test(lines_are_right_far_down),
-        cmocka_unit_test(failure_leaves_the_scene_alone),
-        cmocka_unit_test(names_are_cut_and_cleaned),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

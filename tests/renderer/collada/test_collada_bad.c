@@ -2,17 +2,9 @@
  * line that carries the comment <!-- fault -->; the expected line number is found by that comment,
  * not by the loader. */
 #include "renderer/collada/collada.h"
+#include "tests/support/test.h"
 
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 struct bad {
     const char *name;
@@ -148,9 +140,8 @@ static long marked_line(const char *path)
     return marked;
 }
 
-static void each_fault_is_named_with_its_line(void **state)
+TEST(each_fault_is_named_with_its_line)
 {
-    (void)state;
     int failures = 0;
     for (size_t i = 0; i < TABLE_SIZE; i++) {
         char path[512], start[600];
@@ -173,22 +164,19 @@ static void each_fault_is_named_with_its_line(void **state)
 }
 
 /* Negative control: without a fault the scene loads, so the faults are what is refused. */
-static void scene_without_fault_loads(void **state)
+TEST(scene_without_fault_loads)
 {
-    (void)state;
     struct scene s = {0};
     struct err e = {""};
-    if (!collada_load("tests/bad/00_valid.dae", DIALECT_AUTO, &s, &e))
-        fail_msg("%s", e.msg);
+    MUST(collada_load("tests/bad/00_valid.dae", DIALECT_AUTO, &s, &e));
     assert_int_equal(s.num_triangles, 2);
     assert_int_equal(s.num_spheres, 1);
     scene_free(&s);
 }
 
 /* No file of the folder is left out of the table. */
-static void table_is_complete(void **state)
+TEST(table_is_complete)
 {
-    (void)state;
     DIR *d = opendir("tests/bad");
     assert_non_null(d);
     size_t files = 0;
@@ -200,24 +188,12 @@ static void table_is_complete(void **state)
     assert_int_equal(files, TABLE_SIZE + 1);
 }
 
-static void unreadable_file_is_an_error(void **state)
+TEST(unreadable_file_is_an_error)
 {
-    (void)state;
     struct scene s = {0};
     struct err e = {""};
     assert_false(collada_load("tests/bad/no_such_file.dae", DIALECT_AUTO, &s, &e));
     assert_non_null(strstr(e.msg, "no_such_file.dae: cannot read"));
     assert_false(collada_load("tests", DIALECT_AUTO, &s, &e));
     assert_non_null(strstr(e.msg, "tests: cannot read"));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_fault_is_named_with_its_line),
-        cmocka_unit_test(scene_without_fault_loads),
-        cmocka_unit_test(table_is_complete),
-        cmocka_unit_test(unreadable_file_is_an_error),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,8 @@
 /* Mirror, glass, refraction and microfacet in both profiles: every number arrives where it belongs, what
  * may be left out has its default, and the limits are inside. Faults are in test_collada_bad.c. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "dae.h"
+#include "tests/support/test.h"
 
 /* The material of a triangle whose effect reflects (.2, .3, .4) diffusely and has that tag. */
 static struct material load(const char *profile, const char *tag)
@@ -41,9 +36,8 @@ static void assert_rgb(rgb c, float r, float g, float b)
 
 static const char *const PROFILES[] = {"ASSAY", "CGL"};
 
-static void mirror(void **state)
+TEST(mirror)
 {
-    (void)state;
     for (int i = 0; i < 2; i++) {
         struct material m = load(PROFILES[i], "<mirror><reflectance>0 .5 1</reflectance></mirror>");
         assert_int_equal(m.kind, MATERIAL_MIRROR);
@@ -51,9 +45,8 @@ static void mirror(void **state)
     }
 }
 
-static void glass(void **state)
+TEST(glass)
 {
-    (void)state;
     for (int i = 0; i < 2; i++) {
         struct material m = load(
             PROFILES[i], "<glass><ior>1.45</ior><transmittance>.1 .2 .3</transmittance>"
@@ -65,9 +58,8 @@ static void glass(void **state)
     }
 }
 
-static void refraction(void **state)
+TEST(refraction)
 {
-    (void)state;
     static const char *const IOR[] = {"0.01", "0.75", "100"};
     static const float VALUE[] = {0.01f, 0.75f, 100};
     for (int i = 0; i < 2; i++)
@@ -85,9 +77,8 @@ static void refraction(void **state)
 }
 
 /* The assignment's is Beckmann with heights correlated. */
-static void microfacet_of_the_assignment(void **state)
+TEST(microfacet_of_the_assignment)
 {
-    (void)state;
     struct material m = load("CGL", "<microfacet><alpha>.25</alpha><eta>.1 .2 .3</eta>"
                                     "<k>4 5 1000</k></microfacet>");
     assert_int_equal(m.kind, MATERIAL_MICROFACET);
@@ -97,9 +88,8 @@ static void microfacet_of_the_assignment(void **state)
     assert_rgb(m.k, 4, 5, 1000);
 }
 
-static void microfacet_of_ours(void **state)
+TEST(microfacet_of_ours)
 {
-    (void)state;
     static const char *const DISTRIBUTION[] = {"", "<distribution>ggx</distribution>",
                                                "<distribution> beckmann </distribution>"};
     static const char *const SHADOWING[] = {"", "<shadowing>correlated</shadowing>",
@@ -128,9 +118,8 @@ static void microfacet_of_ours(void **state)
 }
 
 /* The tags of one profile that the other has not: our choices in the assignment's tag. */
-static void profiles_keep_to_themselves(void **state)
+TEST(profiles_keep_to_themselves)
 {
-    (void)state;
     struct dae d = {
         .libraries = "<library_effects>" EFFECT(
             "x",
@@ -140,17 +129,4 @@ static void profiles_keep_to_themselves(void **state)
                 "<reflectance>1 1 1</reflectance></microfacet>")) "</library_effects><library_materials>" MATERIAL("x") "</library_materials>",
         .nodes = "<node><instance_geometry url=\"#tri\">" BIND("x") "</instance_geometry></node>"};
     dae_must_fail(d, DIALECT_AUTO, "unexpected <reflectance>");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mirror),
-        cmocka_unit_test(glass),
-        cmocka_unit_test(refraction),
-        cmocka_unit_test(microfacet_of_the_assignment),
-        cmocka_unit_test(microfacet_of_ours),
-        cmocka_unit_test(profiles_keep_to_themselves),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

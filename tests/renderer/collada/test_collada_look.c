@@ -1,14 +1,9 @@
 /* Materials, lights, cameras and the two dialects of the COLLADA loader. Expected numbers are derived
  * by hand beside each test. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "renderer/scene/environment.h"
 #include "dae.h"
+#include "tests/support/test.h"
 
 static const double DEGREE = 3.14159265358979323846 / 180;
 
@@ -40,9 +35,8 @@ static void assert_rgb(rgb c, float r, float g, float b)
     assert_vec(v3(c.r, c.g, c.b), r, g, b);
 }
 
-static void diffuse_and_emission_of_the_common_profile(void **state)
+TEST(diffuse_and_emission_of_the_common_profile)
 {
-    (void)state;
     static const char *const SHADERS[] = {"lambert", "phong", "blinn"};
     for (int i = 0; i < 3; i++) {
         char libraries[1024];
@@ -72,9 +66,8 @@ static void diffuse_and_emission_of_the_common_profile(void **state)
 }
 
 /* All of these say "opaque", by the formulas of the COLLADA specification. */
-static void opaque_in_every_spelling(void **state)
+TEST(opaque_in_every_spelling)
 {
-    (void)state;
     static const char *const SPELLINGS[] = {
         "<transparency><float>1</float></transparency>",
         "<transparent opaque=\"A_ONE\"><color>1 0 0 1</color></transparent>",
@@ -117,9 +110,8 @@ static void opaque_in_every_spelling(void **state)
 }
 
 /* The assignment reads the diffuse colour and nothing else. */
-static void cgl_ignores_what_the_assignment_ignores(void **state)
+TEST(cgl_ignores_what_the_assignment_ignores)
 {
-    (void)state;
     struct material m = load_material(
         (struct dae)WEAR(COMMON("<phong><diffuse><color>.1 .2 .3 1</color></diffuse><specular>"
                                 "<texture texture=\"t\"/></specular><transparency><float>.5</float>"
@@ -138,9 +130,8 @@ static void cgl_ignores_what_the_assignment_ignores(void **state)
                   DIALECT_CGL, "emission");
 }
 
-static void emission_of_the_two_profiles(void **state)
+TEST(emission_of_the_two_profiles)
 {
-    (void)state;
 #define DIFFUSE COMMON("<lambert><diffuse><color>.1 .2 .3 1</color></diffuse></lambert>")
     struct material m = load_material(
         (struct dae)WEAR(DIFFUSE EXTRA(
@@ -168,9 +159,8 @@ static void emission_of_the_two_profiles(void **state)
 }
 
 /* Two groups of one mesh: an object each, named by the symbol; the third uses the first's material. */
-static void groups_get_their_own_material(void **state)
+TEST(groups_get_their_own_material)
 {
-    (void)state;
 #define GROUP(symbol)                                                                              \
     "<triangles material=\"" symbol "\" count=\"1\"><input semantic=\"VERTEX\" source=\"#v\" "     \
     "offset=\"0\"/><p>0 1 2</p></triangles>"
@@ -212,9 +202,8 @@ static void groups_get_their_own_material(void **state)
     scene_free(&s);
 }
 
-static void without_a_binding(void **state)
+TEST(without_a_binding)
 {
-    (void)state;
     const struct dae bare = {.nodes = "<node><instance_geometry url=\"#tri\"/></node>"};
     dae_must_fail(bare, DIALECT_COLLADA, "no material bound to symbol 'm'");
     struct material m = load_material(bare, DIALECT_CGL);
@@ -233,9 +222,8 @@ static void without_a_binding(void **state)
 /* In a file in centimetres, c + l d + q d^2 at a distance of d cm must be what the scene has at d/100
  * m: 2 + 3 d + 4 d^2 = 2 + 300 (d/100) + 40000 (d/100)^2. Pure falloff 4 d^2 is 40000 (d/100)^2, so
  * an intensity of value / 40000. */
-static void point_lights(void **state)
+TEST(point_lights)
 {
-    (void)state;
     struct scene s = dae_must_load((struct dae){.libraries = LIGHT(POINT(""), ""),
                                                 .nodes = SHINE("<translate>1 2 3</translate>")},
                                    DIALECT_AUTO);
@@ -287,9 +275,8 @@ static void point_lights(void **state)
 /* It shines along -Z. Turned by -90 degrees about x, +Z becomes +Y: a light from above; where it
  * stands does not matter. In the assignment the direction is that of the point M (0,0,-1): turned,
  * (0,-1,0), and moved, (3,-1,4), over sqrt(26). */
-static void directional_lights(void **state)
+TEST(directional_lights)
 {
-    (void)state;
     const struct dae d = {.libraries = LIGHT("<directional><color>1 2 3</color></directional>", ""),
                           .nodes = SHINE("<translate>3 0 4</translate><rotate>1 0 0 -90</rotate>"
                                          "<scale>2 2 2</scale>")};
@@ -308,9 +295,8 @@ static void directional_lights(void **state)
 
 /* Shines along -Z of its node, which looks along world -X after a quarter turn about Y. The angle is
  * that of the whole cone; the falloff is that of a point light. */
-static void spot_lights(void **state)
+TEST(spot_lights)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.asset = "<unit meter=\"0.01\"/>",
                      .libraries = LIGHT("<spot><color>10 20 30</color>"
@@ -343,9 +329,8 @@ static void spot_lights(void **state)
 }
 
 /* Everywhere the same, and seen; in the assignment from above only, and hidden. */
-static void ambient_light(void **state)
+TEST(ambient_light)
 {
-    (void)state;
     static const struct dae AMBIENT = {
         .libraries = LIGHT("<ambient><color>1 2 3</color></ambient>", ""), .nodes = SHINE("")};
     for (int cgl = 0; cgl < 2; cgl++) {
@@ -362,9 +347,8 @@ static void ambient_light(void **state)
     }
 }
 
-static void black_ambient_light_is_nothing(void **state)
+TEST(black_ambient_light_is_nothing)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = LIGHT("<ambient><color>0 0 0</color></ambient>", ""),
                      .nodes = SHINE("")},
@@ -404,9 +388,8 @@ static void check_rectangle(const struct scene *s, double x, double y, double z)
 }
 
 /* It shines along its -Z, also where it is mirrored; turned by -90 degrees about x, -Z becomes -Y. */
-static void rectangles_are_geometry(void **state)
+TEST(rectangles_are_geometry)
 {
-    (void)state;
     static const char *const MIRRORS[] = {"", "<scale>-1 1 1</scale>", "<scale>1 -1 1</scale>"};
     char nodes[1024];
     for (int i = 0; i < 3; i++) {
@@ -439,9 +422,8 @@ static void rectangles_are_geometry(void **state)
 #define AREA EXTRA("CGL", "<area><color>10 10 10</color></area>")
 
 /* The assignment's unit square, scaled to 0.6 x 0.8 by the node. */
-static void area_light_of_the_assignment(void **state)
+TEST(area_light_of_the_assignment)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries = LIGHT(POINT(""), AREA),
                      .nodes = SHINE("<matrix>.6 0 0 0 0 .8 0 0 0 0 1 2 0 0 0 1</matrix>")},
@@ -540,9 +522,8 @@ static struct scene load_twins(const char *place, const char *size)
         DIALECT_AUTO);
 }
 
-static void twin_of_an_area_light_is_left_out(void **state)
+TEST(twin_of_an_area_light_is_left_out)
 {
-    (void)state;
     struct scene s = load_twins("0 .05 1.99", "1 1 1");
     assert_int_equal(s.num_lights, 1);
     assert_int_equal(s.num_triangles, 4);
@@ -562,9 +543,8 @@ static void twin_of_an_area_light_is_left_out(void **state)
     scene_free(&s);
 }
 
-static void emissive_mesh_elsewhere_is_a_lamp_of_its_own(void **state)
+TEST(emissive_mesh_elsewhere_is_a_lamp_of_its_own)
 {
-    (void)state;
     /* Beside it, below it, and of three times its area. */
     static const char *const PLACES[] = {"0 .2 2", "0 0 1.8", "0 0 2"};
     static const char *const SIZES[] = {"1 1 1", "1 1 1", "1 3 1"};
@@ -591,9 +571,8 @@ static void emissive_mesh_elsewhere_is_a_lamp_of_its_own(void **state)
  * looks along the file's +Y and its up is the file's +Z: (0,0,-1) -> (0,1,0), (0,1,0) -> (0,0,1).
  * In the world, (x,y,z) -> (-x,z,y): right (-1,0,0), up (0,1,0), view (0,0,1), so backward (0,0,-1);
  * eye (1,2,3) inches -> (-1,3,2) * 0.0254. */
-static void camera_pose_angles_and_clips(void **state)
+TEST(camera_pose_angles_and_clips)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.asset = "<unit meter=\"0.0254\"/><up_axis>Z_UP</up_axis>",
                      .libraries = CAMERAS(CAMERA("c", WIDE)),
@@ -624,9 +603,8 @@ static void camera_pose_angles_and_clips(void **state)
 /* c = unit(M (0,0,-1,1)) with the translation in it: (3,0,4) - (0,0,1) = (3,0,3), so c = (1,0,1) over
  * root 2, right = Y x c = (1,0,-1) over root 2, up = Y. The vertical angle follows from
  * tan(60/2) / 1.5 = 0.3849: 2 * 21.0517 degrees. */
-static void camera_of_the_assignment(void **state)
+TEST(camera_of_the_assignment)
 {
-    (void)state;
     struct scene s = dae_must_load(
         (struct dae){.libraries =
                          CAMERAS(CAMERA("c", "<xfov>20</xfov><yfov>10</yfov>") CAMERA("d", WIDE)),
@@ -659,9 +637,8 @@ static void camera_of_the_assignment(void **state)
         DIALECT_CGL, "last row");
 }
 
-static void assignment_without_a_camera(void **state)
+TEST(assignment_without_a_camera)
 {
-    (void)state;
     struct scene s = dae_must_load((struct dae){.nodes = TRI}, DIALECT_CGL);
     const struct scene_camera *c = &s.camera;
     assert_false(c->present);
@@ -676,9 +653,8 @@ static void assignment_without_a_camera(void **state)
 }
 
 /* A file is the assignment's if it has a technique of its profile; ours alone does not make it so. */
-static void dialect_is_found_in_the_file(void **state)
+TEST(dialect_is_found_in_the_file)
 {
-    (void)state;
     static const struct {
         const char *extra;
         enum dialect expected;
@@ -697,30 +673,4 @@ static void dialect_is_found_in_the_file(void **state)
         if (CASES[i].expected == DIALECT_CGL)
             dae_must_fail(d, DIALECT_COLLADA, "--dialect cgl");
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(diffuse_and_emission_of_the_common_profile),
-        cmocka_unit_test(opaque_in_every_spelling),
-        cmocka_unit_test(cgl_ignores_what_the_assignment_ignores),
-        cmocka_unit_test(emission_of_the_two_profiles),
-        cmocka_unit_test(groups_get_their_own_material),
-        cmocka_unit_test(without_a_binding),
-        cmocka_unit_test(point_lights),
-        cmocka_unit_test(directional_lights),
-        cmocka_unit_test(spot_lights),
-        cmocka_unit_test(ambient_light),
-        cmocka_unit_test(black_ambient_light_is_nothing),
-        cmocka_unit_test(rectangles_are_geometry),
-        cmocka_unit_test(area_light_of_the_assignment),
-        cmocka_unit_test(twin_of_an_area_light_is_left_out),
-        cmocka_unit_test(emissive_mesh_elsewhere_is_a_lamp_of_its_own),
-        cmocka_unit_test(camera_pose_angles_and_clips),
-        cmocka_unit_test(camera_of_the_assignment),
-        cmocka_unit_test(assignment_without_a_camera),
-        cmocka_unit_test(dialect_is_found_in_the_file),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

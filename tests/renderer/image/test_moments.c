@@ -1,16 +1,7 @@
 /* Moments against two passes over the same numbers, and their files. */
 #include "renderer/image/moments.h"
 #include "renderer/math/sampler.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { N = 1000 };
 
@@ -54,9 +45,8 @@ static void check(const struct moments *m, uint32_t first, uint32_t last)
     }
 }
 
-static void online_equals_two_pass(void **state)
+TEST(online_equals_two_pass)
 {
-    (void)state;
     struct err e;
     struct moments m;
     assert_true(moments_alloc(&m, 1, 1, &e));
@@ -66,9 +56,8 @@ static void online_equals_two_pass(void **state)
     moments_free(&m);
 }
 
-static void merged_in_any_grouping(void **state)
+TEST(merged_in_any_grouping)
 {
-    (void)state;
     struct err e;
     static const uint32_t cuts[][4] = {
         {0, 1, 2, N}, {0, 500, 999, N}, {0, 0, 0, N}, {0, N, N, N}, {0, 333, 666, N}};
@@ -87,9 +76,8 @@ static void merged_in_any_grouping(void **state)
     }
 }
 
-static void unlike_moments_do_not_merge(void **state)
+TEST(unlike_moments_do_not_merge)
 {
-    (void)state;
     struct err e;
     struct moments a, b;
     assert_true(moments_alloc(&a, 2, 2, &e));
@@ -118,9 +106,8 @@ static int remove_dir(void **state)
     return rmdir(dir);
 }
 
-static void write_and_read(void **state)
+TEST(write_and_read)
 {
-    (void)state;
     struct err e = {0};
     struct moments m, back;
     struct image im;
@@ -153,9 +140,8 @@ static void write_and_read(void **state)
 }
 
 /* Each fault has its own line and no moments. */
-static void bad_files(void **state)
+TEST(bad_files)
 {
-    (void)state;
     static const char *const names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                           "M2.B", "M3.R", "M3.G", "M3.B", "n"};
     static const struct {
@@ -206,9 +192,8 @@ static void bad_files(void **state)
 }
 
 /* Nothing appears where a write fails, and no temporary stays. */
-static void failed_write_leaves_nothing(void **state)
+TEST(failed_write_leaves_nothing)
 {
-    (void)state;
     struct err e = {0};
     struct moments m;
     assert_true(moments_alloc(&m, 2, 2, &e));
@@ -217,15 +202,4 @@ static void failed_write_leaves_nothing(void **state)
     moments_free(&m);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(online_equals_two_pass),
-        cmocka_unit_test(merged_in_any_grouping),
-        cmocka_unit_test(unlike_moments_do_not_merge),
-        cmocka_unit_test(write_and_read),
-        cmocka_unit_test(bad_files),
-        cmocka_unit_test(failed_write_leaves_nothing),
-    };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
-}
+TEST_GROUP(make_dir, remove_dir)

@@ -2,16 +2,7 @@
  * the power curve against simulated tests; and its CSV files, decoded again. */
 #include "tools/html/csv_link.h"
 #include "tools/plots/plot_power.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* The i-th smallest of n uniform numbers is at most x if at least i of them are: a binomial tail. */
 static double order_cdf(int i, int n, double x)
@@ -23,9 +14,8 @@ static double order_cdf(int i, int n, double x)
     return sum;
 }
 
-static void qq_band_is_binomial(void **state)
+TEST(qq_band_is_binomial)
 {
-    (void)state;
     static const int of[][2] = {{1, 4},   {4, 4},     {1, 64},   {10, 64},
                                 {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
     for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
@@ -60,9 +50,8 @@ static json_t *claim_of(double alpha, double margin, double mdb)
 /* A test of level 0.05 x 0.25 / 4 (two-sided) of a mean with that standard error, 40000 times for each bias.
  * Frequencies lie within 4 standard errors, at most 0.01, of the curve with 0.9999 each. Control: the curve
  * of half the bias does not fit. */
-static void power_is_that_of_the_test(void **state)
+TEST(power_is_that_of_the_test)
 {
-    (void)state;
     enum { TRIALS = 40000 };
     json_t *claim = claim_of(0.05, 0.003, 0.008);
     struct power p = power_of(claim);
@@ -109,9 +98,8 @@ static char *saved(const char *link)
     return out;
 }
 
-static void csv_comes_back(void **state)
+TEST(csv_comes_back)
 {
-    (void)state;
     char *link = NULL;
     size_t size;
     FILE *f = open_memstream(&link, &size);
@@ -132,14 +120,4 @@ static void csv_comes_back(void **state)
         text, "name,a,b\r\n\"say \"\"hi\"\", <b>&#'\xc3\xa4\",-0.25,\r\n\"'=1+1\",1e-09,3\r\n");
     free(text);
     free(link);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(qq_band_is_binomial),
-        cmocka_unit_test(power_is_that_of_the_test),
-        cmocka_unit_test(csv_comes_back),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }
