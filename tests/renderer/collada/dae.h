@@ -1,4 +1,4 @@
-/* Small COLLADA documents for the loader's tests, put together from pieces. Include after cmocka. */
+/* Small COLLADA documents for the loader's tests, put together from pieces. */
 #ifndef ASSAY_TEST_DAE_H
 #define ASSAY_TEST_DAE_H
 
