@@ -215,7 +215,7 @@ TEST_WITH(what_is_missing_is_named, probe_setup, probe_teardown)
     assert_fails(f, "blender: no such program in PATH");
     stand_in(f, "touch started; " OK);
     f->opt.share_dir = "/assay/none";
-    assert_fails(f, "/assay/none/cycles.py: ");
+    assert_fails(f, "/assay/none/cycles/cycles.py: ");
     f->opt.share_dir = "reference";
     f->suite.depth = 2000;
     assert_fails(f, "Cycles: depth 2000");
