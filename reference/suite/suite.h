@@ -32,6 +32,7 @@
 #ifndef ASSAY_SUITE_H
 #define ASSAY_SUITE_H
 
+#include "engine_table.h"
 #include "renderer/scene/camera.h"
 #include "renderer/base/err.h"
 
@@ -40,14 +41,14 @@
 enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
 
 struct suite_reference {
-    char engine[16];      /* "cycles", "povray" or "truth" */
+    char engine[16];      /* of engine_table.h, with goldens, or "truth" */
     char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
     int replicates;       /* engines: images with a seed of their own */
-    int spp;              /* cycles: samples per pixel of one replicate */
-    int subgrid;          /* povray: one replicate is a box-averaged (k W) x (k H) picture */
+    int spp;              /* samples per pixel of one replicate, or */
+    int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) picture */
     char kind[32];        /* truth: which closed form (truth.h) */
     json_t *values;       /* truth: its numbers; borrowed from the suite */
 };
@@ -60,7 +61,7 @@ struct suite_variant {
     const char *options[9];            /* NULL at the end; borrowed from the suite */
 };
 
-enum { MAX_VARIANTS = 8 };
+enum { MAX_VARIANTS = 8, MAX_REFERENCES = NUM_ENGINES_WITH_GOLDENS + 1 /* truth */ };
 
 struct suite_scene {
     char name[64];                      /* "41_cornell" */
@@ -89,7 +90,7 @@ struct suite_scene {
     json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
     char references_of[64];  /* name of the scene whose references are used; its own name by default
                              */
-    struct suite_reference reference[3];
+    struct suite_reference reference[MAX_REFERENCES];
     int num_references;
     json_t *json; /* owned */
 };

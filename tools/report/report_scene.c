@@ -2,6 +2,7 @@
 
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"
+#include "reference/suite/engine_table.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -47,12 +48,13 @@ static bool load_shot(struct page *p, struct scene *s, const json_t *claim, cons
     return report_pixel_data_add(p, path, &shot->m, &shot->layer, e);
 }
 
-/* Ours first, then the references in the order that the keys 1 to 4 have in every scene, then others. */
+/* Ours first, then the references in the order that the keys 1, 2, .. have in every scene, then others. */
 static int rank_of(const struct shot *s)
 {
-    static const char *const order[] = {"pathtracer", "cycles", "povray", "truth"};
+    static const char *const order[] = {"pathtracer", ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth",
+                                        NULL};
     int rank = 0;
-    while (rank < 4 && strcmp(s->engine, order[rank]) != 0)
+    while (order[rank] != NULL && strcmp(s->engine, order[rank]) != 0)
         rank++;
     return rank;
 }

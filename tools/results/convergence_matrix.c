@@ -1,5 +1,7 @@
 #include "convergence_matrix.h"
 
+#include "reference/suite/engine_table.h"
+
 #include <string.h>
 
 static const json_t *engine_of(const json_t *scene, const char *name)
@@ -13,14 +15,15 @@ static const json_t *engine_of(const json_t *scene, const char *name)
     return NULL;
 }
 
-/* Of a over Cycles at the first or the last rung. */
+/* Of a over the engine that all are compared with, at the first or the last rung. */
 static const json_t *ratio_of(const json_t *scene, const char *a, bool last)
 {
     const json_t *ratios = json_object_get(scene, "ratios");
     for (size_t i = 0; i < json_array_size(ratios); i++) {
         const json_t *r = json_array_get(ratios, i);
         const json_t *rungs = json_object_get(r, "rungs");
-        if (strcmp(member_text(r, "a"), a) == 0 && strcmp(member_text(r, "b"), "cycles") == 0)
+        if (strcmp(member_text(r, "a"), a) == 0 &&
+            strcmp(member_text(r, "b"), engine_names[0]) == 0)
             return json_array_get(rungs, last ? json_array_size(rungs) - 1 : 0);
     }
     return NULL;
@@ -69,11 +72,13 @@ static void print_ratio(FILE *f, const json_t *rung, const char *name, const cha
 
 void convergence_matrix_print(FILE *f, const json_t *convergence)
 {
-    fputs(
-        "| scene | slope, ours | Sobol | Cycles | bias at most %, ours | Sobol | variance / Cycles', ours, "
-        "first | top | Sobol, top | efficiency / Cycles', Sobol |\n"
+    const char *other = engine_table[0].title;
+    fprintf(
+        f,
+        "| scene | slope, ours | Sobol | %s | bias at most %%, ours | Sobol | variance / %s', ours, "
+        "first | top | Sobol, top | efficiency / %s', Sobol |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
-        f);
+        other, other, other);
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *scene = json_array_get(convergence, i);
         const json_t *ours = engine_of(scene, "pathtracer");
@@ -81,7 +86,7 @@ void convergence_matrix_print(FILE *f, const json_t *convergence)
         fprintf(f, "| %s", member_text(scene, "scene"));
         print_slope(f, ours);
         print_slope(f, sobol);
-        print_slope(f, engine_of(scene, "cycles"));
+        print_slope(f, engine_of(scene, engine_names[0]));
         print_bias(f, ours);
         print_bias(f, sobol);
         print_ratio(f, ratio_of(scene, "pathtracer", false), "variance", "variance_ci");

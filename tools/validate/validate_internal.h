@@ -8,7 +8,7 @@
 #include "tools/sequential/alpha_spending.h"
 #include "validate.h"
 
-enum { MAX_PATH = 8192, MAX_REFERENCES = 3, NUM_STAGES = 2, CLAIM_NAME = 256 };
+enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
 /* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants, consistency. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 2 };
 
