@@ -4,9 +4,34 @@
 #include "tools/images/tone_curve.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
+
+const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
+                                                             "exact", "noise", "rates"};
+
+void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
+{
+    if (m->num < (int)(sizeof m->at / sizeof *m->at)) {
+        va_list ap;
+        va_start(ap, format);
+        m->at[m->num].line = line;
+        vsnprintf(m->at[m->num].text, sizeof m->at->text, format, ap);
+        va_end(ap);
+        err_hide_controls(m->at[m->num].text);
+    }
+    m->num++;
+}
+
+double rubric_points(const struct rubric *r)
+{
+    double sum = 0;
+    for (int i = 0; i < r->num_checks; i++)
+        sum += r->check[i].points;
+    return sum;
+}
 
 static bool is_word(const char *word, const char *const *words)
 {

@@ -6,6 +6,30 @@
 #include "tools/results/results.h"
 
 #include <math.h>
+#include <string.h>
+
+void report_reference(FILE *f, const struct claim_ref *claim)
+{
+    html_text(f, member_text(claim->json, "b"));
+    const char *quantity = member_text(claim->json, "quantity");
+    if (quantity != NULL && strcmp(quantity, "mean") != 0) {
+        fputs(", ", f);
+        html_text(f, quantity);
+    }
+}
+
+void report_badge(FILE *f, const struct claim_ref *claim)
+{
+    static const char *const style[] = {"error", "bad", "bad", "good"};
+    static const char *const mark[] = {"!", "✗", "✗", "✓"};
+    fprintf(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> ",
+            style[claim->outcome], mark[claim->outcome]);
+    if (claim->outcome == OUTCOME_NOT_JUDGED && !results_claim_lacks_time(claim->json))
+        fputs("not judged", f);
+    else
+        html_text(f, member_text(claim->json, "verdict"));
+    fputs("</span>", f);
+}
 
 static void write_row(FILE *f, const struct claim_ref *claim)
 {

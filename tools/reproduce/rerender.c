@@ -20,6 +20,13 @@
 
 enum { MAX_PATH = 4096 };
 
+bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
+{
+    free(out->command);
+    out->command = shell_quote_join(NULL, word);
+    return out->command != NULL || err_set(e, "out of memory");
+}
+
 static const char *attr(const struct image *im, const char *name)
 {
     const char *value = image_get_attr(im, name);
