@@ -1,7 +1,7 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/github_annotations.h"
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
 #include "tools/results/history.h"

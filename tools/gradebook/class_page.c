@@ -64,14 +64,14 @@ static void table(FILE *f, const json_t *grades)
     json_array_foreach(parts, k, p)
     {
         fputs("<th class=\"n\">", f);
-        html_text(f, student_page_text(p, "number"));
+        html_text(f, member_or_empty(p, "number"));
         fputs("</th>", f);
     }
     fputs("<th>bug</th><th>for you to look at</th></tr>\n", f);
     json_array_foreach(grades, i, g)
     {
         fputs("<tr><td>", f);
-        link_to(f, student_page_text(g, "id"));
+        link_to(f, member_or_empty(g, "id"));
         fprintf(f, "</td><td class=\"n\">%.2f</td>", member_number(g, "points"));
         json_array_foreach(json_object_get(g, "parts"), k, p)
         {
@@ -83,30 +83,30 @@ static void table(FILE *f, const json_t *grades)
         json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, p)
         {
             fputs(k > 0 ? " or " : "", f);
-            html_text(f, student_page_text(p, "name"));
+            html_text(f, member_or_empty(p, "name"));
         }
         /* Of other deviations than those it was graded with: staff may want to know. */
-        const char *with = student_page_text(json_object_get(g, "diagnosis"), "with");
-        if (k > 0 && with[0] != '\0' && strcmp(with, student_page_text(g, "accepted")) != 0) {
+        const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0) {
             fputs(" on top of ", f);
             html_text(f, with);
         }
         fputs("</td><td>", f);
-        html_text(f, student_page_text(g, "trouble"));
-        html_text(f, student_page_text(g, "wrong"));
-        if (student_page_text(g, "accepted")[0] != '\0') {
+        html_text(f, member_or_empty(g, "trouble"));
+        html_text(f, member_or_empty(g, "wrong"));
+        if (member_or_empty(g, "accepted")[0] != '\0') {
             fputs("accepted: ", f);
-            html_text(f, student_page_text(g, "accepted"));
+            html_text(f, member_or_empty(g, "accepted"));
             fputs("; ", f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             bool judged = json_is_true(json_object_get(c, "judged"));
-            if (student_page_text(c, "flag")[0] == '\0' && judged)
+            if (member_or_empty(c, "flag")[0] == '\0' && judged)
                 continue;
-            html_text(f, student_page_text(c, "name"));
+            html_text(f, member_or_empty(c, "name"));
             fputs(": ", f);
-            html_text(f, student_page_text(c, "flag"));
+            html_text(f, member_or_empty(c, "flag"));
             fputs(judged ? "; " : " not judged; ", f);
         }
         fputs("</td></tr>\n", f);
@@ -146,7 +146,7 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
         const json_t *first =
             json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
         if (first != NULL)
-            num = count_one(t, num, student_page_text(first, "bug"));
+            num = count_one(t, num, member_or_empty(first, "bug"));
     }
     if (num == 0)
         return;
@@ -165,7 +165,7 @@ static void slowest(FILE *f, const json_t *grades, struct tally *t)
     size_t i, num = 0;
     json_t *g;
     json_array_foreach(grades, i, g) t[num++] =
-        (struct tally){.text = student_page_text(g, "id"), .num = member_number(g, "cpu_s")};
+        (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
     for (i = 0; i < num && i < SLOWEST; i++) {
@@ -190,9 +190,9 @@ static void look_alikes(FILE *f, const json_t *grades)
             h = json_array_get(grades, k);
             json_array_foreach(json_object_get(g, "pictures"), m, p)
             {
-                const char *a = student_page_text(p, "sha256"),
-                           *b = student_page_text(json_array_get(json_object_get(h, "pictures"), m),
-                                                  "sha256");
+                const char *a = member_or_empty(p, "sha256"),
+                           *b = member_or_empty(json_array_get(json_object_get(h, "pictures"), m),
+                                                "sha256");
                 num += a[0] != '\0';
                 same += a[0] != '\0' && strcmp(a, b) == 0;
             }
@@ -205,9 +205,9 @@ static void look_alikes(FILE *f, const json_t *grades)
                     f);
             any = true;
             fputs("<li>", f);
-            html_text(f, student_page_text(g, "id"));
+            html_text(f, member_or_empty(g, "id"));
             fputs(" and ", f);
-            html_text(f, student_page_text(h, "id"));
+            html_text(f, member_or_empty(h, "id"));
             fputs("</li>\n", f);
         }
     }
@@ -226,7 +226,7 @@ static void join_group(const json_t *grades, size_t i, int number, int *group)
         json_array_foreach(grades, m, other)
         {
             if (group[m] == 0 &&
-                strcmp(student_page_text(other, "id"), student_page_text(like, "id")) == 0)
+                strcmp(member_or_empty(other, "id"), member_or_empty(like, "id")) == 0)
                 join_group(grades, m, number, group);
         }
     }
@@ -242,7 +242,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
         if (group[i] != number)
             continue;
         fputs(members++ > 0 ? ", " : "", f);
-        link_to(f, student_page_text(g, "id"));
+        link_to(f, member_or_empty(g, "id"));
     }
     fputs("</li>\n", f);
 }
@@ -280,7 +280,7 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
     }
     fputs(student_page_head, f);
     fputs("<title>Grades</title>\n<h1>", f);
-    html_text(f, student_page_text(json_array_get(grades, 0), "rubric"));
+    html_text(f, member_or_empty(json_array_get(grades, 0), "rubric"));
     fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
     histogram(f, grades);
     common_bugs(f, grades, t);

@@ -10,7 +10,7 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
 {
     const json_t *values = json_object_get(check, "relative"),
                  *tile = json_object_get(check, "tile");
-    bool exact = strcmp(student_page_text(check, "kind"), "exact") == 0;
+    bool exact = strcmp(member_or_empty(check, "kind"), "exact") == 0;
     size_t columns = (size_t)(width / GRADE_TILE), i;
     json_t *v;
     if (json_array_size(values) == 0 || columns == 0)
@@ -58,7 +58,7 @@ static void show_interval(FILE *f, const json_t *v, double y)
             "<rect x=\"%.1f\" y=\"%g\" width=\"%.1f\" height=\"4\" fill=\"#222\"/>"
             "<circle cx=\"%.1f\" cy=\"%g\" r=\"4\"/><text x=\"378\" y=\"%g\">",
             lo, y + 6, fmax(1, hi - lo), place(member_number(v, "value") / none), y + 8, y + 12);
-    html_text(f, student_page_text(v, "what"));
+    html_text(f, member_or_empty(v, "what"));
     fprintf(f, " %+.1f %% (%+.1f to %+.1f)</text>\n", 100 * member_number(v, "value"),
             100 * member_number(v, "lo"), 100 * member_number(v, "hi"));
 }

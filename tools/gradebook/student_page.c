@@ -25,12 +25,6 @@ const char student_page_head[] =
     "figcaption{font-size:.85rem;color:#555}.lost{color:#a11}.full{color:#171}.where{color:#555}h2{margin-bottom:.2rem}\n"
     "</style>\n";
 
-const char *student_page_text(const json_t *object, const char *key)
-{
-    const char *text = json_string_value(json_object_get(object, key));
-    return text != NULL ? text : "";
-}
-
 static void paragraph(FILE *f, const char *label, const char *text, const char *class)
 {
     if (text[0] == '\0')
@@ -132,7 +126,7 @@ static const json_t *picture_of(const json_t *grade, const char *name)
     json_t *p;
     json_array_foreach(json_object_get(grade, "pictures"), i, p)
     {
-        if (strcmp(student_page_text(p, "name"), name) == 0)
+        if (strcmp(member_or_empty(p, "name"), name) == 0)
             return p;
     }
     return NULL;
@@ -143,25 +137,25 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
 {
     bool full = member_number(c, "share") >= 1;
     fputs("<section><h3>", f);
-    html_text(f, student_page_text(c, "title"));
+    html_text(f, member_or_empty(c, "title"));
     fprintf(f, " <span class=\"%s\">%.2f of %g</span></h3>\n", full ? "full" : "lost",
             member_number(c, "points"), member_number(c, "of"));
-    paragraph(f, "Expected:", student_page_text(c, "expected"), "");
-    paragraph(f, "Seen:", student_page_text(c, "seen"), "");
+    paragraph(f, "Expected:", member_or_empty(c, "expected"), "");
+    paragraph(f, "Seen:", member_or_empty(c, "seen"), "");
     paragraph(f, "Explained by what you were given, no points lost for it:",
-              student_page_text(c, "accepted"), "");
+              member_or_empty(c, "accepted"), "");
     double share = member_number(c, "share");
     show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
-    const json_t *p = picture_of(grade, student_page_text(c, "picture"));
+    const json_t *p = picture_of(grade, member_or_empty(c, "picture"));
     bool ok = true;
     if (!full) {
-        paragraph(f, "Hint:", student_page_text(c, "hint"), "");
-        paragraph(f, "Where:", student_page_text(c, "where"), "where");
+        paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
+        paragraph(f, "Where:", member_or_empty(c, "where"), "where");
         if (json_is_string(json_object_get(p, "sha256"))) {
             char path[MAX_PATH];
-            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir,
-                     student_page_text(grade, "id"), student_page_text(p, "file"));
-            ok = show_picture(f, path, student_page_text(p, "name"), json_object_get(c, "tile"), e);
+            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir, member_or_empty(grade, "id"),
+                     member_or_empty(p, "file"));
+            ok = show_picture(f, path, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
             grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
             grade_plot_intervals(f, c);
         }
@@ -176,7 +170,7 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     const json_t *named = json_object_get(diagnosis, "named");
     size_t i;
     json_t *b;
-    const char *finding = student_page_text(diagnosis, "finding");
+    const char *finding = member_or_empty(diagnosis, "finding");
     if (strcmp(finding, "unknown") == 0)
         fputs(
             "<p>The pictures differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
@@ -188,9 +182,9 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     json_array_foreach(named, i, b)
     {
         fputs("<li>", f);
-        html_text(f, student_page_text(b, "bug"));
+        html_text(f, member_or_empty(b, "bug"));
         fputs(" <span class=\"where\">(", f);
-        html_text(f, student_page_text(b, "where"));
+        html_text(f, member_or_empty(b, "where"));
         fputs(")</span></li>\n", f);
     }
     fputs("</ul>\n", f);
@@ -203,33 +197,33 @@ bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     bool ok = true, left_out = false;
     fputs(student_page_head, f);
     fputs("<title>", f);
-    html_text(f, student_page_text(grade, "id"));
+    html_text(f, member_or_empty(grade, "id"));
     fputs("</title>\n<h1>", f);
-    html_text(f, student_page_text(grade, "id"));
+    html_text(f, member_or_empty(grade, "id"));
     fprintf(f, ": %.2f of %g points</h1>\n<p>", member_number(grade, "points"),
             member_number(grade, "of"));
-    html_text(f, student_page_text(grade, "rubric"));
+    html_text(f, member_or_empty(grade, "rubric"));
     fputs("</p>\n", f);
-    if (student_page_text(grade, "trouble")[0] == '\0' &&
-        strcmp(student_page_text(grade, "kind"), "images") != 0)
+    if (member_or_empty(grade, "trouble")[0] == '\0' &&
+        strcmp(member_or_empty(grade, "kind"), "images") != 0)
         show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
-    paragraph(f, "Could not be graded:", student_page_text(grade, "trouble"), "lost");
-    paragraph(f, "All of it:", student_page_text(grade, "wrong"), "lost");
+    paragraph(f, "Could not be graded:", member_or_empty(grade, "trouble"), "lost");
+    paragraph(f, "All of it:", member_or_empty(grade, "wrong"), "lost");
     show_bug(f, json_object_get(grade, "diagnosis"));
     fputs("<table>\n", f);
     json_array_foreach(json_object_get(grade, "parts"), i, p)
     {
         fputs("<tr><td>", f);
-        html_text(f, student_page_text(p, "number"));
+        html_text(f, member_or_empty(p, "number"));
         fputs("</td><td>", f);
-        html_text(f, student_page_text(p, "title"));
+        html_text(f, member_or_empty(p, "title"));
         fprintf(f, "</td><td class=\"n\">%.2f</td><td>of %g</td></tr>\n",
                 member_number(p, "points"), member_number(p, "of"));
     }
     fputs("</table>\n", f);
     json_array_foreach(json_object_get(grade, "checks"), i, c)
     {
-        if (strcmp(student_page_text(c, "visibility"), "visible") == 0)
+        if (strcmp(member_or_empty(c, "visibility"), "visible") == 0)
             ok = ok && show_check(f, dir, grade, c, e);
         else
             left_out = true;

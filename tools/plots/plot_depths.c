@@ -1,4 +1,5 @@
-#include "tools/converge/depth_ladder.h"
+#include "plot_convergence.h"
+
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"

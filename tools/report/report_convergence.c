@@ -1,7 +1,6 @@
 #include "report_convergence.h"
 
 #include "tools/results/convergence_results.h"
-#include "tools/converge/depth_ladder.h"
 #include "tools/plots/plot_convergence.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"

@@ -1,6 +1,6 @@
 #include "report_stated_error.h"
 
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/html/html.h"
 
 static size_t count_good(const json_t *consistency)

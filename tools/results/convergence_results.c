@@ -1,7 +1,6 @@
 #include "convergence_results.h"
 
 #include "reference/suite/suite.h"
-#include "tools/converge/depth_ladder.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -108,6 +107,27 @@ static bool check_ratio_rung(const json_t *g, const char *where, struct err *e)
            check_interval(g, "efficiency_ci", false, true, where, e);
 }
 
+bool convergence_results_check_depths(const json_t *depths, const char *where, struct err *e)
+{
+    const json_t *rungs = json_object_get(depths, "rungs");
+    if (json_is_string(json_object_get(depths, "error")))
+        return true;
+    if (!json_is_integer(json_object_get(depths, "samples")) || json_array_size(rungs) == 0)
+        return err_set(e, "%s: 'depths' has no whole 'samples' or no 'rungs'", where);
+    for (size_t i = 0; i < json_array_size(rungs); i++) {
+        const json_t *g = json_array_get(rungs, i), *depth = json_object_get(g, "depth"),
+                     *before = json_object_get(json_array_get(rungs, i - 1), "depth");
+        if (!json_is_integer(depth) || json_integer_value(depth) < 0 ||
+            (i > 0 && json_integer_value(depth) <= json_integer_value(before)))
+            return err_set(e, "%s: 'depths': 'depth' does not ascend in whole numbers", where);
+        const json_t *se = json_object_get(g, "se"), *truth = json_object_get(g, "truth");
+        if (!json_is_number(json_object_get(g, "mean")) || !json_is_number(se) ||
+            json_number_value(se) < 0 || (truth != NULL && !json_is_number(truth)))
+            return err_set(e, "%s: 'depths': 'mean', 'se' or 'truth' is not a number", where);
+    }
+    return true;
+}
+
 static bool check_scene(const json_t *s, const char *where, struct err *e)
 {
     static const char *const numbers[] = {"width",           "height", "depth",  "replicates",
@@ -136,7 +156,7 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
             return false;
     }
     const json_t *depths = json_object_get(s, "depths");
-    return depths == NULL || depth_ladder_check(depths, where, e);
+    return depths == NULL || convergence_results_check_depths(depths, where, e);
 }
 
 bool convergence_results_check(const json_t *convergence, const char *path, struct err *e)

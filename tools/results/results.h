@@ -5,7 +5,7 @@
  *     "command": "assay validate ...", "version": "0.1 (commit)", "date": "2026-..Z",
  *     "machine": "2 x AMD ...", "alpha": 1e-3, "mode": "golden" | "live",
  *     "seconds": 98.1,
- *     "consistency": [ ... ],             stated_error_claims.h; absent where `assay validate` has not run
+ *     "consistency": [ ... ],             stated_error_results.h; absent where `assay validate` has not run
  *     "convergence": [ ... ],             convergence_results.h; absent where `assay converge` has not run
  *     "unfinished": 87,               only in what `assay validate --page-every` shows while it runs: how many
  *                                     claims and scenes of "consistency" are still to be judged
@@ -59,6 +59,7 @@
 #define ASSAY_RESULTS_H
 
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 
 #include <jansson.h>
 
@@ -69,10 +70,6 @@ enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_
  * with file, claim and member. New reference in *out. */
 bool results_read(const char *path, json_t **out, struct err *e)
     __attribute__((warn_unused_result));
-
-/* A member of a claim or of the root, checked by results_read(): NULL or 0 where it is absent. */
-const char *member_text(const json_t *object, const char *name);
-double member_number(const json_t *object, const char *name);
 
 /* How a claim came out, worst first. OPPOSITE: DIFFERENT for EQUIVALENT or the reverse. UNDECIDED: any
  * other verdict that was not expected. */

@@ -1,4 +1,4 @@
-/* Claims of consistency (stated_error.h): rendered, judged, and as "consistency" in results.json:
+/* "consistency" in results.json: claims about the error that our renders state (stated_error.h).
  *
  *   [ {"scene": "41_cornell", "engine": "pathtracer", "renders": 8, "spp": 32, "alpha": 1e-5,
  *      "margin": .1, "verdict": "EQUIVALENT", "passed": true, "reason": "one sentence",
@@ -10,21 +10,12 @@
  *      only the time was missing} ]
  *
  * pixels and image are 0 where two renders are the same. */
-#ifndef ASSAY_STATED_ERROR_CLAIMS_H
-#define ASSAY_STATED_ERROR_CLAIMS_H
+#ifndef ASSAY_STATED_ERROR_RESULTS_H
+#define ASSAY_STATED_ERROR_RESULTS_H
 
-#include "tools/results/results.h"
-#include "validate.h"
-
-#include "reference/suite/suite.h"
+#include "results.h"
 
 #include <stdio.h>
-
-/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
- * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
- * an "error" that says so. */
-json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
-                         double alpha, double deadline);
 
 /* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
 bool stated_error_check(const json_t *consistency, const char *path, struct err *e)

@@ -1,7 +1,7 @@
 #include "validate_internal.h"
 
 #include "tools/results/claim_result.h"
-#include "stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
 
 #include <assert.h>
@@ -295,11 +295,4 @@ bool claim_run_differs(const struct claim_run *t)
     const char *verdict = member_text(t->result, "verdict");
     return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
            results_claim_outcome(t->result) == OUTCOME_OPPOSITE;
-}
-
-void claim_run_free(struct claim_run *t)
-{
-    comparison_free(&t->c);
-    json_decref(t->history);
-    json_decref(t->result);
 }

@@ -254,3 +254,10 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
         keep_selected(v);
     return ok;
 }
+
+void claim_run_free(struct claim_run *t)
+{
+    comparison_free(&t->c);
+    json_decref(t->history);
+    json_decref(t->result);
+}

@@ -6,7 +6,7 @@
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
 #include "tools/results/results.h"
-#include "stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "import_result.h"
 
 #include <stdlib.h>

@@ -125,4 +125,10 @@ void claim_run_give_up(struct validation *v, struct claim_run *t, const char *wh
 bool claim_run_differs(const struct claim_run *t);
 void claim_run_free(struct claim_run *t);
 
+/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
+ * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
+ * an "error" that says so. */
+json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline);
+
 #endif

@@ -4,6 +4,8 @@
 #include "renderer/base/fs.h"
 #include "tools/converge/depth_ladder.h"
 #include "tests/support/test.h"
+#include "tools/plots/plot_convergence.h"
+#include "tools/results/convergence_results.h"
 
 #include <libgen.h>
 
@@ -43,7 +45,7 @@ TEST(furnace)
                                      .timeout_s = 60};
     json_t *depths;
     MUST(depth_ladder_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e));
-    assert_true(depth_ladder_check(depths, "x", &e));
+    assert_true(convergence_results_check_depths(depths, "x", &e));
     const json_t *rungs = json_object_get(depths, "rungs");
     assert_int_equal(json_array_size(rungs), 6);
     /* Emission 0.5, 1, 2 and albedo 0.8, 0.5, 0.2 (11_furnace.json). */
@@ -82,7 +84,7 @@ static htmlDocPtr page_of(const char *json)
     struct err e = {""};
     FILE *f = open_memstream(&text, &size);
     assert_non_null(depths);
-    assert_true(depth_ladder_check(depths, "x", &e));
+    assert_true(convergence_results_check_depths(depths, "x", &e));
     plot_depths(f, depths);
     fclose(f);
     htmlDocPtr doc =
@@ -148,7 +150,7 @@ TEST(bad_ladders)
         struct err e = {""};
         json_t *j = json_loads(bad[i], 0, NULL);
         assert_non_null(j);
-        assert_false(depth_ladder_check(j, "file: scene", &e));
+        assert_false(convergence_results_check_depths(j, "file: scene", &e));
         assert_non_null(strstr(e.msg, "file: scene: 'depths'"));
         json_decref(j);
     }

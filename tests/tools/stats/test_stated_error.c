@@ -2,7 +2,7 @@
  * light, of 16 x 16 pixels, n = 32 a pixel, K = 8 renders. Seeds are fixed; nothing is retried. */
 #include "renderer/math/sampler.h"
 #include "tools/stats/stated_error.h"
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/report/report_stated_error.h"
 #include "tests/support/test.h"
 
