@@ -38,11 +38,35 @@ void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
         test_add_group(set_up, tear_down);                                                         \
     }
 
+#define COUNT(a) (sizeof(a) / sizeof *(a))
+
+/* "DIR/name" in a directory of this program's own, which is made when it is first asked for and removed with all that is
+ * in it after the tests. One of 16 buffers, which take turns. */
+const char *test_path(const char *name);
+/* The whole file with a 0 behind it; the caller frees. Writes one of those bytes. */
+char *test_read(const char *path);
+void test_write(const char *path, const void *bytes, size_t size);
+
+/* Fails at the first line of the text that is not the one of the file `expected`. Numbers are the same that differ by
+ * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
+void test_same_text(const char *text, const char *expected);
+
 /* What must not fail for the test to mean anything: else it fails with the line in `e`. */
 #define MUST(call)                                                                                 \
     do {                                                                                           \
         if (!(call))                                                                               \
             fail_msg("%s", e.msg);                                                                 \
+    } while (0)
+
+/* The call must fail, with one line in `e` that holds `why`. */
+#define REFUSES(call, why)                                                                         \
+    do {                                                                                           \
+        const char *why_ = (why);                                                                  \
+        *e.msg = '\0';                                                                             \
+        if (call)                                                                                  \
+            fail_msg("does not fail with '%s'", why_);                                             \
+        if (strstr(e.msg, why_) == NULL || strchr(e.msg, '\n') != NULL)                            \
+            fail_msg("'%s' does not say '%s'", e.msg, why_);                                       \
     } while (0)
 
 #endif

@@ -5,8 +5,6 @@
 #include "renderer/base/sha256.h"
 #include "tests/support/test.h"
 
-#define COUNT(a) (sizeof(a) / sizeof *(a))
-
 static const char shipped[] = "reference/scenes";
 
 /* Writes dir/name. */

@@ -11,8 +11,6 @@
 
 static const double tolerance = 1e-9; /* relative */
 
-#define COUNT(a) (sizeof(a) / sizeof *(a))
-
 static bool same(double a, double b)
 {
     return fabs(a - b) <= tolerance * fabs(b);

@@ -7,7 +7,6 @@
 #include "tools/sequential/adaptive_stop.h"
 #include "tests/support/test.h"
 
-#define COUNT(a) (sizeof(a) / sizeof *(a))
 
 static double uniform(uint32_t stream, uint32_t i, int k)
 {
