@@ -51,6 +51,14 @@ void test_write(const char *path, const void *bytes, size_t size);
  * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
 void test_same_text(const char *text, const char *expected);
 
+/* In double precision, unlike cmocka's own. */
+#define assert_near(a, b, tolerance)                                                               \
+    do {                                                                                           \
+        double a_ = (double)(a), b_ = (double)(b);                                                 \
+        if (!(fabs(a_ - b_) <= (tolerance)))                                                       \
+            fail_msg("%s is %.15g, expected %.15g", #a, a_, b_);                                   \
+    } while (0)
+
 /* What must not fail for the test to mean anything: else it fails with the line in `e`. */
 #define MUST(call)                                                                                 \
     do {                                                                                           \

@@ -9,9 +9,6 @@
 
 #include <gsl/gsl_math.h>
 
-/* cmocka's own compares in single precision. */
-#define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
-
 /* A floor, a ball on it and, if asked for, a lamp above: 0.5 x 0.25 around (0, 2, 0), facing down. */
 static struct scene floor_and_ball(bool with_lamp)
 {

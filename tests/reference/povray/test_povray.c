@@ -13,9 +13,6 @@
 #include <gsl/gsl_math.h>
 #include <sys/stat.h>
 
-/* cmocka's own compares in single precision. */
-#define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
-
 static const struct povray_passes bright = {
     .pass = {{.sources = true, .glow = true, .recursion = 4, .levels = 60, .levels_indirect = 60}},
     .num_passes = 1,

@@ -109,13 +109,6 @@ static inline void dae_must_fail(struct dae d, enum dialect dialect, const char 
         fail_msg("expected '%s', got '%s'", keyword, e.msg);
 }
 
-#define assert_near(a, b, tolerance)                                                               \
-    do {                                                                                           \
-        double a_ = (a), b_ = (b);                                                                 \
-        if (!(fabs(a_ - b_) <= (tolerance)))                                                       \
-            fail_msg("%s is %.9g, expected %.9g", #a, a_, b_);                                     \
-    } while (0)
-
 #define assert_vec(a, X, Y, Z)                                                                     \
     do {                                                                                           \
         vec3 v_ = (a);                                                                             \

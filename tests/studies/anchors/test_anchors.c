@@ -12,12 +12,6 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
 
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
-
 enum { SIDE = 64, PIXELS = SIDE * SIDE };
 
 /* XYZ of the primaries is their chromaticity times a weight; the weights make white (1, 1, 1) the

@@ -10,12 +10,6 @@
 #include "renderer/base/sha256.h"
 #include "tests/support/test.h"
 
-static void assert_near(double value, double expected, double tolerance)
-{
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%.17g, expected %.17g", value, expected);
-}
-
 /* Closed forms: no success in 10 has the upper bound 1 - tail^(1/10), 10 of 10 the lower bound
  * tail^(1/10); 5 of 10 at 95 % is [0.1871, 0.8129] in every table of [ClopperPearson34]. */
 TEST(test_bounds)

@@ -8,12 +8,6 @@
 
 #include <gsl/gsl_cdf.h>
 
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
-
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {

@@ -19,12 +19,6 @@
 
 static const double pi = 3.14159265358979323846;
 
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
-
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {

@@ -18,12 +18,6 @@ static const char *file(int slot, const char *name)
     return path_text[slot];
 }
 
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.15g, want %.15g", got, want);
-}
-
 static void write_floats(const char *path, int width, int height, int channels,
                          const char *const *names, const float *v)
 {

@@ -42,12 +42,6 @@ struct engine {
     double scale;    /* of the noise */
 };
 
-static void assert_near(double got, double expected, double tolerance)
-{
-    if (!(fabs(got - expected) <= tolerance))
-        fail_msg("%.15g is not %.15g +- %g", got, expected, tolerance);
-}
-
 static double truth(size_t i)
 {
     return 0.5 + (double)(i / 3) / (SIZE / 3);
