@@ -1,6 +1,6 @@
 /* The calibration itself: its mathematics against known values, the short version on the tester as it
  * is and on testers weakened on purpose, each of which must be rejected, and the published page.
- * Seeds and numbers of pairs (calibrate_settings.c) were fixed beforehand, nothing is retried. A line
+ * Seeds and numbers of pairs (calibrate.c) were fixed beforehand, nothing is retried. A line
  * fails by chance with 5e-4 at most where a rate is just what it may be; most are far below, so that
  * the short version of a right tester fails with about 1 %, over all its lines. What it can find
  * is what the weakened testers show. */
