@@ -1,6 +1,6 @@
 /* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
 #define _GNU_SOURCE
-#include "reference/replicates/engine_driver.h"
+#include "cycles_driver.h"
 
 #include "export_cycles.h"
 #include "reference/replicates/independence.h"
@@ -203,5 +203,19 @@ out:
     return ok;
 }
 
-const struct engine_driver cycles_driver = {
-    .engine = "cycles", .prefix = "replicate", .count = count, .render = render, .fold = fold};
+static bool write_key(const struct reference_job *job, const char *path, struct err *e)
+{
+    return export_cycles(job->scene, job->camera, job->suite->depth, path, e);
+}
+
+static const char *const scripts[] = {"cycles/cycles.py",          "cycles/cycles_blender.py",
+                                      "cycles/cycles_geometry.py", "cycles/cycles_light.py",
+                                      "cycles/cycles_material.py", NULL};
+
+const struct engine_driver cycles_driver = {.program = "blender",
+                                            .scripts = scripts,
+                                            .prefix = "replicate",
+                                            .count = count,
+                                            .render = render,
+                                            .fold = fold,
+                                            .write_key = write_key};

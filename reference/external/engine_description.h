@@ -27,14 +27,13 @@
 #include "renderer/image/moments.h"
 #include "reference/suite/suite.h"
 
-enum engine_format { FORMAT_MITSUBA, FORMAT_PBRT, FORMAT_POVRAY, FORMAT_CYCLES, FORMAT_DAE };
 enum engine_output { OUTPUT_MEAN, OUTPUT_EXACT, OUTPUT_MOMENTS };
 
 struct engine {
     char file[4096]; /* the description */
     char here[4096]; /* its directory, absolute */
     char name[32];
-    enum engine_format format;
+    const struct engine_kind *format; /* whose scene files it reads; NULL: the suite's own, "dae" */
     enum engine_output output;
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */

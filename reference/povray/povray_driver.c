@@ -1,5 +1,5 @@
 /* Drives POV-Ray: the pictures of a povray_replicates, rendered side by side. */
-#include "reference/replicates/engine_driver.h"
+#include "povray_driver.h"
 
 #include "povray_replicates.h"
 #include "reference/base/process.h"
@@ -239,9 +239,36 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     return true;
 }
 
-const struct engine_driver povray_driver = {.engine = "povray",
+/* One picture of each of the three kinds in each pass; the others differ from them by the seed. */
+static bool write_key(const struct reference_job *job, const char *path, struct err *e)
+{
+    const struct suite_scene *s = job->suite;
+    struct povray_passes plan;
+    if (!povray_passes(job->scene, job->camera, s->depth, &plan, e))
+        return false;
+    uint32_t seed = replicate_seed(job->opt->seed, 0);
+    FILE *f = fopen(path, "w");
+    if (f == NULL)
+        return err_set(e, "%s: cannot write: %s", path, strerror(errno));
+    bool ok = true;
+    for (int i = 0; ok && i < 3 * plan.num_passes; i++) {
+        struct povray_image p =
+            i % 3 == 0 ? povray_window(&plan, s->width, s->height, 0, i / 3)
+                       : povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed,
+                                          i / 3, i % 3 == 1);
+        fprintf(f, "// grid %d, block %d\n", p.grid, p.block);
+        ok = export_povray(job->scene, job->camera, s->depth, &p.variant, f, e);
+    }
+    fprintf(f, "// %d windows\n", POVRAY_WINDOWS);
+    if (fclose(f) != 0 && ok)
+        ok = err_set(e, "%s: cannot write: %s", path, strerror(errno));
+    return ok;
+}
+
+const struct engine_driver povray_driver = {.program = "povray",
                                             .prefix = "picture",
                                             .below_zero = true,
                                             .count = count,
                                             .render = render,
-                                            .fold = povray_fold};
+                                            .fold = povray_fold,
+                                            .write_key = write_key};

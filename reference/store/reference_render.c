@@ -10,13 +10,6 @@
 #include <string.h>
 #include <unistd.h>
 
-const struct engine_driver *engine_driver_of(const char *engine)
-{
-    return strcmp(engine, cycles_driver.engine) == 0   ? &cycles_driver
-           : strcmp(engine, povray_driver.engine) == 0 ? &povray_driver
-                                                       : NULL;
-}
-
 bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
                             const struct reference_options *opt,
                             bool (*act)(const struct reference_job *job, void *ctx, struct err *e),

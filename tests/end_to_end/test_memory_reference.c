@@ -2,10 +2,7 @@
 #include "tests/support/alloc_fail.h"
 
 #include "reference/external/engine_description.h"
-#include "reference/cycles/export_cycles.h"
-#include "reference/mitsuba/export_mitsuba.h"
-#include "reference/pbrt/export_pbrt.h"
-#include "reference/povray/export_povray.h"
+#include "reference/external/engine_bindings.h"
 #include "reference/base/gsl_errors.h"
 #include "reference/replicates/independence.h"
 #include "reference/store/reference_render.h"
@@ -56,7 +53,7 @@ struct export
 {
     struct scene s;
     struct camera c;
-    enum engine_format format;
+    const char *engine;
     long size; /* 0: not known yet */
 };
 
@@ -78,21 +75,8 @@ static void remove_more(void)
 static bool export_scene(void *ctx, struct err *e)
 {
     struct export *x = ctx;
-    struct out_file o = {.f = NULL};
-    const struct povray_variant plain = povray_variant_plain();
-    bool stream = x->format == FORMAT_PBRT || x->format == FORMAT_POVRAY;
+    bool ok = engine_export(engine_kind_of(x->engine), &x->s, &x->c, 3, out, e);
     alloc_fail_off();
-    assert_true(!stream || out_open(&o, out, e));
-    alloc_fail_on();
-    bool ok = x->format == FORMAT_MITSUBA  ? export_mitsuba(&x->s, &x->c, 3, out, e)
-              : x->format == FORMAT_CYCLES ? export_cycles(&x->s, &x->c, 3, out, e)
-              : x->format == FORMAT_PBRT   ? export_pbrt(&x->s, &x->c, 3, o.f, e)
-                                           : export_povray(&x->s, &x->c, 3, &plain, o.f, e);
-    alloc_fail_off();
-    if (stream && ok)
-        assert_true(out_commit(&o, e));
-    else if (stream)
-        out_abandon(&o);
     remove_more();
     if (ok) {
         FILE *f = fopen(out, "rb");
@@ -111,20 +95,19 @@ static void exports(void **state)
 {
     (void)state;
     static const struct {
-        const char *scene, *name;
-        enum engine_format format;
+        const char *scene, *name, *engine;
         enum alloc_by by;
     } all[] = {
         /* libxml2's writer loses blocks where its lists fail. */
-        {"12_point_plane", "export_mitsuba", FORMAT_MITSUBA, ALLOC_LOSSY},
-        {"41_cornell", "export_cycles", FORMAT_CYCLES, ALLOC_ALL},
-        {"22_glass_sphere", "export_cycles, glass", FORMAT_CYCLES, ALLOC_ALL},
-        {"12_point_plane", "export_pbrt", FORMAT_PBRT, ALLOC_ALL},
-        {"19_glass_slab", "export_povray, glass", FORMAT_POVRAY, ALLOC_ALL},
+        {"12_point_plane", "export_mitsuba", "mitsuba", ALLOC_LOSSY},
+        {"41_cornell", "export_cycles", "cycles", ALLOC_ALL},
+        {"22_glass_sphere", "export_cycles, glass", "cycles", ALLOC_ALL},
+        {"12_point_plane", "export_pbrt", "pbrt", ALLOC_ALL},
+        {"19_glass_slab", "export_povray, glass", "povray", ALLOC_ALL},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         struct err e = {0};
-        struct export x = {.format = all[i].format};
+        struct export x = {.engine = all[i].engine};
         assert_true(suite_open(suite_find(&suite, all[i].scene), &x.s, &x.c, &e));
         alloc_fail_each(all[i].name, all[i].by, export_scene, &x);
         scene_free(&x.s);

@@ -25,7 +25,8 @@ enum option {
 
 static const struct cli_option options[] = {
     [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene; may be given again"},
-    [OPT_ENGINE] = {0, "engine", 1, "NAME", "only cycles, or only povray"},
+    [OPT_ENGINE] = {0, "engine", 1, "NAME",
+                    "only those of one of" ENGINES_WITH_GOLDENS(ENGINE_TEXT)},
     [OPT_OUT] = {'o', "out", 1, "DIR", "where they go (build/golden-candidate)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "leave out what is stored there and up to date"},
     [OPT_FRESH] = {0, "fresh", 0, "", "render also what is there and up to date"},
@@ -58,7 +59,6 @@ static bool parse_range(const char *text, struct reference_command *c, struct er
 
 static bool parse(int argc, char **argv, struct reference_command *c, struct err *e)
 {
-    static const char *const engines[] = {"cycles", "povray", NULL};
     struct cli cli = {.options = options, .argc = argc, .argv = argv, .next = 1};
     bool ok = true;
     for (int i; ok && (i = cli_next(&cli, e)) != CLI_END;) {
@@ -75,7 +75,7 @@ static bool parse(int argc, char **argv, struct reference_command *c, struct err
             c->only[c->num_only++] = v;
             break;
         case OPT_ENGINE:
-            ok = cli_choice("--engine", v, engines, &n, e);
+            ok = cli_choice("--engine", v, engine_names, &n, e);
             c->engine = v;
             break;
         case OPT_OUT: c->out = v; break;

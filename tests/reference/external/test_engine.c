@@ -5,6 +5,7 @@
 #define _GNU_SOURCE
 #include "tests/support/build_scene.h"
 
+#include "reference/external/engine_bindings.h"
 #include "reference/external/engine_description.h"
 #include "reference/suite/features.h"
 #include "reference/replicates/engine_driver.h"
@@ -144,7 +145,7 @@ TEST(members_are_read)
         "\"depth_offset\": -1, \"spp\": 9, \"replicates\": 11}",
         &en);
     assert_string_equal(en.name, "a-1");
-    assert_int_equal(en.format, FORMAT_CYCLES);
+    assert_ptr_equal(en.format, engine_kind_of("cycles"));
     assert_int_equal(en.output, OUTPUT_MEAN);
     assert_string_equal(en.image, "hdr");
     assert_int_equal(en.feature, 1u << FEATURE_MIRROR);
@@ -171,7 +172,7 @@ TEST(bad_descriptions_are_refused)
         {"name", "\"X\"", "a-z, 0-9"},
         {"name", "\"../x\"", "a-z, 0-9"},
         {"name", "\"cycles\"", "which this program uses itself"},
-        {"format", "\"obj\"", "'format' is 'obj', none of: mitsuba, pbrt, povray, cycles, dae"},
+        {"format", "\"obj\"", "'format' is 'obj', none of: cycles, povray, mitsuba, pbrt, dae"},
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
         {"image", "\"png\"", "none of: exr, hdr, pfm"},
@@ -515,6 +516,33 @@ TEST(programs_that_misbehave_are_errors)
     /* Beside the description, not where we stand. */
     assert_non_null(strstr(e.msg, path_of("./no-such-program: no such program")));
     engine_free(&en);
+}
+
+/* No name or ending says two engines, each can be asked to export, and those with goldens, which come first, are driven. */
+TEST(the_table_is_bound)
+{
+    struct scene scene;
+    struct camera camera;
+    struct err e;
+    int num = 0;
+    MUST(suite_open(&point_plane, &scene, &camera, &e));
+    for (const struct engine_kind *k = engine_table; k->name != NULL; k++, num++) {
+        bool has_goldens = num < NUM_ENGINES_WITH_GOLDENS;
+        char name[32];
+        for (const struct engine_kind *other = engine_table; other < k; other++)
+            assert_true(strcmp(other->name, k->name) != 0 && strcmp(other->ending, k->ending) != 0);
+        snprintf(name, sizeof name, "table%s", k->ending);
+        bool ok = engine_export(k, &scene, &camera, 1, path_of(name), &e);
+        assert_true(ok || strstr(e.msg, k->title) != NULL);
+        assert_int_equal(access(path_of(name), R_OK) == 0, ok);
+        assert_int_equal(engine_driver_of(k->name) != NULL, has_goldens);
+        assert_ptr_equal(engine_with_goldens(k->name), has_goldens ? k : NULL);
+        assert_ptr_equal(engine_kind_of(k->name), k);
+    }
+    assert_null(engine_names[NUM_ENGINES_WITH_GOLDENS]);
+    assert_null(engine_kind_of("truth"));
+    assert_null(engine_driver_of("mitsuba_"));
+    scene_free(&scene);
 }
 
 TEST_GROUP(set_up, tear_down)
