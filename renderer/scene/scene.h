@@ -7,7 +7,6 @@
 #define ASSAY_SCENE_H
 
 #include "renderer/base/err.h"
-#include "renderer/shading/microfacet.h"
 #include "renderer/math/vec.h"
 
 #include <stddef.h>
@@ -33,6 +32,15 @@ enum material_kind {
     MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
     MATERIAL_MICROFACET  /* rough conductor */
 };
+
+enum microfacet_kind {
+    MICROFACET_GGX,
+    MICROFACET_BECKMANN,
+    MICROFACET_BECKMANN_STARTER /* Beckmann's, but for microfacet_g2() (cs184_deviations.h) */
+};
+
+/* Smoother than this is a mirror: float32 hardly tells the normals apart. */
+#define MICROFACET_MIN_ALPHA 1e-4f
 
 /* Emission and reflection are independent: an emitter may reflect too. */
 struct material {

@@ -4,16 +4,7 @@
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
-#include "renderer/math/vec.h"
-
-/* Smoother than this is a mirror: float32 hardly tells the normals apart. */
-#define MICROFACET_MIN_ALPHA 1e-4f
-
-enum microfacet_kind {
-    MICROFACET_GGX,
-    MICROFACET_BECKMANN,
-    MICROFACET_BECKMANN_STARTER /* Beckmann's, but for microfacet_g2() (cs184_deviations.h) */
-};
+#include "renderer/scene/scene.h"
 
 /* Density of normals per steradian of m and unit of macroscopic area [Walter07 eq. 25, 33]. */
 float microfacet_d(enum microfacet_kind kind, float alpha, vec3 m);
