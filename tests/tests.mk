@@ -94,10 +94,12 @@ fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
 	tests/fuzz/run.sh $(BUILD) $(SECONDS_EACH) $(or $(ONLY),$(FUZZ))
 
 # clang-tidy (.clang-tidy) over the programs, cppcheck over all C (.cppcheck-suppressions): no finding.
-#: make lint       clang-tidy and cppcheck, no finding (minutes; a part of make check)
+#: make lint       clang-tidy and cppcheck, the order of the folders: no finding (minutes; a part of make check)
 LINT := $(MAINS) $(SOURCES)
-lint: $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
+lint: order $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
 	@echo '$(words $(LINT) $(KERNELS)) files, no finding'
+order: all
+	tests/lint/order.sh $(BUILD)
 # A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
 # every va_list but the first file's for one that was never started.
 define clang_tidy
@@ -191,5 +193,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(ISAS),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
+.PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz
