@@ -34,8 +34,8 @@ enum option {
 
 static const struct cli_option options[] = {
     [OPT_ENGINE] = {0, "engine", 1, "NAME",
-                    "pathtracer, pathtracer-sobol, cycles or povray; may be given again\n"
-                    "(the first three)"},
+                    "one of pathtracer pathtracer-sobol" ENGINES_WITH_GOLDENS(
+                        ENGINE_TEXT) "; may be given\nagain (the first three)"},
     [OPT_LADDER] = {0, "ladder", 1, "N,N,...",
                     "samples per pixel of the rungs, ascending; povray needs squares\n"
                     "(1,4,16,64,256)"},
@@ -46,9 +46,10 @@ static const struct cli_option options[] = {
          "samples per pixel of the depth ladder, pathtracer's picture at every greatest\n"
          "depth up to the scene's; 0: none (64)"},
     [OPT_SHRINK] = {0, "shrink", 1, "N", "pictures N times smaller on both sides (1)"},
-    [OPT_REFERENCE] = {0, "reference", 1, "NAME",
-                       "what errors are measured against: truth (closed form), cycles or povray\n"
-                       "(golden), own (a long run of pathtracer), or auto: the first there is"},
+    [OPT_REFERENCE] =
+        {0, "reference", 1, "NAME",
+         "what errors are measured against: truth (closed form), an engine's golden,\n"
+         "own (a long run of pathtracer), or auto: the first there is"},
     [OPT_ALPHA] = {0, "alpha", 1, "A",
                    "chance of any wrong verdict in the whole run, for wrong\n"
                    "DIFFERENT and for wrong EQUIVALENT each (1e-3)"},
@@ -184,7 +185,8 @@ int command_converge(int argc, char **argv, struct err *e)
     struct converge_options o = {
         .out_dir = "build/converge",
         .pathtracer = pathtracer,
-        .engine = {[CONVERGE_PATHTRACER] = true, [CONVERGE_SOBOL] = true, [CONVERGE_CYCLES] = true},
+        .engine =
+            {[CONVERGE_PATHTRACER] = true, [CONVERGE_SOBOL] = true, [CONVERGE_REFERENCES] = true},
         .ladder = {1, 4, 16, 64, 256},
         .num_rungs = 5,
         .replicates = 16,

@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 const char *const converge_engine_names[] = {
-    [CONVERGE_PATHTRACER] = "pathtracer", [CONVERGE_SOBOL] = "pathtracer-sobol",
-    [CONVERGE_CYCLES] = "cycles",         [CONVERGE_POVRAY] = "povray",
-    [CONVERGE_NUM_ENGINES] = NULL,
+    "pathtracer",
+    "pathtracer-sobol",
+    ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL,
 };
 
 /* Another number for each (engine, rung, replicate); OWN is one more engine. */
@@ -90,11 +90,12 @@ static bool render_reference(const struct converge_job *job, enum converge_engin
 {
     struct suite_reference ref = {.fidelity = "exact", .replicates = job->replicates, .spp = spp};
     snprintf(ref.engine, sizeof ref.engine, "%s", converge_engine_names[engine]);
-    if (engine == CONVERGE_POVRAY) {
+    if (engine_with_goldens(ref.engine)->subgrid) {
         ref.spp = 0;
         ref.subgrid = (int)lround(sqrt(spp));
         if (ref.subgrid * ref.subgrid != spp || ref.subgrid > 64)
-            return err_set(e, "povray: renders k x k points a pixel, k up to 64, not %d", spp);
+            return err_set(e, "%s: renders k x k points a pixel, k up to 64, not %d", ref.engine,
+                           spp);
     }
     struct sink sink = {images, 3 * (size_t)job->scene->width * (size_t)job->scene->height, 0};
     const struct reference_options opt = {.seed = seed_of(job, engine, rung, 0),
@@ -127,7 +128,7 @@ bool converge_render(const struct converge_job *job, enum converge_engine engine
                      const struct converge_progress *progress, struct err *e)
 {
     *version = NULL;
-    if (engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL)
+    if (engine < CONVERGE_REFERENCES)
         return render_ours(job, engine, rung, spp, images, cpu_s, progress, e);
     return render_reference(job, engine, rung, spp, images, cpu_s, version, e);
 }

@@ -14,7 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *const converge_against_names[] = {"auto", "truth", "cycles", "povray", "own", NULL};
+const char *const converge_against_names[] = {"auto", "truth",
+                                              ENGINES_WITH_GOLDENS(ENGINE_WORD) "own", NULL};
 
 /* The reference of our own has so many times the samples of the longest ladder. */
 enum { OWN_FACTOR = 64 };
@@ -43,7 +44,7 @@ static bool is_independent(int engine)
 /* Ours must leave no bias whatever the sampler; other engines are measured. */
 static bool is_judged(int engine)
 {
-    return engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL;
+    return engine < CONVERGE_REFERENCES;
 }
 
 static enum converge_against choose_reference(const struct suite_scene *s)

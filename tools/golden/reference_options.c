@@ -26,7 +26,7 @@ enum option {
 static const struct cli_option options[] = {
     [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene; may be given again"},
     [OPT_ENGINE] = {0, "engine", 1, "NAME",
-                    "only those of one of" ENGINES_WITH_GOLDENS(ENGINE_TEXT)},
+                    "only one engine's, of" ENGINES_WITH_GOLDENS(ENGINE_TEXT)},
     [OPT_OUT] = {'o', "out", 1, "DIR", "where they go (build/golden-candidate)"},
     [OPT_GOLDEN] = {0, "golden", 1, "DIR", "leave out what is stored there and up to date"},
     [OPT_FRESH] = {0, "fresh", 0, "", "render also what is there and up to date"},

@@ -101,11 +101,11 @@ static bool render_ours(const struct rubric *r, const struct rubric_picture *p, 
 static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
                          const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    static const char *const engines[] = {"", "truth", "cycles", "povray"};
     if (p->reference == REFERENCE_OURS)
         return render_ours(r, p, "", opt, out, e);
     struct suite_scene scene = *p->suite;
-    const struct suite_reference *ref = suite_reference_of(&scene, engines[p->reference]);
+    const struct suite_reference *ref =
+        suite_reference_of(&scene, rubric_reference_names[p->reference]);
     json_t *manifest = NULL;
     if (p->reference != REFERENCE_TRUTH) {
         bool ok = golden_read(opt->golden_dir, &scene, ref, out, &manifest, e);

@@ -214,15 +214,15 @@ static void read_check(struct statement *s)
 
 static void read_reference(struct statement *s, struct rubric_picture *p)
 {
-    static const char *const kinds[] = {"none", "truth", "cycles", "povray", "ours"};
     char *kind = take_word(s);
     if (p->reference != REFERENCE_NONE)
         rubric_mistake(s->m, s->line, "a second 'reference'");
     for (int k = REFERENCE_TRUTH; k <= REFERENCE_OURS; k++)
-        if (strcmp(kind, kinds[k]) == 0)
+        if (strcmp(kind, rubric_reference_names[k]) == 0)
             p->reference = (enum rubric_reference)k;
     if (p->reference == REFERENCE_NONE)
-        rubric_mistake(s->m, s->line, "reference '%s' is none of truth, cycles, povray, ours",
+        rubric_mistake(s->m, s->line,
+                       "reference '%s' is none of truth" ENGINES_WITH_GOLDENS(ENGINE_TEXT) " ours",
                        kind);
     if (p->reference == REFERENCE_OURS) {
         take_int(s, "reference ours", 1, 1 << 20, &p->reference_spp);

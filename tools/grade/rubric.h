@@ -27,7 +27,7 @@
  *   picture NAME                        one run of the program, or NAME.png (.exr, .pfm, .hdr) of a directory
  *     scene SCENE                       of the suite, or FILE.dae beside the rubric
  *     size W H, spp N, lights N (1), bounces N, options WORDS
- *     reference truth | cycles | povray | ours SPP [WORDS]
+ *     reference truth | ENGINE | ours SPP [WORDS]      (ENGINE of engine_table.h with goldens)
  *                                       a closed form or a golden of the suite's scene (golden: of its size and
  *                                       bounces), or our own render with as many samples and WORDS instead of
  *                                       `options` (or "none"); not needed where no check asks for it
@@ -80,10 +80,10 @@ extern const char *const rubric_check_kind_name[NUM_CHECK_KINDS];
 enum rubric_reference {
     REFERENCE_NONE,
     REFERENCE_TRUTH,
-    REFERENCE_CYCLES,
-    REFERENCE_POVRAY,
-    REFERENCE_OURS
+    REFERENCE_GOLDENS, /* of the first of engine_table.h, and so on */
+    REFERENCE_OURS = REFERENCE_GOLDENS + NUM_ENGINES_WITH_GOLDENS
 };
+extern const char *const rubric_reference_names[]; /* "none", "truth", ... */
 
 struct accepted {
     int line;

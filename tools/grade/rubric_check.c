@@ -9,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+const char *const rubric_reference_names[] = {"none", "truth",
+                                              ENGINES_WITH_GOLDENS(ENGINE_WORD) "ours"};
 const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
                                                              "exact", "noise", "rates"};
 
@@ -122,7 +124,6 @@ static void check_golden(const struct rubric_picture *p, const char *engine,
 static void check_picture(const struct rubric *r, struct rubric_picture *p,
                           const struct suite *suite, struct rubric_mistakes *m)
 {
-    static const char *const engines[] = {"", "truth", "cycles", "povray"};
     size_t n = strlen(p->scene);
     p->suite = suite_find(suite, p->scene);
     if (p->scene[0] == '\0')
@@ -143,8 +144,8 @@ static void check_picture(const struct rubric *r, struct rubric_picture *p,
         rubric_mistake(m, p->line, "picture '%s' has no 'spp'", p->name);
     if (p->bounces < 0)
         rubric_mistake(m, p->line, "picture '%s' has no 'bounces'", p->name);
-    if (p->reference >= REFERENCE_TRUTH && p->reference <= REFERENCE_POVRAY && p->scene[0] != '\0')
-        check_golden(p, engines[p->reference], m);
+    if (p->reference >= REFERENCE_TRUTH && p->reference < REFERENCE_OURS && p->scene[0] != '\0')
+        check_golden(p, rubric_reference_names[p->reference], m);
     if (p->environment[0] != '\0' && !is_beside(r, p->environment))
         rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
                        p->environment);
