@@ -98,3 +98,8 @@ double member_number(const json_t *object, const char *name)
 {
     return json_number_value(json_object_get(object, name));
 }
+
+double member_end(const json_t *object, const char *name, size_t end)
+{
+    return json_number_value(json_array_get(json_object_get(object, name), end));
+}

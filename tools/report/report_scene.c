@@ -149,11 +149,8 @@ static void write_images(struct page *p, const struct scene *s)
             "data-height=\"%d\">\n<ul class=\"shots\">\n",
             m->width, m->height);
     for (size_t i = 0; i < s->num_shots; i++) {
-        fprintf(p->f, "<li data-layer=\"%zu\" data-name=\"", s->shot[i].layer);
-        html_text(p->f, s->shot[i].engine);
-        fputs("\"><b>", p->f);
-        html_text(p->f, s->shot[i].engine);
-        fputs("</b> <span>", p->f);
+        html_print(p->f, "<li data-layer=\"%zu\" data-name=\"%s\"><b>%s</b> <span>",
+                   s->shot[i].layer, s->shot[i].engine, s->shot[i].engine);
         print_observations(p->f, &s->shot[i].m);
         fputs("</span></li>\n", p->f);
     }
@@ -178,16 +175,10 @@ static void write_purpose(FILE *f, const json_t *claim)
     if (detects == NULL && blind == NULL)
         return;
     fputs("<dl class=\"purpose\">", f);
-    if (detects != NULL) {
-        fputs("<div><dt>What it can detect</dt><dd>", f);
-        html_text(f, detects);
-        fputs("</dd></div>", f);
-    }
-    if (blind != NULL) {
-        fputs("<div><dt>What it is blind to</dt><dd>", f);
-        html_text(f, blind);
-        fputs("</dd></div>", f);
-    }
+    if (detects != NULL)
+        html_print(f, "<div><dt>What it can detect</dt><dd>%s</dd></div>", detects);
+    if (blind != NULL)
+        html_print(f, "<div><dt>What it is blind to</dt><dd>%s</dd></div>", blind);
     fputs("</dl>\n", f);
 }
 
@@ -204,13 +195,10 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
         if (member_text(purpose, "detects") == NULL)
             purpose = claim[i].json;
     }
-    fprintf(p->f, "<section class=\"scene\" data-white=\"%.9g\" data-scene=\"", s.white);
-    html_text(p->f, name);
-    fputs("\">\n<h2>", p->f);
-    html_text(p->f, title != NULL ? title : name);
-    fputs(" <code>", p->f);
-    html_text(p->f, name);
-    fputs("</code>", p->f);
+    html_print(p->f,
+               "<section class=\"scene\" data-white=\"%.9g\" data-scene=\"%s\">\n<h2>%s "
+               "<code>%s</code>",
+               s.white, name, title != NULL ? title : name, name);
     fputs(p->folded ? "<a class=\"up\" href=\"#table\">↑ all claims</a></h2>\n" : "</h2>\n", p->f);
     write_purpose(p->f, purpose);
 

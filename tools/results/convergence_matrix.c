@@ -29,11 +29,6 @@ static const json_t *ratio_of(const json_t *scene, const char *a, bool last)
     return NULL;
 }
 
-static double end(const json_t *object, const char *name, size_t i)
-{
-    return json_number_value(json_array_get(json_object_get(object, name), i));
-}
-
 static void print_verdict(FILE *f, const json_t *engine, const char *name)
 {
     const char *verdict = member_text(engine, name);
@@ -47,7 +42,7 @@ static void print_slope(FILE *f, const json_t *engine)
     if (engine == NULL)
         return;
     fprintf(f, " %.3f ± %.3f", member_number(engine, "slope"),
-            (end(engine, "slope_ci", 1) - end(engine, "slope_ci", 0)) / 2);
+            (member_end(engine, "slope_ci", 1) - member_end(engine, "slope_ci", 0)) / 2);
     print_verdict(f, engine, "slope_verdict");
 }
 
@@ -56,7 +51,7 @@ static void print_bias(FILE *f, const json_t *engine)
     fputs(" |", f);
     if (engine == NULL)
         return;
-    fprintf(f, " %.2f", 100 * end(engine, "floor_ci", 1));
+    fprintf(f, " %.2f", 100 * member_end(engine, "floor_ci", 1));
     print_verdict(f, engine, "floor_verdict");
 }
 
@@ -67,7 +62,7 @@ static void print_ratio(FILE *f, const json_t *rung, const char *name, const cha
         return;
     fprintf(f, " %.2f", member_number(rung, name));
     if (json_array_size(json_object_get(rung, interval)) == 2)
-        fprintf(f, " [%.2f, %.2f]", end(rung, interval, 0), end(rung, interval, 1));
+        fprintf(f, " [%.2f, %.2f]", member_end(rung, interval, 0), member_end(rung, interval, 1));
 }
 
 void convergence_matrix_print(FILE *f, const json_t *convergence)

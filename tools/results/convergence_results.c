@@ -189,11 +189,6 @@ enum outcome convergence_results_outcome(const json_t *engine)
     return outcome_of(member_text(engine, "verdict"));
 }
 
-static double end(const json_t *object, const char *name, size_t i)
-{
-    return json_number_value(json_array_get(json_object_get(object, name), i));
-}
-
 /* "name [lo, hi]", or without the interval where there is none; "-" where there is no number. */
 static void format_value(char *text, size_t size, const json_t *object, const char *name,
                          const char *interval)
@@ -202,7 +197,7 @@ static void format_value(char *text, size_t size, const json_t *object, const ch
         snprintf(text, size, "-");
     else if (json_array_size(json_object_get(object, interval)) == 2)
         snprintf(text, size, "%.3g [%.3g, %.3g]", member_number(object, name),
-                 end(object, interval, 0), end(object, interval, 1));
+                 member_end(object, interval, 0), member_end(object, interval, 1));
     else
         snprintf(text, size, "%.3g", member_number(object, name));
 }
@@ -232,11 +227,11 @@ static void engine_rows(const struct sink *s, const json_t *scene, const json_t 
     const json_t *rungs = json_object_get(j, "rungs");
     const json_t *top = json_array_get(rungs, json_array_size(rungs) - 1);
     snprintf(text, sizeof text, "%+.4f [%+.4f, %+.4f]", member_number(j, "slope"),
-             end(j, "slope_ci", 0), end(j, "slope_ci", 1));
+             member_end(j, "slope_ci", 0), member_end(j, "slope_ci", 1));
     emit(s, name, engine, "slope of RMSE", text, member_text(j, "slope_verdict"));
     snprintf(quantity, sizeof quantity, "RMS bias at %g spp, %%", member_number(top, "spp"));
     snprintf(text, sizeof text, "%.3f [%.3f, %.3f]", 100 * member_number(top, "bias"),
-             100 * end(j, "floor_ci", 0), 100 * end(j, "floor_ci", 1));
+             100 * member_end(j, "floor_ci", 0), 100 * member_end(j, "floor_ci", 1));
     emit(s, name, engine, quantity, text, member_text(j, "floor_verdict"));
 }
 
@@ -282,7 +277,7 @@ static void print_rungs(FILE *f, const json_t *scene)
             const json_t *g = json_array_get(rungs, i);
             char rmse[64], variance[64], efficiency[64];
             snprintf(rmse, sizeof rmse, "%.4g [%.4g, %.4g]", 100 * member_number(g, "rmse"),
-                     100 * end(g, "rmse_ci", 0), 100 * end(g, "rmse_ci", 1));
+                     100 * member_end(g, "rmse_ci", 0), 100 * member_end(g, "rmse_ci", 1));
             format_value(variance, sizeof variance, g, "variance", "variance_ci");
             format_value(efficiency, sizeof efficiency, g, "efficiency", "efficiency_ci");
             fprintf(f, "%-17s %6g  %-26s %-26s %8.3f %9.1f  %s\n", member_text(j, "engine"),

@@ -73,18 +73,13 @@ enum outcome stated_error_outcome(const json_t *claim)
     return OUTCOME_UNDECIDED;
 }
 
-static double end_of(const json_t *c, const char *name, size_t end)
-{
-    return json_number_value(json_array_get(json_object_get(c, name), end));
-}
-
 /* The last columns: noise, and pixels that break the stop rule; empty where the scene does not ask. */
 static void print_more(FILE *f, const json_t *c, const char *before)
 {
     fputs(before, f);
     if (json_object_get(c, "noise") != NULL)
-        fprintf(f, "%.3f [%.3f, %.3f]", member_number(c, "noise"), end_of(c, "noise_ci", 0),
-                end_of(c, "noise_ci", 1));
+        fprintf(f, "%.3f [%.3f, %.3f]", member_number(c, "noise"), member_end(c, "noise_ci", 0),
+                member_end(c, "noise_ci", 1));
     fputs(before, f);
     if (json_object_get(c, "too_early") != NULL)
         fprintf(f, "%.0f + %.0f", member_number(c, "too_early"), member_number(c, "too_late"));
@@ -114,7 +109,7 @@ void stated_error_print(FILE *f, const json_t *consistency, bool markdown)
                 markdown ? "| %s | %.0f x %.0f spp | %.3f [%.3f, %.3f] | %.2f"
                          : "%s  %.0f x %.0f spp  %.3f [%.3f, %.3f]  %.2f",
                 member_text(c, "scene"), member_number(c, "renders"), member_number(c, "spp"),
-                member_number(c, "pixels"), end_of(c, "pixels_ci", 0), end_of(c, "pixels_ci", 1),
+                member_number(c, "pixels"), member_end(c, "pixels_ci", 0), member_end(c, "pixels_ci", 1),
                 member_number(c, "image"));
         if (markdown || json_object_get(c, "noise") != NULL ||
             json_object_get(c, "too_early") != NULL)

@@ -1,6 +1,8 @@
 /* The curves of the page's plots against other routes: the QQ band against sums of binomial probabilities,
  * the power curve against simulated tests; and its CSV files, decoded again. */
 #include "tools/html/csv_link.h"
+#include "tools/html/html.h"
+#include "tools/plots/plot.h"
 #include "tools/plots/plot_power.h"
 #include "tests/support/test.h"
 
@@ -120,4 +122,59 @@ TEST(csv_comes_back)
         text, "name,a,b\r\n\"say \"\"hi\"\", <b>&#'\xc3\xa4\",-0.25,\r\n\"'=1+1\",1e-09,3\r\n");
     free(text);
     free(link);
+}
+
+TEST(text_is_escaped_and_numbers_are_printed)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    html_print(f, "<b title=\"%s\">%s</b> %d %zu %+.2f%% %lld%s", "\"x'", "<i>&", -3, (size_t)7,
+               1.5, 1LL << 40, json_string_value(NULL));
+    fclose(f);
+    assert_string_equal(text,
+                        "<b title=\"&quot;x&#39;\">&lt;i&gt;&amp;</b> -3 7 +1.50% 1099511627776");
+    free(text);
+}
+
+/* Of a drawing: the places of marks, and the numbers of the axes, by hand. */
+TEST(axes_are_in_proportion)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    struct plot p = {.f = f,
+                     .style = "plot",
+                     .left = 100,
+                     .width = 300,
+                     .height = 200,
+                     .bottom = 40,
+                     .x = {.label = "a <b>", .lo = 1, .hi = 1000, .is_log = true, .unit = " s"},
+                     .y = {.label = "y", .lo = -1, .hi = 1}};
+    plot_open(&p, "what %s is", "\"it\"");
+    plot_point(&p, 0, 10, 0.5, "%s", "10 & half");
+    plot_point(&p, 0, 1e9, -7, "%s", "beyond both ends");
+    plot_close(&p);
+    fclose(f);
+    assert_float_equal(plot_x(&p, 100), 300, 1e-9);
+    assert_float_equal(plot_y(&p, 1), 0, 1e-9);
+    static const char *const there[] = {
+        "aria-label=\"what &quot;it&quot; is\"",
+        ">a &lt;b&gt;</text>",
+        ">1 s</text>",
+        ">1000 s</text>",
+        ">-0.5</text>",
+        "cx=\"200.0\" cy=\"50.0\" r=\"3.2\"><title>10 &amp; half</title>",
+        "cx=\"400.0\" cy=\"200.0\"",
+    };
+    for (size_t i = 0; i < sizeof there / sizeof *there; i++)
+        if (strstr(text, there[i]) == NULL)
+            fail_msg("no %s in %s", there[i], text);
+    assert_null(strstr(text, ">2 s</text>")); /* three decades: powers of ten alone */
+    static const double steps[][2] = {{5, 1}, {5.1, 2}, {12, 5}, {0.3, 0.1}, {40, 10}};
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
+        assert_float_equal(plot_step(steps[i][0]), steps[i][1], 1e-9);
+    free(text);
 }
