@@ -6,7 +6,7 @@
 #include "tools/results/convergence_matrix.h"
 #include "tools/results/history.h"
 #include "tools/report/report.h"
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 #include "tools/results/results_matrix.h"
 #include "commands.h"
 

@@ -88,10 +88,6 @@ bool results_lack_time(const json_t *results);
  * opposite of the expected (DIFFERENT for EQUIVALENT or the reverse), else 2. */
 int results_exit_code(const json_t *results);
 
-/* The verdict table: one line per claim, for a terminal (widths fitted) or as Markdown, and below it
- * the error line of each claim that could not be judged. */
-void results_table_print(FILE *f, const json_t *results, bool markdown);
-
 /* JUnit XML: one testsuite, one testcase per claim; failure for a wrong verdict, error for one that
  * could not be judged. Appears by rename. */
 bool junit_write(const char *path, const json_t *results, struct err *e)

@@ -5,7 +5,7 @@
 #include "tools/base/data_dirs.h"
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 #include "tools/results/stated_error_results.h"
 #include "import_result.h"
 

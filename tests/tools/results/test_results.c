@@ -1,6 +1,6 @@
 /* results.json's schema, exit codes, verdict table and JUnit XML. Expected strings are written by
  * hand from the numbers in the claims; the JUnit file is read back by libxml2's own parser. */
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 
 #include "renderer/base/fs.h"
 #include "tools/results/claim_result.h"
