@@ -98,24 +98,18 @@ static bool parse_document(void *ctx, struct err *e)
     return ok;
 }
 
-#define VERTEX "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
-static const char polygon[] = "<library_geometries>" GEOMETRY(
-    "g",
-    SOURCE("p", 18, 6, "0 0 0 2 0 0 2 1 0 1 1 0 1 2 0 0 2 0") VERTICES(
-        "v",
-        "p") "<polylist material=\"m\" count=\"1\">" VERTEX
-             "<vcount>6</vcount><p>0 1 2 3 4 5</p></polylist>") "<geometry id=\"ball\">" EXTRA("CGL",
-                                                                                               "<sphere><radius>2</radius></sphere>") "</geometry>"
-                                                                                                                                      "</library_geometries>";
-
 /* A polygon of six corners with a notch, and a sphere of the assignment's dialect. */
 static void dialects_and_polygons(void **state)
 {
     (void)state;
     struct document d = {
-        dae_text(&(struct dae){.libraries = polygon,
-                               .nodes = "<node id=\"a\">" INSTANCE(
-                                   "g") "</node><node id=\"b\">" INSTANCE("ball") "</node>"}),
+        dae_text(&(struct dae){
+            .mesh =
+                "<polylist material='m' count='1'>$vertex<vcount>6</vcount><p>0 1 2 3 4 5</p></polylist>",
+            .libraries =
+                "<library_geometries><geometry id='ball'><extra><technique profile='CGL'><sphere>"
+                "<radius>2</radius></sphere></technique></extra></geometry></library_geometries>",
+            .nodes = "<node id='a'>$g</node><node id='b'>$ball</node>"}),
         NO_SUM};
     alloc_fail_each("collada_parse", ALLOC_ALL, parse_document, &d);
     free(d.text);
