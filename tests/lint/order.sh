@@ -1,16 +1,13 @@
 #!/bin/bash
 # tests/lint/order.sh BUILD: who may use whom, by the sources here and their objects in BUILD. A file uses only its own folder and those
-# before it in the list, in what it includes and in the symbols that it links; no circle between files; at most 25 C files in a folder;
+# before it, in what it includes and in the symbols that it links; no circle between files; at most 25 C files in a folder;
 # each file name once; public functions begin with a word of their file's or folder's name or of a type's. Planted faults have to be seen first.
 set -euo pipefail
 build=$(realpath "${1:?usage: tests/lint/order.sh BUILD}")
-folders="
-renderer/base renderer/math renderer/image renderer/scene renderer/collada renderer/shading renderer/bvh renderer/transport
-renderer/pathtracer
-reference/base reference/suite reference/replicates reference/truth reference/cycles reference/povray reference/mitsuba reference/pbrt
-reference/external reference/import_check reference/store
-tools/base tools/images tools/stats tools/compare tools/input tools/sequential tools/results tools/html tools/plots tools/report
-tools/validate tools/converge tools/diagnose tools/golden tools/grade tools/gradebook tools/jobs tools/reproduce tools/commands"
+# In their order, from the first column of the READMEs' tables.
+folders=$(for top in renderer reference tools; do
+    sed -nE 's/^\| (`[^|]*`) \|.*/\1/p' $top/README.md | tr -d '`,' | tr ' ' '\n' | sed "s,^,$top/,"
+done)
 strangers=16 # functions with another beginning, at most
 
 # "FROM TO" of what the files on stdin include; within a folder TO has none.
@@ -54,7 +51,7 @@ faults() {
     local all ours
     all=$(find renderer reference tools tests -name '*.[ch]' -o -name '*.cc' | sort)
     ours=$(grep -v '^tests/' <<<"$all")
-    sed 's,/[^/]*$,,' <<<"$ours" | sort -u | grep -vxF "$(tr ' ' '\n' <<<"$folders")" | sed 's/$/ is not in the list/' || :
+    sed 's,/[^/]*$,,' <<<"$ours" | sort -u | grep -vxF "$folders" | sed 's/$/ is in no README/' || :
     includes <<<"$ours" >"$tmp/includes"
     against_order includes <"$tmp/includes"
     grep '\.c$' <<<"$ours" | symbols "$1" | sort -u >"$tmp/symbols"
@@ -66,7 +63,7 @@ faults() {
     sed 's,.*/,,' <<<"$all" | sort | uniq -d | sed 's/$/ is the name of two files/'
     strangers <"$tmp/symbols" >"$tmp/strangers"
     [ "$(wc -l <"$tmp/strangers")" -le "$2" ] || cat "$tmp/strangers"
-    echo "$(wc -w <<<"$folders") folders, $(wc -l <<<"$all") files, $(wc -l <"$tmp/includes") includes, $(wc -l <"$tmp/links") links" >"$tmp/count"
+    echo "$(sed 's,/[^/]*$,,' <<<"$ours" | sort -u | wc -l) folders, $(wc -l <<<"$all") files, $(wc -l <"$tmp/includes") includes, $(wc -l <"$tmp/links") links" >"$tmp/count"
 }
 
 # A tree with a fault of each kind.
@@ -79,7 +76,7 @@ plant() {
     touch tools/base/high.h renderer/new/other.h tests/many/twin.c tests/many/{a..y}.h
     for f in renderer/base/low tools/base/high tools/base/twin; do "${CC:-cc}" -c -o $f.c.o $f.c; done
 }
-planted="renderer/new is not in the list
+planted="renderer/new is in no README
 renderer/base/low.h includes tools/base/high.h
 renderer/base/low.c needs a symbol of tools/base/high.c
 a circle:
