@@ -1,34 +1,7 @@
-/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against
- * which references, inside which margins, what must come out) and NN_name.md (what it can detect,
- * what it is blind to, and, for closed forms, the derivation). Families by number: 1x closed form,
- * 2x BSDF, 3x light, 4x whole scene, 9x must differ.
- *
- *   {
- *     "title": "Cornell box with two diffuse spheres",
- *     "detects": "one line", "blind_to": "one line",
- *     "width": 128, "height": 128, "depth": 5, "spp": 2048, "tile": 16,
- *     "expect": "EQUIVALENT",
- *     "environment": "sky.exr",                  (optional: the file beside this one that lights it)
- *     "lens_radius": 0.1, "focal_distance": 2,   (optional, both or none: a thin lens)
- *     "variants": [{"name": "hemisphere", "options": ["--direct", "hemisphere"], "spp": 4096,
- *                   "margin_global": 0.01, "margin_tile": 0.05}],
- *                                                (optional: ours by other means, judged too)
- *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1,  (optional: tools/stats/stated_error.h)
- *                     "noise_margin": 0.05,      (optional: tools/stats/sample_efficiency.h; with a truth whose noise
- *                                                 has a closed form)
- *                     "adaptive": {"batch": 16, "tolerance": 0.1, "spp": 512}},
- *                                                (optional: tools/sequential/adaptive_stop.h)
- *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
- *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
- *     "references": {
- *       "cycles": {"class": "exact", "margin_global": 0.005, "margin_tile": 0.02,
- *                  "replicates": 16, "spp": 256},
- *       "povray": {"class": "limit", ..., "replicates": 16, "subgrid": 4},
- *       "truth":  {"class": "exact", ..., "kind": "point_over_plane", "values": {...}}
- *     }
- *   }
- *
- * An unknown key, a missing key, a value out of range is an error with file and reason. */
+/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which references, inside
+ * which margins, what must come out: tools/docs/formats/suite.md) and NN_name.md (what it can detect, what it is blind
+ * to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF, 3x light, 4x whole scene,
+ * 9x must differ. An unknown key, a missing key, a value out of range is an error with file and reason. */
 #ifndef ASSAY_SUITE_H
 #define ASSAY_SUITE_H
 
