@@ -89,6 +89,7 @@ const struct suite_reference *suite_reference_of(const struct suite_scene *s, co
 bool suite_noise_is_known(const char *kind);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
+extern const char *const verdict_names[]; /* by enum verdict; end with NULL */
 bool verdict_parse(const char *name, enum verdict *out);
 
 #endif

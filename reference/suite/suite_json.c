@@ -5,10 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const verdict_names[] = {
+const char *const verdict_names[] = {
     [VERDICT_EQUIVALENT] = "EQUIVALENT",
     [VERDICT_DIFFERENT] = "DIFFERENT",
     [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
+    NULL,
 };
 
 const char *verdict_name(enum verdict v)
@@ -18,7 +19,7 @@ const char *verdict_name(enum verdict v)
 
 bool verdict_parse(const char *name, enum verdict *out)
 {
-    for (size_t i = 0; i < sizeof verdict_names / sizeof *verdict_names; i++)
+    for (size_t i = 0; verdict_names[i] != NULL; i++)
         if (strcmp(name, verdict_names[i]) == 0) {
             *out = (enum verdict)i;
             return true;

@@ -35,6 +35,7 @@ struct converge_options {
     int threads;
     double timeout_s;
     bool quiet;
+    bool engine_chosen, help; /* of the command line */
 };
 
 /* Fills *results (results.h; a new reference): no claims, but "convergence" (convergence_results.h). Writes no

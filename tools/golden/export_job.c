@@ -8,32 +8,35 @@
 #include <stdio.h>
 #include <string.h>
 
-enum option {
-    OPT_OUT,
-    OPT_ENGINE,
-    OPT_RESOLUTION,
-    OPT_BOUNCES,
-    OPT_ENVIRONMENT,
-    OPT_LENS,
-    OPT_FOCUS,
-    OPT_HELP
-};
-
 /* " .json (cycles)" */
 #define ENGINE_ENDING(name, title, ending, subgrid) " " ending " (" #name ")"
 
+static bool read_engine(void *job, const char *const v[4], struct err *e)
+{
+    static const char *const engines[] = {ENGINES(ENGINE_WORD) NULL};
+    struct export_job *s = job;
+    int n;
+    if (!cli_choice("--engine", v[0], engines, &n, e))
+        return false;
+    s->engine = &engine_table[n];
+    return true;
+}
+
+#define TO(member) CLI_TO(struct export_job, member)
+
 static const struct cli_option options[] = {
-    [OPT_OUT] = {'o', "out", 1, "FILE",
-                 "required; its ending says which engine's:\n" ENGINES(ENGINE_ENDING)},
-    [OPT_ENGINE] = {0, "engine", 1, "NAME",
-                    "one of" ENGINES(ENGINE_TEXT) " (by the ending of --out)"},
-    [OPT_RESOLUTION] = {'r', "resolution", 2, "W H", "pixels (480 360)"},
-    [OPT_BOUNCES] = {'m', "max-bounces", 1, "N", "as pathtracer counts them (5)"},
-    [OPT_ENVIRONMENT] = {'e', "environment", 1, "FILE", "as pathtracer's"},
-    [OPT_LENS] = {'b', "lens-radius", 1, "R", "as pathtracer's; 0: pinhole (0)"},
-    [OPT_FOCUS] = {'d', "focal-distance", 1, "D", "as pathtracer's (4.7)"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
+    {'o', "out", "FILE", "required; its ending says which engine's:\n" ENGINES(ENGINE_ENDING),
+     TO(out)},
+    {0, "engine", "NAME", "one of" ENGINES(ENGINE_TEXT) " (by the ending of --out)",
+     .read = read_engine},
+    {'r', "resolution", "W H", "pixels (480 360)", TO(width), 1, 65535},
+    {'m', "max-bounces", "N", "as pathtracer counts them (5)", TO(depth), 0, 10000},
+    {'e', "environment", "FILE", "as pathtracer's", TO(environment)},
+    {'b', "lens-radius", "R", "as pathtracer's; 0: pinhole (0)", TO(lens_radius), 0, 1e6},
+    {'d', "focal-distance", "D", "as pathtracer's (4.7)", TO(focal_distance), 1e-6, 1e9},
+    {'h', "help", "", "print this", TO(help),
+     .usage = "usage: assay export [options] -o OUT SCENE.dae\n"},
+    {.args = "one scene", TO(scene)}};
 
 static const struct engine_kind *engine_of_ending(const char *path)
 {
@@ -46,46 +49,11 @@ static const struct engine_kind *engine_of_ending(const char *path)
 
 bool export_job_parse(int argc, char **argv, struct export_job *s, struct err *e)
 {
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    static const char *const engines[] = {ENGINES(ENGINE_WORD) NULL};
-    bool ok = true;
-    int n;
     *s = (struct export_job){.width = 480, .height = 360, .depth = 5, .focal_distance = 4.7};
-    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        const char *v = c.value[0];
-        if (i == CLI_POSITIONAL) {
-            if (s->scene != NULL)
-                return err_set(e, "export takes one scene, '%s' is one more", v);
-            s->scene = v;
-            continue;
-        }
-        switch ((enum option)i) {
-        case OPT_OUT: s->out = v; break;
-        case OPT_ENGINE:
-            ok = cli_choice("--engine", v, engines, &n, e);
-            s->engine = ok ? &engine_table[n] : NULL;
-            break;
-        case OPT_RESOLUTION:
-            ok = cli_int("--resolution", v, 1, 65535, &s->width, e) &&
-                 cli_int("--resolution", c.value[1], 1, 65535, &s->height, e);
-            break;
-        case OPT_BOUNCES: ok = cli_int("--max-bounces", v, 0, 10000, &s->depth, e); break;
-        case OPT_ENVIRONMENT: s->environment = v; break;
-        case OPT_LENS: ok = cli_double("--lens-radius", v, 0, 1e6, &s->lens_radius, e); break;
-        case OPT_FOCUS:
-            ok = cli_double("--focal-distance", v, 1e-6, 1e9, &s->focal_distance, e);
-            break;
-        case OPT_HELP:
-            puts("usage: assay export [options] -o OUT SCENE.dae\n");
-            cli_print_options(stdout, options);
-            s->help = true;
-            return true;
-        }
-    }
-    if (!ok)
+    if (!cli_read(options, argc, argv, s, e))
         return false;
+    if (s->help)
+        return true;
     if (s->scene == NULL || s->out == NULL)
         return err_set(e, "export needs a scene and --out (see --help)");
     if (s->engine == NULL)
