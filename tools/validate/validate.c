@@ -120,7 +120,7 @@ static bool take_looks(struct validation *v, const json_t *root, struct err *e)
     }
     for (int i = 0; i < v->num_tasks; i++) {
         struct claim_run *t = &v->task[i];
-        if (t->result == NULL && (t->seen || !found))
+        if (t->result == NULL && (t->seen[0] != NULL || !found))
             claim_run_give_up(v, t,
                               found ? "stopped at the difference of another claim" : BUDGET_SPENT);
     }

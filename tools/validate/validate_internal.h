@@ -59,8 +59,8 @@ struct claim_run {
     int stages;   /* 1 or 2 */
     int next;     /* look; NUM_LOOKS: none is left */
     bool stalled; /* what is left of the budget is too short for it */
-    /* What the last look saw; seen is false before the first. */
-    bool seen;
+    /* What the last look saw: the images of a and b, NULL before the first. */
+    struct side_image *seen[2];
     int look, stage;
     struct comparison c;
     json_t *history; /* "looks" of the results */
