@@ -62,7 +62,7 @@ faults() {
     sed 's,/[^/]*$,,' <<<"$all" | uniq -c | awk '$1 > 25 { print $2 " has " $1 " C files" }'
     sed 's,.*/,,' <<<"$all" | sort | uniq -d | sed 's/$/ is the name of two files/'
     strangers <"$tmp/symbols" >"$tmp/strangers"
-    [ "$(wc -l <"$tmp/strangers")" -le "$2" ] || cat "$tmp/strangers"
+    [ "$(wc -l <"$tmp/strangers")" -le "$2" ] || sed "\$ s/$/ (more than $2 such)/" "$tmp/strangers"
     echo "$(sed 's,/[^/]*$,,' <<<"$ours" | sort -u | wc -l) folders, $(wc -l <<<"$all") files, $(wc -l <"$tmp/includes") includes, $(wc -l <"$tmp/links") links" >"$tmp/count"
 }
 
@@ -84,7 +84,7 @@ a circle:
   tools/base/twin.c
 tests/many has 26 C files
 twin.c is the name of two files
-tools/base/twin.c: stray_one() begins with no word of its path or of a type"
+tools/base/twin.c: stray_one() begins with no word of its path or of a type (more than 0 such)"
 
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -28,7 +28,7 @@ static double beta_quantile(double probability, int i, int n)
     return (low + high) / 2;
 }
 
-void qq_band(int i, int n, double *low, double *high)
+void plot_qq_band(int i, int n, double *low, double *high)
 {
     *low = beta_quantile(0.025, i, n);
     *high = beta_quantile(0.975, i, n);
@@ -51,11 +51,11 @@ static void draw_band(struct plot *p, int n)
     double low, high;
     plot_path_open(p, "band");
     for (int i = 1; i <= n; i = next_shown(i, n)) {
-        qq_band(i, n, &low, &high);
+        plot_qq_band(i, n, &low, &high);
         plot_path_to(p, qq_expected(i, n), -log10(low));
     }
     for (int i = n; i >= 1; i -= next_shown(i, n) - i) {
-        qq_band(i, n, &low, &high);
+        plot_qq_band(i, n, &low, &high);
         plot_path_to(p, qq_expected(i, n), -log10(high));
     }
     plot_path_close(p, true);

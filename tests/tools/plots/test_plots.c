@@ -22,7 +22,7 @@ TEST(qq_band_is_binomial)
                                 {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
     for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
         double low, high;
-        qq_band(of[k][0], of[k][1], &low, &high);
+        plot_qq_band(of[k][0], of[k][1], &low, &high);
         assert_float_equal(order_cdf(of[k][0], of[k][1], low), 0.025, 1e-6);
         assert_float_equal(order_cdf(of[k][0], of[k][1], high), 0.975, 1e-6);
     }
