@@ -1,8 +1,8 @@
 #include "export_cycles.h"
 
-#include "renderer/base/fs.h"
 #include "export_cycles_internal.h"
 #include "reference/suite/features.h"
+#include "reference/base/json_file.h"
 
 #include <assert.h>
 #include <math.h>
@@ -63,19 +63,6 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
                      (double)c->focal_distance);
 }
 
-static bool write_json(const json_t *root, const char *path, struct err *e)
-{
-    struct out_file o;
-    if (!out_open(&o, path, e))
-        return false;
-    if (json_dumpf(root, o.f, JSON_COMPACT | JSON_REAL_PRECISION(9)) != 0 ||
-        fputc('\n', o.f) == EOF) {
-        out_abandon(&o);
-        return err_set(e, "%s: cannot write", path);
-    }
-    return out_commit(&o, e);
-}
-
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
                    struct err *e)
 {
@@ -100,7 +87,7 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
                          "materials", materials, "meshes", meshes, "spheres",
                          cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
                          environment);
-        ok = root != NULL && write_json(root, path, &why);
+        ok = root != NULL && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), &why);
     }
     if (!ok && image_written)
         unlink(image);

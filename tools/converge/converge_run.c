@@ -265,9 +265,14 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
         return false;
     json_t *depths = NULL;
     struct err why;
-    if (o->depth_spp > 0 &&
-        !depth_ladder_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
+    if (o->depth_spp > 0 && !depth_ladder_measure(&job, suite_reference_of(from, "truth"),
+                                                  o->depth_spp, &depths, &why)) {
+        if (err_is_of_memory(&why)) {
+            convergence_rate_reference_free(&ref);
+            return err_set(e, "%s", why.msg);
+        }
         depths = json_pack("{s:s}", "error", why.msg);
+    }
     struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
     json_t *engines = json_array(), *ratios = json_array();
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)

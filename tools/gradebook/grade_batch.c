@@ -253,11 +253,14 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     if (!fs_remove_tree(out, e) || !fs_make_dirs(out, e) ||
         !submission_build(job->rubric, job->sandbox, work, log, &s, e))
         return false;
+    json_t *command = command_of(job, path);
+    if (command == NULL && job->word != NULL && job->word[0] != NULL)
+        return err_set(e, "%s: out of memory", path);
     *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
-                       s.id, "kind", submission_kind_name[s.kind], "command", command_of(job, path),
-                       "version", assay_version, "key", key, "rubric", job->rubric->title,
-                       "sandbox", !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha",
-                       job->alpha, "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
+                       s.id, "kind", submission_kind_name[s.kind], "command", command, "version",
+                       assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
+                       !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
+                       "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
     if (*grade != NULL && grade_made(job, &s, work, out, *grade, e) && json_write(file, *grade, e))
         return true;
     json_decref(*grade);

@@ -28,12 +28,15 @@ static bool write_plan(const struct plan *p, struct err *e)
     char path[PLAN_PATH + 32];
     struct out_file out;
     snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
-    if (!out_open(&out, path, e))
-        return false;
-    if (json_dumpf(p->head, out.f, JSON_COMPACT) != 0 && !ferror(out.f)) {
-        out_abandon(&out);
+    char *head = json_dumps(p->head, JSON_COMPACT);
+    if (head == NULL)
         return err_set(e, "%s: out of memory", path);
+    if (!out_open(&out, path, e)) {
+        free(head);
+        return false;
     }
+    fputs(head, out.f);
+    free(head);
     for (int k = 0; k < p->num; k++)
         fprintf(out.f, "\n%s", p->line[k]);
     fputc('\n', out.f); /* out_commit() looks at the error flag */
