@@ -2,6 +2,7 @@
 #include "image.h"
 
 #include <openexr.h>
+#include <errno.h>
 #include <png.h>
 #include <stdlib.h>
 #include <string.h>
