@@ -164,15 +164,23 @@ void plot_series_end(struct plot *p)
     p->in_series = p->is_down = false;
 }
 
+static void write_hover(FILE *f, const char *hover, va_list values)
+{
+    if (hover == NULL)
+        return;
+    fputs("<title>", f);
+    html_vprint(f, hover, values);
+    fputs("</title>", f);
+}
+
 void plot_point(struct plot *p, size_t number, double x, double y, const char *hover, ...)
 {
     const char *tag = open_mark(p->f, number, plot_x(p, x), plot_y(p, y), 3.2);
     va_list values;
     va_start(values, hover);
-    fputs("<title>", p->f);
-    html_vprint(p->f, hover, values);
-    fprintf(p->f, "</title></%s>", tag);
+    write_hover(p->f, hover, values);
     va_end(values);
+    fprintf(p->f, "</%s>", tag);
 }
 
 void plot_bar(struct plot *p, const char *style, double x0, double y0, double x1, double y1,
@@ -183,13 +191,20 @@ void plot_bar(struct plot *p, const char *style, double x0, double y0, double x1
     fprintf(p->f, "<rect class=\"%s\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\">", style,
             fmin(left, right), fmin(low, high), fabs(right - left), fabs(high - low));
     va_start(values, hover);
-    if (hover != NULL) {
-        fputs("<title>", p->f);
-        html_vprint(p->f, hover, values);
-        fputs("</title>", p->f);
-    }
+    write_hover(p->f, hover, values);
     va_end(values);
     fputs("</rect>", p->f);
+}
+
+void plot_arrow(struct plot *p, bool right, double y, const char *hover, ...)
+{
+    va_list values;
+    fprintf(p->f, "<path class=\"arrow\" d=\"M%.1f %.1fl%d -5v10z\">",
+            p->left + (right ? p->width : 0), plot_y(p, y), right ? -8 : 8);
+    va_start(values, hover);
+    write_hover(p->f, hover, values);
+    va_end(values);
+    fputs("</path>", p->f);
 }
 
 void plot_segment(struct plot *p, const char *style, double x0, double y0, double x1, double y1)
@@ -205,12 +220,6 @@ void plot_line_to(struct plot *p, double x, double y)
     p->is_down = true;
     p->pen_x = x;
     p->pen_y = y;
-}
-
-void plot_arrow(struct plot *p, bool right, double y)
-{
-    fprintf(p->f, "<path class=\"arrow\" d=\"M%.1f %.1fl%d -5v10z\"/>",
-            p->left + (right ? p->width : 0), plot_y(p, y), right ? -8 : 8);
 }
 
 void plot_path_open(struct plot *p, const char *style)

@@ -36,7 +36,8 @@ struct plot plot_sized(FILE *f, double width, double height);
 /* The step of a linear axis of that length: 1, 2 or 5 times a power of ten. */
 double plot_step(double range);
 
-/* <svg> with grid and numbers; the text, printf's, tells what is shown to those who do not see it. Text is escaped. */
+/* <svg> with grid and numbers; the text, printf's, tells what is shown to those who do not see it. Here and below the
+ * text of %s is escaped, as html_print() does. */
 void plot_open(struct plot *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* The axes, above all else, and </svg>. */
 void plot_close(struct plot *p);
@@ -50,7 +51,7 @@ double plot_y(const struct plot *p, double y);
 void plot_series(struct plot *p, size_t number, const char *name);
 void plot_series_end(struct plot *p);
 
-/* A mark of the series; `hover` is printf's, its text is escaped. */
+/* A mark of the series; `hover` is printf's. */
 void plot_point(struct plot *p, size_t number, double x, double y, const char *hover, ...)
     __attribute__((format(printf, 5, 6)));
 /* A rectangle between two corners; hover may be NULL. */
@@ -60,7 +61,8 @@ void plot_segment(struct plot *p, const char *style, double x0, double y0, doubl
 /* From where the last one ended; the first of a series only begins. */
 void plot_line_to(struct plot *p, double x, double y);
 /* An arrow head that ends in the left or right end of the x axis. */
-void plot_arrow(struct plot *p, bool right, double y);
+void plot_arrow(struct plot *p, bool right, double y, const char *hover, ...)
+    __attribute__((format(printf, 4, 5)));
 /* Lines through many points, the last one joined to the first if `closed`. */
 void plot_path_open(struct plot *p, const char *style);
 void plot_path_to(struct plot *p, double x, double y);

@@ -42,11 +42,11 @@ void plot_interval(FILE *f, const json_t *claim)
     if (hi > -range && lo < range)
         plot_segment(&p, "ci", lo, 0, hi, 0);
     if (lo < -range)
-        plot_arrow(&p, false, 0);
+        plot_arrow(&p, false, 0, "%s", text);
     else if (lo < range)
         plot_segment(&p, "ci", lo, -4, lo, 4);
     if (hi > range)
-        plot_arrow(&p, true, 0);
+        plot_arrow(&p, true, 0, "%s", text);
     else if (hi > -range)
         plot_segment(&p, "ci", hi, -4, hi, 4);
     if (fabs(d) <= range)
