@@ -1,5 +1,7 @@
 /* The manuals of files (tools/docs/formats): the real reader takes every example, and a page's tables list what the reader knows,
  * no key more, none less. What a reader knows is asked of it: every word in quotes in its folder is tried as a key. */
+#include "tests/support/test.h"
+
 #include "reference/external/engine_description.h"
 #include "reference/suite/features.h"
 #include "renderer/base/fs.h"
@@ -11,20 +13,9 @@
 
 #include <ctype.h>
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 enum { TEXT = 1 << 16, WORDS = 2048 };
 
-static char dir[64];
 static struct suite suite;
 static struct rubric *rubric;
 
@@ -32,9 +23,7 @@ static int set_up(void **state)
 {
     (void)state;
     struct err e;
-    strcpy(dir, "/tmp/assay_formats_XXXXXX");
     rubric = calloc(1, sizeof *rubric);
-    assert_non_null(mkdtemp(dir));
     if (rubric == NULL || !suite_load("reference/scenes", &suite, &e))
         fail_msg("%s", rubric == NULL ? "memory" : e.msg);
     return 0;
@@ -43,49 +32,25 @@ static int set_up(void **state)
 static int tear_down(void **state)
 {
     (void)state;
-    struct err e;
     free(rubric);
     suite_free(&suite);
-    return fs_remove_tree(dir, &e) ? 0 : -1;
+    return 0;
 }
-
-static const char *path_of(const char *name)
-{
-    static char path[4][256];
-    static int turn;
-    char *out = path[turn++ % 4];
-    snprintf(out, sizeof *path, "%s/%s", dir, name);
-    return out;
-}
+TEST_GROUP(set_up, tear_down)
 
 static const char *write_text(const char *name, const char *text)
 {
-    const char *path = path_of(name);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    assert_true(fputs(text, f) >= 0);
-    assert_int_equal(fclose(f), 0);
+    const char *path = test_path(name);
+    test_write(path, text, strlen(text));
     return path;
-}
-
-static void read_text(const char *path, char text[TEXT])
-{
-    FILE *f = fopen(path, "r");
-    if (f == NULL)
-        fail_msg("%s: cannot read", path);
-    size_t n = fread(text, 1, TEXT - 1, f);
-    assert_true(n < TEXT - 1);
-    text[n] = '\0';
-    fclose(f);
 }
 
 /* The block number k of a page, of that language, up to its closing fence. */
 static void read_block(const char *page, const char *language, int k, char block[TEXT])
 {
-    static char text[TEXT];
     char fence[32], path[128];
     snprintf(path, sizeof path, "tools/docs/formats/%s", page);
-    read_text(path, text);
+    char *text = test_read(path);
     snprintf(fence, sizeof fence, "```%s\n", language);
     const char *at = text;
     for (; k >= 0; k--)
@@ -96,6 +61,7 @@ static void read_block(const char *page, const char *language, int k, char block
     const char *end = strstr(at, "\n```");
     assert_non_null(end);
     snprintf(block, TEXT, "%.*s\n", (int)(end - at), at);
+    free(text);
 }
 
 static json_t *load_block(const char *page, int k)
@@ -144,12 +110,11 @@ static size_t name_length(const char *text)
 /* First cells of the tables that have this heading over it: the name that each piece of code begins with. */
 static void page_words(const char *page, const char *heading, struct words *out)
 {
-    static char text[TEXT];
     char path[128], head[64];
     bool in = false;
     snprintf(path, sizeof path, "tools/docs/formats/%s", page);
     snprintf(head, sizeof head, "| %s |", heading);
-    read_text(path, text);
+    char *text = test_read(path);
     *out = (struct words){.num = 0};
     for (char *line = text, *next; line != NULL; line = next) {
         next = strchr(line, '\n');
@@ -167,6 +132,7 @@ static void page_words(const char *page, const char *heading, struct words *out)
             assert_non_null(c);
         }
     }
+    free(text);
     if (out->num == 0)
         fail_msg("%s: no table of '%s'", page, heading);
 }
@@ -174,7 +140,6 @@ static void page_words(const char *page, const char *heading, struct words *out)
 /* What stands in quotes in the C files of a folder. */
 static void source_words(const char *folder, struct words *out)
 {
-    static char text[TEXT];
     struct dirent *entry;
     DIR *d = opendir(folder);
     if (d == NULL)
@@ -185,12 +150,13 @@ static void source_words(const char *folder, struct words *out)
         if (dot == NULL || strcmp(dot, ".c") != 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-        read_text(path, text);
+        char *text = test_read(path);
         for (const char *c = strchr(text, '"'); c != NULL; c = strchr(c + 1, '"')) {
             size_t n = name_length(c + 1);
             if (c[1 + n] == '"')
                 words_add(out, c + 1, n);
         }
+        free(text);
     }
     closedir(d);
 }
@@ -263,24 +229,26 @@ static bool is_known_in(json_t *whole, json_t *at, const char *word, bool (*read
 
 static void dump(const json_t *json, const char *name)
 {
-    assert_int_equal(json_dump_file(json, path_of(name), 0), 0);
+    assert_int_equal(json_dump_file(json, test_path(name), 0), 0);
 }
 
 static void write_scene(const char *name, json_t *json)
 {
     char file[64];
-    snprintf(file, sizeof file, "%s.dae", name);
+    snprintf(file, sizeof file, "suite/%s.dae", name);
     write_text(file, "<COLLADA/>"); /* it is hashed, not read */
-    snprintf(file, sizeof file, "%s.json", name);
+    snprintf(file, sizeof file, "suite/%s.json", name);
     dump(json, file);
 }
 
 /* The page's scenes by the names that it gives them. */
 static bool load_scenes(json_t *equal, json_t *differs, struct suite *out, struct err *e)
 {
+    if (!fs_make_dirs(test_path("suite"), e))
+        return false;
     write_scene("13_square_patch", equal);
     write_scene("95_one_bounce_less", differs);
-    return suite_load(dir, out, e);
+    return suite_load(test_path("suite"), out, e);
 }
 
 static bool reads_scenes(json_t *scenes)
@@ -301,14 +269,12 @@ static bool knows_scene_key(const char *word)
     return known;
 }
 
-static void scenes_are_as_their_page_says(void **state)
+TEST(scenes_are_as_their_page_says)
 {
-    (void)state;
     struct suite s;
     struct err e;
     json_t *a = load_block("suite.md", 0), *b = load_block("suite.md", 1);
-    if (!load_scenes(a, b, &s, &e))
-        fail_msg("%s", e.msg);
+    MUST(load_scenes(a, b, &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[0].num_references, 3);
     assert_int_equal(s.scene[1].expect, VERDICT_DIFFERENT);
@@ -376,16 +342,14 @@ static bool knows_feature(const char *word)
     return loads_engine(text, "is no feature");
 }
 
-static void engines_are_as_their_page_says(void **state)
+TEST(engines_are_as_their_page_says)
 {
-    (void)state;
     static const char *const reader[] = {"reference/external", NULL};
     struct engine en;
     struct err e;
     json_t *description = load_block("engine.md", 0);
     dump(description, "example.json");
-    if (!engine_load(path_of("example.json"), &en, &e))
-        fail_msg("%s", e.msg);
+    MUST(engine_load(test_path("example.json"), &en, &e));
     assert_int_equal(en.replicates, 64);
     engine_free(&en);
     json_decref(description);
@@ -400,8 +364,7 @@ static bool rubric_says(const char *text, const char *words)
     static struct rubric_mistakes m;
     struct err e;
     bool says = false;
-    if (!rubric_read(write_text("a.rubric", text), &suite, rubric, &m, &e))
-        fail_msg("%s", e.msg);
+    MUST(rubric_read(write_text("a.rubric", text), &suite, rubric, &m, &e));
     for (int i = 0; i < m.num; i++)
         says |= strstr(m.at[i].text, words) != NULL;
     return says;
@@ -435,16 +398,14 @@ static bool knows_kind(const char *word)
     return !rubric_says(text, "is no kind");
 }
 
-static void rubrics_are_as_their_page_says(void **state)
+TEST(rubrics_are_as_their_page_says)
 {
-    (void)state;
     static const char *const reader[] = {"tools/grade", NULL};
     static char text[TEXT];
     struct rubric_mistakes m;
     struct err e;
     read_block("rubric.md", "rubric", 0, text);
-    if (!rubric_read(write_text("example.rubric", text), &suite, rubric, &m, &e))
-        fail_msg("%s", e.msg);
+    MUST(rubric_read(write_text("example.rubric", text), &suite, rubric, &m, &e));
     if (m.num > 0)
         fail_msg("rubric.md: line %d of the example: %s", m.at[0].line, m.at[0].text);
     assert_true(rubric_points(rubric) == 10);
@@ -473,7 +434,7 @@ static bool refuses_results(json_t *results)
     struct err e;
     json_t *read;
     dump(results, "results.json");
-    if (!results_read(path_of("results.json"), &read, &e))
+    if (!results_read(test_path("results.json"), &read, &e))
         return true;
     json_decref(read);
     return false;
@@ -487,14 +448,12 @@ static bool knows_member(const char *word)
     return known;
 }
 
-static void results_are_as_their_page_says(void **state)
+TEST(results_are_as_their_page_says)
 {
-    (void)state;
     struct err e;
     json_t *results = load_block("results.md", 0), *read;
     dump(results, "results.json");
-    if (!results_read(path_of("results.json"), &read, &e))
-        fail_msg("%s", e.msg);
+    MUST(results_read(test_path("results.json"), &read, &e));
     assert_int_equal(results_exit_code(read), 0);
     json_decref(read);
     json_decref(results);
@@ -505,25 +464,22 @@ static void results_are_as_their_page_says(void **state)
 }
 
 /* Pages and Gradescope's file are made from the example; of keys, docs.sh asks a real one. */
-static void grades_are_as_their_page_says(void **state)
+TEST(grades_are_as_their_page_says)
 {
-    (void)state;
-    struct err e = {""};
+    struct err e;
     json_t *grades = json_pack("[o]", load_block("grades.md", 0));
-    assert_int_equal(fs_make_dirs(path_of("bob"), &e), true);
-    if (!grade_write(dir, grades, &e))
-        fail_msg("%s", e.msg);
+    MUST(fs_make_dirs(test_path("grades/bob"), &e));
+    MUST(grade_write(test_path("grades"), grades, &e));
     json_decref(grades);
-    json_t *gradescope = json_load_file(path_of("bob/results.json"), 0, NULL);
+    json_t *gradescope = json_load_file(test_path("grades/bob/results.json"), 0, NULL);
     const json_t *test = json_array_get(json_object_get(gradescope, "tests"), 0);
     assert_string_equal(json_string_value(json_object_get(test, "status")), "failed");
     assert_true(json_number_value(json_object_get(test, "max_score")) == 6);
     json_decref(gradescope);
 }
 
-static void plans_are_as_their_page_says(void **state)
+TEST(plans_are_as_their_page_says)
 {
-    (void)state;
     static char text[TEXT], ours[TEXT + 128];
     struct plan p;
     struct err e;
@@ -532,24 +488,11 @@ static void plans_are_as_their_page_says(void **state)
     assert_non_null(version);
     char *rest = strchr(version, ')');
     snprintf(ours, sizeof ours, "%.*s%s%s", (int)(version - text), text, assay_version, rest + 1);
-    write_text("plan.jsonl", ours);
-    if (!plan_read(dir, &p, &e))
-        fail_msg("%s", e.msg);
+    MUST(fs_make_dirs(test_path("plan"), &e));
+    write_text("plan/plan.jsonl", ours);
+    MUST(plan_read(test_path("plan"), &p, &e));
     assert_int_equal(p.num, 2);
     assert_string_equal(plan_text(&p, "kind"), "pathtracer");
     assert_false(job_run_is_made(&p, 1));
     plan_free(&p);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_are_as_their_page_says),
-        cmocka_unit_test(engines_are_as_their_page_says),
-        cmocka_unit_test(rubrics_are_as_their_page_says),
-        cmocka_unit_test(results_are_as_their_page_says),
-        cmocka_unit_test(grades_are_as_their_page_says),
-        cmocka_unit_test(plans_are_as_their_page_says),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
 }
