@@ -46,11 +46,11 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
 bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
                       struct err *why)
 {
-    char sub[PATH_SIZE], path[PATH_SIZE];
+    char path[PATH_SIZE];
     struct err ignored;
-    snprintf(sub, sizeof sub, "%s/%s-try-XXXXXX", dir, en->name);
-    if (mkdtemp(sub) == NULL)
+    struct path sub = fs_path("%s/%s-try-XXXXXX", dir, en->name);
+    if (mkdtemp(sub.s) == NULL)
         return err_set(why, "%s: cannot make a directory in it: %s", dir, strerror(errno));
-    bool ok = engine_write_scene(en, scene, sub, path, why);
-    return fs_remove_tree(sub, ok ? why : &ignored) && ok;
+    bool ok = engine_write_scene(en, scene, sub.s, path, why);
+    return fs_remove_tree(sub.s, ok ? why : &ignored) && ok;
 }

@@ -19,14 +19,12 @@ enum { RECIPE = 1, MOST_SCRIPTS = 8 };
 static bool hash_parts(const struct engine_driver *driver, const struct reference_job *job,
                        const char *path, char hex[3][65], struct err *e)
 {
-    char program[4096], script[4096], all[64 * MOST_SCRIPTS + 1];
+    char program[4096], all[64 * MOST_SCRIPTS + 1];
     strcpy(hex[1], "none");
     for (int i = 0; driver->scripts != NULL && driver->scripts[i] != NULL; i++) {
         assert(i < MOST_SCRIPTS);
-        if (snprintf(script, sizeof script, "%s/%s", job->opt->share_dir, driver->scripts[i]) >=
-            (int)sizeof script)
-            return err_set(e, "%.64s...: path too long", job->opt->share_dir);
-        if (!sha256_file(script, all + 64 * i, e))
+        if (!sha256_file(fs_path("%s/%s", job->opt->share_dir, driver->scripts[i]).s, all + 64 * i,
+                         e))
             return false;
         sha256_text(all, hex[1]);
     }
@@ -43,23 +41,20 @@ bool reference_key(const struct suite_scene *scene, const struct suite_reference
     const struct engine_driver *driver = engine_driver_of(ref->engine);
     if (driver == NULL)
         return err_set(e, "%s: '%s' is no engine that is rendered", scene->name, ref->engine);
-    char dir[4000], path[4096], text[1024], hex[3][65];
+    char text[1024], hex[3][65];
     struct scene s;
     struct camera camera;
-    int n = snprintf(dir, sizeof dir, "%s/key-XXXXXX", opt->work_dir);
-    if (n < 0 || (size_t)n >= sizeof dir)
-        return err_set(e, "%.64s...: path too long", opt->work_dir);
+    struct path dir = fs_path("%s/key-XXXXXX", opt->work_dir);
     if (!suite_open(scene, &s, &camera, e))
         return false;
     struct reference_job job = {
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
-    bool ok = mkdtemp(dir) != NULL ||
+    bool ok = mkdtemp(dir.s) != NULL ||
               err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
     if (ok) {
-        snprintf(path, sizeof path, "%s/scene", dir);
-        ok = hash_parts(driver, &job, path, hex, e);
+        ok = hash_parts(driver, &job, fs_path("%s/scene", dir.s).s, hex, e);
         struct err cleanup;
-        if (!fs_remove_tree(dir, &cleanup) && ok) {
+        if (!fs_remove_tree(dir.s, &cleanup) && ok) {
             *e = cleanup;
             ok = false;
         }

@@ -3,9 +3,20 @@
 
 #include <errno.h>
 #include <ftw.h>
+#include <stdarg.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+struct path fs_path(const char *format, ...)
+{
+    struct path p;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(p.s, sizeof p.s, format, args);
+    va_end(args);
+    return p;
+}
 
 bool out_open(struct out_file *o, const char *path, struct err *e)
 {

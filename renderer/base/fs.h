@@ -4,7 +4,15 @@
 
 #include "err.h"
 
+#include <limits.h>
 #include <stdio.h>
+
+/* A path put together from parts. One that is too long for the system is cut where it still is: every use of it fails, none
+ * touches another file. */
+struct path {
+    char s[PATH_MAX + 1];
+};
+struct path fs_path(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* A file under construction: written beside its final place, renamed by out_commit(). */
 struct out_file {

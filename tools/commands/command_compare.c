@@ -1,3 +1,4 @@
+#include "renderer/base/fs.h"
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"
@@ -137,12 +138,11 @@ static bool write_report(const struct settings *s, const struct compared *c, int
                          struct err *e)
 {
     struct temp_dir dir;
-    char results[sizeof dir.path + 16];
     if (!temp_dir_open(&dir, "compare", e))
         return false;
-    snprintf(results, sizeof results, "%s/results.json", dir.path);
-    bool ok = compare_job_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
-              report_write(results, s->report, e);
+    const struct path results = fs_path("%s/results.json", dir.path);
+    bool ok = compare_job_write_json(&s->job, c, s->expect, results.s, argc, argv, e) &&
+              report_write(results.s, s->report, e);
     struct err ignored = {0};
     return temp_dir_close(&dir, ok ? e : &ignored) && ok;
 }

@@ -91,13 +91,12 @@ static const struct cli_option options[] = {
 
 static bool write_all(const json_t *results, const char *out_dir, struct err *e)
 {
-    char json[4096], html[4096];
-    snprintf(json, sizeof json, "%s/results.json", out_dir);
-    snprintf(html, sizeof html, "%s/index.html", out_dir);
-    if (!json_write(json, results, e) || !report_write(json, html, e))
+    const struct path json = fs_path("%s/results.json", out_dir);
+    const struct path html = fs_path("%s/index.html", out_dir);
+    if (!json_write(json.s, results, e) || !report_write(json.s, html.s, e))
         return false;
     convergence_results_print(stdout, json_object_get(results, "convergence"));
-    printf("\n%s\n", html);
+    printf("\n%s\n", html.s);
     return true;
 }
 

@@ -106,19 +106,14 @@ static const double history_alpha = 1e-3;
 static int write_history(const char *dir, const char *out, struct err *e)
 {
     struct history h;
-    char path[4096];
     size_t length = strlen(dir);
     while (length > 1 && dir[length - 1] == '/')
         length--;
-    int n = snprintf(path, sizeof path, "%.*s/history.html", (int)length, dir);
-    if (n < 0 || (size_t)n >= sizeof path) {
-        err_set(e, "%.64s...: path too long", dir);
-        return EXIT_NOT_JUDGED;
-    }
+    const struct path path = fs_path("%.*s/history.html", (int)length, dir);
     if (!history_read(dir, history_alpha, &h, e))
         return EXIT_NOT_JUDGED;
     int code = h.moved > 0 ? EXIT_DIFFERENT : EXIT_EQUIVALENT;
-    out = out != NULL ? out : path;
+    out = out != NULL ? out : path.s;
     if (report_history(&h, out, e))
         printf("%zu of %zu claims moved in the last of %zu runs: %s\n", h.moved, h.num_series,
                h.num_runs, out);

@@ -1,4 +1,5 @@
 #include "converge_engine.h"
+#include "renderer/base/fs.h"
 
 #include "reference/replicates/engine_driver.h"
 #include "tools/validate/run_pathtracer.h"
@@ -30,10 +31,9 @@ static uint32_t seed_of(const struct converge_job *job, int engine, int rung, in
 static bool render_by_pathtracer(const struct converge_job *job, const char *sampler, int spp,
                                  uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
 {
-    char path[4224], log[4224];
     const char *const options[] = {"--sampler", sampler, NULL};
-    snprintf(path, sizeof path, "%.4096s/pathtracer.exr", job->dir);
-    snprintf(log, sizeof log, "%.4096s/pathtracer.log", job->dir);
+    const struct path path = fs_path("%s/pathtracer.exr", job->dir);
+    const struct path log = fs_path("%s/pathtracer.log", job->dir);
     const struct pathtracer_job ours = {.program = job->pathtracer,
                                         .scene = job->scene,
                                         .spp = spp,
@@ -41,11 +41,11 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                         .options = options,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .picture = path,
-                                        .log = log};
+                                        .picture = path.s,
+                                        .log = log.s};
     bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
-    unlink(path);
-    unlink(log);
+    unlink(path.s);
+    unlink(log.s);
     return ok;
 }
 

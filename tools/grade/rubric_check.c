@@ -1,4 +1,5 @@
 #include "rubric_internal.h"
+#include "renderer/base/fs.h"
 
 #include "reference/truth/truth.h"
 #include "tools/images/tone_curve.h"
@@ -69,9 +70,8 @@ static void check_command(const char *what, const char *command, struct rubric_m
 
 static bool is_beside(const struct rubric *r, const char *file)
 {
-    char path[8192];
-    snprintf(path, sizeof path, "%s/%s", r->dir, file);
-    return strchr(file, '/') == NULL && access(path, R_OK) == 0;
+    const struct path path = fs_path("%s/%s", r->dir, file);
+    return strchr(file, '/') == NULL && access(path.s, R_OK) == 0;
 }
 
 static void check_head(struct rubric *r, struct rubric_mistakes *m)

@@ -3,6 +3,7 @@
  * student's picture differs from it. */
 #include "student_page.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
 #include "tools/images/image_file.h"
 #include "tools/html/html.h"
@@ -11,8 +12,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { MAX_PATH = 4400 };
 
 const char student_page_head[] =
     "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
@@ -152,10 +151,9 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
         paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
         paragraph(f, "Where:", member_or_empty(c, "where"), "where");
         if (json_is_string(json_object_get(p, "sha256"))) {
-            char path[MAX_PATH];
-            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir, member_or_empty(grade, "id"),
-                     member_or_empty(p, "file"));
-            ok = show_picture(f, path, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
+            const struct path path =
+                fs_path("%s/%s/%s", dir, member_or_empty(grade, "id"), member_or_empty(p, "file"));
+            ok = show_picture(f, path.s, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
             grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
             grade_plot_intervals(f, c);
         }

@@ -113,13 +113,13 @@ static int jobs_of(const struct wanted *w, int parts, int pictures)
 static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const char *binary,
                      struct err *e)
 {
-    char json[4096 + 8], seed[16], range[32];
+    char seed[16], range[32];
     const struct suite_scene *s = w->scene;
-    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    const struct path json = fs_path("%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
     snprintf(seed, sizeof seed, "%u", (unsigned)w->state.opt.seed);
     const char *const word[] = {"--only", s->name, "--engine",   w->ref->engine,
                                 "--seed", seed,    "--pictures", range};
-    const char *const input[] = {s->dae, json, s->environment[0] != '\0' ? s->environment : NULL,
+    const char *const input[] = {s->dae, json.s, s->environment[0] != '\0' ? s->environment : NULL,
                                  NULL};
     json_t *entry = json_pack("{ss, ss, sI, ss, ss, si, si}", "scene", s->name, "engine",
                               w->ref->engine, "seed", (json_int_t)w->state.opt.seed, "key",

@@ -51,22 +51,22 @@ static bool plan_part(void *ctx, const struct validate_part *part, struct err *e
 {
     struct planning *g = ctx;
     const struct suite_scene *s = part->scene;
-    char json[4096 + 8], from[4096 + 80], golden[4096 + 80], threads[16];
+    char threads[16];
     const char *input[6], **next = input;
     snprintf(threads, sizeof threads, "%d", g->cpus);
     if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, part->num_claims, e))
         return false;
-    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
-    snprintf(from, sizeof from, "%s/%s.json", g->opt->suite_dir, s->references_of);
-    snprintf(golden, sizeof golden, "%s/%s", g->opt->golden_dir, s->references_of);
+    const struct path json = fs_path("%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    const struct path from = fs_path("%s/%s.json", g->opt->suite_dir, s->references_of);
+    const struct path golden = fs_path("%s/%s", g->opt->golden_dir, s->references_of);
     *next++ = s->dae;
-    *next++ = json;
+    *next++ = json.s;
     if (strcmp(s->name, s->references_of) != 0)
-        *next++ = from;
+        *next++ = from.s;
     if (s->environment[0] != '\0')
         *next++ = s->environment;
-    if (!g->opt->live && access(golden, F_OK) == 0)
-        *next++ = golden;
+    if (!g->opt->live && access(golden.s, F_OK) == 0)
+        *next++ = golden.s;
     *next = NULL;
     const char **word = calloc(2 * (size_t)part->num_only, sizeof *word);
     if (word == NULL)

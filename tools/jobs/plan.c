@@ -25,13 +25,12 @@ enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 static bool write_plan(const struct plan *p, struct err *e)
 {
-    char path[PLAN_PATH + 32];
     struct out_file out;
-    snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
+    const struct path path = fs_path("%s/plan.jsonl", p->dir);
     char *head = json_dumps(p->head, JSON_COMPACT);
     if (head == NULL)
-        return err_set(e, "%s: out of memory", path);
-    if (!out_open(&out, path, e)) {
+        return err_set(e, "%s: out of memory", path.s);
+    if (!out_open(&out, path.s, e)) {
         free(head);
         return false;
     }
@@ -160,19 +159,19 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
 
 bool plan_read(const char *dir, struct plan *out, struct err *e)
 {
-    char path[PLAN_PATH + 32], full[PATH_MAX];
+    char full[PATH_MAX];
     struct plan p = {.dir = ""};
     if (realpath(dir, full) == NULL || strlen(full) >= sizeof p.dir)
         return err_set(e, "%s: %s", dir, strerror(errno));
     strcpy(p.dir, full);
-    snprintf(path, sizeof path, "%s/plan.jsonl", p.dir);
-    FILE *f = fopen(path, "r");
+    const struct path path = fs_path("%s/plan.jsonl", p.dir);
+    FILE *f = fopen(path.s, "r");
     if (f == NULL)
-        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+        return err_set(e, "%s: cannot read: %s", path.s, strerror(errno));
     bool ok = read_lines(f, &p, e);
     fclose(f);
     if (ok && strcmp(plan_text(&p, "version"), assay_version) != 0)
-        ok = err_set(e, "%s: of version %s, this is %s", path, plan_text(&p, "version"),
+        ok = err_set(e, "%s: of version %s, this is %s", path.s, plan_text(&p, "version"),
                      assay_version);
     if (ok)
         *out = p;

@@ -1,5 +1,6 @@
 #include "report_internal.h"
 
+#include "renderer/base/fs.h"
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"
 #include "reference/suite/engine_table.h"
@@ -22,10 +23,9 @@ struct scene {
     bool white_capped;
 };
 
-static bool full_path(const struct page *p, const char *file, char path[8192], struct err *e)
+static struct path full_path(const struct page *p, const char *file)
 {
-    int n = snprintf(path, 8192, "%s%s", file[0] == '/' ? "" : p->dir, file);
-    return n > 0 && n < 8192 ? true : err_set(e, "%.64s...: path too long", file);
+    return fs_path("%s%s", file[0] == '/' ? "" : p->dir, file);
 }
 
 static bool load_shot(struct page *p, struct scene *s, const json_t *claim, const char *side,
@@ -36,16 +36,16 @@ static bool load_shot(struct page *p, struct scene *s, const json_t *claim, cons
         if (strcmp(s->shot[i].file, file) == 0)
             return true;
     struct shot *shot = &s->shot[s->num_shots];
-    char path[8192];
-    if (!full_path(p, file, path, e) || !moments_read(path, &shot->m, NULL, e))
+    const struct path path = full_path(p, file);
+    if (!moments_read(path.s, &shot->m, NULL, e))
         return false;
     shot->engine = member_text(claim, side);
     shot->file = file;
     s->num_shots++;
     if (shot->m.width != s->shot[0].m.width || shot->m.height != s->shot[0].m.height)
-        return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path, shot->m.width,
+        return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path.s, shot->m.width,
                        shot->m.height, s->shot[0].file, s->shot[0].m.width, s->shot[0].m.height);
-    return report_pixel_data_add(p, path, &shot->m, &shot->layer, e);
+    return report_pixel_data_add(p, path.s, &shot->m, &shot->layer, e);
 }
 
 /* Ours first, then the references in the order that the keys 1, 2, .. have in every scene, then others. */

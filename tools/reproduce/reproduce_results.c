@@ -153,7 +153,7 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
                       struct reproduced *out, struct err *e)
 {
     static const struct option_words seed[] = {{"--reference-seed", 1}, {0}};
-    char assay[4096], log[MAX_PATH], file[MAX_PATH], number[24];
+    char assay[4096], file[MAX_PATH], number[24];
     const char *option, *verb = num > 1 ? word[1] : "";
     const json_t *drawn = json_object_get(then, "reference_seed");
     struct process_usage usage = {.exit_status = -1};
@@ -165,7 +165,7 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
     if (argv == NULL)
         return err_set(e, "out of memory");
     fs_beside_program(assay, sizeof assay, "assay");
-    snprintf(log, sizeof log, "%.4000s/log", dir);
+    const struct path log = fs_path("%s/log", dir);
     const char *ours[] = {assay, verb, "-q", option, file};
     memcpy(argv, ours, sizeof ours);
     int more = (int)(sizeof ours / sizeof *ours), n = together_kept(num - 2, word + 2);
@@ -178,7 +178,7 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
     }
     memcpy(argv + more, word + 2, (size_t)n * sizeof *argv);
     struct err why = {""};
-    const struct process p = {.argv = argv, .log = log};
+    const struct process p = {.argv = argv, .log = log.s};
     bool ok =
         reproduced_command(out, argv, e) && (opt->run_foreign || check_programs(path, argv, e));
     if (ok && !process_run(&p, &usage, &why) &&

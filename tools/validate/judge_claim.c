@@ -1,4 +1,5 @@
 #include "validate_internal.h"
+#include "renderer/base/fs.h"
 
 #include "tools/results/claim_result.h"
 #include "tools/results/stated_error_results.h"
@@ -53,11 +54,11 @@ static bool write_maps(const struct validation *v, const struct claim_run *t, js
     static const char *const kind[2] = {"z", "rel"};
     const struct image *map[2] = {&t->c.z, &t->c.relative};
     for (int k = 0; k < 2; k++) {
-        char path[MAX_PATH], file[256];
+        char file[256];
         snprintf(file, sizeof file, "data/%s/%s_%s_%s.exr", t->scene->name, kind[k], t->a->name,
                  t->ref.engine);
-        snprintf(path, sizeof path, "%s/%s", v->opt->out_dir, file);
-        if (!image_write_exr(path, map[k], e))
+        const struct path path = fs_path("%s/%s", v->opt->out_dir, file);
+        if (!image_write_exr(path.s, map[k], e))
             return false;
         json_object_set_new(files, k == 0 ? "z" : "relative", json_string(file));
     }

@@ -13,8 +13,6 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-enum { PATH_SIZE = 8192 };
-
 /* Render k of the scene with those samples and further options; the picture is removed. */
 static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
                        int spp, const char *const *options, double deadline, struct moments *out,
@@ -23,9 +21,8 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     double left = deadline - now_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
-    char picture[PATH_SIZE], log[PATH_SIZE];
-    snprintf(picture, sizeof picture, "%s/data/%s/consistency.exr", opt->out_dir, s->name);
-    snprintf(log, sizeof log, "%s/data/%s/consistency.log", opt->out_dir, s->name);
+    const struct path picture = fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
+    const struct path log = fs_path("%s/data/%s/consistency.log", opt->out_dir, s->name);
     const struct pathtracer_job job = {.program = opt->pathtracer,
                                        .scene = s,
                                        .spp = spp,
@@ -33,14 +30,14 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                        .seed = replicate_seed((uint32_t)opt->seed, k),
                                        .threads = opt->threads,
                                        .timeout_s = fmin(left, opt->timeout_s),
-                                       .picture = picture,
-                                       .log = log};
+                                       .picture = picture.s,
+                                       .log = log.s};
     double cpu_s;
-    if (!fs_make_parent_dirs(picture, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
+    if (!fs_make_parent_dirs(picture.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
-    unlink(picture);
-    unlink(log);
+    unlink(picture.s);
+    unlink(log.s);
     return true;
 }
 

@@ -82,14 +82,12 @@ static const struct cli_option options[] = {
 /* A name alone is one of those that came with us. */
 static bool load_engine(struct validate_command *c, struct err *e)
 {
-    char path[4096];
-    bool is_name = strpbrk(c->engine_file, "./") == NULL;
-    int n = snprintf(path, sizeof path, "%s%s%s%s", is_name ? c->opt.share_dir : "",
-                     is_name ? "/engines/" : "", c->engine_file, is_name ? ".json" : "");
-    if (n < 0 || (size_t)n >= sizeof path)
-        return err_set(e, "%.64s...: path too long", c->engine_file);
+    const char *file = c->engine_file;
     c->opt.engine = &c->engine;
-    return engine_load(path, &c->engine, e);
+    return engine_load(strpbrk(file, "./") != NULL
+                           ? file
+                           : fs_path("%s/engines/%s.json", c->opt.share_dir, file).s,
+                       &c->engine, e);
 }
 
 static void print_not_expressible(const json_t *results)
@@ -104,22 +102,20 @@ static void print_not_expressible(const json_t *results)
 /* index.html from results that are there only as long as that takes, so that nothing takes them for a run's. */
 static bool write_page_so_far(const json_t *so_far, const struct validate_options *o, struct err *e)
 {
-    char json[4096], html[4096];
-    snprintf(json, sizeof json, "%s/so_far.json", o->out_dir);
-    snprintf(html, sizeof html, "%s/index.html", o->out_dir);
-    bool ok = json_write(json, so_far, e) && report_write(json, html, e);
-    remove(json);
+    const struct path json = fs_path("%s/so_far.json", o->out_dir);
+    const struct path html = fs_path("%s/index.html", o->out_dir);
+    bool ok = json_write(json.s, so_far, e) && report_write(json.s, html.s, e);
+    remove(json.s);
     return ok;
 }
 
 static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
 {
-    char json[4096], junit[4096], html[4096];
-    snprintf(json, sizeof json, "%s/results.json", out_dir);
-    snprintf(junit, sizeof junit, "%s/junit.xml", out_dir);
-    snprintf(html, sizeof html, "%s/index.html", out_dir);
-    if (!json_write(json, results, e) || !junit_write(junit, results, e) ||
-        !report_write(json, html, e))
+    const struct path json = fs_path("%s/results.json", out_dir);
+    const struct path junit = fs_path("%s/junit.xml", out_dir);
+    const struct path html = fs_path("%s/index.html", out_dir);
+    if (!json_write(json.s, results, e) || !junit_write(junit.s, results, e) ||
+        !report_write(json.s, html.s, e))
         return false;
     if (json_array_size(json_object_get(results, "claims")) > 0)
         results_table_print(stdout, results, false);
@@ -132,7 +128,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     print_not_expressible(results);
     if (!quiet)
         render_cost_print(stderr, results);
-    printf("\n%s\n", html);
+    printf("\n%s\n", html.s);
     return true;
 }
 
