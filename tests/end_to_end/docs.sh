@@ -1,6 +1,6 @@
 #!/bin/bash
 # tests/end_to_end/docs.sh BUILD: every relative link of every Markdown file of the repository leads to a file that is there, and to a
-# heading that it has; the five-minute walk is walked; what programs write has the keys of its manual (tools/docs/formats; what
+# heading that it has; sources that pages name are there, and pages that sources name; the five-minute walk is walked; what programs write has the keys of its manual (tools/docs/formats; what
 # they read: test_formats.c). Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/docs.sh BUILD}")
@@ -39,6 +39,22 @@ printf '# One page\n[a](../two.md#a-heading-2) [b](gone.md) [c](../two.md#gone) 
 printf '## A heading, 2\n' >"$tmp/two.md"
 tell "control: two dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed "s,^$tmp/,," |
     diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\n'))"
+
+# Sources in code of pages, by name or from the top, and pages named in sources: those that are not there. NAME stands for any.
+git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u >"$tmp/names"
+missing_names() {
+    grep -oE '`[A-Za-z0-9_/]+\.(c|h|cc|sh|mjs|js)`' "$@" /dev/null | tr -d '`' | grep -v NAME | while IFS=: read -r page name; do
+        case $name in
+        */*) [ -e "$name" ] || [ -e "$(dirname "$page")/$name" ] || echo "$page: $name" ;;
+        *) grep -qxF "$name" "$tmp/names" || echo "$page: $name" ;;
+        esac
+    done
+}
+tell "sources that pages name" "$(missing_names "${pages[@]}")"
+tell "pages that sources name" "$(git grep -oE '\b(renderer|reference|tools|tests)/[A-Za-z_/-]+\.md\b' -- '*.[ch]' '*.sh' '*.mk' '*.rubric' '*.json' |
+    while IFS=: read -r source page; do [ -e "$page" ] || echo "$source: $page"; done)"
+printf '`docs.sh` and `gone_for_good.c`\n' >"$tmp/three.md"
+tell "control: a name that is not there is seen" "$(missing_names "$tmp/three.md" | diff - <(echo "$tmp/three.md: gone_for_good.c"))"
 
 # From here on a directory with the checkout's names in it, which takes what examples write.
 top=$PWD
