@@ -1,4 +1,4 @@
-/* Pages of grades: pieces that the student's and the class's page share. */
+/* Pages of grades, for a student and of a class, and their plots. */
 #ifndef ASSAY_STUDENT_PAGE_H
 #define ASSAY_STUDENT_PAGE_H
 
@@ -8,8 +8,6 @@
 #include <stdio.h>
 
 enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
-
-extern const char student_page_head[]; /* up to the title */
 
 /* Of one grade.json (grade_batch.h); its pictures are in dir/ID. */
 bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)

@@ -188,6 +188,11 @@ void html_page_open(FILE *f, const char *title, const char *script, double refre
     fprintf(f, "%s</style>\n</head>\n<body>\n<main>\n", page_css);
 }
 
+void html_page_close(FILE *f)
+{
+    fputs("</main>\n</body>\n</html>\n", f);
+}
+
 void html_table_open(FILE *f, const char *id, const char *label, const char *headings)
 {
     fprintf(f, "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"%s\">\n<table",

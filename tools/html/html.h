@@ -40,6 +40,7 @@ void html_base64(FILE *f, const void *bytes, size_t size);
 /* Up to <main>, with the style sheet of all pages and a policy that lets nothing in from elsewhere. `script`: the only
  * one that may run, or NULL; refresh_s: seconds after which the page loads itself again, or 0. */
 void html_page_open(FILE *f, const char *title, const char *script, double refresh_s);
+void html_page_close(FILE *f);
 
 /* A table that scrolls by itself where it is too wide, up to <tbody>. id may be NULL. label says to those who do not
  * see it what it is; headings are divided by '|', that of a column of numbers begins with '>'. All are ours. */

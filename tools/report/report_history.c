@@ -194,6 +194,6 @@ bool report_history(const struct history *h, const char *path, struct err *e)
     if (h->num_series > 0)
         write_table(f, h);
     write_runs(f, h);
-    fputs("</main>\n</body>\n</html>\n", f);
+    html_page_close(f);
     return out_commit(&out, e);
 }
