@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include "fs.h"
 
+#include "renderer/base/fs.h"
 #include <errno.h>
 #include <ftw.h>
 #include <stdarg.h>
@@ -119,12 +120,12 @@ const char *fs_base(const char *path)
     return slash != NULL ? slash + 1 : path;
 }
 
-void fs_beside_file(const char *path, const char *name, char *beside, size_t size)
+struct path fs_beside_file(const char *path, const char *name)
 {
-    snprintf(beside, size, "%.*s%s", (int)(fs_base(path) - path), path, name);
+    return fs_path("%.*s%s", (int)(fs_base(path) - path), path, name);
 }
 
-void fs_beside_program(char *path, size_t size, const char *name)
+struct path fs_beside_program(const char *name)
 {
     char self[3072];
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
@@ -132,5 +133,5 @@ void fs_beside_program(char *path, size_t size, const char *name)
     char *slash = strrchr(self, '/');
     if (slash != NULL)
         *slash = '\0';
-    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
+    return fs_path("%s/%s", slash != NULL ? self : ".", name);
 }

@@ -4,6 +4,7 @@
 
 #include "err.h"
 
+#include "renderer/base/fs.h"
 #include <limits.h>
 #include <stdio.h>
 
@@ -39,10 +40,10 @@ bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_
 
 /* The name of a file without its directories, within `path`. */
 const char *fs_base(const char *path);
-/* Into beside: the file `name` in the directory of the file `path`. */
-void fs_beside_file(const char *path, const char *name, char *beside, size_t size);
+/* The file `name` in the directory of the file `path`. */
+struct path fs_beside_file(const char *path, const char *name);
 
-/* Into path: the file `name` beside the program that runs, or in the current directory if that cannot be known. */
-void fs_beside_program(char *path, size_t size, const char *name);
+/* The file `name` beside the program that runs, or in the current directory if that cannot be known. */
+struct path fs_beside_program(const char *name);
 
 #endif

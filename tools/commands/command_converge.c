@@ -110,11 +110,10 @@ static void tell_not_judged(void *ctx, const struct convergence_row *r)
 
 int command_converge(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite[4096], golden[4096], share[4096];
-    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    const struct data_dirs at = data_dirs_find();
     struct converge_options o = {
         .out_dir = "build/converge",
-        .pathtracer = pathtracer,
+        .pathtracer = at.pathtracer.s,
         .engine =
             {[CONVERGE_PATHTRACER] = true, [CONVERGE_SOBOL] = true, [CONVERGE_REFERENCES] = true},
         .ladder = {1, 4, 16, 64, 256},
@@ -127,9 +126,9 @@ int command_converge(int argc, char **argv, struct err *e)
         .margin = 0.01,
         .slope_margin = 0.1,
         .timeout_s = 3600,
-        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = data_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
+        .suite_dir = at.suite.s,
+        .golden_dir = at.golden.s,
+        .share_dir = at.share.s};
     json_t *results = NULL;
     if (!cli_read(options, argc, argv, &o, e))
         return EXIT_NOT_JUDGED;

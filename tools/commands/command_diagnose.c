@@ -134,22 +134,19 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
 
 int command_diagnose(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite[4096], catalogue[4096];
-    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
-    struct settings s = {
-        .diagnose = {.alpha = 1e-6},
-        .seed = 1,
-        .timeout_s = 600,
-        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .catalogue_dir = data_dir(catalogue, sizeof catalogue, "golden/diagnose",
-                                  "../share/assay/golden/diagnose")};
+    const struct data_dirs at = data_dirs_find();
+    struct settings s = {.diagnose = {.alpha = 1e-6},
+                         .seed = 1,
+                         .timeout_s = 600,
+                         .suite_dir = at.suite.s,
+                         .catalogue_dir = at.catalogue.s};
     struct catalogue c;
     int code = EXIT_NOT_JUDGED;
     if (!cli_read(options, argc, argv, &s, e) || (!s.help && !check(&s, e)) ||
         !catalogue_read(s.catalogue_dir, &c, e))
         return code;
     if (s.pathtracer == NULL)
-        s.pathtracer = pathtracer;
+        s.pathtracer = at.pathtracer.s;
     if (s.help) {
         print_help(&c);
         code = 0;

@@ -152,7 +152,7 @@ static bool check(const struct settings *s, struct err *e)
 int command_report(int argc, char **argv, struct err *e)
 {
     struct settings s = {0};
-    char beside[4096];
+    struct path beside;
     if (!cli_read(options, argc, argv, &s, e) || (!s.help && !check(&s, e)))
         return EXIT_NOT_JUDGED;
     if (s.help)
@@ -164,8 +164,8 @@ int command_report(int argc, char **argv, struct err *e)
     if (s.matrix || s.markdown)
         return print_tables(&s, e) ? 0 : EXIT_NOT_JUDGED;
     if (s.out == NULL) {
-        fs_beside_file(s.results, "index.html", beside, sizeof beside);
-        s.out = beside;
+        beside = fs_beside_file(s.results, "index.html");
+        s.out = beside.s;
     }
     if (!report_write_with(s.results, s.converge, s.out, e))
         return EXIT_NOT_JUDGED;

@@ -3,7 +3,6 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
-#include "tools/base/data_dirs.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,19 +97,17 @@ void grade_options_help(void)
         "\nExit code: 0 all graded, 2 staff have to look at some, 3 could not grade (one line on stderr).");
 }
 
-struct grade_settings grade_options_default(int argc, struct grade_paths *at)
+struct grade_settings grade_options_default(int argc, struct data_dirs *at)
 {
-    fs_beside_program(at->pathtracer, sizeof at->pathtracer, "pathtracer");
-    return (struct grade_settings){
-        .out = "grades",
-        .pathtracer = at->pathtracer,
-        .jobs = 1,
-        .threads = 1,
-        .seed = 1,
-        .alpha = 1e-5,
-        .suite = data_dir(at->suite, sizeof at->suite, "reference/scenes", "../share/assay/scenes"),
-        .golden = data_dir(at->golden, sizeof at->golden, "golden", "../share/assay/golden"),
-        .catalogue = data_dir(at->catalogue, sizeof at->catalogue, "golden/diagnose",
-                              "../share/assay/golden/diagnose"),
-        .submission = calloc((size_t)argc + 1, sizeof(const char *))};
+    *at = data_dirs_find();
+    return (struct grade_settings){.out = "grades",
+                                   .pathtracer = at->pathtracer.s,
+                                   .jobs = 1,
+                                   .threads = 1,
+                                   .seed = 1,
+                                   .alpha = 1e-5,
+                                   .suite = at->suite.s,
+                                   .golden = at->golden.s,
+                                   .catalogue = at->catalogue.s,
+                                   .submission = calloc((size_t)argc + 1, sizeof(const char *))};
 }

@@ -59,14 +59,14 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct
 static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, struct plan *p,
                       struct err *e)
 {
-    char assay[4096];
     int num = 0;
     char **words = grade_options_words(argc, argv, s, &num);
     bool ok = words != NULL || err_set(e, "out of memory");
-    fs_beside_program(assay, sizeof assay, "assay");
+    const struct path assay = fs_beside_program("assay");
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
     const struct path references = fs_path("%s/references", p->dir);
-    const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references.s};
+    const char *const first[] = {assay.s, "grade",        "-q",        "-o",
+                                 "{out}", "--references", references.s};
     ok = ok && prepare(s, references.s, argc, argv, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
          plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
@@ -83,7 +83,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
 bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                     struct err *e)
 {
-    struct grade_paths at;
+    struct data_dirs at;
     struct grade_settings s = grade_options_default(argc, &at);
     (void)w; /* a job for each submission */
     bool ok = s.submission != NULL || err_set(e, "out of memory");
@@ -131,7 +131,7 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
 /* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
 int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
-    struct grade_paths at;
+    struct data_dirs at;
     struct grade_settings s = grade_options_default(argc, &at);
     bool ok = s.submission != NULL || err_set(e, "out of memory");
     ok = ok && grade_options_parse(argc, argv, &s, e) && fs_make_dirs(s.out, e);

@@ -29,10 +29,10 @@ static const struct option_words not_of_a_job[] = {{"--only", 1},
 
 static bool add_words(struct plan *p, int argc, char **argv, int threads, struct err *e)
 {
-    char assay[4096], t[16];
-    fs_beside_program(assay, sizeof assay, "assay");
+    char t[16];
+    const struct path assay = fs_beside_program("assay");
     snprintf(t, sizeof t, "%d", threads);
-    const char *const first[] = {assay, "reference", "-t", t, "--out", "{out}", "{job}"};
+    const char *const first[] = {assay.s, "reference", "-t", t, "--out", "{out}", "{job}"};
     return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }

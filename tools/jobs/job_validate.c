@@ -27,12 +27,12 @@ static const struct option_words not_of_a_job[] = {{"--only", 1},
 static bool add_words(struct plan *p, int argc, char **argv, const struct validate_options *o,
                       const char *threads, int claims, struct err *e)
 {
-    char assay[4096], n[16], seed[16];
-    fs_beside_program(assay, sizeof assay, "assay");
+    char n[16], seed[16];
+    const struct path assay = fs_beside_program("assay");
     snprintf(n, sizeof n, "%d", claims);
     snprintf(seed, sizeof seed, "%u", (unsigned)o->reference_seed);
     const char *const first[] = {
-        assay,   "validate", "-q",    "--of-claims",      n,   "-t", threads,
+        assay.s, "validate", "-q",    "--of-claims",      n,   "-t", threads,
         "--out", "{out}",    "{job}", "--reference-seed", seed};
     return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);

@@ -270,18 +270,19 @@ static bool render_golden(const struct suite_scene *scene, const struct suite_re
                           const struct reproduce_options *opt, const char *golden_dir,
                           const char *dir, const char *to, struct reproduced *out, struct err *e)
 {
-    char share[4096], seed[24];
+    const struct data_dirs at = data_dirs_find();
+    char seed[24];
     struct moments then, now;
     json_t *was = NULL, *is = NULL;
     if (!golden_read(golden_dir, scene, ref, &then, &was, e))
         return false;
     moments_free(&then);
-    const struct reference_options how = {
-        .seed = (uint32_t)member_number(was, "seed"),
-        .threads = opt->threads == 0 ? cli_processors() : opt->threads,
-        .timeout_s = 7200,
-        .work_dir = dir,
-        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
+    const struct reference_options how = {.seed = (uint32_t)member_number(was, "seed"),
+                                          .threads =
+                                              opt->threads == 0 ? cli_processors() : opt->threads,
+                                          .timeout_s = 7200,
+                                          .work_dir = dir,
+                                          .share_dir = at.share.s};
     snprintf(seed, sizeof seed, "%u", (unsigned)how.seed);
     const struct path again = fs_path("%s/%s/%s.exr", dir, scene->name, ref->engine);
     const char *const word[] = {"assay",    "reference", "--fresh", "--only", scene->name,
@@ -304,7 +305,8 @@ static bool remake_golden(const char *path, const struct image *im,
                           const struct reproduce_options *opt, const char *dir, const char *to,
                           struct reproduced *out, struct err *e)
 {
-    char suite_dir[4096], golden_dir[MAX_PATH];
+    const struct data_dirs at = data_dirs_find();
+    char golden_dir[MAX_PATH];
     const char *name = image_get_attr(im, "assay:scene"),
                *engine = image_get_attr(im, "assay:engine");
     struct suite suite = {0};
@@ -312,8 +314,7 @@ static bool remake_golden(const char *path, const struct image *im,
         return err_set(e, "%s: does not say of what scene it is", path);
     if (opt->scene != NULL || opt->pathtracer != NULL)
         return err_set(e, "%s: --scene and --pathtracer are for renders of pathtracer", path);
-    const char *from =
-        data_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes");
+    const char *from = at.suite.s;
     if (!directory_of(path, name, engine, golden_dir, e) || !suite_load(from, &suite, e))
         return false;
     const struct suite_scene *scene = suite_find(&suite, name);
@@ -330,10 +331,9 @@ bool rerender(const char *path, const struct reproduce_options *opt, const char 
 {
     struct image then = {0}, now = {0};
     struct reproduce_options with = *opt;
-    char beside[4096];
-    fs_beside_program(beside, sizeof beside, "pathtracer");
+    const struct path beside = fs_beside_program("pathtracer");
     if (with.pathtracer == NULL)
-        with.pathtracer = beside;
+        with.pathtracer = beside.s;
     if (!image_read_exr(path, &then, NULL, e))
         return false;
     const struct path to = fs_path("%s/again.exr", dir);

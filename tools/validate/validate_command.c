@@ -2,7 +2,6 @@
 
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
-#include "tools/base/data_dirs.h"
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
 #include "tools/results/results_table.h"
@@ -172,19 +171,16 @@ static int with_loader(int code, const json_t *results, struct err *e)
 
 bool validate_command_read(int argc, char **argv, struct validate_command *c, struct err *e)
 {
-    *c = (struct validate_command){.help = false};
-    fs_beside_program(c->pathtracer, sizeof c->pathtracer, "pathtracer");
-    c->opt = (struct validate_options){
-        .out_dir = "build/report",
-        .pathtracer = c->pathtracer,
-        .alpha = 1e-3,
-        .seed = 1,
-        .timeout_s = 3600,
-        .suite_dir =
-            data_dir(c->suite, sizeof c->suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = data_dir(c->golden, sizeof c->golden, "golden", "../share/assay/golden"),
-        .share_dir = data_dir(c->share, sizeof c->share, "reference", "../share/assay"),
-        .show = write_page_so_far};
+    *c = (struct validate_command){.at = data_dirs_find()};
+    c->opt = (struct validate_options){.out_dir = "build/report",
+                                       .pathtracer = c->at.pathtracer.s,
+                                       .alpha = 1e-3,
+                                       .seed = 1,
+                                       .timeout_s = 3600,
+                                       .suite_dir = c->at.suite.s,
+                                       .golden_dir = c->at.golden.s,
+                                       .share_dir = c->at.share.s,
+                                       .show = write_page_so_far};
     if (!cli_read(options, argc, argv, c, e) || c->help)
         return c->help;
     uint32_t *seed = &c->opt.reference_seed;
