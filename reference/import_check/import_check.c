@@ -213,8 +213,7 @@ static bool write_jobs(const struct suite_scene *const *scene, int num, const ch
                                                           scene[i]->height)) == 0 ||
                     err_set(e, "out of memory"));
     }
-    const struct path path = fs_path("%s/jobs.json", dir);
-    ok = ok && json_write(path.s, jobs, e);
+    ok = ok && json_write(fs_path("%s/jobs.json", dir).s, jobs, e);
     json_decref(jobs);
     return ok;
 }

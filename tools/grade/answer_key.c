@@ -202,8 +202,7 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                      struct answer_key *out, struct err *e)
 {
     *out = (struct answer_key){0};
-    const struct path path = fs_path("%s/scene", opt->cache);
-    bool ok = submission_stage(r, path.s, e);
+    bool ok = submission_stage(r, fs_path("%s/scene", opt->cache).s, e);
     for (int i = 0; ok && i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
         struct answer *a = &out->of[0][i];

@@ -331,8 +331,7 @@ bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct
                       struct err *e)
 {
     *out = (struct rubric_bugs){0};
-    const struct path dir = fs_path("%s/%s", r->dir, r->bugs);
-    if (!catalogue_read(dir.s, &out->catalogue, e))
+    if (!catalogue_read(fs_path("%s/%s", r->dir, r->bugs).s, &out->catalogue, e))
         return false;
     if (find_views(r, a, out, e))
         return true;

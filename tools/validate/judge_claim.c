@@ -57,8 +57,7 @@ static bool write_maps(const struct validation *v, const struct claim_run *t, js
         char file[256];
         snprintf(file, sizeof file, "data/%s/%s_%s_%s.exr", t->scene->name, kind[k], t->a->name,
                  t->ref.engine);
-        const struct path path = fs_path("%s/%s", v->opt->out_dir, file);
-        if (!image_write_exr(path.s, map[k], e))
+        if (!image_write_exr(fs_path("%s/%s", v->opt->out_dir, file).s, map[k], e))
             return false;
         json_object_set_new(files, k == 0 ? "z" : "relative", json_string(file));
     }

@@ -102,8 +102,8 @@ static void print_not_expressible(const json_t *results)
 static bool write_page_so_far(const json_t *so_far, const struct validate_options *o, struct err *e)
 {
     const struct path json = fs_path("%s/so_far.json", o->out_dir);
-    const struct path html = fs_path("%s/index.html", o->out_dir);
-    bool ok = json_write(json.s, so_far, e) && report_write(json.s, html.s, e);
+    bool ok = json_write(json.s, so_far, e) &&
+              report_write(json.s, fs_path("%s/index.html", o->out_dir).s, e);
     remove(json.s);
     return ok;
 }
