@@ -263,7 +263,7 @@ TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
     free(dump(f, 1));
     f->c.near = 0;
     f->c.eye = v3(.1f, 0, 1);
-    assert_refused(f, 1, "geometry at distance 0 from the eye");
+    assert_refused(f, 1, "geometry, at distance 0 to");
 }
 
 TEST_WITH(depth_is_limited_and_files_appear_whole, setup, teardown)

@@ -140,10 +140,10 @@ TEST(test_camera_refused)
     /* The ball's nearest point is 4.2 - 0.3 away at least, the farthest floor corner about 5.3. */
     bad = c;
     bad.near = 4.5f;
-    refused(&s, &bad, 1, "nearer than 4.5");
+    refused(&s, &bad, 1, "near plane is at 4.5");
     bad = c;
     bad.far = 5;
-    refused(&s, &bad, 1, "farther than 5");
+    refused(&s, &bad, 1, "far plane is at 5");
     refused(&s, &c, 22, "depth 21 only");
     struct povray_passes p;
     struct err e;
@@ -166,7 +166,7 @@ TEST(test_normals_refused)
     struct scene s = floor_and_ball(true);
     s.normal[4] = v3(0, -1, 0);
     struct camera c = finish(&s);
-    refused(&s, &c, 1, "behind the triangle");
+    refused(&s, &c, 1, "behind its triangle");
     scene_free(&s);
 }
 
