@@ -4,6 +4,7 @@
 #include "tests/support/optics.h"
 #include "tests/support/sky.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 static const double REFLECTANCE[3] = {.9, .8, .7}, TRANSMITTANCE[3] = {.95, .9, .6};
 
@@ -15,11 +16,6 @@ static uint32_t specular(struct scene *s, enum material_kind kind, double ior, b
     s->materials[i].ior = (float)ior;
     s->materials[i].schlick = schlick;
     return i;
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static void unit(const double d[3], double out[3])

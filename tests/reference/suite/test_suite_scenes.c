@@ -8,6 +8,7 @@
 #include "tests/support/suite_files.h"
 #include "reference/base/image_oiio.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #define Z_LIMIT 4.89
 
@@ -47,24 +48,6 @@ static void view_ray(const struct view *v, double x, double y, int size, double 
     double sx = (2 * x / size - 1) * v->tan_half, sy = (1 - 2 * y / size) * v->tan_half;
     for (int k = 0; k < 3; k++)
         d[k] = v->forward[k] + sx * v->right[k] + sy * v->up[k];
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross3(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-}
-
-static void unit3(double v[3])
-{
-    double length = sqrt(dot3(v, v));
-    for (int k = 0; k < 3; k++)
-        v[k] /= length;
 }
 
 /* Distance along d to the triangle and the weights of its corners, by Cramer's rule; 0 if missed. */
@@ -480,34 +463,17 @@ TEST(many_lamps_are_the_sum_of_single_ones)
     scene_free(&all);
 }
 
-static char *whole_file(const char *path, size_t *size)
-{
-    FILE *f = fopen(path, "rb");
-    assert_non_null(f);
-    assert_int_equal(fseek(f, 0, SEEK_END), 0);
-    long end = ftell(f);
-    assert_true(end > 0);
-    rewind(f);
-    *size = (size_t)end;
-    char *text = malloc(*size);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, *size, f), *size);
-    fclose(f);
-    return text;
-}
-
 /* The mesh is what its formula says, and large enough. */
 TEST(mesh_is_the_generated_one)
 {
-    size_t size, shipped_size;
+    size_t size;
     char *text;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
     suite_write_mesh(f);
     assert_int_equal(fclose(f), 0);
-    char *shipped = whole_file("reference/scenes/44_mesh.dae", &shipped_size);
-    assert_int_equal(size, shipped_size);
-    assert_memory_equal(text, shipped, size);
+    char *shipped = test_read("reference/scenes/44_mesh.dae");
+    assert_string_equal(text, shipped);
     free(shipped);
     free(text);
     struct scene s = open_shipped("44_mesh");

@@ -5,28 +5,10 @@
 #include "reference/truth/truth_sun.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross3(const double a[3], const double b[3], double c[3])
-{
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void unit(double v[3])
-{
-    double length = sqrt(dot3(v, v));
-    for (int i = 0; i < 3; i++)
-        v[i] /= length;
-}
 
 /* The direction at the angle whose cosine is `cosine` from the unit vector w, turned by phi. */
 static void around(const double w[3], double cosine, double phi, double out[3])
@@ -34,7 +16,7 @@ static void around(const double w[3], double cosine, double phi, double out[3])
     double u[3] = {0}, v[3], s = sqrt(fmax(0, 1 - cosine * cosine));
     u[fabs(w[0]) < 0.6 ? 0 : 1] = 1;
     cross3(w, u, v);
-    unit(v);
+    unit3(v);
     cross3(v, w, u);
     for (int i = 0; i < 3; i++)
         out[i] = cosine * w[i] + s * (cos(phi) * u[i] + sin(phi) * v[i]);
@@ -139,7 +121,7 @@ static double ball_axis(const struct ball *b, double w[3])
     w[1] = -b->centre[1];
     w[2] = b->z - b->centre[2];
     double d = sqrt(dot3(w, w));
-    unit(w);
+    unit3(w);
     return d;
 }
 
@@ -486,8 +468,8 @@ static double sun_direction(double cosine, double phi, const void *ctx)
 static double facet_by_quadrature(const double normal[3], const double to_light[3])
 {
     struct sun s = {{to_light[0], to_light[1], to_light[2]}, {normal[0], normal[1], normal[2]}};
-    unit(s.axis);
-    unit(s.normal);
+    unit3(s.axis);
+    unit3(s.normal);
     double sine = sin(5 * M_PI / 180);
     return over_cap(sun_direction, &s, sqrt(1 - sine * sine)) / (M_PI * sine * sine);
 }

@@ -4,17 +4,12 @@
  * tolerance must reject forms with a known mistake. */
 #include "reference/truth/truth_mirrors_and_glass.h"
 #include "tests/support/optics.h"
+#include "tests/support/quadrature.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
-
-static const double tolerance = 1e-9; /* relative */
-
-static bool same(double a, double b)
-{
-    return fabs(a - b) <= tolerance * fabs(b);
-}
 
 static bool same_light(const double a[3], const double b[3])
 {
@@ -26,18 +21,6 @@ static double next_number(uint64_t *state)
 {
     *state = *state * 6364136223846793005u + 1442695040888963407u;
     return (double)(*state >> 11) / 9007199254740992.0;
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void normalize3(double v[3])
-{
-    double l = sqrt(dot3(v, v));
-    for (int k = 0; k < 3; k++)
-        v[k] /= l;
 }
 
 /* Radiance in the direction (sx, sy, -1) by any of the routes. */
@@ -361,7 +344,7 @@ static void slab_scene(const void *scene, double sx, double sy, double light[3])
 {
     double d[3] = {0.6 + 0.8 * sx, sy, -0.8 + 0.6 * sx};
     (void)scene;
-    normalize3(d);
+    unit3(d);
     look_at_body(&slab, slab_eye, d, SLAB_DEPTH, NONE, light);
 }
 
@@ -403,7 +386,7 @@ static bool ball_hit(const struct body *b, double p[3], const double d[3], bool 
         p[k] += t * d[k];
     for (int k = 0; k < 3; k++)
         n[k] = p[k] - s->centre[k];
-    normalize3(n);
+    unit3(n);
     return true;
 }
 
@@ -435,7 +418,7 @@ static int count_ball_differences(int depth, enum mistake m)
         double formula[3], tree[3];
         struct truth_glass_sphere s = ball;
         s.depth = depth;
-        normalize3(d);
+        unit3(d);
         truth_glass_sphere_radiance(&s, ball_eye, d, formula);
         look_at_body(&ball_body, ball_eye, d, depth, m, tree);
         different += !same_light(formula, tree);
@@ -456,7 +439,7 @@ static void ball_scene(const void *scene, double sx, double sy, double light[3])
 {
     double d[3] = {sx, sy, -1};
     (void)scene;
-    normalize3(d);
+    unit3(d);
     look_at_body(&ball_body, ball_eye, d, ball.depth, NONE, light);
 }
 

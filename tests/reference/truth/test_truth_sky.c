@@ -6,21 +6,11 @@
 #include "reference/truth/truth_pixel_mean.h"
 #include "tests/support/optics.h"
 #include "reference/base/image_oiio.h"
+#include "tests/support/quadrature.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_integration.h>
-
-static const double tolerance = 1e-9; /* relative */
-
-static bool same(double a, double b)
-{
-    return fabs(a - b) <= tolerance * fabs(b);
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static double next_number(uint64_t *state)
 {
