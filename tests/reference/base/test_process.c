@@ -21,13 +21,6 @@ static bool sh(const char *script, const char *log, double timeout_s, struct pro
                        e);
 }
 
-/* A fresh directory; the caller removes what it puts there. */
-static void temp_dir(char path[64])
-{
-    strcpy(path, "/tmp/assay_process_XXXXXX");
-    assert_non_null(mkdtemp(path));
-}
-
 static long read_number(const char *path)
 {
     long v = -1;
@@ -136,29 +129,23 @@ TEST(a_missing_program_is_not_found)
 /* Found and executable, but the kernel refuses it: its interpreter is missing. */
 TEST(a_program_that_cannot_be_executed_says_why)
 {
-    char dir[64], path[128], want[256];
-    temp_dir(dir);
-    snprintf(path, sizeof path, "%s/script", dir);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs("#!/assay/no/such/interpreter\n", f);
-    fclose(f);
+    static const char script[] = "#!/assay/no/such/interpreter\n";
+    const char *path = test_path("script");
+    char want[1024];
+    test_write(path, script, strlen(script));
     assert_int_equal(chmod(path, 0755), 0);
     struct err e;
     const char *const argv[] = {path, NULL};
     assert_false(process_run(&(struct process){.argv = argv}, NULL, &e));
     snprintf(want, sizeof want, "%s: cannot run: %s", path, strerror(ENOENT));
     assert_string_equal(e.msg, want);
-    unlink(path);
-    rmdir(dir);
 }
 
 /* The shell ignores SIGTERM and so does what it started: only SIGKILL to the group ends them. */
 TEST(a_hang_is_killed_with_its_grandchild)
 {
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("hang.pid");
+    char script[2048];
     snprintf(script, sizeof script,
              "trap '' TERM; sleep 1000 & echo $! > %s; echo started; while :; do sleep 1; done",
              file);
@@ -170,32 +157,26 @@ TEST(a_hang_is_killed_with_its_grandchild)
     long pid = read_number(file);
     assert_true(pid > 1);
     assert_true(dies_soon(pid));
-    unlink(file);
-    rmdir(dir);
 }
 
 /* A program that ends but leaves a process behind, which holds the output open. */
 TEST(what_a_finished_program_leaves_behind_is_killed)
 {
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("left.pid");
+    char script[2048];
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s", file);
     struct err e;
     struct process_usage u;
     assert_true(sh(script, NULL, 100, &u, &e));
     assert_true(u.wall_s < 60);
     assert_true(dies_soon(read_number(file)));
-    unlink(file);
-    rmdir(dir);
 }
 
 /* Ctrl-C, or even kill -9, of the harness must not leave an engine and its children running. */
 TEST(the_death_of_the_caller_ends_the_group)
 {
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("caller.pid");
+    char script[2048];
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s.new; mv %s.new %s; wait", file, file,
              file);
     pid_t caller = fork();
@@ -211,14 +192,13 @@ TEST(the_death_of_the_caller_ends_the_group)
     kill(caller, SIGKILL);
     assert_int_equal(waitpid(caller, NULL, 0), caller);
     assert_true(dies_soon(pid));
-    unlink(file);
-    rmdir(dir);
 }
 
 TEST(stdin_is_empty_and_the_directory_is_the_one_asked_for)
 {
-    char dir[64], want[128];
-    temp_dir(dir);
+    const char *dir = test_path("gone");
+    char want[1024];
+    assert_int_equal(mkdir(dir, 0777), 0);
     struct err e;
     const char *const argv[] = {"sh", "-c", "cat; pwd -P; exit 1", NULL};
     assert_false(
@@ -235,9 +215,7 @@ TEST(stdin_is_empty_and_the_directory_is_the_one_asked_for)
 /* 1e5 lines of 100 bytes go to the log whole; only the last are quoted. */
 TEST(a_long_output_is_logged_whole)
 {
-    char dir[64], log[128];
-    temp_dir(dir);
-    snprintf(log, sizeof log, "%s/log", dir);
+    const char *log = test_path("long.log");
     struct err e;
     assert_false(
         sh("yes 123456789012345678901234567890123456789012345678901234567890123456789012345"
@@ -248,16 +226,12 @@ TEST(a_long_output_is_logged_whole)
     struct stat st;
     assert_int_equal(stat(log, &st), 0);
     assert_int_equal(st.st_size, 100 * 100000 + 4);
-    unlink(log);
-    rmdir(dir);
 }
 
 /* `yes` prints for ever, faster than we can read: the clock must win and the log must end. */
 TEST(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded)
 {
-    char dir[64], log[128];
-    temp_dir(dir);
-    snprintf(log, sizeof log, "%s/log", dir);
+    const char *log = test_path("flood.log");
     struct err e;
     struct process_usage u;
     assert_false(sh("exec yes flood", log, 1, &u, &e));
@@ -266,8 +240,6 @@ TEST(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded)
     struct stat st;
     assert_int_equal(stat(log, &st), 0);
     assert_true(st.st_size > 0 && st.st_size <= (64 << 20) + 64);
-    unlink(log);
-    rmdir(dir);
 }
 
 TEST(a_log_that_cannot_be_written_is_an_error)

@@ -92,27 +92,12 @@ TEST(unlike_moments_do_not_merge)
     moments_free(&b);
 }
 
-static char dir[] = "/tmp/assay_moments_XXXXXX";
-
-static int make_dir(void **state)
-{
-    (void)state;
-    return mkdtemp(dir) == NULL;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
-}
-
 TEST(write_and_read)
 {
     struct err e = {0};
     struct moments m, back;
     struct image im;
-    char path[64];
-    snprintf(path, sizeof path, "%s/m.exr", dir);
+    const char *path = test_path("m.exr");
     assert_true(moments_alloc(&m, 3, 2, &e));
     for (size_t p = 0; p < 6; p++)
         for (uint32_t i = 0; i < 10 + p; i++)
@@ -136,7 +121,6 @@ TEST(write_and_read)
     moments_free(&m);
     moments_free(&back);
     image_free(&im);
-    unlink(path);
 }
 
 /* Each fault has its own line and no moments. */
@@ -160,8 +144,7 @@ TEST(bad_files)
                  {10, "fortnight", "1", 0, 1, "unknown unit"},
                  {10, "sample", "-2", 0, 1, "spp"},
                  {10, "sample", "many", 0, 1, "spp"}};
-    char path[64];
-    snprintf(path, sizeof path, "%s/bad.exr", dir);
+    const char *path = test_path("bad.exr");
     for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
         struct err e = {0};
         struct image im;
@@ -201,5 +184,3 @@ TEST(failed_write_leaves_nothing)
     assert_true(strncmp(e.msg, "/nonexistent/m.exr", 18) == 0);
     moments_free(&m);
 }
-
-TEST_GROUP(make_dir, remove_dir)

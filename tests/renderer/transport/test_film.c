@@ -6,20 +6,6 @@
 #include "tests/support/build_scene.h"
 #include "tests/support/test.h"
 
-static char dir[] = "/tmp/assay_film_XXXXXX";
-
-static int make_dir(void **state)
-{
-    (void)state;
-    return mkdtemp(dir) == NULL;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
-}
-
 struct fixture {
     struct scene scene;
     struct camera camera;
@@ -136,8 +122,7 @@ TEST(resumed_equals_uninterrupted)
 {
     struct fixture f;
     rare_bright_samples(&f);
-    char path[64];
-    snprintf(path, sizeof path, "%s/x.state", dir);
+    const char *path = test_path("x.state");
     for (int mode = 0; mode < 4; mode++) {
         struct render_options o = options_of(13);
         o.first_sample = 5;
@@ -265,10 +250,9 @@ static void expect_no_state(const char *path, const struct render_id *id, const 
 
 TEST(bad_states)
 {
-    char path[64];
+    const char *path = test_path("bad.state");
     struct err e = {0};
     struct film film;
-    snprintf(path, sizeof path, "%s/bad.state", dir);
     expect_no_state(path, &some_id, "No such file");
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
     assert_true(checkpoint_write(path, &some_id, &film, &e));
@@ -306,7 +290,6 @@ TEST(bad_states)
     fflush(f);
     expect_no_state(path, &some_id, "not a state file");
     fclose(f);
-    unlink(path);
 }
 
 /* The relative error against two passes over the same numbers; and a render that stops by it stops at the
@@ -552,11 +535,10 @@ TEST(heatmap_of_one_triangle)
     build_triangle(&f.scene, v3(0, 0, -1), v3(1, 0, -1), v3(0, 1, -1), m);
     build_camera(&f.scene, v3(0, 0, 0), 60);
     finish(&f, 8, 4);
-    char path[64];
+    const char *path = test_path("heat.png");
     struct err e = {0};
     struct image im;
     uint64_t most;
-    snprintf(path, sizeof path, "%s/heat.png", dir);
     if (!heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) ||
         !image_read(path, &im, NULL, &e))
         fail_msg("%s", e.msg);
@@ -569,5 +551,3 @@ TEST(heatmap_of_one_triangle)
     unlink(path);
     drop(&f);
 }
-
-TEST_GROUP(make_dir, remove_dir)
