@@ -33,6 +33,7 @@ export -f run_job
 {
     echo tests/end_to_end/end_to_end.sh
     echo tests/end_to_end/lint.sh
+    echo tests/end_to_end/docs.sh
     echo tests/fuzz.sh
     long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
     printf '%s\n' "${programs[@]}" | grep -E "$long"
@@ -58,7 +59,7 @@ for program in "${programs[@]}"; do
 done
 
 # Lines "ok ...", "not ok ..." and "skip ...".
-for name in end_to_end lint fuzz; do
+for name in end_to_end lint docs fuzz; do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
     p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")

@@ -19,7 +19,7 @@ PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagno
   tests/end_to_end/student_tracer.c tests/studies/bench/bench.c
 BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
 # What several tests share: a library, of which each takes what it wants.
-SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c tests/support/alloc_fail.c, \
+SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c, \
   $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES   := $(addprefix test_,calibration compare_rates converge permutation alpha_spending noise_estimate statistics)
@@ -55,8 +55,12 @@ $(foreach t,$(TESTS) $(PROGRAMS),$(eval $(call test_program,$(1),$(t))))
 $(call program,$(1),$(TESTS) $(PROGRAMS)): $(1)/tests/support/asan_options.c.o $(1)/libtests.a $(1)/libassay.a | $(1)/oiio.so
 	$$(link)
 $(1)/tests/%: TEST_LIBS := -lcmocka
-# With a malloc() of their own, which can fail.
-$(filter $(1)/tests/test_memory%,$(call program,$(1),$(TESTS))): $(1)/tests/support/alloc_fail.c.o
+# Whole programs with a malloc() of their own, which can fail.
+$(1)/no_memory/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o
+$(1)/no_memory/assay: $(1)/tools/commands/assay.c.o
+$(1)/no_memory/pathtracer $(1)/no_memory/assay: $(1)/tests/end_to_end/no_memory.c.o $(1)/tests/support/asan_options.c.o $(1)/libassay.a | $(1)/oiio.so
+	$$(link)
+$(1)/no_memory/%: TEST_LIBS := -Wl,--wrap=main,--wrap=dlopen,--wrap=wait4
 $(1)/tests/test_embree $(1)/tests/bench: TEST_LIBS := -lcmocka -lembree3
 endef
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/tsan $(BUILD)/cov,$(eval $(call test_tree,$(b))))
@@ -72,9 +76,10 @@ $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browse
 	  mv lock.json package-lock.json && npm ci --silent --ignore-scripts --no-audit --no-fund
 
 END_TO_END := $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
-check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz $(CHECKED) $(END_TO_END)
+check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz programs-no-memory $(CHECKED) $(END_TO_END)
 	tests/run.sh $(BUILD) $(CHECKED)
 
+programs-no-memory: $(BUILD)/san/no_memory/pathtracer $(BUILD)/san/no_memory/assay $(BUILD)/no_memory/pathtracer
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay $(BUILD)/san/oiio.so
 # What the fuzzers are linked from, and all the rest as far as clang's warnings look.
 programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,$(MAINS) $(wildcard tests/support/*.c tests/[a-eg-z]*/*.c tests/*/*/*.c))
@@ -94,10 +99,12 @@ fuzz: $(patsubst %,$(BUILD)/clang/fuzz_%,$(or $(ONLY),$(FUZZ)))
 	tests/fuzz/run.sh $(BUILD) $(SECONDS_EACH) $(or $(ONLY),$(FUZZ))
 
 # clang-tidy (.clang-tidy) over the programs, cppcheck over all C (.cppcheck-suppressions): no finding.
-#: make lint       clang-tidy and cppcheck, no finding (minutes; a part of make check)
+#: make lint       clang-tidy and cppcheck, the order of the folders: no finding (minutes; a part of make check)
 LINT := $(MAINS) $(SOURCES)
-lint: $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
+lint: order $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS)) $(BUILD)/lint/cppcheck.ok
 	@echo '$(words $(LINT) $(KERNELS)) files, no finding'
+order: all
+	tests/lint/order.sh $(BUILD)
 # A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
 # every va_list but the first file's for one that was never started.
 define clang_tidy
@@ -130,11 +137,11 @@ tsan: $(BUILD)/tsan/pathtracer $(BUILD)/tsan/assay $(BUILD)/tsan/oiio.so $(THREA
 	tests/end_to_end/tsan.sh $(BUILD)/tsan $(THREADED)
 
 #: make faults     kill -9 at 200 moments each of five kinds of run; every allocation fails in turn (an hour)
-faults: $(BUILD)/pathtracer $(BUILD)/assay
-	tests/end_to_end/faults.sh $(BUILD) 200 1 $(ONLY)
+faults: $(BUILD)/pathtracer $(BUILD)/assay programs-no-memory
+	tests/end_to_end/faults.sh $(BUILD) 200 $(or $(ONLY),kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory)
 
 #: make coverage   lines of renderer/, reference/ and tools/ that the tests reach (12 minutes)
-coverage: all $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(BUILD)/cov/oiio.so $(call program,$(BUILD)/cov,$(TESTS)) \
+coverage: all $(BUILD)/no_memory/pathtracer $(BUILD)/cov/no_memory/pathtracer $(BUILD)/cov/no_memory/assay $(BUILD)/cov/pathtracer $(BUILD)/cov/assay $(BUILD)/cov/oiio.so $(call program,$(BUILD)/cov,$(TESTS)) \
   $(BUILD)/cov/tests/student_tracer $(END_TO_END)
 	tests/end_to_end/coverage.sh $(BUILD) $(call program,$(BUILD)/cov,$(TESTS))
 
@@ -191,5 +198,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz
+.PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
+  bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

@@ -12,26 +12,26 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e)
+bool image_oiio_file(struct path *path, struct err *e)
 {
     /* Beside the programs; beside the directory of the tests; where `make install` puts it. */
     static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so"};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-        fs_beside_program(path, IMAGE_OIIO_PATH, places[i]);
-        if (access(path, R_OK) == 0)
+        *path = fs_beside_program(places[i]);
+        if (access(path->s, R_OK) == 0)
             return true;
     }
-    fs_beside_program(path, IMAGE_OIIO_PATH, places[0]);
-    return err_set(e, "cannot load what reads pictures: %s is not there", path);
+    *path = fs_beside_program(places[0]);
+    return err_set(e, "cannot load what reads pictures: %s is not there", path->s);
 }
 
 /* Loaded for good at the first call; it is found again at the others. */
 static const struct oiio_table *load(struct err *e)
 {
-    char path[IMAGE_OIIO_PATH];
-    if (!image_oiio_file(path, e))
+    struct path path;
+    if (!image_oiio_file(&path, e))
         return NULL;
-    void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
+    void *module = dlopen(path.s, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
     const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
     if (table == NULL)
         err_set(e, "cannot load what reads pictures: %s", dlerror());

@@ -3,6 +3,7 @@
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
+#include "renderer/base/fs.h"
 #include "renderer/image/image.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
@@ -31,8 +32,7 @@ bool image_inspect(const char *path, struct image_info *out, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The file that it is loaded from. */
-enum { IMAGE_OIIO_PATH = 4096 };
-bool image_oiio_file(char path[IMAGE_OIIO_PATH], struct err *e) __attribute__((warn_unused_result));
+bool image_oiio_file(struct path *path, struct err *e) __attribute__((warn_unused_result));
 
 /* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */
 const char *image_oiio_version(struct err *e);

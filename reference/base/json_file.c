@@ -2,16 +2,25 @@
 
 #include "renderer/base/fs.h"
 
-bool json_write(const char *path, const json_t *root, struct err *e)
+#include <stdlib.h>
+
+bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)
 {
     struct out_file out;
-    if (!fs_make_parent_dirs(path, e) || !out_open(&out, path, e))
-        return false;
-    /* 12 digits: more than any estimate here holds, and a file that a person can read. */
-    if (json_dumpf(root, out.f, JSON_INDENT(1) | JSON_REAL_PRECISION(12)) != 0 ||
-        fputc('\n', out.f) == EOF) {
-        out_abandon(&out);
+    /* All that jansson needs before there is a file: without memory for it the program may end (tools/commands/assay.c). */
+    char *text = json_dumps(root, flags);
+    if (text == NULL)
         return err_set(e, "%s: cannot write JSON", path);
-    }
-    return out_commit(&out, e);
+    bool ok = out_open(&out, path, e);
+    if (ok)
+        fprintf(out.f, "%s\n", text); /* out_commit() looks at the error flag */
+    free(text);
+    return ok && out_commit(&out, e);
+}
+
+bool json_write(const char *path, const json_t *root, struct err *e)
+{
+    /* 12 digits: more than any estimate here holds, and a file that a person can read. */
+    return fs_make_parent_dirs(path, e) &&
+           json_write_as(path, root, JSON_INDENT(1) | JSON_REAL_PRECISION(12), e);
 }

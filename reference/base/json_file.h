@@ -9,5 +9,8 @@
 /* Writes by rename, indented, with a final newline; makes the directories above it. */
 bool json_write(const char *path, const json_t *root, struct err *e)
     __attribute__((warn_unused_result));
+/* The same with flags of json_dumps(), in a directory that is there. */
+bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

@@ -82,3 +82,24 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
     memcpy(out, s, strlen(s) + 1);
     return true;
 }
+
+const char *member_text(const json_t *object, const char *name)
+{
+    return json_string_value(json_object_get(object, name));
+}
+
+const char *member_or_empty(const json_t *object, const char *name)
+{
+    const char *text = member_text(object, name);
+    return text != NULL ? text : "";
+}
+
+double member_number(const json_t *object, const char *name)
+{
+    return json_number_value(json_object_get(object, name));
+}
+
+double member_end(const json_t *object, const char *name, size_t end)
+{
+    return json_number_value(json_array_get(json_object_get(object, name), end));
+}

@@ -1,4 +1,4 @@
-/* Reading a JSON object strictly: every error names the file and the member. */
+/* Reading a JSON object strictly: every error names the file and the member. And members of what was checked before. */
 #ifndef ASSAY_JSON_NODE_H
 #define ASSAY_JSON_NODE_H
 
@@ -33,5 +33,12 @@ bool json_get_number(const struct json_node *n, const char *key, double lo, doub
 /* One line of text, neither empty nor longer than the buffer. */
 bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
                    struct err *e) __attribute__((warn_unused_result));
+
+/* A member of an object of which all is known: NULL, "" and 0 where it is absent. */
+const char *member_text(const json_t *object, const char *name);
+const char *member_or_empty(const json_t *object, const char *name);
+double member_number(const json_t *object, const char *name);
+/* Of an interval: its lower (0) or upper (1) end. */
+double member_end(const json_t *object, const char *name, size_t end);
 
 #endif

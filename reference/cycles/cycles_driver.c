@@ -1,11 +1,12 @@
 /* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
 #define _GNU_SOURCE
-#include "reference/replicates/engine_driver.h"
+#include "cycles_driver.h"
 
 #include "export_cycles.h"
 #include "reference/replicates/independence.h"
 #include "reference/base/process.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "reference/base/json_file.h"
 
@@ -14,8 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { PATH_SIZE = 4096 + 64 };
 
 /* Of replicates first .. last-1; NULL out of memory. */
 static json_t *seeds_of(const struct reference_job *job, int first, int last)
@@ -33,10 +32,9 @@ static json_t *seeds_of(const struct reference_job *job, int first, int last)
 
 static bool write_seeds(const struct reference_job *job, int first, int last, struct err *e)
 {
-    char path[PATH_SIZE];
-    snprintf(path, sizeof path, "%s/seeds.json", job->dir);
+    const struct path path = fs_path("%s/seeds.json", job->dir);
     json_t *seeds = seeds_of(job, first, last);
-    bool ok = seeds != NULL ? json_write(path, seeds, e) : err_set(e, "out of memory");
+    bool ok = seeds != NULL ? json_write(path.s, seeds, e) : err_set(e, "out of memory");
     json_decref(seeds);
     return ok;
 }
@@ -141,24 +139,22 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
 static bool render(const struct reference_job *job, int first, int last, json_t *said,
                    struct err *e)
 {
-    char blender[4096], sha256[65], dump[PATH_SIZE], log[PATH_SIZE], relative[PATH_SIZE];
+    char blender[4096], sha256[65];
     char spp[16], threads[16], command[512] = "";
     json_t *report = NULL;
     char *script = NULL;
     bool ok = false;
     assert(last > first && job->ref->spp > 0 && job->opt->threads > 0);
-    if (strlen(job->dir) >= 4096 || strlen(job->opt->share_dir) >= 4096)
-        return err_set(e, "%.64s...: path too long", job->dir);
     if (!process_find("blender", blender, sizeof blender))
         return err_set(e, "blender: no such program in PATH (Blender 3.4 with Cycles)");
-    snprintf(relative, sizeof relative, "%s/cycles/cycles.py", job->opt->share_dir);
-    script = realpath(relative, NULL);
+    const struct path relative = fs_path("%s/cycles/cycles.py", job->opt->share_dir);
+    script = realpath(relative.s, NULL);
     if (script == NULL)
-        return err_set(e, "%s: %s", relative, strerror(errno));
-    snprintf(dump, sizeof dump, "%s/scene.json", job->dir);
-    snprintf(log, sizeof log, "%s/blender.log", job->dir);
+        return err_set(e, "%s: %s", relative.s, strerror(errno));
+    const struct path dump = fs_path("%s/scene.json", job->dir);
+    const struct path log = fs_path("%s/blender.log", job->dir);
     if (!sha256_file(blender, sha256, e) ||
-        !export_cycles(job->scene, job->camera, job->suite->depth, dump, e) ||
+        !export_cycles(job->scene, job->camera, job->suite->depth, dump.s, e) ||
         !write_seeds(job, first, last, e))
         goto out;
 
@@ -184,9 +180,9 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
                                 NULL};
     if (!process_run(
             &(struct process){
-                .argv = argv, .cwd = job->dir, .log = log, .timeout_s = job->opt->timeout_s},
+                .argv = argv, .cwd = job->dir, .log = log.s, .timeout_s = job->opt->timeout_s},
             NULL, e) ||
-        !read_report(log, &report, e))
+        !read_report(log.s, &report, e))
         goto out;
 
     for (int i = 0; argv[i] != NULL; i++)
@@ -203,5 +199,19 @@ out:
     return ok;
 }
 
-const struct engine_driver cycles_driver = {
-    .engine = "cycles", .prefix = "replicate", .count = count, .render = render, .fold = fold};
+static bool write_key(const struct reference_job *job, const char *path, struct err *e)
+{
+    return export_cycles(job->scene, job->camera, job->suite->depth, path, e);
+}
+
+static const char *const scripts[] = {"cycles/cycles.py",          "cycles/cycles_blender.py",
+                                      "cycles/cycles_geometry.py", "cycles/cycles_light.py",
+                                      "cycles/cycles_material.py", NULL};
+
+const struct engine_driver cycles_driver = {.program = "blender",
+                                            .scripts = scripts,
+                                            .prefix = "replicate",
+                                            .count = count,
+                                            .render = render,
+                                            .fold = fold,
+                                            .write_key = write_key};

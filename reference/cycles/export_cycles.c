@@ -1,8 +1,8 @@
 #include "export_cycles.h"
 
-#include "renderer/base/fs.h"
 #include "export_cycles_internal.h"
 #include "reference/suite/features.h"
+#include "reference/base/json_file.h"
 
 #include <assert.h>
 #include <math.h>
@@ -22,38 +22,20 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         err_set(e, "Cycles: a lens that focuses at distance %g", (double)c->focal_distance);
         return NULL;
     }
-    double tan_h = c->tan_h, lens = 18 / tan_h, square = tan_h * c->height / c->width;
-    if (!(fabs(c->tan_v / square - 1) < 1e-5)) {
-        err_set(e, "Cycles: the camera's pixels are not square (tan_h %g, tan_v %g, %d x %d)",
-                tan_h, (double)c->tan_v, c->width, c->height);
+    /* Blender keeps a rotation, not a matrix. */
+    if (!features_check_camera("Cycles", s, c, e))
         return NULL;
-    }
+    double tan_h = c->tan_h, lens = 18 / tan_h, square = tan_h * c->height / c->width;
     if (!(lens >= LENS_MIN && lens <= LENS_MAX)) {
         err_set(e,
                 "Cycles: horizontal angle of view out of Blender's range (tan of its half is %g)",
                 tan_h);
         return NULL;
     }
-    /* Blender keeps a rotation, not a matrix. */
-    dvec3 right = cycles_wide(c->right), up = cycles_wide(c->up), back = cycles_wide(c->backward);
-    if (!(d3_length(d3_sub(d3_cross(right, up), back)) < 1e-5 && fabs(d3_dot(right, up)) < 1e-5)) {
-        err_set(e, "Cycles: the camera's axes are not orthogonal");
-        return NULL;
-    }
     double nearest, furthest;
     features_distances(s, c->eye, &nearest, &furthest);
     nearest -= (double)c->lens_radius; /* where a ray may start */
     furthest += (double)c->lens_radius;
-    if (!(nearest > c->near && nearest > 0)) {
-        err_set(e, "Cycles: geometry at distance %g from the eye, the near plane is at %g", nearest,
-                (double)c->near);
-        return NULL;
-    }
-    if (!(furthest < c->far)) {
-        err_set(e, "Cycles: geometry at distance %g from the eye, the far plane is at %g", furthest,
-                (double)c->far);
-        return NULL;
-    }
     /* Cycles clips by depth, we by distance: take planes that clip nothing in either. */
     double corner = sqrt(1 + tan_h * tan_h + square * square);
     return json_pack("{so,so,so,so,sf,s[ff],sf,sf}", "right", cycles_vec3(c->right), "up",
@@ -61,19 +43,6 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
                      cycles_vec3(c->eye), "tan_h", tan_h, "clip", 0.5 * nearest / corner,
                      2 * furthest, "lens_radius", (double)c->lens_radius, "focal_distance",
                      (double)c->focal_distance);
-}
-
-static bool write_json(const json_t *root, const char *path, struct err *e)
-{
-    struct out_file o;
-    if (!out_open(&o, path, e))
-        return false;
-    if (json_dumpf(root, o.f, JSON_COMPACT | JSON_REAL_PRECISION(9)) != 0 ||
-        fputc('\n', o.f) == EOF) {
-        out_abandon(&o);
-        return err_set(e, "%s: cannot write", path);
-    }
-    return out_commit(&o, e);
 }
 
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
@@ -100,7 +69,7 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
                          "materials", materials, "meshes", meshes, "spheres",
                          cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
                          environment);
-        ok = root != NULL && write_json(root, path, &why);
+        ok = root != NULL && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), &why);
     }
     if (!ok && image_written)
         unlink(image);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const format_names[] = {"mitsuba", "pbrt", "povray", "cycles", "dae", NULL};
+static const char *const format_names[] = {ENGINES(ENGINE_WORD) "dae", NULL};
 static const char *const output_names[] = {"mean", "exact", "moments", NULL};
 static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
 
@@ -145,8 +145,8 @@ static bool read_extra(const struct json_node *n, const struct engine *en, const
 {
     unsigned used;
     bool has = json_object_get(n->object, key) != NULL;
-    bool wants = en->format == FORMAT_DAE && (en->feature & 1u << feature);
-    if (has && en->format != FORMAT_DAE)
+    bool wants = en->format == NULL && (en->feature & 1u << feature);
+    if (has && en->format != NULL)
         return err_set(e, "%s: '%s' is for \"format\": \"dae\" only", n->file, key);
     if (has != wants)
         return err_set(e, "%s: '%s' and the feature '%s' come together with \"format\": \"dae\"",
@@ -167,7 +167,8 @@ static bool read_optional_int(const struct json_node *n, const char *key, int lo
 
 static bool read_name(const struct json_node *n, struct engine *en, struct err *e)
 {
-    static const char *const taken[] = {"truth", "cycles", "povray", "pathtracer", NULL};
+    static const char *const taken[] = {"truth", "pathtracer",
+                                        ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL};
     if (!json_get_text(n, "name", en->name, sizeof en->name, e))
         return false;
     if (en->name[strspn(en->name, "abcdefghijklmnopqrstuvwxyz0123456789_-")] != '\0')
@@ -191,7 +192,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
     if (!json_only_keys(&n, keys, e) || !read_name(&n, en, e) ||
         !get_word(&n, "format", format_names, &word, e))
         return false;
-    en->format = (enum engine_format)word;
+    en->format = engine_kind_of(format_names[word]);
     if (!get_word(&n, "output", output_names, &word, e))
         return false;
     en->output = (enum engine_output)word;

@@ -1,40 +1,18 @@
-/* Any renderer, by a small JSON file that says how to call it and what it can do (tools/docs/formats/engine.md):
- *
- *   {
- *     "name": "mitsuba",            a-z, 0-9, _ and -; names files and claims
- *     "comment": "...",             (optional, for people)
- *     "format": "mitsuba",          what {scene} is: "mitsuba", "pbrt", "povray" or "cycles" (what
- *                                   `assay export` writes), or "dae" (the suite's own file)
- *     "command": ["mitsuba", "-D", "spp={spp}", "-D", "seed={seed}", "-o", "{out}", "{scene}"],
- *     "output": "mean",             "mean": a picture of radiance for each seed; "exact": one picture
- *                                   without noise; "moments": one moments EXR (renderer/image/moments.h)
- *     "image": "exr",               (optional) ending of {out}: "exr", "hdr" or "pfm"
- *     "expresses": ["diffuse", "area", ...],    features.h
- *     "depth_offset": 1,            (optional, -1 .. 1) {depth} is our -m plus this
- *     "spp": 64, "replicates": 16,  (optional) what is asked for unless the user says otherwise
- *     "version": ["mitsuba", "--help"],         (optional) its first line of output is the version
- *     "lens_args": ["-b", "{lens_radius}", "-d", "{focal_distance}"],  (with "dae" only) added to the
- *     "environment_args": ["-e", "{environment}"]                      command for scenes that have one
- *   }
- *
- * Commands run without a shell. The program is looked up in PATH; with a slash in its name and no
- * slash in front it is relative to the directory of the description, which is also {here}. Other
- * placeholders: {scene} {out} (absolute paths) {spp} {seed} {depth} {width} {height} {threads};
- * {{ and }} are braces. */
+/* Any renderer, by a small JSON file that says how to call it and what it can do: tools/docs/formats/engine.md. Commands
+ * run without a shell. */
 #ifndef ASSAY_ENGINE_DESCRIPTION_H
 #define ASSAY_ENGINE_DESCRIPTION_H
 
 #include "renderer/image/moments.h"
 #include "reference/suite/suite.h"
 
-enum engine_format { FORMAT_MITSUBA, FORMAT_PBRT, FORMAT_POVRAY, FORMAT_CYCLES, FORMAT_DAE };
 enum engine_output { OUTPUT_MEAN, OUTPUT_EXACT, OUTPUT_MOMENTS };
 
 struct engine {
     char file[4096]; /* the description */
     char here[4096]; /* its directory, absolute */
     char name[32];
-    enum engine_format format;
+    const struct engine_kind *format; /* whose scene files it reads; NULL: the suite's own, "dae" */
     enum engine_output output;
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */

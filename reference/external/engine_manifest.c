@@ -5,6 +5,7 @@
 #include "reference/replicates/engine_driver.h"
 #include "reference/base/process.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/shell_quote.h"
 
@@ -42,27 +43,27 @@ bool engine_program(const struct engine *en, const char *key, char *path, size_t
 /* The first line with something in it, printable ASCII. */
 static bool read_version(const struct engine_job *j, char line[256], struct err *e)
 {
-    char program[4096], log[PATH_SIZE];
+    char program[4096];
     const char *const values[] = {"here", j->en->here, NULL};
     char **argv = NULL;
     strcpy(line, "unknown");
     if (json_object_get(j->en->json, "version") == NULL)
         return true;
-    snprintf(log, sizeof log, "%s/version.log", j->dir);
+    const struct path log = fs_path("%s/version.log", j->dir);
     bool ok = engine_program(j->en, "version", program, sizeof program, e) &&
               engine_argv(j->en, "version", values, &argv, e);
     if (ok) {
         argv[0] = program;
         ok = process_run(&(struct process){.argv = (const char *const *)argv,
                                            .cwd = j->dir,
-                                           .log = log,
+                                           .log = log.s,
                                            .timeout_s = j->opt->timeout_s},
                          NULL, e);
     }
     free(argv);
-    FILE *f = ok ? fopen(log, "r") : NULL;
+    FILE *f = ok ? fopen(log.s, "r") : NULL;
     if (ok && f == NULL)
-        ok = err_set(e, "%s: cannot read: %s", log, strerror(errno));
+        ok = err_set(e, "%s: cannot read: %s", log.s, strerror(errno));
     bool found = false;
     while (ok && !found && fgets(line, 256, f) != NULL) {
         line[strcspn(line, "\r\n")] = '\0';
@@ -81,13 +82,13 @@ static bool hash_files(const struct engine *en, json_t *files, struct err *e)
     const json_t *command = json_object_get(en->json, "command");
     for (size_t i = 0; i < json_array_size(command); i++) {
         const char *arg = json_string_value(json_array_get(command, i));
-        char path[PATH_SIZE], hash[65];
+        char hash[65];
         if (strncmp(arg, "{here}/", 7) != 0 || strchr(arg + 7, '{') != NULL)
             continue;
-        snprintf(path, sizeof path, "%s/%s", en->here, arg + 7);
-        if (access(path, F_OK) != 0)
+        const struct path path = fs_path("%s/%s", en->here, arg + 7);
+        if (access(path.s, F_OK) != 0)
             continue;
-        if (!sha256_file(path, hash, e))
+        if (!sha256_file(path.s, hash, e))
             return false;
         if (json_object_set_new(files, arg, json_string(hash)) != 0)
             return err_set(e, "out of memory");

@@ -135,10 +135,9 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     struct replicate_repeats repeats;
     bool ok = replicate_repeats_alloc(&repeats, j->replicates, e);
     for (int k = 0; ok && k < j->replicates; k++) {
-        char path[PATH_SIZE];
-        snprintf(path, sizeof path, "%s/replicate_%04d.%s", j->dir, k, j->en->image);
-        float *px = run_process(j, replicate_seed(j->opt->seed, k), path, e)
-                        ? read_picture(j, path, e)
+        const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
+        float *px = run_process(j, replicate_seed(j->opt->seed, k), path.s, e)
+                        ? read_picture(j, path.s, e)
                         : NULL;
         ok = px != NULL;
         if (!ok)
@@ -150,7 +149,7 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
                 repeats.same);
         moments_add_image(m, px);
         free(px);
-        unlink(path);
+        unlink(path.s);
     }
     if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
         make_exact(m);
@@ -187,8 +186,8 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
                    const struct engine_options *opt, struct moments *out, json_t **manifest,
                    struct err *e)
 {
-    char dir[PATH_SIZE], work[PATH_MAX];
-    struct engine_job j = {.en = en, .suite = scene, .opt = opt, .dir = dir};
+    char work[PATH_MAX];
+    struct engine_job j = {.en = en, .suite = scene, .opt = opt};
     double start = now_seconds();
     assert(opt->threads > 0);
     j.spp = opt->spp > 0 ? opt->spp : en->spp;
@@ -197,16 +196,15 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
                                              : en->replicates;
     if (realpath(opt->work_dir, work) == NULL)
         return err_set(e, "%s: %s", opt->work_dir, strerror(errno));
-    if (snprintf(dir, sizeof dir, "%s/%s-%s-XXXXXX", work, scene->name, en->name) >=
-        (int)sizeof dir)
-        return err_set(e, "%.64s...: path too long", work);
-    if (mkdtemp(dir) == NULL)
+    struct path dir = fs_path("%s/%s-%s-XXXXXX", work, scene->name, en->name);
+    j.dir = dir.s;
+    if (mkdtemp(dir.s) == NULL)
         return err_set(e, "%s: cannot make a directory in it: %s", work, strerror(errno));
     *manifest = NULL;
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
-                    engine_write_scene(en, scene, dir, j.scene, e) && run_all(&j, out, e);
+                    engine_write_scene(en, scene, dir.s, j.scene, e) && run_all(&j, out, e);
     bool ok = rendered && engine_describe(&j, out, now_seconds() - start, manifest, e) &&
-              fs_remove_tree(dir, e);
+              fs_remove_tree(dir.s, e);
     if (ok)
         return true;
     if (rendered)
@@ -214,7 +212,7 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
     json_decref(*manifest);
     *manifest = NULL;
     struct err what = *e;
-    bool kept = rmdir(dir) != 0;
+    bool kept = rmdir(dir.s) != 0;
     return err_set(e, "%s, %s: %.800s%s%s%s", scene->name, en->name, what.msg, kept ? " (see " : "",
-                   kept ? dir : "", kept ? ")" : "");
+                   kept ? dir.s : "", kept ? ")" : "");
 }

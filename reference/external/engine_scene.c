@@ -2,10 +2,7 @@
 #define _GNU_SOURCE
 #include "engine_internal.h"
 
-#include "reference/cycles/export_cycles.h"
-#include "reference/mitsuba/export_mitsuba.h"
-#include "reference/pbrt/export_pbrt.h"
-#include "reference/povray/export_povray.h"
+#include "engine_bindings.h"
 #include "reference/suite/features.h"
 
 #include "renderer/base/fs.h"
@@ -14,33 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char *ending_of(enum engine_format format)
-{
-    switch (format) {
-    case FORMAT_MITSUBA: return "xml";
-    case FORMAT_PBRT: return "pbrt";
-    case FORMAT_POVRAY: return "pov";
-    case FORMAT_CYCLES: return "json";
-    case FORMAT_DAE: break;
-    }
-    return "dae";
-}
-
-static bool write_text(const struct engine *en, const struct scene *s, const struct camera *c,
-                       int depth, const char *path, struct err *e)
-{
-    struct out_file out;
-    struct povray_variant plain = povray_variant_plain();
-    if (!out_open(&out, path, e))
-        return false;
-    if (en->format == FORMAT_PBRT ? !export_pbrt(s, c, depth, out.f, e)
-                                  : !export_povray(s, c, depth, &plain, out.f, e)) {
-        out_abandon(&out);
-        return false;
-    }
-    return out_commit(&out, e);
-}
 
 static bool check_features(const struct engine *en, unsigned needed, struct err *e)
 {
@@ -62,18 +32,13 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
     /* Mitsuba's count of bounces is ours plus one whoever reads the file, and so on: that is the
      * exporter's business. depth_offset is only for {depth}. */
     bool ok = check_features(en, features_of_scene(&s, &c), e);
-    if (ok && snprintf(path, PATH_SIZE, "%s/scene.%s", dir, ending_of(en->format)) >= PATH_SIZE)
+    if (ok && en->format == NULL)
+        ok =
+            realpath(suite->dae, path) != NULL || err_set(e, "%s: %s", suite->dae, strerror(errno));
+    else if (ok && snprintf(path, PATH_SIZE, "%s/scene%s", dir, en->format->ending) >= PATH_SIZE)
         ok = err_set(e, "%.64s...: path too long", dir);
-    switch (en->format) {
-    case FORMAT_MITSUBA: ok = ok && export_mitsuba(&s, &c, suite->depth, path, e); break;
-    case FORMAT_CYCLES: ok = ok && export_cycles(&s, &c, suite->depth, path, e); break;
-    case FORMAT_PBRT:
-    case FORMAT_POVRAY: ok = ok && write_text(en, &s, &c, suite->depth, path, e); break;
-    case FORMAT_DAE:
-        if (ok && realpath(suite->dae, path) == NULL)
-            ok = err_set(e, "%s: %s", suite->dae, strerror(errno));
-        break;
-    }
+    else
+        ok = ok && engine_export(en->format, &s, &c, suite->depth, path, e);
     scene_free(&s);
     return ok;
 }
@@ -81,11 +46,11 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
 bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
                       struct err *why)
 {
-    char sub[PATH_SIZE], path[PATH_SIZE];
+    char path[PATH_SIZE];
     struct err ignored;
-    snprintf(sub, sizeof sub, "%s/%s-try-XXXXXX", dir, en->name);
-    if (mkdtemp(sub) == NULL)
+    struct path sub = fs_path("%s/%s-try-XXXXXX", dir, en->name);
+    if (mkdtemp(sub.s) == NULL)
         return err_set(why, "%s: cannot make a directory in it: %s", dir, strerror(errno));
-    bool ok = engine_write_scene(en, scene, sub, path, why);
-    return fs_remove_tree(sub, ok ? why : &ignored) && ok;
+    bool ok = engine_write_scene(en, scene, sub.s, path, why);
+    return fs_remove_tree(sub.s, ok ? why : &ignored) && ok;
 }

@@ -202,7 +202,6 @@ bool import_check_compare(const struct scene *s, const struct camera *c, const j
 static bool write_jobs(const struct suite_scene *const *scene, int num, const char *dir,
                        struct err *e)
 {
-    char path[4096 + 32];
     json_t *jobs = json_array();
     bool ok = true;
     for (int i = 0; ok && i < num; i++) {
@@ -214,8 +213,7 @@ static bool write_jobs(const struct suite_scene *const *scene, int num, const ch
                                                           scene[i]->height)) == 0 ||
                     err_set(e, "out of memory"));
     }
-    snprintf(path, sizeof path, "%s/jobs.json", dir);
-    ok = ok && json_write(path, jobs, e);
+    ok = ok && json_write(fs_path("%s/jobs.json", dir).s, jobs, e);
     json_decref(jobs);
     return ok;
 }
@@ -239,19 +237,17 @@ static bool read_dumps(int num, const char *dir, json_t **dumps, struct err *e)
 bool import_check_run(const struct suite_scene *const *scene, int num,
                       const struct import_options *opt, json_t **dumps, struct err *e)
 {
-    char dir[4096], log[4096 + 32], relative[4096 + 32];
-    int n = snprintf(dir, sizeof dir, "%s/import-XXXXXX", opt->work_dir);
-    if (n < 0 || (size_t)n >= sizeof dir || strlen(opt->share_dir) >= 4096)
-        return err_set(e, "%.64s...: path too long", opt->work_dir);
-    snprintf(relative, sizeof relative, "%s/import_check/blender_import.py", opt->share_dir);
-    char *script = realpath(relative, NULL);
+    struct path temp = fs_path("%s/import-XXXXXX", opt->work_dir);
+    const char *const dir = temp.s;
+    const struct path relative = fs_path("%s/import_check/blender_import.py", opt->share_dir);
+    char *script = realpath(relative.s, NULL);
     if (script == NULL)
-        return err_set(e, "%s: %s", relative, strerror(errno));
-    if (mkdtemp(dir) == NULL) {
+        return err_set(e, "%s: %s", relative.s, strerror(errno));
+    if (mkdtemp(temp.s) == NULL) {
         free(script);
         return err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
     }
-    snprintf(log, sizeof log, "%s/blender.log", dir);
+    const struct path log = fs_path("%s/blender.log", dir);
     const char *const argv[] = {"blender",
                                 "-b",
                                 "--factory-startup",
@@ -264,7 +260,7 @@ bool import_check_run(const struct suite_scene *const *scene, int num,
                                 "--jobs",
                                 "jobs.json",
                                 NULL};
-    const struct process p = {.argv = argv, .cwd = dir, .log = log, .timeout_s = opt->timeout_s};
+    const struct process p = {.argv = argv, .cwd = dir, .log = log.s, .timeout_s = opt->timeout_s};
     bool ok = write_jobs(scene, num, dir, e) && process_run(&p, NULL, e) &&
               read_dumps(num, dir, dumps, e);
     free(script);

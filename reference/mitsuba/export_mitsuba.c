@@ -13,8 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PATH_SIZE = 4096 };
-
 /* What the writers below share. */
 struct writer {
     struct mitsuba_xml *xml;
@@ -27,18 +25,13 @@ struct writer {
 /* The reference to a file beside the scene. */
 static void filename(struct writer *w, const char *ending)
 {
-    char name[PATH_SIZE];
-    snprintf(name, sizeof name, "%s_%s", w->base, ending);
-    mitsuba_text(w->xml, "string", "filename", name);
+    mitsuba_text(w->xml, "string", "filename", fs_path("%s_%s", w->base, ending).s);
 }
 
 static bool write_picture(const struct writer *w, const char *ending, const struct image *im,
                           struct err *e)
 {
-    char path[PATH_SIZE];
-    if (snprintf(path, sizeof path, "%s_%s", w->stem, ending) >= (int)sizeof path)
-        return err_set(e, "%.64s...: path too long", w->stem);
-    return image_write_exr(path, im, e);
+    return image_write_exr(fs_path("%s_%s", w->stem, ending).s, im, e);
 }
 
 static const char *const RGB_NAMES[3] = {"R", "G", "B"};
@@ -169,11 +162,8 @@ static bool put_material(struct writer *w, uint32_t index, struct err *e)
 static bool write_mesh(const struct writer *w, const struct object *o, const char *ending,
                        bool smooth, struct err *e)
 {
-    char path[PATH_SIZE];
     struct out_file out;
-    if (snprintf(path, sizeof path, "%s_%s", w->stem, ending) >= (int)sizeof path)
-        return err_set(e, "%.64s...: path too long", w->stem);
-    if (!out_open(&out, path, e))
+    if (!out_open(&out, fs_path("%s_%s", w->stem, ending).s, e))
         return false;
     fprintf(out.f,
             "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty float x\n"
@@ -355,15 +345,13 @@ bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, co
                     struct err *e)
 {
     assert(depth >= 0);
-    char stem[PATH_SIZE];
-    if (snprintf(stem, sizeof stem, "%s", path) >= (int)sizeof stem)
-        return err_set(e, "%.64s...: path too long", path);
-    char *slash = strrchr(stem, '/'), *dot = strrchr(stem, '.');
+    struct path stem = fs_path("%s", path);
+    char *slash = strrchr(stem.s, '/'), *dot = strrchr(stem.s, '.');
     if (dot != NULL && (slash == NULL || dot > slash + 1))
         *dot = '\0';
     struct mitsuba_xml xml;
     struct writer w = {
-        .xml = &xml, .s = s, .c = c, .stem = stem, .base = slash != NULL ? slash + 1 : stem};
+        .xml = &xml, .s = s, .c = c, .stem = stem.s, .base = slash != NULL ? slash + 1 : stem.s};
     if (!features_check_exportable("Mitsuba", s, c, e))
         return false;
     bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) && mitsuba_write(&xml, path, e);

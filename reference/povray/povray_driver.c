@@ -1,5 +1,5 @@
 /* Drives POV-Ray: the pictures of a povray_replicates, rendered side by side. */
-#include "reference/replicates/engine_driver.h"
+#include "povray_driver.h"
 
 #include "povray_replicates.h"
 #include "reference/base/process.h"
@@ -95,29 +95,28 @@ static bool run_engine(const struct process *run, struct err *e)
 static bool render_one(struct crew *w, const struct povray_image *p, float sign, float *out,
                        struct err *e)
 {
-    char dir[4096], pov[4224], exr[4224], log[4224], text[4][32];
+    char text[4][32];
     const char *argv[POVRAY_ARGS];
-    if (snprintf(dir, sizeof dir, "%s/%s", w->job->dir, p->name) >= (int)sizeof dir)
-        return err_set(e, "%.64s...: path too long", w->job->dir);
-    snprintf(pov, sizeof pov, "%s/scene.pov", dir);
-    snprintf(exr, sizeof exr, "%s/scene.exr", dir);
-    snprintf(log, sizeof log, "%s/povray.log", dir);
-    if (!fs_make_dirs(dir, e))
+    const struct path dir = fs_path("%s/%s", w->job->dir, p->name);
+    const struct path pov = fs_path("%s/scene.pov", dir.s);
+    const struct path exr = fs_path("%s/scene.exr", dir.s);
+    const struct path log = fs_path("%s/povray.log", dir.s);
+    if (!fs_make_dirs(dir.s, e))
         return false;
-    FILE *f = fopen(pov, "w");
+    FILE *f = fopen(pov.s, "w");
     if (f == NULL)
-        return err_set(e, "%s: cannot write: %s", pov, strerror(errno));
+        return err_set(e, "%s: cannot write: %s", pov.s, strerror(errno));
     bool ok = export_povray(w->job->scene, w->job->camera, w->job->suite->depth, &p->variant, f, e);
     if (fclose(f) != 0 && ok)
-        ok = err_set(e, "%s: cannot write: %s", pov, strerror(errno));
+        ok = err_set(e, "%s: cannot write: %s", pov.s, strerror(errno));
     if (!ok)
         return false;
     povray_command_line(w->set, w->program, p, text, argv);
     struct process run = {
-        .argv = argv, .cwd = dir, .log = log, .timeout_s = w->job->opt->timeout_s};
+        .argv = argv, .cwd = dir.s, .log = log.s, .timeout_s = w->job->opt->timeout_s};
     bool radiosity = p->variant.indirect && w->set->plan.pass[p->variant.pass].recursion > 0;
-    return run_engine(&run, e) && (!radiosity || check_log(log, e)) &&
-           add_picture(w, p, exr, sign, out, e) && fs_remove_tree(dir, e);
+    return run_engine(&run, e) && (!radiosity || check_log(log.s, e)) &&
+           add_picture(w, p, exr.s, sign, out, e) && fs_remove_tree(dir.s, e);
 }
 
 /* Adds its passes up, box-averaged to the job's size, into a file. */
@@ -190,17 +189,17 @@ static bool run_crew(struct crew *w, struct err *e)
 /* "POV-Ray 3.7.0.10.unofficial": the first line that begins so. */
 static bool engine_version(const struct crew *w, char line[128], struct err *e)
 {
-    char log[4224];
     const char *argv[] = {w->program, "--version", NULL};
-    snprintf(log, sizeof log, "%s/version.log", w->job->dir);
-    if (!process_run(
-            &(struct process){
-                .argv = argv, .cwd = w->job->dir, .log = log, .timeout_s = w->job->opt->timeout_s},
-            NULL, e))
+    const struct path log = fs_path("%s/version.log", w->job->dir);
+    if (!process_run(&(struct process){.argv = argv,
+                                       .cwd = w->job->dir,
+                                       .log = log.s,
+                                       .timeout_s = w->job->opt->timeout_s},
+                     NULL, e))
         return false;
-    FILE *f = fopen(log, "r");
+    FILE *f = fopen(log.s, "r");
     if (f == NULL)
-        return err_set(e, "%s: cannot read: %s", log, strerror(errno));
+        return err_set(e, "%s: cannot read: %s", log.s, strerror(errno));
     bool found = false;
     while (!found && fgets(line, 128, f) != NULL)
         found = strncmp(line, "POV-Ray ", 8) == 0;
@@ -219,8 +218,6 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
     struct crew w = {.set = &set, .job = job, .program = program, .first = first, .last = last};
     if (!process_find("povray", program, sizeof program))
         return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
-    if (strlen(job->dir) >= 4096)
-        return err_set(e, "%.64s...: path too long", job->dir);
     if (!povray_replicates(job, &set, e))
         return false;
     w.next = first;
@@ -239,9 +236,36 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     return true;
 }
 
-const struct engine_driver povray_driver = {.engine = "povray",
+/* One picture of each of the three kinds in each pass; the others differ from them by the seed. */
+static bool write_key(const struct reference_job *job, const char *path, struct err *e)
+{
+    const struct suite_scene *s = job->suite;
+    struct povray_passes plan;
+    if (!povray_passes(job->scene, job->camera, s->depth, &plan, e))
+        return false;
+    uint32_t seed = replicate_seed(job->opt->seed, 0);
+    FILE *f = fopen(path, "w");
+    if (f == NULL)
+        return err_set(e, "%s: cannot write: %s", path, strerror(errno));
+    bool ok = true;
+    for (int i = 0; ok && i < 3 * plan.num_passes; i++) {
+        struct povray_image p =
+            i % 3 == 0 ? povray_window(&plan, s->width, s->height, 0, i / 3)
+                       : povray_replicate(&plan, s->width, s->height, job->ref->subgrid, 0, seed,
+                                          i / 3, i % 3 == 1);
+        fprintf(f, "// grid %d, block %d\n", p.grid, p.block);
+        ok = export_povray(job->scene, job->camera, s->depth, &p.variant, f, e);
+    }
+    fprintf(f, "// %d windows\n", POVRAY_WINDOWS);
+    if (fclose(f) != 0 && ok)
+        ok = err_set(e, "%s: cannot write: %s", path, strerror(errno));
+    return ok;
+}
+
+const struct engine_driver povray_driver = {.program = "povray",
                                             .prefix = "picture",
                                             .below_zero = true,
                                             .count = count,
                                             .render = render,
-                                            .fold = povray_fold};
+                                            .fold = povray_fold,
+                                            .write_key = write_key};

@@ -3,6 +3,7 @@
 #include "povray_glass.h"
 #include "povray_lamp.h"
 
+#include "reference/suite/features.h"
 #include "renderer/shading/bsdf.h"
 #include "renderer/scene/environment.h"
 
@@ -21,38 +22,6 @@
 static vec3 face_normal(const vec3 *p)
 {
     return normalize(cross(sub(p[1], p[0]), sub(p[2], p[0])));
-}
-
-static double distance_to_box(vec3 p, vec3 lo, vec3 hi)
-{
-    double dx = fmax(0, fmax((double)lo.x - p.x, (double)p.x - hi.x));
-    double dy = fmax(0, fmax((double)lo.y - p.y, (double)p.y - hi.y));
-    double dz = fmax(0, fmax((double)lo.z - p.z, (double)p.z - hi.z));
-    return sqrt(dx * dx + dy * dy + dz * dz);
-}
-
-static vec3 farthest_corner(vec3 p, vec3 lo, vec3 hi)
-{
-    return v3(fmaxf(p.x - lo.x, hi.x - p.x), fmaxf(p.y - lo.y, hi.y - p.y),
-              fmaxf(p.z - lo.z, hi.z - p.z));
-}
-
-/* A lower bound of the eye's distance to what is nearest: for a triangle, the distance to its plane
- * and to its bounding box. */
-static double nearest_geometry(const struct scene *s, vec3 eye)
-{
-    double nearest = INFINITY;
-    for (uint32_t i = 0; i < s->num_triangles; i++) {
-        const vec3 *p = &s->position[3 * (size_t)i];
-        double plane = fabsf(dot(face_normal(p), sub(eye, p[0])));
-        double box =
-            distance_to_box(eye, vmin(p[0], vmin(p[1], p[2])), vmax(p[0], vmax(p[1], p[2])));
-        nearest = fmin(nearest, fmax(plane, box));
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++)
-        nearest = fmin(nearest,
-                       fabs((double)length(sub(eye, s->spheres[i].centre)) - s->spheres[i].radius));
-    return nearest;
 }
 
 static bool reflects(const struct material *m)
@@ -98,24 +67,11 @@ static bool check_material(const struct material *m, struct err *e)
     return true;
 }
 
-static bool check_normals(const struct scene *s, struct err *e)
-{
-    for (uint32_t i = 0; i < s->num_triangles; i++) {
-        vec3 n = face_normal(&s->position[3 * (size_t)i]);
-        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
-            if (!(dot(n, s->normal[k]) > 0))
-                return err_set(e,
-                               "POV-Ray is not verified with shading normals behind the triangle "
-                               "(object '%s')",
-                               s->objects[s->tri_object[i]].name);
-    }
-    return true;
-}
-
 static bool check_camera(const struct scene *s, const struct camera *c, double extent,
                          struct err *e)
 {
-    double farthest = length(farthest_corner(c->eye, s->bounds_min, s->bounds_max));
+    double nearest, farthest;
+    features_distances(s, c->eye, &nearest, &farthest);
     if (c->lens_radius > 0)
         return err_set(e, "POV-Ray's depth of field is not verified: the lens must be a pinhole");
     if (!(extent >= MIN_EXTENT && fmax(extent, farthest) <= MAX_REACH))
@@ -124,16 +80,7 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
             "POV-Ray's fixed tolerances show: the scene spans %.3g and reaches %.3g from "
             "the eye, not at least %g and at most %g",
             extent, farthest, MIN_EXTENT, MAX_REACH);
-    double nearest = nearest_geometry(s, c->eye);
-    if (c->near > 0 && nearest < c->near)
-        return err_set(e,
-                       "POV-Ray has no clipping planes: geometry may be at %.6g, nearer than %.6g",
-                       nearest, c->near);
-    if (c->far > 0 && farthest > c->far)
-        return err_set(e,
-                       "POV-Ray has no clipping planes: geometry may be at %.6g, farther than %.6g",
-                       farthest, c->far);
-    return true;
+    return features_check_clipping("POV-Ray", s, c, e);
 }
 
 /* What there is in a scene, of objects that reflect and of lights. */
@@ -297,7 +244,7 @@ bool povray_passes(const struct scene *s, const struct camera *c, int depth,
         if (!check_material(&s->materials[i], e))
             return false;
     count_materials(s, &n);
-    if (!check_normals(s, e) || !check_camera(s, c, p.extent, e) ||
+    if (!features_check_normals("POV-Ray", s, e) || !check_camera(s, c, p.extent, e) ||
         !povray_check_glass(s, c, p.extent, e) || !plan_lights(s, &p, &n, e))
         return false;
     plan_passes(s, &n, depth, &p);

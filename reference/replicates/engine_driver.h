@@ -37,9 +37,10 @@ uint32_t replicate_seed(uint32_t seed, int k);
 /* An engine. Rendering and folding share nothing but pictures and what was said, so that they can be done on different
  * machines. Each fails with one line if the engine cannot express the scene at all. */
 struct engine_driver {
-    const char *engine;
-    const char *prefix; /* of a picture's file, replicate_images_path() */
-    bool below_zero;    /* pictures are differences */
+    const char *program;        /* looked up in PATH */
+    const char *const *scripts; /* what it runs of share_dir, NULL at the end; or NULL */
+    const char *prefix;         /* of a picture's file, replicate_images_path() */
+    bool below_zero;            /* pictures are differences */
     /* How many pictures the fold takes. */
     bool (*count)(const struct reference_job *job, int *num, struct err *e);
     /* Pictures first .. last-1 into files of job->dir that are numbered from 0. Adds to `said` what the manifest needs and only
@@ -51,8 +52,9 @@ struct engine_driver {
      * Calls opt->on_replicate. */
     bool (*fold)(const struct reference_job *job, const struct replicate_images *pictures,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
+    /* A file that says all that decides the pictures, beside the program, the scripts and what the suite asks for. */
+    bool (*write_key)(const struct reference_job *job, const char *path, struct err *e);
 };
-extern const struct engine_driver cycles_driver, povray_driver;
 
 /* All of it here: count, render, fold. */
 bool engine_driver_render(const struct engine_driver *driver, const struct reference_job *job,

@@ -373,8 +373,14 @@ bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **
 {
     *names = json_object();
     DIR *d = opendir(golden_dir);
+    if (d == NULL && errno != ENOENT) {
+        err_set(e, "%s: %s", golden_dir, strerror(errno));
+        json_decref(*names);
+        *names = NULL;
+        return false;
+    }
     if (d == NULL)
-        return errno == ENOENT || err_set(e, "%s: %s", golden_dir, strerror(errno));
+        return true;
     bool ok = *names != NULL || err_set(e, "out of memory");
     struct dirent *entry;
     while (ok && (entry = readdir(d)) != NULL)

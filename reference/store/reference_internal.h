@@ -3,9 +3,7 @@
 #define ASSAY_REFERENCE_INTERNAL_H
 
 #include "reference_render.h"
-
-/* NULL if there is none of that name. */
-const struct engine_driver *engine_driver_of(const char *engine);
+#include "reference/external/engine_bindings.h"
 
 /* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
 bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,

@@ -10,38 +10,28 @@
 #include <string.h>
 #include <unistd.h>
 
-const struct engine_driver *engine_driver_of(const char *engine)
-{
-    return strcmp(engine, cycles_driver.engine) == 0   ? &cycles_driver
-           : strcmp(engine, povray_driver.engine) == 0 ? &povray_driver
-                                                       : NULL;
-}
-
 bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
                             const struct reference_options *opt,
                             bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
                             void *ctx, struct err *e)
 {
-    char dir[4096];
-    int n = snprintf(dir, sizeof dir, "%s/%s-%s-XXXXXX", opt->work_dir, scene->name, ref->engine);
-    if (n < 0 || (size_t)n >= sizeof dir)
-        return err_set(e, "%.64s...: path too long", opt->work_dir);
-    if (mkdtemp(dir) == NULL)
+    struct path dir = fs_path("%s/%s-%s-XXXXXX", opt->work_dir, scene->name, ref->engine);
+    if (mkdtemp(dir.s) == NULL)
         return err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
     struct scene s = {0};
     struct camera camera;
     struct reference_job job = {
-        .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera, .dir = dir};
+        .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera, .dir = dir.s};
     bool ok = suite_open(scene, &s, &camera, e);
     if (ok) {
         ok = act(&job, ctx, e);
         scene_free(&s);
     }
     if (ok)
-        return fs_remove_tree(dir, e);
-    if (rmdir(dir) != 0) {
+        return fs_remove_tree(dir.s, e);
+    if (rmdir(dir.s) != 0) {
         struct err what = *e;
-        err_set(e, "%.900s (see %s)", what.msg, dir);
+        err_set(e, "%.900s (see %s)", what.msg, dir.s);
     }
     return false;
 }

@@ -134,8 +134,20 @@ unsigned features_of_scene(const struct scene *s, const struct camera *c)
     return f;
 }
 
-bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
-                               struct err *e)
+bool features_check_clipping(const char *engine, const struct scene *s, const struct camera *c,
+                             struct err *e)
+{
+    double nearest, furthest;
+    features_distances(s, c->eye, &nearest, &furthest);
+    return !may_be_cut(s, c) ||
+           err_set(e,
+                   "%s: the near plane is at %g, the far plane is at %g: they may cut geometry, at "
+                   "distance %g to %g from the eye",
+                   engine, (double)c->near, (double)c->far, nearest, furthest);
+}
+
+bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
+                           struct err *e)
 {
     double square = (double)c->tan_h * c->height / c->width;
     dvec3 right = wide(c->right), up = wide(c->up), back = wide(c->backward);
@@ -144,9 +156,11 @@ bool features_check_exportable(const char *engine, const struct scene *s, const 
                        engine, (double)c->tan_h, (double)c->tan_v, c->width, c->height);
     if (!(d3_length(d3_sub(d3_cross(right, up), back)) < 1e-5 && fabs(d3_dot(right, up)) < 1e-5))
         return err_set(e, "%s: the camera's axes are not orthogonal", engine);
-    if (may_be_cut(s, c))
-        return err_set(e, "%s: the near plane at %g or the far plane at %g may cut the scene",
-                       engine, (double)c->near, (double)c->far);
+    return features_check_clipping(engine, s, c, e);
+}
+
+bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
+{
     for (uint32_t i = 0; i < s->num_triangles; i++) {
         dvec3 n = unit_normal(s->position + 3 * (size_t)i);
         for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
@@ -155,4 +169,10 @@ bool features_check_exportable(const char *engine, const struct scene *s, const 
                                engine, s->objects[s->tri_object[i]].name);
     }
     return true;
+}
+
+bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
+                               struct err *e)
+{
+    return features_check_camera(engine, s, c, e) && features_check_normals(engine, s, e);
 }

@@ -39,9 +39,16 @@ bool features_triangle_is_flat(const struct scene *s, uint32_t triangle);
  * the larger of its plane's and its box's), and that of the furthest. */
 void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
 
-/* For the writers of scene files: fails, with `engine` in front, where the camera's pixels are not
- * square or its axes not orthogonal, where the near or far plane cuts, and where a shading normal of
- * a vertex is on the back of its triangle. */
+/* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry: */
+bool features_check_clipping(const char *engine, const struct scene *s, const struct camera *c,
+                             struct err *e) __attribute__((warn_unused_result));
+/* Also where the camera's pixels are not square or its axes not orthogonal. */
+bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
+                           struct err *e) __attribute__((warn_unused_result));
+/* Where a shading normal of a vertex is on the back of its triangle. */
+bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
+    __attribute__((warn_unused_result));
+/* Camera and normals. */
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e) __attribute__((warn_unused_result));
 

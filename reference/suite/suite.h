@@ -1,37 +1,11 @@
-/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against
- * which references, inside which margins, what must come out) and NN_name.md (what it can detect,
- * what it is blind to, and, for closed forms, the derivation). Families by number: 1x closed form,
- * 2x BSDF, 3x light, 4x whole scene, 9x must differ.
- *
- *   {
- *     "title": "Cornell box with two diffuse spheres",
- *     "detects": "one line", "blind_to": "one line",
- *     "width": 128, "height": 128, "depth": 5, "spp": 2048, "tile": 16,
- *     "expect": "EQUIVALENT",
- *     "environment": "sky.exr",                  (optional: the file beside this one that lights it)
- *     "lens_radius": 0.1, "focal_distance": 2,   (optional, both or none: a thin lens)
- *     "variants": [{"name": "hemisphere", "options": ["--direct", "hemisphere"], "spp": 4096,
- *                   "margin_global": 0.01, "margin_tile": 0.05}],
- *                                                (optional: ours by other means, judged too)
- *     "consistency": {"renders": 8, "spp": 32, "margin": 0.1,  (optional: tools/stats/stated_error.h)
- *                     "noise_margin": 0.05,      (optional: tools/stats/sample_efficiency.h; with a truth whose noise
- *                                                 has a closed form)
- *                     "adaptive": {"batch": 16, "tolerance": 0.1, "spp": 512}},
- *                                                (optional: tools/sequential/adaptive_stop.h)
- *     "not_expressible": {"povray": "one line"}, (optional: why an engine is not among references)
- *     "references_of": "41_cornell",             (only 9x: whose references it is held against)
- *     "references": {
- *       "cycles": {"class": "exact", "margin_global": 0.005, "margin_tile": 0.02,
- *                  "replicates": 16, "spp": 256},
- *       "povray": {"class": "limit", ..., "replicates": 16, "subgrid": 4},
- *       "truth":  {"class": "exact", ..., "kind": "point_over_plane", "values": {...}}
- *     }
- *   }
- *
- * An unknown key, a missing key, a value out of range is an error with file and reason. */
+/* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which references, inside
+ * which margins, what must come out: tools/docs/formats/suite.md) and NN_name.md (what it can detect, what it is blind
+ * to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF, 3x light, 4x whole scene,
+ * 9x must differ. An unknown key, a missing key, a value out of range is an error with file and reason. */
 #ifndef ASSAY_SUITE_H
 #define ASSAY_SUITE_H
 
+#include "engine_table.h"
 #include "renderer/scene/camera.h"
 #include "renderer/base/err.h"
 
@@ -40,14 +14,14 @@
 enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
 
 struct suite_reference {
-    char engine[16];      /* "cycles", "povray" or "truth" */
+    char engine[16];      /* of engine_table.h, with goldens, or "truth" */
     char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
     int replicates;       /* engines: images with a seed of their own */
-    int spp;              /* cycles: samples per pixel of one replicate */
-    int subgrid;          /* povray: one replicate is a box-averaged (k W) x (k H) picture */
+    int spp;              /* samples per pixel of one replicate, or */
+    int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) picture */
     char kind[32];        /* truth: which closed form (truth.h) */
     json_t *values;       /* truth: its numbers; borrowed from the suite */
 };
@@ -60,7 +34,7 @@ struct suite_variant {
     const char *options[9];            /* NULL at the end; borrowed from the suite */
 };
 
-enum { MAX_VARIANTS = 8 };
+enum { MAX_VARIANTS = 8, MAX_REFERENCES = NUM_ENGINES_WITH_GOLDENS + 1 /* truth */ };
 
 struct suite_scene {
     char name[64];                      /* "41_cornell" */
@@ -89,7 +63,7 @@ struct suite_scene {
     json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
     char references_of[64];  /* name of the scene whose references are used; its own name by default
                              */
-    struct suite_reference reference[3];
+    struct suite_reference reference[MAX_REFERENCES];
     int num_references;
     json_t *json; /* owned */
 };
@@ -115,6 +89,7 @@ const struct suite_reference *suite_reference_of(const struct suite_scene *s, co
 bool suite_noise_is_known(const char *kind);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
+extern const char *const verdict_names[]; /* by enum verdict; end with NULL */
 bool verdict_parse(const char *name, enum verdict *out);
 
 #endif

@@ -5,10 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const verdict_names[] = {
+const char *const verdict_names[] = {
     [VERDICT_EQUIVALENT] = "EQUIVALENT",
     [VERDICT_DIFFERENT] = "DIFFERENT",
     [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
+    NULL,
 };
 
 const char *verdict_name(enum verdict v)
@@ -18,7 +19,7 @@ const char *verdict_name(enum verdict v)
 
 bool verdict_parse(const char *name, enum verdict *out)
 {
-    for (size_t i = 0; i < sizeof verdict_names / sizeof *verdict_names; i++)
+    for (size_t i = 0; verdict_names[i] != NULL; i++)
         if (strcmp(name, verdict_names[i]) == 0) {
             *out = (enum verdict)i;
             return true;
@@ -35,15 +36,17 @@ bool suite_noise_is_known(const char *kind)
 static bool read_reference(const char *file, const char *engine, json_t *object,
                            struct suite_reference *r, struct err *e)
 {
-    static const char *const cycles_keys[] = {"class",      "margin_global", "margin_tile",
-                                              "replicates", "spp",           NULL};
-    static const char *const povray_keys[] = {"class",      "margin_global", "margin_tile",
-                                              "replicates", "subgrid",       NULL};
-    static const char *const truth_keys[] = {"class", "margin_global", "margin_tile",
-                                             "kind",  "values",        NULL};
-    bool cycles = strcmp(engine, "cycles") == 0, povray = strcmp(engine, "povray") == 0;
-    bool truth = strcmp(engine, "truth") == 0;
-    if (!cycles && !povray && !truth)
+    const struct engine_kind *kind = engine_with_goldens(engine);
+    bool truth = strcmp(engine, "truth") == 0, subgrid = kind != NULL && kind->subgrid;
+    const char *const keys[] = {"class",
+                                "margin_global",
+                                "margin_tile",
+                                truth ? "kind" : "replicates",
+                                truth     ? "values"
+                                : subgrid ? "subgrid"
+                                          : "spp",
+                                NULL};
+    if (kind == NULL && !truth)
         return err_set(e, "%s: unknown engine 'references.%s'", file, engine);
     if (!json_is_object(object))
         return err_set(e, "%s: 'references.%s' is not an object", file, engine);
@@ -51,11 +54,7 @@ static bool read_reference(const char *file, const char *engine, json_t *object,
     snprintf(at, sizeof at, "references.%s.", engine);
     struct json_node n = {file, at, object};
     snprintf(r->engine, sizeof r->engine, "%s", engine);
-    if (!json_only_keys(&n,
-                        cycles   ? cycles_keys
-                        : povray ? povray_keys
-                                 : truth_keys,
-                        e) ||
+    if (!json_only_keys(&n, keys, e) ||
         !json_get_text(&n, "class", r->fidelity, sizeof r->fidelity, e) ||
         !json_get_number(&n, "margin_global", 0, 1, &r->margin_global, e) ||
         !json_get_number(&n, "margin_tile", 0, 1, &r->margin_tile, e))
@@ -70,8 +69,8 @@ static bool read_reference(const char *file, const char *engine, json_t *object,
     /* One replicate would have no variance. */
     if (!json_get_int(&n, "replicates", 2, 4096, &r->replicates, e))
         return false;
-    return cycles ? json_get_int(&n, "spp", 1, 1 << 20, &r->spp, e)
-                  : json_get_int(&n, "subgrid", 1, 64, &r->subgrid, e);
+    return subgrid ? json_get_int(&n, "subgrid", 1, 64, &r->subgrid, e)
+                   : json_get_int(&n, "spp", 1, 1 << 20, &r->spp, e);
 }
 
 static bool read_references(const char *file, json_t *object, struct suite_scene *s, struct err *e)
@@ -200,13 +199,12 @@ static bool check_noise(const char *file, const struct suite_scene *s, struct er
 /* An engine either has a reference or a reason, not both. */
 static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    static const char *const engines[] = {"cycles", "povray", NULL};
     if (json_object_get(n->object, "not_expressible") == NULL)
         return true;
     if (!json_get_object(n, "not_expressible", &s->not_expressible, e))
         return false;
     struct json_node reasons = {n->file, "not_expressible.", s->not_expressible};
-    if (!json_only_keys(&reasons, engines, e))
+    if (!json_only_keys(&reasons, engine_names, e))
         return false;
     const char *engine;
     json_t *value;

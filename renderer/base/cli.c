@@ -1,5 +1,6 @@
 #include "cli.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -29,15 +30,23 @@ static int unknown(const char *arg, struct err *e)
     return CLI_ERROR;
 }
 
+static int num_args(const struct cli_option *o)
+{
+    int num = o->args != NULL && o->args[0] != '\0';
+    for (const char *c = o->args; num > 0 && *c != '\0'; c++)
+        num += *c == ' ';
+    return num;
+}
+
 /* The option's arguments are the words that follow. */
 static int take_words(struct cli *c, int i, const char *arg, struct err *e)
 {
     const struct cli_option *o = &c->options[i];
-    if (c->argc - c->next < o->num_args) {
+    if (c->argc - c->next < num_args(o)) {
         err_set(e, "option '%s' needs %s", arg, o->args);
         return CLI_ERROR;
     }
-    for (int k = 0; k < o->num_args; k++)
+    for (int k = 0; k < num_args(o); k++)
         c->value[k] = c->argv[c->next++];
     return i;
 }
@@ -51,8 +60,8 @@ static int next_long(struct cli *c, const char *arg, struct err *e)
     const struct cli_option *o = &c->options[i];
     if (equals == NULL)
         return take_words(c, i, arg, e);
-    if (o->num_args != 1) {
-        err_set(e, "option --%s takes %d arguments, not '='", o->long_name, o->num_args);
+    if (num_args(o) != 1) {
+        err_set(e, "option --%s takes %d arguments, not '='", o->long_name, num_args(o));
         return CLI_ERROR;
     }
     c->value[0] = equals + 1;
@@ -74,11 +83,11 @@ static int next_short(struct cli *c, const char *arg, const char *at, struct err
     const struct cli_option *o = &c->options[i];
     if (at[1] == '\0')
         return take_words(c, i, arg, e);
-    if (o->num_args > 1) {
+    if (num_args(o) > 1) {
         err_set(e, "option '-%c' takes %s, each a word of its own, not '%s'", *at, o->args, arg);
         return CLI_ERROR;
     }
-    if (o->num_args == 1)
+    if (num_args(o) == 1)
         c->value[0] = at + 1;
     else
         c->letters = at + 1;
@@ -129,27 +138,28 @@ char **cli_apart(const struct cli_option *options, int argc, char **argv)
         sprintf(letters, "-%c", options[i].short_name);
         word[n++] = letters;
         letters += sizeof "-x";
-        for (int k = 0; k < options[i].num_args; k++)
+        for (int k = 0; k < num_args(&options[i]); k++)
             word[n++] = (char *)c.value[k];
     }
     word[n] = NULL;
     return word;
 }
 
-void cli_print_options(FILE *f, const struct cli_option *options)
+void cli_print_help(const char *usage, const struct cli_option *options)
 {
+    puts(usage);
     for (const struct cli_option *o = options; o->long_name != NULL; o++) {
         char left[64];
         int n = o->short_name
                     ? snprintf(left, sizeof left, "  -%c, --%s", o->short_name, o->long_name)
                     : snprintf(left, sizeof left, "      --%s", o->long_name);
-        if (o->num_args > 0)
+        if (num_args(o) > 0)
             snprintf(left + n, sizeof left - (size_t)n, " %s", o->args);
         const char *help = o->help;
         while (true) {
             const char *end = strchr(help, '\n');
             int length = end ? (int)(end - help) : (int)strlen(help);
-            fprintf(f, "%-30s %.*s\n", left, length, help);
+            printf("%-30s %.*s\n", left, length, help);
             if (end == NULL)
                 break;
             help = end + 1;
@@ -169,7 +179,7 @@ bool cli_int(const char *what, const char *text, long lo, long hi, int *out, str
     return true;
 }
 
-bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
+static bool read_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
 {
     char *end;
     errno = 0;
@@ -193,8 +203,8 @@ bool cli_double(const char *what, const char *text, double lo, double hi, double
 
 const struct cli_unit cli_time_units[] = {{"s", 1}, {"m", 60}, {"h", 3600}, {NULL, 1}};
 
-bool cli_with_unit(const char *what, const char *text, const struct cli_unit *unit, double hi,
-                   double *out, struct err *e)
+static bool with_unit(const char *what, const char *text, const struct cli_unit *unit, double hi,
+                      double *out, struct err *e)
 {
     char number[64];
     size_t n = strlen(text);
@@ -228,4 +238,114 @@ int cli_processors(void)
 {
     long n = sysconf(_SC_NPROCESSORS_ONLN);
     return n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
+}
+
+bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e)
+{
+    uint64_t v = 0;
+    if (!read_uint64(what, text, &v, e))
+        return false;
+    *out = (uint32_t)v;
+    return v <= UINT32_MAX || err_set(e, "%s: '%s' is above 2^32-1", what, text);
+}
+
+static bool read_range(const struct cli_option *o, const char *what, const char *text, int out[2],
+                       struct err *e)
+{
+    char first[32] = "";
+    const char *colon = strchr(text, ':');
+    if (colon == NULL || colon - text >= (ptrdiff_t)sizeof first)
+        return err_set(e, "%s: '%s' is not a range A:B", what, text);
+    memcpy(first, text, (size_t)(colon - text));
+    return cli_int(what, first, 0, (long)o->hi - 1, &out[0], e) &&
+           cli_int(what, colon + 1, 1, (long)o->hi, &out[1], e) &&
+           (out[0] < out[1] || err_set(e, "%s: no %s in '%s'", what, o->noun, text));
+}
+
+/* One argument of an option. */
+static bool read_value(const struct cli_option *o, const char *text, void *to, struct err *e)
+{
+    char what[64];
+    int index;
+    assert(text != NULL);
+    snprintf(what, sizeof what, "--%s", o->long_name);
+    if (o->names != NULL && !cli_choice(what, text, o->names, &index, e))
+        return false;
+    if (o->kind == CLI_TEXT)
+        *(const char **)to = text;
+    else if (o->names != NULL)
+        *(int *)to = (int)o->lo + index;
+    else if (o->kind == CLI_INT)
+        return cli_int(what, text, (long)o->lo, (long)o->hi, to, e);
+    else if (o->kind == CLI_UINT32)
+        return cli_uint32(what, text, to, e);
+    else if (o->kind == CLI_UINT64)
+        return read_uint64(what, text, to, e);
+    else if (o->kind == CLI_RANGE)
+        return read_range(o, what, text, to, e);
+    else
+        return o->unit != NULL ? with_unit(what, text, o->unit, o->hi, to, e)
+                               : cli_double(what, text, o->lo, o->hi, to, e);
+    return true;
+}
+
+/* The next text of a list with room for `most`. */
+static bool add_text(const struct cli_option *o, const struct cli *c, const char **to, int *num,
+                     int most, struct err *e)
+{
+    if (*num < most) {
+        to[(*num)++] = c->value[0];
+        return true;
+    }
+    if (o->long_name != NULL)
+        return err_set(e, "--%s: at most %d %s", o->long_name, most, o->noun);
+    return o->noun != NULL
+               ? err_set(e, "at most %d %s", most, o->noun)
+               : err_set(e, "%s takes %s, '%s' is one more", c->argv[0], o->args, c->value[0]);
+}
+
+static bool take(const struct cli_option *o, const struct cli *c, void *settings, struct err *e)
+{
+    char *to = (char *)settings + o->to;
+    const char **text = (void *)to;
+    int num = num_args(o);
+    if (o->read != NULL)
+        return o->read(settings, c->value, e);
+    if (o->kind == CLI_LIST)
+        return add_text(o, c, text, (void *)((char *)settings + o->num), (int)o->hi, e);
+    if (o->kind == CLI_REST)
+        *(int *)(void *)to = c->next - 1;
+    else if (o->long_name == NULL && o->kind == CLI_TEXT)
+        return add_text(o, c, text, &(int){*text != NULL}, 1, e);
+    else if (o->long_name == NULL)
+        return err_set(e, "%s takes no argument '%s'", c->argv[0], c->value[0]);
+    else if (o->kind == CLI_FLAG)
+        *(bool *)to = true;
+    else if (num == 0)
+        *(int *)(void *)to = (int)o->lo;
+    for (int k = 0; k < num; k++, to += o->kind == CLI_INT ? sizeof(int) : sizeof *text)
+        if (!read_value(o, c->value[k], to, e))
+            return false;
+    return true;
+}
+
+bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
+              struct err *e)
+{
+    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
+    const struct cli_option *words = options;
+    while (words->long_name != NULL)
+        words++;
+    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
+        if (i == CLI_ERROR)
+            return false;
+        const struct cli_option *o = i == CLI_POSITIONAL ? words : &options[i];
+        if (!take(o, &c, settings, e))
+            return false;
+        if (o->usage != NULL)
+            cli_print_help(o->usage, options);
+        if (o->stops || o->usage != NULL)
+            break;
+    }
+    return true;
 }

@@ -1,20 +1,78 @@
-/* Command lines: a table of options that is also the --help text, and strict number parsing. Shared
- * by both programs. An option may take several arguments, as the assignment's -r W H does. */
+/* Command lines: a table of options that is the --help text and says where each value goes and what it may be, and strict
+ * number parsing. Shared by both programs. An option may take several arguments, as the assignment's -r W H does. */
 #ifndef ASSAY_CLI_H
 #define ASSAY_CLI_H
 
 #include "err.h"
 
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
+/* A number above 0 is times the value of the unit (one character) behind it or, without one, of the last, whose name is NULL. */
+struct cli_unit {
+    const char *name;
+    double value;
+};
+extern const struct cli_unit cli_time_units[]; /* 90, 90s, 5m or 2h, in seconds */
+
+enum cli_kind {
+    CLI_READ,
+    CLI_FLAG,
+    CLI_INT,
+    CLI_UINT32,
+    CLI_UINT64,
+    CLI_DOUBLE,
+    CLI_TEXT,
+    CLI_LIST,
+    CLI_RANGE,
+    CLI_REST
+};
+
+/* A row: where the value goes stands in a member of the command's settings, whose type says how it is read. A table ends with
+ * a row without a name, which is about the words that are no options: {0} if the command takes none. */
 struct cli_option {
     char short_name;       /* 0: none */
     const char *long_name; /* without dashes */
-    int num_args;          /* 0 .. 4 */
-    const char *args;      /* as shown in the help: "W H" */
+    const char *args;      /* as shown in the help, a word for each of up to 4: "W H"; "": none */
     const char *help;      /* with default and unit; '\n' starts a new line */
+    enum cli_kind kind;    /* this and the next by one of the macros below */
+    size_t to;
+    double lo,
+        hi; /* of a number; lo: what an int becomes without arguments, or by the first of the names */
+    const char *const *names;    /* a text is one of these, an int lo + its index; NULL: any */
+    const struct cli_unit *unit; /* a double is cli_with_unit(), at most hi; NULL: no units */
+    size_t num;                  /* CLI_LIST: where the int is that counts */
+    const char *noun;            /* what a CLI_LIST or CLI_RANGE is of, for messages */
+    bool (*read)(void *settings, const char *const value[4], struct err *e); /* CLI_READ: does it */
+    bool stops;        /* nothing is read after it */
+    const char *usage; /* of --help: stops, and prints this and the table; NULL: does not */
 };
+
+/* The kind and the place of a member of struct `type`. Several arguments go into as many members in a row. */
+#define CLI_TO(type, member)                                                                       \
+    .kind = _Generic(((type *)0)->member,                                                          \
+                     bool: CLI_FLAG,                                                               \
+                     int: CLI_INT,                                                                 \
+                     int *: CLI_INT,                                                               \
+                     uint32_t: CLI_UINT32, /* or an enum, with names or without arguments */       \
+                     uint64_t: CLI_UINT64,                                                         \
+                     double: CLI_DOUBLE,                                                           \
+                     const char *: CLI_TEXT,                                                       \
+                     const char **: CLI_TEXT),                                                     \
+    .to = offsetof(type, member)
+/* An option that may be given again: an array of texts, and the int that counts them. */
+#define CLI_TO_LIST(type, member, count)                                                           \
+    .kind = CLI_LIST, .to = offsetof(type, member), .num = offsetof(type, count),                  \
+    .hi = sizeof((type *)0)->member / sizeof(const char *)
+/* A:B, 0 <= A < B <= hi, into the int `member` and the one behind it. */
+#define CLI_TO_RANGE(type, member) .kind = CLI_RANGE, .to = offsetof(type, member)
+/* Of the last row: the words from the first that is no option on are another command; its index. */
+#define CLI_TO_REST(type, member) .kind = CLI_REST, .to = offsetof(type, member), .stops = true
+/* Reads the words into *settings, which hold the defaults. False with one line on what is no option, no value of it, or one word
+ * too many. Text is that of argv. */
+bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
+              struct err *e) __attribute__((warn_unused_result));
 
 struct cli {
     const struct cli_option *options; /* ends with a NULL long_name */
@@ -39,32 +97,22 @@ int cli_next(struct cli *c, struct err *e);
 char **cli_apart(const struct cli_option *options, int argc, char **argv)
     __attribute__((warn_unused_result));
 
-/* Prints the table, two columns. */
-void cli_print_options(FILE *f, const struct cli_option *options);
+/* Prints the text and then the table in two columns on stdout. */
+void cli_print_help(const char *usage, const struct cli_option *options);
 
 /* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. */
 bool cli_int(const char *what, const char *text, long lo, long hi, int *out, struct err *e)
     __attribute__((warn_unused_result));
-bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
+bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e)
     __attribute__((warn_unused_result));
 bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
                 struct err *e) __attribute__((warn_unused_result));
 
-/* A number above 0 and at most hi, times the value of the unit (one character) behind it or, without
- * one, of the last, whose name is NULL. */
-struct cli_unit {
-    const char *name;
-    double value;
-};
-extern const struct cli_unit cli_time_units[]; /* 90, 90s, 5m or 2h, in seconds */
-bool cli_with_unit(const char *what, const char *text, const struct cli_unit *unit, double hi,
-                   double *out, struct err *e) __attribute__((warn_unused_result));
-
-/* What --threads is where nobody says: the processors of the machine, at most 1024. */
-int cli_processors(void);
-
 /* Index of `text` in a NULL-terminated list of words; fails naming the list. */
 bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                 struct err *e) __attribute__((warn_unused_result));
+
+/* What --threads is where nobody says: the processors of the machine, at most 1024. */
+int cli_processors(void);
 
 #endif

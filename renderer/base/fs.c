@@ -1,11 +1,23 @@
 #define _GNU_SOURCE
 #include "fs.h"
 
+#include "renderer/base/fs.h"
 #include <errno.h>
 #include <ftw.h>
+#include <stdarg.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+struct path fs_path(const char *format, ...)
+{
+    struct path p;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(p.s, sizeof p.s, format, args);
+    va_end(args);
+    return p;
+}
 
 bool out_open(struct out_file *o, const char *path, struct err *e)
 {
@@ -108,12 +120,12 @@ const char *fs_base(const char *path)
     return slash != NULL ? slash + 1 : path;
 }
 
-void fs_beside_file(const char *path, const char *name, char *beside, size_t size)
+struct path fs_beside_file(const char *path, const char *name)
 {
-    snprintf(beside, size, "%.*s%s", (int)(fs_base(path) - path), path, name);
+    return fs_path("%.*s%s", (int)(fs_base(path) - path), path, name);
 }
 
-void fs_beside_program(char *path, size_t size, const char *name)
+struct path fs_beside_program(const char *name)
 {
     char self[3072];
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
@@ -121,5 +133,5 @@ void fs_beside_program(char *path, size_t size, const char *name)
     char *slash = strrchr(self, '/');
     if (slash != NULL)
         *slash = '\0';
-    snprintf(path, size, "%s/%s", slash != NULL ? self : ".", name);
+    return fs_path("%s/%s", slash != NULL ? self : ".", name);
 }

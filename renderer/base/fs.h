@@ -4,7 +4,16 @@
 
 #include "err.h"
 
+#include "renderer/base/fs.h"
+#include <limits.h>
 #include <stdio.h>
+
+/* A path put together from parts. One that is too long for the system is cut where it still is: every use of it fails, none
+ * touches another file. */
+struct path {
+    char s[PATH_MAX + 1];
+};
+struct path fs_path(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* A file under construction: written beside its final place, renamed by out_commit(). */
 struct out_file {
@@ -31,10 +40,10 @@ bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_
 
 /* The name of a file without its directories, within `path`. */
 const char *fs_base(const char *path);
-/* Into beside: the file `name` in the directory of the file `path`. */
-void fs_beside_file(const char *path, const char *name, char *beside, size_t size);
+/* The file `name` in the directory of the file `path`. */
+struct path fs_beside_file(const char *path, const char *name);
 
-/* Into path: the file `name` beside the program that runs, or in the current directory if that cannot be known. */
-void fs_beside_program(char *path, size_t size, const char *name);
+/* The file `name` beside the program that runs, or in the current directory if that cannot be known. */
+struct path fs_beside_program(const char *name);
 
 #endif

@@ -2,14 +2,16 @@
 #include "image.h"
 
 #include <openexr.h>
+#include <errno.h>
 #include <png.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* libpng comes back by longjmp() after this, so all that is to be freed lies with those who call the function with the setjmp(). */
+/* For memory that it lacks libpng has many words, "too many text chunks" among them: errno, which is 0 before, knows better.
+ * It comes back by longjmp() after this, so all that is to be freed lies with those who call the function with the setjmp(). */
 static void failed(png_structp png, png_const_charp message)
 {
-    err_set(png_get_error_ptr(png), "%s", message);
+    err_set(png_get_error_ptr(png), "%s", errno == ENOMEM ? "out of memory" : message);
     png_longjmp(png, 1);
 }
 
@@ -18,7 +20,7 @@ static void warned(png_structp png, png_const_charp message)
 {
     struct err *why = png_get_error_ptr(png);
     if (why->msg[0] == '\0')
-        err_set(why, "%s", message);
+        err_set(why, "%s", errno == ENOMEM ? "out of memory" : message);
 }
 
 static png_text *texts_of(const struct image_attr *attr, int num)
@@ -37,6 +39,7 @@ static bool write_to(png_structp png, png_infop info, FILE *f, int width, int he
 {
     if (setjmp(png_jmpbuf(png)))
         return false;
+    errno = 0;
     png_init_io(png, f);
     png_set_IHDR(png, info, (png_uint_32)width, (png_uint_32)height, 8, PNG_COLOR_TYPE_RGB,
                  PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);

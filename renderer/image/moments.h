@@ -46,7 +46,7 @@ struct moments moments_run(const struct moments *m, size_t first, int num);
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 
 /* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes
- * "assay:unit", "assay:spp" and those given. float32. */
+ * "assay:unit", "assay:spp" and those given (tools/docs/formats/moments-exr.md). float32. */
 bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
                    int num_attrs, struct err *e) __attribute__((warn_unused_result));
 /* The same with the channels of `layers` (same size; NULL: none) after those. */

@@ -22,6 +22,7 @@ struct options {
     int spp;          /* of the whole picture, the most if adaptive */
     int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
+    int accumulate; /* 0: only light that bounced exactly max_bounces times, which first_bounce then says */
     bool quiet, aov, keep_state;
     enum roulette_kind roulette;
     double survival; /* of ROULETTE_FIXED */

@@ -1,5 +1,6 @@
 #include "output.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/base/shell_quote.h"
 #include "renderer/image/tone.h"
 #include "renderer/base/version.h"
@@ -156,11 +157,8 @@ static bool write_png(const struct output_writer *w, const char *path, const uin
 
 static bool write_rates(const struct output_writer *w, const char *png, struct err *e)
 {
-    char path[4096];
-    if (strlen(png) + sizeof "_rate" > sizeof path)
-        return err_set(e, "%.64s...: path too long", png);
-    snprintf(path, sizeof path, "%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
-    return write_png(w, path, w->rates, e);
+    int stem = (int)(strlen(png) - strlen(".png"));
+    return write_png(w, fs_path("%.*s_rate.png", stem, png).s, w->rates, e);
 }
 
 bool output_close(struct output_writer *w, struct err *e)

@@ -226,18 +226,17 @@ done:
 /* assay plans, submits and gathers; it calls us again for each part. Returns only if it cannot be run. */
 static bool hand_over(int argc, char **argv, struct err *e)
 {
-    char path[4096];
-    fs_beside_program(path, sizeof path, "assay");
+    struct path path = fs_beside_program("assay");
     char **words = calloc((size_t)argc + 3, sizeof *words);
     if (words == NULL)
         return err_set(e, "--slurm: out of memory");
-    words[0] = path;
+    words[0] = path.s;
     words[1] = (char[]){"slurm"};
     words[2] = (char[]){"pathtracer"};
     memcpy(words + 3, argv + 1, (size_t)(argc - 1) * sizeof *words);
-    execv(path, words);
+    execv(path.s, words);
     free(words);
-    return err_set(e, "--slurm: cannot run %s: %s", path, strerror(errno));
+    return err_set(e, "--slurm: cannot run %s: %s", path.s, strerror(errno));
 }
 
 int main(int argc, char **argv)

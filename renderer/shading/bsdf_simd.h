@@ -1,5 +1,6 @@
 /* Scattering (bsdf.h) by lanes, which may be of different materials. Directions in the local frame. A new material has
- * a header of its own, its lines in eval_lobes() and sample_lobes() and, if it scatters, its bit in MATERIAL_SCATTERS. */
+ * a header of its own, lines in eval_lobes() and sample_lobes() and, unless all its lobes are delta, its bit in
+ * MATERIAL_SCATTERS. */
 #ifndef ASSAY_BSDF_SIMD_H
 #define ASSAY_BSDF_SIMD_H
 

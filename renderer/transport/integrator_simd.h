@@ -1,5 +1,5 @@
-/* The stages of the integrator on as many paths at a time as there are lanes, compiled once for each instruction set: one
- * lane for ISA_SCALAR, else eight. Every path has the same bits. */
+/* The stages of the integrator on as many paths at a time as there are lanes, compiled once for each instruction set:
+ * one lane for ISA_SCALAR, else eight. Every path has the same bits. */
 #ifndef ASSAY_INTEGRATOR_SIMD_H
 #define ASSAY_INTEGRATOR_SIMD_H
 

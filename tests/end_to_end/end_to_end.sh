@@ -676,7 +676,8 @@ part tests/studies/scale/scale.sh "$build"
 part tests/studies/scale/scale_reference.sh "$build"
 
 # Kills, full disks and missing memory.
-part tests/end_to_end/faults.sh "$build" 2 97
+part tests/end_to_end/faults.sh "$build" 2
+part tests/end_to_end/no_memory.sh "$build"
 
 # The page, in a browser.
 part tests/browser/run.sh "$build"

@@ -1,14 +1,13 @@
 #!/bin/bash
-# tests/end_to_end/faults.sh BUILD [KILLS [STEP [PART...]]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
+# tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
 # render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
-# of an uninterrupted run. Full disk, read-only directory, closed pipe. Every STEP-th allocation (61st) fails in turn, in pathtracer
-# and in assay: one line and exit 3, or the right answer. Prints "ok NAME" or "not ok NAME: why".
-# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory (all; disk uses what grading and
-# validation leave).
+# of an uninterrupted run. Full disk, read-only directory, closed pipe. Prints "ok NAME" or "not ok NAME: why".
+# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock (all these; disk uses what grading and
+# validation leave); memory: tests/end_to_end/no_memory.sh with every allocation (an hour).
 set -u
-build=$(realpath "${1:?usage: tests/end_to_end/faults.sh BUILD [KILLS [STEP [PART...]]]}") kills=${2:-6} step=${3:-61}
-shift $(($# > 3 ? 3 : $#))
-[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock memory
+build=$(realpath "${1:?usage: tests/end_to_end/faults.sh BUILD [KILLS [PART...]]}") kills=${2:-6}
+shift $(($# > 2 ? 2 : $#))
+[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock
 pathtracer=$build/pathtracer assay=$build/assay scene=$PWD/reference/scenes/41_cornell.dae
 tmp=$(mktemp -d)
 # What is killed here, or has no disk, keeps no counts for tests/end_to_end/coverage.sh (LLVM_PROFILE_FILE): it would spoil those of the others.
@@ -294,45 +293,9 @@ disk() {
     if is_whole "$tmp/p1.exr" && is_whole "$tmp/p2.exr"; then tell "closed pipe: whole pictures" ""; else tell "closed pipe: whole pictures" "no"; fi
 }
 
-# A results file but for what a clock says, and the processor's name, which is "unknown" where it cannot be read.
-content() { grep -av '"date"\|"machine"\|"seconds\|_s":\|_seconds' "$1" | sha256sum; }
-# OUTPUT, a file that the command writes, must be right where it says 0. OpenImageIO ends a program where memory is out
-# in one of its destructors; nothing catches that, so it is counted.
-no_memory() { # NAME OUTPUT COMMAND...
-    local name=$1 output=$2 why="" i count status bad=0 survived=0 right aborted=0
-    shift 2
-    rm -f "$output"
-    env NO_MEMORY_COUNT="$tmp/count" LD_PRELOAD="$tmp/no_memory.so" "$@" >"$tmp/out.right" 2>"$tmp/err" || why="$(cat "$tmp/err")"
-    count=$(cat "$tmp/count")
-    right=$(content "$output")
-    for ((i = 1 + RANDOM % step; i <= count && bad < 3; i += step)); do
-        rm -f "$output"
-        { timeout -s KILL 60 env NO_MEMORY_AT=$i LD_PRELOAD="$tmp/no_memory.so" "$@" >"$tmp/out" 2>"$tmp/err" </dev/null; } 2>/dev/null
-        status=$?
-        if [ $status -eq 134 ] && grep -q 'std::bad_alloc\|OpenImageIO' "$tmp/err" && [ ! -e "$output" ]; then
-            aborted=$((aborted + 1))
-        elif [ $status -eq 0 ]; then
-            survived=$((survived + 1))
-            [ "$(content "$output")" = "$right" ] || { why="$why allocation $i: success with a wrong $(basename "$output");" bad=$((bad + 1)); }
-        elif [ $status -ne 3 ] || [ "$(wc -l <"$tmp/err")" -ne 1 ]; then
-            why="$why allocation $i: status $status, $(head -c 300 "$tmp/err");" bad=$((bad + 1))
-        elif [ -e "$output" ]; then
-            why="$why allocation $i: failed, but left $(basename "$output");" bad=$((bad + 1))
-        fi
-    done
-    tell "no memory: $name, each $step. of $count allocations: one line and exit 3, or ($survived) the right answer$([ $aborted -gt 0 ] && echo "; $aborted ended by OpenImageIO")" "$why"
-}
-
+# Whole commands while memory runs out.
 memory() {
-    mkdir -p "$tmp/memory"
-    [ -e "$tmp/share1.exr" ] || render_shares
-    gcc -O1 -shared -fPIC -o "$tmp/no_memory.so" tests/end_to_end/no_memory.c -ldl || tell "no memory" "cannot build it"
-    no_memory "render" "$tmp/memory/x.png.state" "$pathtracer" -q -r 8 8 -s 2 -t 1 --aov --keep-state -f "$tmp/memory/x.png" -f "$tmp/memory/x.exr" "$scene"
-    no_memory "merge" "$tmp/memory/m.exr" "$assay" merge "$tmp/memory/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
-    no_memory "export" "$tmp/memory/s.pov" "$assay" export -o "$tmp/memory/s.pov" "$scene"
-    "$pathtracer" -q -r 32 32 -s 64 --seed 1 -f "$tmp/one.exr" "$scene" >/dev/null
-    "$pathtracer" -q -r 32 32 -s 64 --seed 2 -f "$tmp/two.exr" "$scene" >/dev/null
-    no_memory "compare" "$tmp/memory/c.json" "$assay" compare -q --margin 0.3 --margin-tile 0.9 --json "$tmp/memory/c.json" "$tmp/one.exr" "$tmp/two.exr"
+    tests/end_to_end/no_memory.sh --all "$build" || failures=$((failures + 1))
 }
 
 # --time, --write-every, Ctrl-C and the time limit of a program are measured by a clock that nobody sets.

@@ -1,6 +1,6 @@
 #!/bin/bash
-# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and two more students, one with
-# ada's program under another name and one with a seed of her own: points, the same noise, the same again on one processor
+# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and two
+# more students, one with ada's program under another name and one with a seed of her own: points, the same noise, the same again on one processor
 # and two, and after an interruption. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/grading.sh BUILD}")

@@ -1,6 +1,6 @@
 /* results.json, that whatever was read can be shown, and that a command that can be read can be written and read again. */
 #include "renderer/base/shell_quote.h"
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 #include "fuzz.h"
 
 #include <jansson.h>

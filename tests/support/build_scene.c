@@ -1,6 +1,7 @@
 #include "build_scene.h"
 
 #include <assert.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 enum { ROOM = 4096 };
@@ -104,4 +105,14 @@ void build_camera(struct scene *s, vec3 eye, float hfov_degrees)
                                       .hfov = hfov_degrees * PI_F / 180,
                                       .near = 1e-3f,
                                       .far = 1e6f};
+}
+
+struct camera build_finish(struct scene *s, int width, int height)
+{
+    struct err e;
+    struct camera c;
+    if (scene_finish(s, "test", &e) && camera_init(&c, s, width, height, &e))
+        return c;
+    fprintf(stderr, "%s\n", e.msg);
+    abort();
 }

@@ -2,6 +2,7 @@
 #ifndef ASSAY_BUILD_SCENE_H
 #define ASSAY_BUILD_SCENE_H
 
+#include "renderer/scene/camera.h"
 #include "renderer/scene/scene.h"
 
 /* An empty scene with room for a few hundred primitives; the helpers below append to it, and
@@ -16,5 +17,8 @@ void build_sphere(struct scene *s, vec3 centre, float radius, float normal_out, 
 void build_light(struct scene *s, struct light light);
 /* Pinhole at `eye` looking along -Z with Y up, full horizontal angle in degrees. */
 void build_camera(struct scene *s, vec3 eye, float hfov_degrees);
+
+/* Completes the scene, and its camera for so many pixels; abort where that fails. */
+struct camera build_finish(struct scene *s, int width, int height);
 
 #endif

@@ -1,5 +1,7 @@
 #include "optics.h"
 
+#include "vectors.h"
+
 #include <assert.h>
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
@@ -42,11 +44,6 @@ struct optics_view optics_view(double cos_o, double azimuth, double alpha)
                                 .sin_o = sin_o,
                                 .azimuth = azimuth,
                                 .alpha = alpha};
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static void halfway(const double a[3], const double b[3], double m[3])

@@ -1,18 +1,10 @@
 #include "quadrature.h"
+#include "test.h"
 
 #include "reference/truth/truth.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 bool same(double a, double b)
 {

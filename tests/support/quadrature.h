@@ -6,8 +6,6 @@
 
 #include <stdbool.h>
 
-#define COUNT(a) (sizeof(a) / sizeof *(a))
-
 /* Equal to 1e-9 of b: what closed forms have to reach, and what their negative controls must miss. */
 bool same(double a, double b);
 

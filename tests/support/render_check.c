@@ -1,12 +1,5 @@
 #include "render_check.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "test.h"
 
 #define Z_LIMIT  4.89
 #define ROUNDING 2e-5

@@ -1,13 +1,7 @@
 #include "sky.h"
+#include "test.h"
 
 #include <gsl/gsl_integration.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 struct sky sky_uneven(int width, int height)
 {

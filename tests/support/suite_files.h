@@ -14,7 +14,7 @@
 void suite_knot(double s, double t, double p[3], double n[3]);
 
 enum { KNOT_ALONG = 400, KNOT_AROUND = 36 };
-/* 44_mesh.dae: KNOT_ALONG x KNOT_AROUND vertices, two triangles for each, in a box. */
+/* 44_mesh.dae: KNOT_ALONG x KNOT_AROUND vertices, two triangles for each, in the box of tests/support/44_mesh.dae.in. */
 void suite_write_mesh(FILE *f);
 
 enum { SKY_WIDTH = 128, SKY_HEIGHT = 64, SKY_TURN = 1 };

@@ -1,13 +1,15 @@
 #include "data_dirs.h"
 
-#include "renderer/base/fs.h"
-
 #include <unistd.h>
 
-const char *data_dir(char *path, size_t size, const char *checkout, const char *installed)
+struct data_dirs data_dirs_find(void)
 {
-    if (access("reference/scenes", R_OK) == 0)
-        return checkout;
-    fs_beside_program(path, size, installed);
-    return path;
+    bool checkout = access("reference/scenes", R_OK) == 0;
+    struct path share = checkout ? fs_path("reference") : fs_beside_program("../share/assay"),
+                golden = checkout ? fs_path("golden") : fs_path("%s/golden", share.s);
+    return (struct data_dirs){.suite = fs_path("%s/scenes", share.s),
+                              .golden = golden,
+                              .catalogue = fs_path("%s/diagnose", golden.s),
+                              .share = share,
+                              .pathtracer = fs_beside_program("pathtracer")};
 }

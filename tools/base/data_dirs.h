@@ -2,9 +2,13 @@
 #ifndef ASSAY_DATA_DIRS_H
 #define ASSAY_DATA_DIRS_H
 
-#include <stddef.h>
+#include "renderer/base/fs.h"
 
-/* `checkout` if the current directory is a checkout, else `installed` beside the program ("../share/assay/..."), in path. */
-const char *data_dir(char *path, size_t size, const char *checkout, const char *installed);
+struct data_dirs {
+    struct path suite, golden, catalogue; /* scenes, stored references, effects of bugs */
+    struct path share;                    /* scripts for other programs, and descriptions of them */
+    struct path pathtracer;               /* the program beside this one */
+};
+struct data_dirs data_dirs_find(void);
 
 #endif

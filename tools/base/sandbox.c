@@ -384,11 +384,10 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
     if (!temp_dir_open(&out->dir, "sandbox", e))
         return false;
     chmod(out->dir.path, 0755);
-    char probe[sizeof out->dir.path + 16];
-    snprintf(probe, sizeof probe, "%s/probe", out->dir.path);
+    const struct path probe = fs_path("%s/probe", out->dir.path);
     struct sandbox_result r = {0};
     const struct sandbox_job job = {
-        .argv = (const char *const[]){"true", NULL}, .out = probe, .limit = sandbox_default};
+        .argv = (const char *const[]){"true", NULL}, .out = probe.s, .limit = sandbox_default};
     struct err why = {""};
     if (unsafe || (sandbox_run(out, &job, &r, &why) && r.end == SANDBOX_OK))
         return true;

@@ -1,3 +1,4 @@
+#include "renderer/base/fs.h"
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"
@@ -11,58 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum option {
-    OPT_ALPHA,
-    OPT_MARGIN,
-    OPT_MARGIN_TILE,
-    OPT_MARGIN_VARIANCE,
-    OPT_TILE,
-    OPT_AGAIN,
-    OPT_EXCHANGEABLE,
-    OPT_MIN_SIDE,
-    OPT_CURVE,
-    OPT_SPP_A,
-    OPT_SPP_B,
-    OPT_EXPECT,
-    OPT_JSON,
-    OPT_REPORT,
-    OPT_QUIET,
-    OPT_HELP
-};
-
-static const struct cli_option options[] = {
-    [OPT_ALPHA] = {0, "alpha", 1, "A",
-                   "chance of a wrong DIFFERENT, and of a wrong EQUIVALENT, 1e-12 to\n"
-                   "0.4 (1e-3)"},
-    [OPT_MARGIN] = {0, "margin", 1, "D",
-                    "largest relative difference of the image mean that\n"
-                    "counts as equal; 0: any difference counts (0)"},
-    [OPT_MARGIN_TILE] = {0, "margin-tile", 1, "D", "the same for one tile (4 x --margin)"},
-    [OPT_MARGIN_VARIANCE] = {0, "margin-variance", 1, "D",
-                             "the same for the variance of one sample or replicate; 0:\n"
-                             "variances are not judged (0)"},
-    [OPT_TILE] = {0, "tile", 1, "N", "side of a reporting tile, pixels (16, or the whole image)"},
-    [OPT_AGAIN] = {0, "again", 2, "A2 B2",
-                   "the same renders with fresh seeds: DIFFERENT only if they\n"
-                   "confirm what A and B show, each stage at the root of alpha"},
-    [OPT_EXCHANGEABLE] = {0, "exchangeable", 0, "",
-                          "A and B are directories of replicates of what should be the\n"
-                          "same program: an exact test by permutation, without margins"},
-    [OPT_MIN_SIDE] = {0, "min-side", 1, "N",
-                      "smallest region of that test, pixels (about 1/32 of the image)"},
-    [OPT_CURVE] = {0, "curve", 1, "CURVE",
-                   "of PNG files, from light to code: srgb, linear, gamma=G\n"
-                   "(G in 0.2 to 5), or cgl, the assignment's"},
-    [OPT_SPP_A] = {0, "spp-a", 1, "N", "samples per pixel of A, if its file has a variance only"},
-    [OPT_SPP_B] = {0, "spp-b", 1, "N", "the same for B"},
-    [OPT_EXPECT] = {0, "expect", 1, "VERDICT", "what exit code 0 stands for (EQUIVALENT)"},
-    [OPT_JSON] = {0, "json", 1, "FILE", "write the claim as results.json"},
-    [OPT_REPORT] = {'r', "report", 1, "FILE", "write the claim as one HTML page with its pictures"},
-    [OPT_QUIET] = {'q', "quiet", 0, "", "print nothing; the exit code says it"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
-
-static const char help_head[] =
+static const char usage[] =
     "usage: assay compare [options] A B\n\n"
     "A is tested, B is the reference. Each is one of\n"
     "  a moments EXR (of pathtracer or assay)\n"
@@ -77,16 +27,68 @@ struct settings {
     int num_paths;
     const char *json, *report;
     enum verdict expect;
-    bool quiet, done;
+    bool quiet, help;
 };
 
+static bool read_curve(void *settings, const char *const v[4], struct err *e)
+{
+    struct settings *s = settings;
+    (void)e;
+    s->job.input[0].curve = s->job.input[1].curve = v[0];
+    return true;
+}
+
+#define TO(member) CLI_TO(struct settings, member)
+
+static const struct cli_option options[] = {
+    {0, "alpha", "A",
+     "chance of a wrong DIFFERENT, and of a wrong EQUIVALENT, 1e-12 to\n"
+     "0.4 (1e-3)",
+     TO(job.opt.alpha), 1e-12, 0.4},
+    {0, "margin", "D",
+     "largest relative difference of the image mean that\n"
+     "counts as equal; 0: any difference counts (0)",
+     TO(job.opt.margin_global), 0, 0.99},
+    {0, "margin-tile", "D", "the same for one tile (4 x --margin)", TO(job.opt.margin_tile), 0,
+     0.99},
+    {0, "margin-variance", "D",
+     "the same for the variance of one sample or replicate; 0:\n"
+     "variances are not judged (0)",
+     TO(job.opt.margin_variance), 0, 100},
+    {0, "tile", "N", "side of a reporting tile, pixels (16, or the whole image)", TO(job.opt.tile),
+     1, 65536},
+    {0, "again", "A2 B2",
+     "the same renders with fresh seeds: DIFFERENT only if they\n"
+     "confirm what A and B show, each stage at the root of alpha",
+     TO(job.again)},
+    {0, "exchangeable", "",
+     "A and B are directories of replicates of what should be the\n"
+     "same program: an exact test by permutation, without margins",
+     TO(job.exchangeable)},
+    {0, "min-side", "N", "smallest region of that test, pixels (about 1/32 of the image)",
+     TO(job.min_side), 1, 65536},
+    {0, "curve", "CURVE",
+     "of PNG files, from light to code: srgb, linear, gamma=G\n"
+     "(G in 0.2 to 5), or cgl, the assignment's",
+     .read = read_curve},
+    {0, "spp-a", "N", "samples per pixel of A, if its file has a variance only",
+     TO(job.input[0].spp), 3, 1e12},
+    {0, "spp-b", "N", "the same for B", TO(job.input[1].spp), 3, 1e12},
+    {0, "expect", "VERDICT", "what exit code 0 stands for (EQUIVALENT)", TO(expect),
+     .names = verdict_names},
+    {0, "json", "FILE", "write the claim as results.json", TO(json)},
+    {'r', "report", "FILE", "write the claim as one HTML page with its pictures", TO(report)},
+    {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
+    {'h', "help", "", "print this", TO(help), .usage = usage},
+    {.args = "two images", CLI_TO_LIST(struct settings, job.path, num_paths)}};
+
 /* Rules between options. */
-static bool check(struct settings *s, bool has_tile_margin, struct err *e)
+static bool check(struct settings *s, struct err *e)
 {
     struct compare_options *opt = &s->job.opt;
     if (s->num_paths != 2)
         return err_set(e, "compare needs two images (see --help)");
-    if (!has_tile_margin)
+    if (opt->margin_tile < 0)
         opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
     if (s->job.exchangeable && (opt->margin_tile > 0 || opt->margin_variance > 0))
         return err_set(e, "--exchangeable asks if anything differs at all: it takes no margin");
@@ -97,59 +99,6 @@ static bool check(struct settings *s, bool has_tile_margin, struct err *e)
     if (!s->job.exchangeable && s->job.min_side > 0)
         return err_set(e, "--min-side is for --exchangeable");
     return true;
-}
-
-static bool parse(int argc, char **argv, struct settings *s, struct err *e)
-{
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool ok = true, has_tile_margin = false;
-    struct compare_options *opt = &s->job.opt;
-    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        const char *v = c.value[0];
-        if (i == CLI_POSITIONAL) {
-            if (s->num_paths == 2)
-                return err_set(e, "compare takes two images, '%s' is one more", v);
-            s->job.path[s->num_paths++] = v;
-            continue;
-        }
-        switch ((enum option)i) {
-        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &opt->alpha, e); break;
-        case OPT_MARGIN: ok = cli_double("--margin", v, 0, 0.99, &opt->margin_global, e); break;
-        case OPT_MARGIN_TILE:
-            ok = cli_double("--margin-tile", v, 0, 0.99, &opt->margin_tile, e);
-            has_tile_margin = true;
-            break;
-        case OPT_MARGIN_VARIANCE:
-            ok = cli_double("--margin-variance", v, 0, 100, &opt->margin_variance, e);
-            break;
-        case OPT_TILE: ok = cli_int("--tile", v, 1, 65536, &opt->tile, e); break;
-        case OPT_AGAIN:
-            s->job.again[0] = c.value[0];
-            s->job.again[1] = c.value[1];
-            break;
-        case OPT_EXCHANGEABLE: s->job.exchangeable = true; break;
-        case OPT_MIN_SIDE: ok = cli_int("--min-side", v, 1, 65536, &s->job.min_side, e); break;
-        case OPT_CURVE: s->job.input[0].curve = s->job.input[1].curve = v; break;
-        case OPT_SPP_A: ok = cli_double("--spp-a", v, 3, 1e12, &s->job.input[0].spp, e); break;
-        case OPT_SPP_B: ok = cli_double("--spp-b", v, 3, 1e12, &s->job.input[1].spp, e); break;
-        case OPT_EXPECT:
-            if (!verdict_parse(v, &s->expect))
-                return err_set(e, "--expect: '%s' is none of: EQUIVALENT, DIFFERENT, INCONCLUSIVE",
-                               v);
-            break;
-        case OPT_JSON: s->json = v; break;
-        case OPT_REPORT: s->report = v; break;
-        case OPT_QUIET: s->quiet = true; break;
-        case OPT_HELP:
-            puts(help_head);
-            cli_print_options(stdout, options);
-            s->done = true;
-            return true;
-        }
-    }
-    return ok && check(s, has_tile_margin, e);
 }
 
 /* "1.25 %", or "nothing" where no test covers it. */
@@ -189,25 +138,25 @@ static bool write_report(const struct settings *s, const struct compared *c, int
                          struct err *e)
 {
     struct temp_dir dir;
-    char results[sizeof dir.path + 16];
     if (!temp_dir_open(&dir, "compare", e))
         return false;
-    snprintf(results, sizeof results, "%s/results.json", dir.path);
-    bool ok = compare_job_write_json(&s->job, c, s->expect, results, argc, argv, e) &&
-              report_write(results, s->report, e);
+    const struct path results = fs_path("%s/results.json", dir.path);
+    bool ok = compare_job_write_json(&s->job, c, s->expect, results.s, argc, argv, e) &&
+              report_write(results.s, s->report, e);
     struct err ignored = {0};
     return temp_dir_close(&dir, ok ? e : &ignored) && ok;
 }
 
 int command_compare(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.job.opt.alpha = 1e-3, .expect = VERDICT_EQUIVALENT};
+    struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1},
+                         .expect = VERDICT_EQUIVALENT};
     struct compared c;
-    if (!parse(argc, argv, &s, e))
+    if (!cli_read(options, argc, argv, &s, e))
         return EXIT_NOT_JUDGED;
-    if (s.done)
+    if (s.help)
         return 0;
-    if (!compare_job_run(&s.job, &c, e))
+    if (!check(&s, e) || !compare_job_run(&s.job, &c, e))
         return EXIT_NOT_JUDGED;
     int code = EXIT_DIFFERENT;
     if (c.r.verdict == s.expect)

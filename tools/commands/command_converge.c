@@ -10,66 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum option {
-    OPT_ENGINE,
-    OPT_LADDER,
-    OPT_REPLICATES,
-    OPT_DEPTH_SPP,
-    OPT_SHRINK,
-    OPT_REFERENCE,
-    OPT_ALPHA,
-    OPT_MARGIN,
-    OPT_SLOPE_MARGIN,
-    OPT_SEED,
-    OPT_OUT,
-    OPT_SUITE,
-    OPT_GOLDEN,
-    OPT_SHARE,
-    OPT_PATHTRACER,
-    OPT_THREADS,
-    OPT_TIMEOUT,
-    OPT_QUIET,
-    OPT_HELP
-};
-
-static const struct cli_option options[] = {
-    [OPT_ENGINE] = {0, "engine", 1, "NAME",
-                    "pathtracer, pathtracer-sobol, cycles or povray; may be given again\n"
-                    "(the first three)"},
-    [OPT_LADDER] = {0, "ladder", 1, "N,N,...",
-                    "samples per pixel of the rungs, ascending; povray needs squares\n"
-                    "(1,4,16,64,256)"},
-    [OPT_REPLICATES] = {'k', "replicates", 1, "K",
-                        "pictures per rung, each with its own seed (16)"},
-    [OPT_DEPTH_SPP] =
-        {0, "depth-spp", 1, "N",
-         "samples per pixel of the depth ladder, pathtracer's picture at every greatest\n"
-         "depth up to the scene's; 0: none (64)"},
-    [OPT_SHRINK] = {0, "shrink", 1, "N", "pictures N times smaller on both sides (1)"},
-    [OPT_REFERENCE] = {0, "reference", 1, "NAME",
-                       "what errors are measured against: truth (closed form), cycles or povray\n"
-                       "(golden), own (a long run of pathtracer), or auto: the first there is"},
-    [OPT_ALPHA] = {0, "alpha", 1, "A",
-                   "chance of any wrong verdict in the whole run, for wrong\n"
-                   "DIFFERENT and for wrong EQUIVALENT each (1e-3)"},
-    [OPT_MARGIN] = {0, "margin", 1, "M",
-                    "RMS over the pixels of the relative bias that counts as none (0.01)"},
-    [OPT_SLOPE_MARGIN] = {0, "slope-margin", 1, "M",
-                          "a slope known to no better than +-M decides nothing (0.1)"},
-    [OPT_SEED] = {0, "seed", 1, "N", "all seeds follow from it (1)"},
-    [OPT_OUT] = {'o', "out", 1, "DIR", "results.json and index.html (build/converge)"},
-    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
-    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
-    [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
-    [OPT_PATHTRACER] = {0, "pathtracer", 1, "FILE", "the program under test (beside this one)"},
-    [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
-    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for any one program (3600)"},
-    [OPT_QUIET] = {'q', "quiet", 0, "", "no progress"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
-
-static bool parse_ladder(const char *text, struct converge_options *o, struct err *e)
+static bool read_ladder(void *options, const char *const v[4], struct err *e)
 {
+    struct converge_options *o = options;
+    const char *text = v[0];
     o->num_rungs = 0;
     for (const char *c = text; c != NULL;) {
         char number[16];
@@ -90,82 +34,69 @@ static bool parse_ladder(const char *text, struct converge_options *o, struct er
     return o->num_rungs >= 3 || err_set(e, "--ladder: at least three rungs");
 }
 
-static bool parse_one(int i, const char *v, struct converge_options *o, bool *chosen, struct err *e)
+/* The first replaces the default. */
+static bool read_engine(void *options, const char *const v[4], struct err *e)
 {
+    struct converge_options *o = options;
     int n;
-    uint64_t seed;
-    switch ((enum option)i) {
-    case OPT_ENGINE:
-        if (!cli_choice("--engine", v, converge_engine_names, &n, e))
-            return false;
-        if (!*chosen)
-            memset(o->engine, 0, sizeof o->engine);
-        *chosen = o->engine[n] = true;
-        return true;
-    case OPT_LADDER: return parse_ladder(v, o, e);
-    case OPT_REPLICATES:
-        return cli_int("--replicates", v, 4, CONVERGE_MAX_REPLICATES, &o->replicates, e);
-    case OPT_DEPTH_SPP: return cli_int("--depth-spp", v, 0, 1 << 20, &o->depth_spp, e);
-    case OPT_SHRINK: return cli_int("--shrink", v, 1, 1024, &o->shrink, e);
-    case OPT_REFERENCE:
-        if (!cli_choice("--reference", v, converge_against_names, &n, e))
-            return false;
-        o->against = (enum converge_against)n;
-        return true;
-    case OPT_ALPHA: return cli_double("--alpha", v, 1e-12, 0.4, &o->alpha, e);
-    case OPT_MARGIN: return cli_double("--margin", v, 1e-6, 1, &o->margin, e);
-    case OPT_SLOPE_MARGIN: return cli_double("--slope-margin", v, 1e-6, 1, &o->slope_margin, e);
-    case OPT_SEED:
-        if (!cli_uint64("--seed", v, &seed, e))
-            return false;
-        o->seed = (uint32_t)seed;
-        return seed <= UINT32_MAX || err_set(e, "--seed: '%s' is above 2^32-1", v);
-    case OPT_OUT: o->out_dir = v; return true;
-    case OPT_SUITE: o->suite_dir = v; return true;
-    case OPT_GOLDEN: o->golden_dir = v; return true;
-    case OPT_SHARE: o->share_dir = v; return true;
-    case OPT_PATHTRACER: o->pathtracer = v; return true;
-    case OPT_THREADS: return cli_int("--threads", v, 0, 1024, &o->threads, e);
-    case OPT_TIMEOUT: return cli_double("--timeout", v, 1, 1e6, &o->timeout_s, e);
-    case OPT_QUIET: o->quiet = true; return true;
-    case OPT_HELP: return true;
-    }
-    return true;
+    if (!cli_choice("--engine", v[0], converge_engine_names, &n, e))
+        return false;
+    if (!o->engine_chosen)
+        memset(o->engine, 0, sizeof o->engine);
+    return o->engine_chosen = o->engine[n] = true;
 }
 
-/* Sets *done where only the help was asked for. */
-static bool parse(int argc, char **argv, struct converge_options *o, bool *done, struct err *e)
-{
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool chosen = false;
-    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        if (i == OPT_HELP) {
-            puts("usage: assay converge [options] SCENE...\n");
-            cli_print_options(stdout, options);
-            *done = true;
-            return true;
-        }
-        if (i == CLI_POSITIONAL && o->num_scenes == CONVERGE_MAX_SCENES)
-            return err_set(e, "at most %d scenes", CONVERGE_MAX_SCENES);
-        if (i == CLI_POSITIONAL)
-            o->scene[o->num_scenes++] = c.value[0];
-        else if (!parse_one(i, c.value[0], o, &chosen, e))
-            return false;
-    }
-    return o->num_scenes > 0 || err_set(e, "converge needs the name of a scene (see --help)");
-}
+#define TO(member) CLI_TO(struct converge_options, member)
+
+static const struct cli_option options[] = {
+    {0, "engine", "NAME",
+     "one of pathtracer pathtracer-sobol" ENGINES_WITH_GOLDENS(
+         ENGINE_TEXT) "; may be given\nagain (the first three)",
+     .read = read_engine},
+    {0, "ladder", "N,N,...",
+     "samples per pixel of the rungs, ascending; povray needs squares\n"
+     "(1,4,16,64,256)",
+     .read = read_ladder},
+    {'k', "replicates", "K", "pictures per rung, each with its own seed (16)", TO(replicates), 4,
+     CONVERGE_MAX_REPLICATES},
+    {0, "depth-spp", "N",
+     "samples per pixel of the depth ladder, pathtracer's picture at every greatest\n"
+     "depth up to the scene's; 0: none (64)",
+     TO(depth_spp), 0, 1 << 20},
+    {0, "shrink", "N", "pictures N times smaller on both sides (1)", TO(shrink), 1, 1024},
+    {0, "reference", "NAME",
+     "what errors are measured against: truth (closed form), an engine's golden,\n"
+     "own (a long run of pathtracer), or auto: the first there is",
+     TO(against), .names = converge_against_names},
+    {0, "alpha", "A",
+     "chance of any wrong verdict in the whole run, for wrong\n"
+     "DIFFERENT and for wrong EQUIVALENT each (1e-3)",
+     TO(alpha), 1e-12, 0.4},
+    {0, "margin", "M", "RMS over the pixels of the relative bias that counts as none (0.01)",
+     TO(margin), 1e-6, 1},
+    {0, "slope-margin", "M", "a slope known to no better than +-M decides nothing (0.1)",
+     TO(slope_margin), 1e-6, 1},
+    {0, "seed", "N", "all seeds follow from it (1)", TO(seed)},
+    {'o', "out", "DIR", "results.json and index.html (build/converge)", TO(out_dir)},
+    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {0, "golden", "DIR", "stored references (golden)", TO(golden_dir)},
+    {0, "share", "DIR", "where cycles.py is (reference)", TO(share_dir)},
+    {0, "pathtracer", "FILE", "the program under test (beside this one)", TO(pathtracer)},
+    {'t', "threads", "N", "0: one per processor (0)", TO(threads), 0, 1024},
+    {0, "timeout", "S", "seconds for any one program (3600)", TO(timeout_s), 1, 1e6},
+    {'q', "quiet", "", "no progress", TO(quiet)},
+    {'h', "help", "", "print this", TO(help),
+     .usage = "usage: assay converge [options] SCENE...\n"},
+    {.noun = "scenes", CLI_TO_LIST(struct converge_options, scene, num_scenes)}};
 
 static bool write_all(const json_t *results, const char *out_dir, struct err *e)
 {
-    char json[4096], html[4096];
-    snprintf(json, sizeof json, "%s/results.json", out_dir);
-    snprintf(html, sizeof html, "%s/index.html", out_dir);
-    if (!json_write(json, results, e) || !report_write(json, html, e))
+    const struct path json = fs_path("%s/results.json", out_dir);
+    const struct path html = fs_path("%s/index.html", out_dir);
+    if (!json_write(json.s, results, e) || !report_write(json.s, html.s, e))
         return false;
     convergence_results_print(stdout, json_object_get(results, "convergence"));
-    printf("\n%s\n", html);
+    printf("\n%s\n", html.s);
     return true;
 }
 
@@ -179,12 +110,12 @@ static void tell_not_judged(void *ctx, const struct convergence_row *r)
 
 int command_converge(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite[4096], golden[4096], share[4096];
-    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
+    const struct data_dirs at = data_dirs_find();
     struct converge_options o = {
         .out_dir = "build/converge",
-        .pathtracer = pathtracer,
-        .engine = {[CONVERGE_PATHTRACER] = true, [CONVERGE_SOBOL] = true, [CONVERGE_CYCLES] = true},
+        .pathtracer = at.pathtracer.s,
+        .engine =
+            {[CONVERGE_PATHTRACER] = true, [CONVERGE_SOBOL] = true, [CONVERGE_REFERENCES] = true},
         .ladder = {1, 4, 16, 64, 256},
         .num_rungs = 5,
         .replicates = 16,
@@ -195,15 +126,18 @@ int command_converge(int argc, char **argv, struct err *e)
         .margin = 0.01,
         .slope_margin = 0.1,
         .timeout_s = 3600,
-        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .golden_dir = data_dir(golden, sizeof golden, "golden", "../share/assay/golden"),
-        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
-    bool done = false;
+        .suite_dir = at.suite.s,
+        .golden_dir = at.golden.s,
+        .share_dir = at.share.s};
     json_t *results = NULL;
-    if (!parse(argc, argv, &o, &done, e))
+    if (!cli_read(options, argc, argv, &o, e))
         return EXIT_NOT_JUDGED;
-    if (done)
+    if (o.help)
         return 0;
+    if (o.num_scenes == 0) {
+        err_set(e, "converge needs the name of a scene (see --help)");
+        return EXIT_NOT_JUDGED;
+    }
     if (o.threads == 0)
         o.threads = cli_processors();
     int code = EXIT_NOT_JUDGED;

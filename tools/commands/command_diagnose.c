@@ -12,37 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum option {
-    OPT_PATHTRACER,
-    OPT_SCENE,
-    OPT_JSON,
-    OPT_ALPHA,
-    OPT_SEED,
-    OPT_WITHOUT,
-    OPT_CATALOGUE,
-    OPT_SUITE,
-    OPT_THREADS,
-    OPT_TIMEOUT,
-    OPT_QUIET,
-    OPT_HELP
-};
-
-static const struct cli_option options[] = {
-    [OPT_PATHTRACER] = {0, "pathtracer", 1, "PROGRAM",
-                        "the renderer to look at (the one beside this program)"},
-    [OPT_SCENE] = {0, "scene", 1, "VIEW", "what the picture shows: one of the views below"},
-    [OPT_JSON] = {0, "json", 1, "FILE", "write the diagnosis as JSON too"},
-    [OPT_ALPHA] = {0, "alpha", 1, "A", "chance of accusing a correct renderer (1e-6)"},
-    [OPT_SEED] = {0, "seed", 1, "N", "of the renders (1)"},
-    [OPT_WITHOUT] = {0, "without", 1, "BUG", "leave a bug out, as if it were not known"},
-    [OPT_CATALOGUE] = {0, "catalogue", 1, "DIR", "the stored effects of bugs (golden/diagnose)"},
-    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
-    [OPT_THREADS] = {'t', "threads", 1, "N", "threads of a render; 0: all processors (0)"},
-    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds that one render may take (600)"},
-    [OPT_QUIET] = {'q', "quiet", 0, "", "print nothing; the exit code says it"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this, and the views"},
-    {0}};
-
 struct settings {
     const char *pathtracer, *view, *input, *json, *catalogue_dir, *suite_dir;
     struct diagnose_options diagnose;
@@ -52,52 +21,42 @@ struct settings {
     bool quiet, help;
 };
 
-static bool parse(int argc, char **argv, struct settings *s, struct err *e)
+#define TO(member) CLI_TO(struct settings, member)
+
+static const struct cli_option options[] = {
+    {0, "pathtracer", "PROGRAM", "the renderer to look at (the one beside this program)",
+     TO(pathtracer)},
+    {0, "scene", "VIEW", "what the picture shows: one of the views below", TO(view)},
+    {0, "json", "FILE", "write the diagnosis as JSON too", TO(json)},
+    {0, "alpha", "A", "chance of accusing a correct renderer (1e-6)", TO(diagnose.alpha), 1e-12,
+     0.1},
+    {0, "seed", "N", "of the renders (1)", TO(seed)},
+    {0, "without", "BUG", "leave a bug out, as if it were not known", TO(diagnose.without)},
+    {0, "catalogue", "DIR", "the stored effects of bugs (golden/diagnose)", TO(catalogue_dir)},
+    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {'t', "threads", "N", "threads of a render; 0: all processors (0)", TO(threads), 0, 1024},
+    {0, "timeout", "S", "seconds that one render may take (600)", TO(timeout_s), 1, 1e6},
+    {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
+    {'h', "help", "", "print this, and the views", TO(help), .stops = true},
+    {.args = "one file", TO(input)}};
+
+/* Rules between options. */
+static bool check(const struct settings *s, struct err *e)
 {
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool ok = true, has_program = false;
-    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        const char *v = c.value[0];
-        if (i == CLI_POSITIONAL) {
-            if (s->input != NULL)
-                return err_set(e, "diagnose takes one file, '%s' is one more", v);
-            s->input = v;
-            continue;
-        }
-        switch ((enum option)i) {
-        case OPT_PATHTRACER:
-            s->pathtracer = v;
-            has_program = true;
-            break;
-        case OPT_SCENE: s->view = v; break;
-        case OPT_JSON: s->json = v; break;
-        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.1, &s->diagnose.alpha, e); break;
-        case OPT_SEED: ok = cli_uint64("--seed", v, &s->seed, e); break;
-        case OPT_WITHOUT: s->diagnose.without = v; break;
-        case OPT_CATALOGUE: s->catalogue_dir = v; break;
-        case OPT_SUITE: s->suite_dir = v; break;
-        case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &s->threads, e); break;
-        case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &s->timeout_s, e); break;
-        case OPT_QUIET: s->quiet = true; break;
-        case OPT_HELP: s->help = true; break;
-        }
-    }
-    if (ok && s->view != NULL && s->input == NULL && !s->help)
+    if (s->view != NULL && s->input == NULL)
         return err_set(e, "--scene needs the picture that shows it (see --help)");
-    if (ok && has_program && s->input != NULL)
-        return err_set(e, "either a program or a file is looked at, not both");
-    return ok;
+    return s->pathtracer == NULL || s->input == NULL ||
+           err_set(e, "either a program or a file is looked at, not both");
 }
 
 static void print_help(const struct catalogue *c)
 {
-    puts("usage: assay diagnose [options]                       render the views and look at them\n"
-         "       assay diagnose [options] results.json          the pictures of a validation\n"
-         "       assay diagnose [options] --scene VIEW X.exr    one moments image\n\n"
-         "Names the known bug that explains how pictures differ from the correct ones.\n");
-    cli_print_options(stdout, options);
+    cli_print_help(
+        "usage: assay diagnose [options]                       render the views and look at them\n"
+        "       assay diagnose [options] results.json          the pictures of a validation\n"
+        "       assay diagnose [options] --scene VIEW X.exr    one moments image\n\n"
+        "Names the known bug that explains how pictures differ from the correct ones.\n",
+        options);
     puts(
         "\nviews, the size of their renders, and what the width of any other picture of the same shape "
         "has\nto be a multiple of:");
@@ -175,20 +134,19 @@ static int look(const struct settings *s, const struct catalogue *c, struct err 
 
 int command_diagnose(int argc, char **argv, struct err *e)
 {
-    char pathtracer[4096], suite[4096], catalogue[4096];
-    fs_beside_program(pathtracer, sizeof pathtracer, "pathtracer");
-    struct settings s = {
-        .pathtracer = pathtracer,
-        .diagnose = {.alpha = 1e-6},
-        .seed = 1,
-        .timeout_s = 600,
-        .suite_dir = data_dir(suite, sizeof suite, "reference/scenes", "../share/assay/scenes"),
-        .catalogue_dir = data_dir(catalogue, sizeof catalogue, "golden/diagnose",
-                                  "../share/assay/golden/diagnose")};
+    const struct data_dirs at = data_dirs_find();
+    struct settings s = {.diagnose = {.alpha = 1e-6},
+                         .seed = 1,
+                         .timeout_s = 600,
+                         .suite_dir = at.suite.s,
+                         .catalogue_dir = at.catalogue.s};
     struct catalogue c;
     int code = EXIT_NOT_JUDGED;
-    if (!parse(argc, argv, &s, e) || !catalogue_read(s.catalogue_dir, &c, e))
+    if (!cli_read(options, argc, argv, &s, e) || (!s.help && !check(&s, e)) ||
+        !catalogue_read(s.catalogue_dir, &c, e))
         return code;
+    if (s.pathtracer == NULL)
+        s.pathtracer = at.pathtracer.s;
     if (s.help) {
         print_help(&c);
         code = 0;

@@ -8,22 +8,6 @@
 
 enum { MAX_NAMES = 256 };
 
-enum option { OPT_ALL, OPT_FROM, OPT_GOLDEN, OPT_SUITE, OPT_NEW, OPT_ACCEPT, OPT_ALPHA, OPT_HELP };
-
-static const struct cli_option options[] = {
-    [OPT_ALL] = {0, "all", 0, "",
-                 "approve every reference of the suite, or of the names given, but\n"
-                 "those that are up to date and have no candidate"},
-    [OPT_FROM] = {0, "from", 1, "DIR", "candidates (build/golden-candidate)"},
-    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "stored references (golden)"},
-    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
-    [OPT_NEW] = {0, "new", 0, "", "approve also where nothing is stored"},
-    [OPT_ACCEPT] = {0, "accept-difference", 1, "WHY",
-                    "approve also what is DIFFERENT; WHY goes into the manifest"},
-    [OPT_ALPHA] = {0, "alpha", 1, "A", "chance of any wrong verdict in this run (1e-3)"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
-
 struct settings {
     const char *suite_dir, *names[MAX_NAMES];
     int num_names;
@@ -31,45 +15,26 @@ struct settings {
     bool all, help;
 };
 
-static void print_usage(void)
-{
-    puts(
-        "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
-        "       assay golden status [options]          what is stored, and what is wrong with it\n"
-        "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE] ...\n");
-    cli_print_options(stdout, options);
-}
+#define TO(member) CLI_TO(struct settings, member)
 
-static bool parse(int argc, char **argv, struct settings *s, struct err *e)
-{
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool ok = true;
-    for (int i; ok && (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        const char *v = c.value[0];
-        if (i == CLI_POSITIONAL) {
-            if (s->num_names == MAX_NAMES)
-                return err_set(e, "more than %d names", MAX_NAMES);
-            s->names[s->num_names++] = v;
-            continue;
-        }
-        switch ((enum option)i) {
-        case OPT_ALL: s->all = true; break;
-        case OPT_FROM: s->opt.from_dir = v; break;
-        case OPT_GOLDEN: s->opt.golden_dir = v; break;
-        case OPT_SUITE: s->suite_dir = v; break;
-        case OPT_NEW: s->opt.accept_new = true; break;
-        case OPT_ACCEPT:
-            s->opt.why = v;
-            ok = v[strspn(v, " \t\n")] != '\0' || err_set(e, "--accept-difference needs a reason");
-            break;
-        case OPT_ALPHA: ok = cli_double("--alpha", v, 1e-12, 0.4, &s->opt.alpha, e); break;
-        case OPT_HELP: s->help = true; break;
-        }
-    }
-    return ok;
-}
+static const struct cli_option options[] = {
+    {0, "all", "",
+     "approve every reference of the suite, or of the names given, but\n"
+     "those that are up to date and have no candidate",
+     TO(all)},
+    {0, "from", "DIR", "candidates (build/golden-candidate)", TO(opt.from_dir)},
+    {0, "golden", "DIR", "stored references (golden)", TO(opt.golden_dir)},
+    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {0, "new", "", "approve also where nothing is stored", TO(opt.accept_new)},
+    {0, "accept-difference", "WHY", "approve also what is DIFFERENT; WHY goes into the manifest",
+     TO(opt.why)},
+    {0, "alpha", "A", "chance of any wrong verdict in this run (1e-3)", TO(opt.alpha), 1e-12, 0.4},
+    {'h', "help", "", "print this", TO(help),
+     .usage =
+         "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
+         "       assay golden status [options]          what is stored, and what is wrong with it\n"
+         "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE] ...\n"},
+    {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 
 /* A reference of the suite that an engine renders, counted over scenes and engines; NULL past the last. */
 static const struct suite_reference *rendered_reference(const struct suite *suite, int i,
@@ -250,16 +215,18 @@ int command_golden(int argc, char **argv, struct err *e)
     const char *what = argc > 1 ? argv[1] : "";
     if (strcmp(what, "render") == 0)
         return command_reference(argc - 1, argv + 1, e);
-    bool is_status = strcmp(what, "status") == 0, help = strcmp(what, "--help") == 0;
-    if (!is_status && !help && strcmp(what, "approve") != 0) {
+    bool is_status = strcmp(what, "status") == 0, is_verb = strcmp(what, "--help") != 0;
+    if (!is_status && is_verb && strcmp(what, "approve") != 0) {
         err_set(e, "golden: '%s' is none of render, status, approve (see --help)", what);
         return EXIT_NOT_JUDGED;
     }
-    if (!parse(argc - 1, argv + 1, &s, e))
+    if (!cli_read(options, argc - is_verb, argv + is_verb, &s, e))
         return EXIT_NOT_JUDGED;
-    if (help || s.help) {
-        print_usage();
+    if (s.help)
         return 0;
+    if (s.opt.why != NULL && s.opt.why[strspn(s.opt.why, " \t\n")] == '\0') {
+        err_set(e, "--accept-difference needs a reason");
+        return EXIT_NOT_JUDGED;
     }
     struct suite suite;
     if (is_status && (s.num_names > 0 || s.all)) {

@@ -6,7 +6,7 @@
 
 int command_grade(int argc, char **argv, struct err *e)
 {
-    struct grade_paths at;
+    struct data_dirs at;
     struct grade_settings s = grade_options_default(argc, &at);
     int code = EXIT_NOT_JUDGED;
     if (s.submission == NULL) {

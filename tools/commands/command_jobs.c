@@ -10,27 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPT_DIR, OPT_PARTS, OPT_RANGES, OPT_BY, OPT_HELP };
-
-static const struct cli_option options[] = {
-    [OPT_DIR] = {0, "plan", 1, "DIR", "where the plan and its jobs are kept (OUTPUT.plan)"},
-    [OPT_PARTS] = {0, "parts", 1, "N",
-                   "into about how many cells a render is cut, or how many jobs\n"
-                   "references (64)"},
-    [OPT_RANGES] = {0, "ranges", 1, "R",
-                    "each cell into R sample ranges, a job each; at most one for each\n"
-                    "sample. Their sums are added up, so that the picture is that of\n"
-                    "one render to rounding, not to the bit; the same bits for the\n"
-                    "same R whatever the cells and the order; not with --adaptive and\n"
-                    "--keep-state (1)"},
-    [OPT_BY] = {0, "by", 1, "WHAT",
-                "a validation: scene, a job for each scene, whose claims share its\n"
-                "renders; claim, a job for each claim, each of which renders what it\n"
-                "needs itself (scene)"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
-static const struct cli_option only_help[] = {{'h', "help", 0, "", "print this"}, {0}};
-
 struct words {
     const char *dir;
     struct plan_wishes wish;
@@ -38,55 +17,44 @@ struct words {
     bool help;
 };
 
-static bool parse_option(int option, const char *value, struct words *w, struct err *e)
-{
-    static const char *const by[] = {"scene", "claim", NULL};
-    int which = 0;
-    switch (option) {
-    case OPT_DIR: w->dir = value; return true;
-    case OPT_PARTS: return cli_int("--parts", value, 1, 1000000, &w->wish.parts, e);
-    case OPT_RANGES: return cli_int("--ranges", value, 1, 1000000, &w->wish.ranges, e);
-    case OPT_BY:
-        if (!cli_choice("--by", value, by, &which, e))
-            return false;
-        w->wish.by = which == 0 ? PLAN_BY_SCENE : PLAN_BY_CLAIM;
-        return true;
-    default: return w->help = true;
-    }
-}
+static const char *const by[] = {"scene", "claim", NULL};
 
-/* Options end where the command begins. */
-static bool parse(int argc, char **argv, struct words *w, struct err *e)
-{
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    *w = (struct words){.first = argc};
-    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        if (i == CLI_POSITIONAL) {
-            w->first = c.next - 1;
-            return true;
-        }
-        if (!parse_option(i, c.value[0], w, e))
-            return false;
-        if (w->help)
-            return true;
-    }
-    return true;
-}
+#define TO(member) CLI_TO(struct words, member)
+
+static const struct cli_option options[] = {
+    {0, "plan", "DIR", "where the plan and its jobs are kept (OUTPUT.plan)", TO(dir)},
+    {0, "parts", "N",
+     "into about how many cells a render is cut, or how many jobs\n"
+     "references (64)",
+     TO(wish.parts), 1, 1000000},
+    {0, "ranges", "R",
+     "each cell into R sample ranges, a job each; at most one for each\n"
+     "sample. Their sums are added up, so that the picture is that of\n"
+     "one render to rounding, not to the bit; the same bits for the\n"
+     "same R whatever the cells and the order; not with --adaptive and\n"
+     "--keep-state (1)",
+     TO(wish.ranges), 1, 1000000},
+    {0, "by", "WHAT",
+     "a validation: scene, a job for each scene, whose claims share its\n"
+     "renders; claim, a job for each claim, each of which renders what it\n"
+     "needs itself (scene)",
+     TO(wish.by), PLAN_BY_SCENE, .names = by},
+    {'h', "help", "", "print this", TO(help), .stops = true},
+    {CLI_TO_REST(struct words, first)}};
+static const struct cli_option only_help[] = {
+    {'h', "help", "", "print this", TO(help), .stops = true}, {CLI_TO_REST(struct words, first)}};
 
 static void print_help(const char *verb, const char *what)
 {
-    printf("usage: assay %s [options] pathtracer|grade|validate|reference ARGUMENT...\n\n%s\n",
-           verb, what);
-    cli_print_options(stdout, options);
+    printf("usage: assay %s [options] pathtracer|grade|validate|reference ARGUMENT...\n\n", verb);
+    cli_print_help(what, options);
 }
 
 int command_plan(int argc, char **argv, struct err *e)
 {
-    struct words w;
+    struct words w = {.first = argc};
     struct plan p;
-    if (!parse(argc, argv, &w, e))
+    if (!cli_read(options, argc, argv, &w, e))
         return EXIT_NOT_JUDGED;
     if (w.help) {
         print_help(
@@ -110,17 +78,18 @@ int command_plan(int argc, char **argv, struct err *e)
 static bool open_plan(int argc, char **argv, const char *help, struct plan *p, int *code,
                       struct err *e)
 {
-    struct cli c = {.options = only_help, .argc = argc, .argv = argv, .next = 1};
-    int i = cli_next(&c, e);
+    struct words w = {.first = argc};
     *code = EXIT_NOT_JUDGED;
-    if (i == 0) {
+    if (!cli_read(only_help, argc, argv, &w, e))
+        return false;
+    if (w.help) {
         puts(help);
         *code = 0;
         return false;
     }
-    if (i != CLI_POSITIONAL)
-        return i == CLI_ERROR ? false : err_set(e, "%s needs a plan (see --help)", argv[0]);
-    if (!plan_read(c.value[0], p, e))
+    if (w.first == argc)
+        return err_set(e, "%s needs a plan (see --help)", argv[0]);
+    if (!plan_read(argv[w.first], p, e))
         return false;
     if (plan_enter(p, e))
         return true;
@@ -204,8 +173,8 @@ int slurm_command(const char *dir, int argc, char **argv, const struct plan_wish
 
 int command_slurm(int argc, char **argv, struct err *e)
 {
-    struct words w;
-    if (!parse(argc, argv, &w, e))
+    struct words w = {.first = argc};
+    if (!cli_read(options, argc, argv, &w, e))
         return EXIT_NOT_JUDGED;
     if (w.help) {
         print_help("slurm",

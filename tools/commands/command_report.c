@@ -1,37 +1,46 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/github_annotations.h"
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
 #include "tools/results/history.h"
 #include "tools/report/report.h"
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 #include "tools/results/results_matrix.h"
 #include "commands.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum option { OPT_OUT, OPT_MARKDOWN, OPT_MATRIX, OPT_CONVERGE, OPT_GITHUB, OPT_HISTORY, OPT_HELP };
+struct settings {
+    const char *results, *converge, *out, *history;
+    bool markdown, matrix, github, help;
+};
+
+#define TO(member) CLI_TO(struct settings, member)
 
 static const struct cli_option options[] = {
-    [OPT_OUT] = {'o', "out", 1, "FILE", "the page (index.html beside the results)"},
-    [OPT_MARKDOWN] = {0, "markdown", 0, "", "no page; print the verdict table as Markdown"},
-    [OPT_MATRIX] = {0, "matrix", 0, "",
-                    "the same, a row for each scene: ours against each reference,\n"
-                    "and with convergence its slopes, biases and ratios to Cycles"},
-    [OPT_CONVERGE] = {0, "converge", 1, "FILE",
-                      "results.json of `assay converge`, to go into the same page or table"},
-    [OPT_GITHUB] = {0, "github", 0, "",
-                    "no page; print workflow commands of GitHub Actions that annotate what is\n"
-                    "not as expected, and add the headline and the verdict table to the file\n"
-                    "that GITHUB_STEP_SUMMARY names"},
-    [OPT_HISTORY] = {0, "history", 1, "DIR",
-                     "instead: a page of all results.json in and below DIR, against time\n"
-                     "(DIR/history.html); exit code 1 if the last run has moved"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
-    {0}};
+    {'o', "out", "FILE", "the page (index.html beside the results)", TO(out)},
+    {0, "markdown", "", "no page; print the verdict table as Markdown", TO(markdown)},
+    {0, "matrix", "",
+     "the same, a row for each scene: ours against each reference,\n"
+     "and with convergence its slopes, biases and ratios to Cycles",
+     TO(matrix)},
+    {0, "converge", "FILE", "results.json of `assay converge`, to go into the same page or table",
+     TO(converge)},
+    {0, "github", "",
+     "no page; print workflow commands of GitHub Actions that annotate what is\n"
+     "not as expected, and add the headline and the verdict table to the file\n"
+     "that GITHUB_STEP_SUMMARY names",
+     TO(github)},
+    {0, "history", "DIR",
+     "instead: a page of all results.json in and below DIR, against time\n"
+     "(DIR/history.html); exit code 1 if the last run has moved",
+     TO(history)},
+    {'h', "help", "", "print this", TO(help),
+     .usage = "usage: assay report [options] RESULTS.json\n"},
+    {.args = "one results file", TO(results)}};
 
 static bool print_markdown(FILE *f, const char *path, bool headline, struct err *e)
 {
@@ -97,19 +106,14 @@ static const double history_alpha = 1e-3;
 static int write_history(const char *dir, const char *out, struct err *e)
 {
     struct history h;
-    char path[4096];
     size_t length = strlen(dir);
     while (length > 1 && dir[length - 1] == '/')
         length--;
-    int n = snprintf(path, sizeof path, "%.*s/history.html", (int)length, dir);
-    if (n < 0 || (size_t)n >= sizeof path) {
-        err_set(e, "%.64s...: path too long", dir);
-        return EXIT_NOT_JUDGED;
-    }
+    const struct path path = fs_path("%.*s/history.html", (int)length, dir);
     if (!history_read(dir, history_alpha, &h, e))
         return EXIT_NOT_JUDGED;
     int code = h.moved > 0 ? EXIT_DIFFERENT : EXIT_EQUIVALENT;
-    out = out != NULL ? out : path;
+    out = out != NULL ? out : path.s;
     if (report_history(&h, out, e))
         printf("%zu of %zu claims moved in the last of %zu runs: %s\n", h.moved, h.num_series,
                h.num_runs, out);
@@ -119,76 +123,52 @@ static int write_history(const char *dir, const char *out, struct err *e)
     return code;
 }
 
+/* The tables of one file or two. */
+static bool print_tables(const struct settings *s, struct err *e)
+{
+    const char *path[] = {s->results, s->converge};
+    for (int i = 0; i < 2 && path[i] != NULL; i++) {
+        if (i > 0)
+            putchar('\n');
+        if (s->matrix ? !print_matrix(path[i], e) : !print_markdown(stdout, path[i], false, e))
+            return false;
+    }
+    return true;
+}
+
+/* Rules between options. */
+static bool check(const struct settings *s, struct err *e)
+{
+    bool others = s->converge != NULL || s->matrix || s->markdown;
+    if (s->history != NULL)
+        return (s->results == NULL && !others && !s->github) ||
+               err_set(e, "--history goes with --out alone");
+    if (s->results == NULL)
+        return err_set(e, "report needs a results.json (see --help)");
+    return !s->github || (!others && s->out == NULL) ||
+           err_set(e, "--github goes with no other option");
+}
+
 int command_report(int argc, char **argv, struct err *e)
 {
-    struct cli c = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    const char *results = NULL, *converge = NULL, *out = NULL, *history = NULL;
-    bool markdown = false, matrix = false, github = false;
-    for (int i; (i = cli_next(&c, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return EXIT_NOT_JUDGED;
-        if (i == CLI_POSITIONAL && results == NULL) {
-            results = c.value[0];
-        } else if (i == OPT_OUT) {
-            out = c.value[0];
-        } else if (i == OPT_CONVERGE) {
-            converge = c.value[0];
-        } else if (i == OPT_MATRIX) {
-            matrix = true;
-        } else if (i == OPT_HISTORY) {
-            history = c.value[0];
-        } else if (i == OPT_GITHUB) {
-            github = true;
-        } else if (i == OPT_MARKDOWN) {
-            markdown = true;
-        } else if (i == OPT_HELP) {
-            puts("usage: assay report [options] RESULTS.json\n");
-            cli_print_options(stdout, options);
-            return 0;
-        } else {
-            err_set(e, "report takes one results file, '%s' is one more", c.value[0]);
-            return EXIT_NOT_JUDGED;
-        }
-    }
-    if (history != NULL) {
-        if (results == NULL && converge == NULL && !matrix && !markdown && !github)
-            return write_history(history, out, e);
-        err_set(e, "--history goes with --out alone");
+    struct settings s = {0};
+    struct path beside;
+    if (!cli_read(options, argc, argv, &s, e) || (!s.help && !check(&s, e)))
         return EXIT_NOT_JUDGED;
+    if (s.help)
+        return 0;
+    if (s.history != NULL)
+        return write_history(s.history, s.out, e);
+    if (s.github)
+        return print_github(s.results, e) ? 0 : EXIT_NOT_JUDGED;
+    if (s.matrix || s.markdown)
+        return print_tables(&s, e) ? 0 : EXIT_NOT_JUDGED;
+    if (s.out == NULL) {
+        beside = fs_beside_file(s.results, "index.html");
+        s.out = beside.s;
     }
-    if (results == NULL) {
-        err_set(e, "report needs a results.json (see --help)");
+    if (!report_write_with(s.results, s.converge, s.out, e))
         return EXIT_NOT_JUDGED;
-    }
-    if (github && (converge != NULL || matrix || markdown || out != NULL)) {
-        err_set(e, "--github goes with no other option");
-        return EXIT_NOT_JUDGED;
-    }
-    if (github)
-        return print_github(results, e) ? 0 : EXIT_NOT_JUDGED;
-    if (matrix) {
-        bool ok = print_matrix(results, e);
-        if (ok && converge != NULL) {
-            putchar('\n');
-            ok = print_matrix(converge, e);
-        }
-        return ok ? 0 : EXIT_NOT_JUDGED;
-    }
-    if (markdown) {
-        bool ok = print_markdown(stdout, results, false, e);
-        if (ok && converge != NULL) {
-            putchar('\n');
-            ok = print_markdown(stdout, converge, false, e);
-        }
-        return ok ? 0 : EXIT_NOT_JUDGED;
-    }
-    char beside[4096];
-    if (out == NULL) {
-        fs_beside_file(results, "index.html", beside, sizeof beside);
-        out = beside;
-    }
-    if (!report_write_with(results, converge, out, e))
-        return EXIT_NOT_JUDGED;
-    printf("%s\n", out);
+    printf("%s\n", s.out);
     return 0;
 }

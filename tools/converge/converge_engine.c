@@ -1,4 +1,5 @@
 #include "converge_engine.h"
+#include "renderer/base/fs.h"
 
 #include "reference/replicates/engine_driver.h"
 #include "tools/validate/run_pathtracer.h"
@@ -11,9 +12,9 @@
 #include <unistd.h>
 
 const char *const converge_engine_names[] = {
-    [CONVERGE_PATHTRACER] = "pathtracer", [CONVERGE_SOBOL] = "pathtracer-sobol",
-    [CONVERGE_CYCLES] = "cycles",         [CONVERGE_POVRAY] = "povray",
-    [CONVERGE_NUM_ENGINES] = NULL,
+    "pathtracer",
+    "pathtracer-sobol",
+    ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL,
 };
 
 /* Another number for each (engine, rung, replicate); OWN is one more engine. */
@@ -30,10 +31,9 @@ static uint32_t seed_of(const struct converge_job *job, int engine, int rung, in
 static bool render_by_pathtracer(const struct converge_job *job, const char *sampler, int spp,
                                  uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
 {
-    char path[4224], log[4224];
     const char *const options[] = {"--sampler", sampler, NULL};
-    snprintf(path, sizeof path, "%.4096s/pathtracer.exr", job->dir);
-    snprintf(log, sizeof log, "%.4096s/pathtracer.log", job->dir);
+    const struct path path = fs_path("%s/pathtracer.exr", job->dir);
+    const struct path log = fs_path("%s/pathtracer.log", job->dir);
     const struct pathtracer_job ours = {.program = job->pathtracer,
                                         .scene = job->scene,
                                         .spp = spp,
@@ -41,11 +41,11 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                         .options = options,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .picture = path,
-                                        .log = log};
+                                        .picture = path.s,
+                                        .log = log.s};
     bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
-    unlink(path);
-    unlink(log);
+    unlink(path.s);
+    unlink(log.s);
     return ok;
 }
 
@@ -90,11 +90,12 @@ static bool render_reference(const struct converge_job *job, enum converge_engin
 {
     struct suite_reference ref = {.fidelity = "exact", .replicates = job->replicates, .spp = spp};
     snprintf(ref.engine, sizeof ref.engine, "%s", converge_engine_names[engine]);
-    if (engine == CONVERGE_POVRAY) {
+    if (engine_with_goldens(ref.engine)->subgrid) {
         ref.spp = 0;
         ref.subgrid = (int)lround(sqrt(spp));
         if (ref.subgrid * ref.subgrid != spp || ref.subgrid > 64)
-            return err_set(e, "povray: renders k x k points a pixel, k up to 64, not %d", spp);
+            return err_set(e, "%s: renders k x k points a pixel, k up to 64, not %d", ref.engine,
+                           spp);
     }
     struct sink sink = {images, 3 * (size_t)job->scene->width * (size_t)job->scene->height, 0};
     const struct reference_options opt = {.seed = seed_of(job, engine, rung, 0),
@@ -127,7 +128,7 @@ bool converge_render(const struct converge_job *job, enum converge_engine engine
                      const struct converge_progress *progress, struct err *e)
 {
     *version = NULL;
-    if (engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL)
+    if (engine < CONVERGE_REFERENCES)
         return render_ours(job, engine, rung, spp, images, cpu_s, progress, e);
     return render_reference(job, engine, rung, spp, images, cpu_s, version, e);
 }

@@ -7,15 +7,13 @@
 #include "renderer/base/progress.h"
 
 /* pathtracer: independent samples, the only engine whose slope must be -1/2. pathtracer-sobol: our
- * stratified sampler. cycles: stratified within a replicate. povray: a replicate is the mean of k x k
- * pictures' pixels (its only knob for one picture; k^2 stands for samples per pixel), on a regular grid
- * with shared directions. */
+ * stratified sampler. The others are stratified within a replicate or, with a subgrid (engine_table.h), k x k pixels
+ * on a regular grid with shared directions, k^2 standing for samples per pixel. */
 enum converge_engine {
     CONVERGE_PATHTRACER,
     CONVERGE_SOBOL,
-    CONVERGE_CYCLES,
-    CONVERGE_POVRAY,
-    CONVERGE_NUM_ENGINES
+    CONVERGE_REFERENCES, /* the first of engine_table.h, and so on */
+    CONVERGE_NUM_ENGINES = CONVERGE_REFERENCES + NUM_ENGINES_WITH_GOLDENS
 };
 extern const char *const converge_engine_names[]; /* end with NULL */
 

@@ -14,7 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *const converge_against_names[] = {"auto", "truth", "cycles", "povray", "own", NULL};
+const char *const converge_against_names[] = {"auto", "truth",
+                                              ENGINES_WITH_GOLDENS(ENGINE_WORD) "own", NULL};
 
 /* The reference of our own has so many times the samples of the longest ladder. */
 enum { OWN_FACTOR = 64 };
@@ -43,7 +44,7 @@ static bool is_independent(int engine)
 /* Ours must leave no bias whatever the sampler; other engines are measured. */
 static bool is_judged(int engine)
 {
-    return engine == CONVERGE_PATHTRACER || engine == CONVERGE_SOBOL;
+    return engine < CONVERGE_REFERENCES;
 }
 
 static enum converge_against choose_reference(const struct suite_scene *s)
@@ -264,9 +265,14 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
         return false;
     json_t *depths = NULL;
     struct err why;
-    if (o->depth_spp > 0 &&
-        !depth_ladder_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths, &why))
+    if (o->depth_spp > 0 && !depth_ladder_measure(&job, suite_reference_of(from, "truth"),
+                                                  o->depth_spp, &depths, &why)) {
+        if (err_is_of_memory(&why)) {
+            convergence_rate_reference_free(&ref);
+            return err_set(e, "%s", why.msg);
+        }
         depths = json_pack("{s:s}", "error", why.msg);
+    }
     struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
     json_t *engines = json_array(), *ratios = json_array();
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)

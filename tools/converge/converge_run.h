@@ -7,9 +7,14 @@
 enum { CONVERGE_MAX_SCENES = 64 };
 
 /* What the squared error is measured against. AUTO: the closed form if the scene has one, else the
- * golden of Cycles, else that of POV-Ray, else a run of our own. The last one is blind to whatever our
+ * golden of the first engine of engine_table.h that has one, else a run of our own. The last one is blind to whatever our
  * renderer does wrong at every number of samples. */
-enum converge_against { AGAINST_AUTO, AGAINST_TRUTH, AGAINST_CYCLES, AGAINST_POVRAY, AGAINST_OWN };
+enum converge_against {
+    AGAINST_AUTO,
+    AGAINST_TRUTH,
+    AGAINST_GOLDENS, /* of the first engine, and so on */
+    AGAINST_OWN = AGAINST_GOLDENS + NUM_ENGINES_WITH_GOLDENS
+};
 extern const char *const converge_against_names[]; /* end with NULL */
 
 struct converge_options {
@@ -30,6 +35,7 @@ struct converge_options {
     int threads;
     double timeout_s;
     bool quiet;
+    bool engine_chosen, help; /* of the command line */
 };
 
 /* Fills *results (results.h; a new reference): no claims, but "convergence" (convergence_results.h). Writes no

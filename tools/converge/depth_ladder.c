@@ -64,24 +64,3 @@ bool depth_ladder_measure(const struct converge_job *job, const struct suite_ref
     *out = json_pack("{s:i, s:o}", "samples", spp, "rungs", rungs);
     return *out != NULL || err_set(e, "out of memory for the results");
 }
-
-bool depth_ladder_check(const json_t *depths, const char *where, struct err *e)
-{
-    const json_t *rungs = json_object_get(depths, "rungs");
-    if (json_is_string(json_object_get(depths, "error")))
-        return true;
-    if (!json_is_integer(json_object_get(depths, "samples")) || json_array_size(rungs) == 0)
-        return err_set(e, "%s: 'depths' has no whole 'samples' or no 'rungs'", where);
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i), *depth = json_object_get(g, "depth"),
-                     *before = json_object_get(json_array_get(rungs, i - 1), "depth");
-        if (!json_is_integer(depth) || json_integer_value(depth) < 0 ||
-            (i > 0 && json_integer_value(depth) <= json_integer_value(before)))
-            return err_set(e, "%s: 'depths': 'depth' does not ascend in whole numbers", where);
-        const json_t *se = json_object_get(g, "se"), *truth = json_object_get(g, "truth");
-        if (!json_is_number(json_object_get(g, "mean")) || !json_is_number(se) ||
-            json_number_value(se) < 0 || (truth != NULL && !json_is_number(truth)))
-            return err_set(e, "%s: 'depths': 'mean', 'se' or 'truth' is not a number", where);
-    }
-    return true;
-}

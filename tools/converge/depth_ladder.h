@@ -4,8 +4,6 @@
 
 #include "converge_engine.h"
 
-#include <stdio.h>
-
 /* "depths" of an element of "convergence" (convergence_results.h), in *out (a new reference):
  *   {"samples": 64, "rungs": [{"depth": 0, "mean": .12, "se": .0004, "truth": .1201}, ...]}
  * Our independent sampler at depths 0 to 8 and then half as many again each time, up to the scene's own. mean: luminance,
@@ -14,12 +12,5 @@
  * than the values. Fails where a picture cannot be rendered. */
 bool depth_ladder_measure(const struct converge_job *job, const struct suite_reference *truth,
                           int spp, json_t **out, struct err *e) __attribute__((warn_unused_result));
-
-/* Checks that, or {"error": "one line"} of a ladder that could not be rendered; the line begins with `where`. */
-bool depth_ladder_check(const json_t *depths, const char *where, struct err *e)
-    __attribute__((warn_unused_result));
-
-/* <figure> of it, or its error; nothing without any (NULL). */
-void plot_depths(FILE *f, const json_t *depths);
 
 #endif

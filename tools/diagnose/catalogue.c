@@ -1,6 +1,7 @@
 #include "catalogue.h"
 
 #include "reference/base/json_file.h"
+#include "renderer/base/fs.h"
 #include "renderer/image/image.h"
 #include "renderer/base/sha256.h"
 
@@ -134,18 +135,17 @@ bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct 
     int patches = 0;
     for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
         size_t n = strlen(entry->d_name);
-        char path[MAX_PATH];
         struct bug bug;
         if (n < sizeof end || strcmp(entry->d_name + n - (sizeof end - 1), end) != 0)
             continue;
-        snprintf(path, sizeof path, "%s/%s", patch_dir, entry->d_name);
-        ok = catalogue_bug_of_patch(path, &bug, e);
+        const struct path path = fs_path("%s/%s", patch_dir, entry->d_name);
+        ok = catalogue_bug_of_patch(path.s, &bug, e);
         int b = ok ? catalogue_bug(c, bug.name) : 0;
         if (ok && b < 0)
-            ok = err_set(e, "%s: not in the catalogue of bugs: make catalogue", path);
+            ok = err_set(e, "%s: not in the catalogue of bugs: make catalogue", path.s);
         else if (ok && strcmp(bug.patch_sha256, c->bug[b].patch_sha256) != 0)
             ok = err_set(e, "%s: has changed since the catalogue of bugs was made: make catalogue",
-                         path);
+                         path.s);
         patches++;
     }
     closedir(d);
@@ -341,17 +341,17 @@ static bool get_effects(struct view *v, const struct catalogue *c, const json_t 
 static bool get_picture(const char *dir, struct view *v, const struct catalogue *c,
                         const json_t *json, struct err *e)
 {
-    char path[MAX_PATH], picture[140], stored[65], sha256[65];
+    char picture[140], stored[65], sha256[65];
     struct image im;
     if (!copy_text(picture, sizeof picture, json, "picture") ||
         !copy_text(stored, sizeof stored, json, "picture_sha256") || strchr(picture, '/') != NULL)
         return err_set(e, "%s/manifest.json: no picture of '%s'", dir, v->name);
-    snprintf(path, sizeof path, "%s/%s", dir, picture);
-    if (!sha256_file(path, sha256, e))
+    const struct path path = fs_path("%s/%s", dir, picture);
+    if (!sha256_file(path.s, sha256, e))
         return false;
     if (strcmp(sha256, stored) != 0)
-        return err_set(e, "%s: is not the file that the manifest describes", path);
-    if (!image_read_exr(path, &im, NULL, e))
+        return err_set(e, "%s: is not the file that the manifest describes", path.s);
+    if (!image_read_exr(path.s, &im, NULL, e))
         return false;
     int cs = image_channel(&im, "cs");
     struct signature *s = &v->correct;
@@ -362,11 +362,11 @@ static bool get_picture(const char *dir, struct view *v, const struct catalogue 
               get_channels(&im, "c", s->mean, NULL) && get_channels(&im, "cv", s->var, NULL) &&
               get_channels(&im, "ck", s->k3, NULL);
     if (!ok)
-        err_set(e, "%s: channels are missing, or its size is wrong", path);
+        err_set(e, "%s: channels are missing, or its size is wrong", path.s);
     for (int i = 0; ok && i < im.width * im.height; i++)
         s->spread[i] = (double)im.data[i * im.channels + cs];
     s->cell = v->width / im.width;
-    ok = ok && get_effects(v, c, json_object_get(json, "bugs"), &im, path, e);
+    ok = ok && get_effects(v, c, json_object_get(json, "bugs"), &im, path.s, e);
     image_free(&im);
     return ok;
 }
@@ -444,13 +444,12 @@ static bool fill(const char *dir, struct catalogue *c, const json_t *root, struc
 
 bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
 {
-    char path[MAX_PATH];
     json_error_t why;
     *out = (struct catalogue){0};
-    snprintf(path, sizeof path, "%s/manifest.json", dir);
-    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
+    const struct path path = fs_path("%s/manifest.json", dir);
+    json_t *root = json_load_file(path.s, JSON_REJECT_DUPLICATES, &why);
     if (root == NULL)
-        return err_set(e, "%s:%d: %s", path, why.line, why.text);
+        return err_set(e, "%s:%d: %s", path.s, why.line, why.text);
     bool ok = fill(dir, out, root, e);
     json_decref(root);
     if (!ok)

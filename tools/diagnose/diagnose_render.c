@@ -1,4 +1,5 @@
 #include "diagnose_render.h"
+#include "renderer/base/fs.h"
 
 #include "reference/replicates/engine_driver.h"
 #include "tools/validate/run_pathtracer.h"
@@ -8,19 +9,18 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_PATH = 4400, FEWEST_CONSISTENT = 4 };
+enum { FEWEST_CONSISTENT = 4 };
 
 /* How far R may lie from 1: ours is independent, so all that counts is alpha. */
 static const double consistency_margin = 0.02;
 
 static bool render_one(const struct diagnose_job *job, int k, struct moments *out, struct err *e)
 {
-    char picture[MAX_PATH], log[MAX_PATH];
     struct suite_scene scene = *job->scene;
     scene.width = job->width;
     scene.height = job->height;
-    snprintf(picture, sizeof picture, "%s/diagnose.exr", job->work_dir);
-    snprintf(log, sizeof log, "%s/diagnose.log", job->work_dir);
+    const struct path picture = fs_path("%s/diagnose.exr", job->work_dir);
+    const struct path log = fs_path("%s/diagnose.log", job->work_dir);
     const struct pathtracer_job ours = {.program = job->program,
                                         .scene = &scene,
                                         .spp = job->spp,
@@ -30,12 +30,12 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
                                                                           : NULL,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .picture = picture,
-                                        .log = log};
+                                        .picture = picture.s,
+                                        .log = log.s};
     double cpu_s;
     bool ok = run_pathtracer(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
-    unlink(picture);
-    unlink(log);
+    unlink(picture.s);
+    unlink(log.s);
     return ok;
 }
 

@@ -2,6 +2,7 @@
 #ifndef ASSAY_EXPORT_JOB_H
 #define ASSAY_EXPORT_JOB_H
 
+#include "reference/suite/engine_table.h"
 #include "renderer/base/err.h"
 
 /* Texts are those of the command line. */
@@ -10,7 +11,7 @@ struct export_job {
     const char *environment; /* NULL: none */
     const char *out;
     double lens_radius, focal_distance;
-    int engine; /* as --engine or the ending of `out` says */
+    const struct engine_kind *engine; /* as --engine or the ending of `out` says */
     int width, height, depth;
     bool help; /* was printed: nothing else is set */
 };

@@ -6,111 +6,40 @@
 #include <stdio.h>
 #include <string.h>
 
-enum option {
-    OPT_ONLY,
-    OPT_ENGINE,
-    OPT_OUT,
-    OPT_GOLDEN,
-    OPT_FRESH,
-    OPT_PICTURES,
-    OPT_SUITE,
-    OPT_SHARE,
-    OPT_WORK,
-    OPT_SEED,
-    OPT_THREADS,
-    OPT_TIMEOUT,
-    OPT_SLURM,
-    OPT_HELP
-};
+#define TO(member) CLI_TO(struct reference_command, member)
 
 static const struct cli_option options[] = {
-    [OPT_ONLY] = {0, "only", 1, "SCENE", "only this scene; may be given again"},
-    [OPT_ENGINE] = {0, "engine", 1, "NAME", "only cycles, or only povray"},
-    [OPT_OUT] = {'o', "out", 1, "DIR", "where they go (build/golden-candidate)"},
-    [OPT_GOLDEN] = {0, "golden", 1, "DIR", "leave out what is stored there and up to date"},
-    [OPT_FRESH] = {0, "fresh", 0, "", "render also what is there and up to date"},
-    [OPT_PICTURES] = {0, "pictures", 1, "A:B",
-                      "of one reference, pictures A to B-1 alone, unfolded, into DIR: of\n"
-                      "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
-                      "its replicates; what a job of assay plan does"},
-    [OPT_SUITE] = {0, "suite", 1, "DIR", "the scenes (reference/scenes)"},
-    [OPT_SHARE] = {0, "share", 1, "DIR", "where cycles.py is (reference)"},
-    [OPT_WORK] = {0, "work", 1, "DIR", "temporary files (build/work)"},
-    [OPT_SEED] = {0, "seed", 1, "N", "seed of all replicates (that of what is stored, else 1)"},
-    [OPT_THREADS] = {'t', "threads", 1, "N", "0: one per processor (0)"},
-    [OPT_TIMEOUT] = {0, "timeout", 1, "S", "seconds for one engine and scene (7200)"},
-    [OPT_SLURM] = {0, "slurm", 0, "", "jobs of some replicates each on a Slurm cluster"},
-    [OPT_HELP] = {'h', "help", 0, "", "print this"},
+    {0, "only", "SCENE", "only this scene; may be given again",
+     CLI_TO_LIST(struct reference_command, only, num_only), .noun = "scenes"},
+    {0, "engine", "NAME", "only one engine's, of" ENGINES_WITH_GOLDENS(ENGINE_TEXT), TO(engine),
+     .names = engine_names},
+    {'o', "out", "DIR", "where they go (build/golden-candidate)", TO(out)},
+    {0, "golden", "DIR", "leave out what is stored there and up to date", TO(golden)},
+    {0, "fresh", "", "render also what is there and up to date", TO(fresh)},
+    {0, "pictures", "A:B",
+     "of one reference, pictures A to B-1 alone, unfolded, into DIR: of\n"
+     "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
+     "its replicates; what a job of assay plan does",
+     CLI_TO_RANGE(struct reference_command, first), 0, INT32_MAX, .noun = "picture"},
+    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
+    {0, "work", "DIR", "temporary files (build/work)", TO(work)},
+    {0, "seed", "N", "seed of all replicates (that of what is stored, else 1)", TO(seed), 0,
+     INT32_MAX},
+    {'t', "threads", "N", "0: one per processor (0)", TO(opt.threads), 0, 1024},
+    {0, "timeout", "S", "seconds for one engine and scene (7200)", TO(opt.timeout_s), 1, 1e6},
+    {0, "slurm", "", "jobs of some replicates each on a Slurm cluster", TO(slurm)},
+    {'h', "help", "", "print this", TO(help), .usage = "usage: assay reference [options]\n"},
     {0}};
-
-static bool parse_range(const char *text, struct reference_command *c, struct err *e)
-{
-    const char *colon = strchr(text, ':');
-    char first[16];
-    if (colon == NULL || colon - text >= (long)sizeof first)
-        return err_set(e, "--pictures: '%s' is not a range A:B", text);
-    snprintf(first, sizeof first, "%.*s", (int)(colon - text), text);
-    if (!cli_int("--pictures", first, 0, INT32_MAX - 1, &c->first, e) ||
-        !cli_int("--pictures", colon + 1, 1, INT32_MAX, &c->last, e))
-        return false;
-    return c->first < c->last || err_set(e, "--pictures: no picture in '%s'", text);
-}
-
-static bool parse(int argc, char **argv, struct reference_command *c, struct err *e)
-{
-    static const char *const engines[] = {"cycles", "povray", NULL};
-    struct cli cli = {.options = options, .argc = argc, .argv = argv, .next = 1};
-    bool ok = true;
-    for (int i; ok && (i = cli_next(&cli, e)) != CLI_END;) {
-        if (i == CLI_ERROR)
-            return false;
-        if (i == CLI_POSITIONAL)
-            return err_set(e, "reference takes no argument '%s'", cli.value[0]);
-        const char *v = cli.value[0];
-        int n;
-        switch ((enum option)i) {
-        case OPT_ONLY:
-            if (c->num_only == REFERENCE_MOST_SCENES)
-                return err_set(e, "--only: at most %d scenes", REFERENCE_MOST_SCENES);
-            c->only[c->num_only++] = v;
-            break;
-        case OPT_ENGINE:
-            ok = cli_choice("--engine", v, engines, &n, e);
-            c->engine = v;
-            break;
-        case OPT_OUT: c->out = v; break;
-        case OPT_GOLDEN: c->golden = v; break;
-        case OPT_FRESH: c->fresh = true; break;
-        case OPT_PICTURES: ok = parse_range(v, c, e); break;
-        case OPT_SUITE: c->suite_dir = v; break;
-        case OPT_SHARE: c->opt.share_dir = v; break;
-        case OPT_WORK: c->work = v; break;
-        case OPT_SEED:
-            ok = cli_int("--seed", v, 0, INT32_MAX, &n, e);
-            c->opt.seed = ok ? (uint32_t)n : 0;
-            c->has_seed = true;
-            break;
-        case OPT_THREADS: ok = cli_int("--threads", v, 0, 1024, &c->opt.threads, e); break;
-        case OPT_TIMEOUT: ok = cli_double("--timeout", v, 1, 1e6, &c->opt.timeout_s, e); break;
-        case OPT_SLURM: c->slurm = true; break;
-        case OPT_HELP:
-            puts("usage: assay reference [options]\n");
-            cli_print_options(stdout, options);
-            c->help = true;
-            return true;
-        }
-    }
-    return ok;
-}
 
 bool reference_options_read(int argc, char **argv, struct reference_command *c, struct err *e)
 {
-    *c =
-        (struct reference_command){.out = "build/golden-candidate",
-                                   .suite_dir = "reference/scenes",
-                                   .work = "build/work",
-                                   .opt = {.seed = 1, .timeout_s = 7200, .share_dir = "reference"}};
-    if (!parse(argc, argv, c, e))
+    *c = (struct reference_command){.out = "build/golden-candidate",
+                                    .suite_dir = "reference/scenes",
+                                    .work = "build/work",
+                                    .seed = -1,
+                                    .opt = {.timeout_s = 7200, .share_dir = "reference"}};
+    if (!cli_read(options, argc, argv, c, e))
         return false;
     if (c->help)
         return true;
@@ -118,6 +47,7 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
         return err_set(e, "--pictures goes with none of --slurm, --fresh, --golden");
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();
+    c->opt.seed = c->seed < 0 ? 1 : (uint32_t)c->seed;
     c->opt.work_dir = c->work;
     if (!fs_make_dirs(c->work, e) || !suite_load(c->suite_dir, &c->suite, e))
         return false;
@@ -191,7 +121,7 @@ bool reference_options_state(const struct reference_command *c, const struct sui
                              struct err *e)
 {
     *out = (struct reference_state){.opt = c->opt};
-    if (!c->has_seed && c->golden != NULL)
+    if (c->seed < 0 && c->golden != NULL)
         out->opt.seed = stored_seed(c, scene, ref);
     if (!reference_key(scene, ref, &out->opt, out->key, e))
         return false;

@@ -11,8 +11,9 @@ struct reference_command {
     const char *only[REFERENCE_MOST_SCENES], *engine, *out, *golden, *suite_dir, *work;
     int num_only;
     struct reference_options opt;
+    int seed;        /* negative: none was given */
     int first, last; /* --pictures; last 0: all */
-    bool fresh, has_seed, slurm, help;
+    bool fresh, slurm, help;
     struct suite suite;
 };
 

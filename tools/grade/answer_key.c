@@ -3,6 +3,7 @@
 #include "reference/base/process.h"
 #include "reference/store/reference_render.h"
 #include "reference/truth/truth.h"
+#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/version.h"
 
@@ -73,39 +74,38 @@ static void scene_files(const struct rubric *r, const struct rubric_picture *p, 
 static bool render_ours(const struct rubric *r, const struct rubric_picture *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    char text[TEXT], key[65], path[MAX_PATH], scene[MAX_PATH], environment[MAX_PATH], log[MAX_PATH];
+    char text[TEXT], key[65], scene[MAX_PATH], environment[MAX_PATH];
     const char *argv[MAX_ARGS];
     if (!command_of(r, p, words, opt, "out.exr", text, argv, e))
         return false;
     scene_files(r, p, scene, environment);
     if (!key_of(argv, scene, environment[0] != '\0' ? environment : NULL, key, e))
         return false;
-    snprintf(path, sizeof path, "%s/%s.exr", opt->cache, key);
-    if (access(path, R_OK) == 0 && moments_read(path, out, NULL, e))
+    const struct path path = fs_path("%s/%s.exr", opt->cache, key);
+    if (access(path.s, R_OK) == 0 && moments_read(path.s, out, NULL, e))
         return true;
-    char made[MAX_PATH];
-    snprintf(made, sizeof made, "%s/new.exr", opt->cache);
-    snprintf(log, sizeof log, "%s/%s.log", opt->cache, p->name);
+    const struct path made = fs_path("%s/new.exr", opt->cache);
+    const struct path log = fs_path("%s/%s.log", opt->cache, p->name);
     if (!command_of(r, p, words, opt, "new.exr", text, argv, e))
         return false;
     const struct process process = {
-        .argv = argv, .cwd = opt->cache, .log = log, .timeout_s = opt->timeout_s};
+        .argv = argv, .cwd = opt->cache, .log = log.s, .timeout_s = opt->timeout_s};
     if (!process_run(&process, NULL, e))
         return err_prefix(e, "reference of '%s'", p->name);
-    if (rename(made, path) != 0)
-        return err_set(e, "%s: cannot rename", made);
-    unlink(log);
-    return moments_read(path, out, NULL, e);
+    if (rename(made.s, path.s) != 0)
+        return err_set(e, "%s: cannot rename", made.s);
+    unlink(log.s);
+    return moments_read(path.s, out, NULL, e);
 }
 
 static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
                          const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    static const char *const engines[] = {"", "truth", "cycles", "povray"};
     if (p->reference == REFERENCE_OURS)
         return render_ours(r, p, "", opt, out, e);
     struct suite_scene scene = *p->suite;
-    const struct suite_reference *ref = suite_reference_of(&scene, engines[p->reference]);
+    const struct suite_reference *ref =
+        suite_reference_of(&scene, rubric_reference_names[p->reference]);
     json_t *manifest = NULL;
     if (p->reference != REFERENCE_TRUTH) {
         bool ok = golden_read(opt->golden_dir, &scene, ref, out, &manifest, e);
@@ -175,12 +175,11 @@ static bool words_matter(const struct rubric *r, const struct rubric_picture *p,
 static bool read_accepted(const struct rubric *r, const struct rubric_picture *p, const char *file,
                           struct moments *out, struct err *e)
 {
-    char path[MAX_PATH];
-    snprintf(path, sizeof path, "%s/%s", r->dir, file);
-    return moments_read(path, out, NULL, e) &&
+    const struct path path = fs_path("%s/%s", r->dir, file);
+    return moments_read(path.s, out, NULL, e) &&
            ((out->width == p->width && out->height == p->height) ||
-            err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path, out->width, out->height,
-                    p->name, p->width, p->height));
+            err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path.s, out->width,
+                    out->height, p->name, p->width, p->height));
 }
 
 /* What picture i looks like with the deviations of a set; left empty where they change nothing. */
@@ -202,10 +201,8 @@ static bool deviating(const struct rubric *r, const struct rubric_set *set, int 
 bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                      struct answer_key *out, struct err *e)
 {
-    char path[MAX_PATH];
     *out = (struct answer_key){0};
-    snprintf(path, sizeof path, "%s/scene", opt->cache);
-    bool ok = submission_stage(r, path, e);
+    bool ok = submission_stage(r, fs_path("%s/scene", opt->cache).s, e);
     for (int i = 0; ok && i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
         struct answer *a = &out->of[0][i];

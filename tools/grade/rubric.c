@@ -4,15 +4,11 @@
 #include "renderer/base/cli.h"
 
 #include <errno.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_FILE = 1 << 20, MAX_LINE = 2048 };
-
-const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
-                                                             "exact", "noise", "rates"};
 
 /* A line being read: its words are taken one by one. */
 struct statement {
@@ -23,19 +19,6 @@ struct statement {
     struct rubric_picture *picture; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
 };
-
-void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
-{
-    if (m->num < (int)(sizeof m->at / sizeof *m->at)) {
-        va_list ap;
-        va_start(ap, format);
-        m->at[m->num].line = line;
-        vsnprintf(m->at[m->num].text, sizeof m->at->text, format, ap);
-        va_end(ap);
-        err_hide_controls(m->at[m->num].text);
-    }
-    m->num++;
-}
 
 static char *take_word(struct statement *s)
 {
@@ -231,15 +214,15 @@ static void read_check(struct statement *s)
 
 static void read_reference(struct statement *s, struct rubric_picture *p)
 {
-    static const char *const kinds[] = {"none", "truth", "cycles", "povray", "ours"};
     char *kind = take_word(s);
     if (p->reference != REFERENCE_NONE)
         rubric_mistake(s->m, s->line, "a second 'reference'");
     for (int k = REFERENCE_TRUTH; k <= REFERENCE_OURS; k++)
-        if (strcmp(kind, kinds[k]) == 0)
+        if (strcmp(kind, rubric_reference_names[k]) == 0)
             p->reference = (enum rubric_reference)k;
     if (p->reference == REFERENCE_NONE)
-        rubric_mistake(s->m, s->line, "reference '%s' is none of truth, cycles, povray, ours",
+        rubric_mistake(s->m, s->line,
+                       "reference '%s' is none of truth" ENGINES_WITH_GOLDENS(ENGINE_TEXT) " ours",
                        kind);
     if (p->reference == REFERENCE_OURS) {
         take_int(s, "reference ours", 1, 1 << 20, &p->reference_spp);
@@ -420,14 +403,6 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
     int kept = (int)(sizeof m->at / sizeof *m->at);
     qsort(m->at, (size_t)(m->num < kept ? m->num : kept), sizeof *m->at, by_line);
     return true;
-}
-
-double rubric_points(const struct rubric *r)
-{
-    double sum = 0;
-    for (int i = 0; i < r->num_checks; i++)
-        sum += r->check[i].points;
-    return sum;
 }
 
 bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel)

@@ -1,55 +1,6 @@
-/* A rubric: what a course asks of a submission, what it is worth, and what is said where it is not met. A file of
- * lines, one statement each, because staff edit it by hand, and because every mistake can be told with its line,
- * which a JSON tree has lost. `#` at the
- * beginning or after a space starts a comment; indentation is free. Lists stand in the order of the file.
- *
- *   rubric TITLE                        first statement
- *   curve cgl | srgb | linear | gamma=G of the PNG files that programs write (tone_curve.h); default cgl
- *   command WORDS                       how a program is run. {program} {scene} {out} {width} {height} {spp} {lights}
- *                                       {bounces} {threads} {seed} {options} are replaced; {options} may be several words.
- *                                       In a scene with an environment or a lens, {options} has -e, -b and -d too
- *   output NAME                         the file that {out} names: its ending is the kind of picture (out.png)
- *   program NAME                        the program inside a submitted directory (pathtracer)
- *   build WORDS                         run first in a submitted source tree; without it trees are as they are
- *   diagnose WORDS                      a command as above that writes our moments (.exr) to {out}, from plain COLLADA:
- *                                       programs that lose points are then diagnosed, and the bug is named
- *   bugs DIR                            a directory beside the rubric (rubric_bugs.h): what known bugs do to its
- *                                       pictures. Submissions of any kind that lose points are then told the bug
- *   limit wall|cpu SECONDS, limit memory|disk MIB, limit processes N, limit build SECONDS
- *   total POINTS                        what all checks have to add up to
- *   mask X Y W H                        pixels that no check looks at, of every picture, from the bottom left as in the
- *                                       assignment's -p: a watermark of a library that students were given
- *   accept NAME WORDS                   a deviation that is not the student's fault: our renderer shows it with WORDS
- *                                       besides its other options. A program is graded against our own references,
- *                                       and against those of each deviation and of all of them together in every
- *                                       choice; the best counts, for the whole program, and staff are told
- *
- *   picture NAME                        one run of the program, or NAME.png (.exr, .pfm, .hdr) of a directory
- *     scene SCENE                       of the suite, or FILE.dae beside the rubric
- *     size W H, spp N, lights N (1), bounces N, options WORDS
- *     reference truth | cycles | povray | ours SPP [WORDS]
- *                                       a closed form or a golden of the suite's scene (golden: of its size and
- *                                       bounces), or our own render with as many samples and WORDS instead of
- *                                       `options` (or "none"); not needed where no check asks for it
- *     accept NAME FILE.exr              the same by a picture of it (our moments) beside the rubric, where our renderer
- *                                       cannot make it; pictures of one NAME belong together
- *     environment FILE.exr              beside the rubric; {options} then has -e too
- *   part NUMBER TITLE
- *   check NAME POINTS KIND PICTURES     of the part above it:
- *                                         equal P             the picture has the mean of its reference
- *                                         agree P Q           two pictures have the same mean
- *                                         sum P Q R ...       P is the sum of the others
- *                                         exact P             codes of the reference away from edges
- *                                         noise P Q           variance of P over that of Q is `ratio`
- *                                         rates P             the rate picture shows whole batches only
- *     image D0 D1, tile D0 D1           relative difference: full points inside +-D0, none outside +-D1 (equal,
- *                                       agree, sum; tiles are SIDE = 8 pixels)
- *     share D0 D1                       of pixels that are wrong (exact, rates)
- *     ratio D0 D1                       on the natural logarithm (noise)
- *     batch N                           samples (rates)
- *     count D0 D1                       relative difference of the mean number of samples from ours (rates)
- *     title TEXT, hint TEXT, where TEXT (the place in the assignment)
- *     visibility hidden | after_due_date | after_published | visible (default) */
+/* A rubric: what a course asks of a submission, what it is worth, and what is said where it is not met; its manual is
+ * tools/docs/formats/rubric.md. A file of lines, one statement each, because staff edit it by hand, and because every
+ * mistake can be told with its line, which a JSON tree has lost. Lists below stand in the order of the file. */
 #ifndef ASSAY_RUBRIC_H
 #define ASSAY_RUBRIC_H
 
@@ -80,10 +31,10 @@ extern const char *const rubric_check_kind_name[NUM_CHECK_KINDS];
 enum rubric_reference {
     REFERENCE_NONE,
     REFERENCE_TRUTH,
-    REFERENCE_CYCLES,
-    REFERENCE_POVRAY,
-    REFERENCE_OURS
+    REFERENCE_GOLDENS, /* of the first of engine_table.h, and so on */
+    REFERENCE_OURS = REFERENCE_GOLDENS + NUM_ENGINES_WITH_GOLDENS
 };
+extern const char *const rubric_reference_names[]; /* "none", "truth", ... */
 
 struct accepted {
     int line;

@@ -1,5 +1,6 @@
 #include "rubric_bugs.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "tools/images/tone_curve.h"
 #include "rate_image.h"
@@ -329,10 +330,8 @@ static bool find_views(const struct rubric *r, const struct answer_key *a, struc
 bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e)
 {
-    char dir[4400];
     *out = (struct rubric_bugs){0};
-    snprintf(dir, sizeof dir, "%.4096s/%s", r->dir, r->bugs);
-    if (!catalogue_read(dir, &out->catalogue, e))
+    if (!catalogue_read(fs_path("%s/%s", r->dir, r->bugs).s, &out->catalogue, e))
         return false;
     if (find_views(r, a, out, e))
         return true;

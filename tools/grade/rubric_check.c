@@ -1,12 +1,40 @@
 #include "rubric_internal.h"
+#include "renderer/base/fs.h"
 
 #include "reference/truth/truth.h"
 #include "tools/images/tone_curve.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
+
+const char *const rubric_reference_names[] = {"none", "truth",
+                                              ENGINES_WITH_GOLDENS(ENGINE_WORD) "ours"};
+const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
+                                                             "exact", "noise", "rates"};
+
+void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
+{
+    if (m->num < (int)(sizeof m->at / sizeof *m->at)) {
+        va_list ap;
+        va_start(ap, format);
+        m->at[m->num].line = line;
+        vsnprintf(m->at[m->num].text, sizeof m->at->text, format, ap);
+        va_end(ap);
+        err_hide_controls(m->at[m->num].text);
+    }
+    m->num++;
+}
+
+double rubric_points(const struct rubric *r)
+{
+    double sum = 0;
+    for (int i = 0; i < r->num_checks; i++)
+        sum += r->check[i].points;
+    return sum;
+}
 
 static bool is_word(const char *word, const char *const *words)
 {
@@ -42,9 +70,8 @@ static void check_command(const char *what, const char *command, struct rubric_m
 
 static bool is_beside(const struct rubric *r, const char *file)
 {
-    char path[8192];
-    snprintf(path, sizeof path, "%s/%s", r->dir, file);
-    return strchr(file, '/') == NULL && access(path, R_OK) == 0;
+    const struct path path = fs_path("%s/%s", r->dir, file);
+    return strchr(file, '/') == NULL && access(path.s, R_OK) == 0;
 }
 
 static void check_head(struct rubric *r, struct rubric_mistakes *m)
@@ -97,7 +124,6 @@ static void check_golden(const struct rubric_picture *p, const char *engine,
 static void check_picture(const struct rubric *r, struct rubric_picture *p,
                           const struct suite *suite, struct rubric_mistakes *m)
 {
-    static const char *const engines[] = {"", "truth", "cycles", "povray"};
     size_t n = strlen(p->scene);
     p->suite = suite_find(suite, p->scene);
     if (p->scene[0] == '\0')
@@ -118,8 +144,8 @@ static void check_picture(const struct rubric *r, struct rubric_picture *p,
         rubric_mistake(m, p->line, "picture '%s' has no 'spp'", p->name);
     if (p->bounces < 0)
         rubric_mistake(m, p->line, "picture '%s' has no 'bounces'", p->name);
-    if (p->reference >= REFERENCE_TRUTH && p->reference <= REFERENCE_POVRAY && p->scene[0] != '\0')
-        check_golden(p, engines[p->reference], m);
+    if (p->reference >= REFERENCE_TRUTH && p->reference < REFERENCE_OURS && p->scene[0] != '\0')
+        check_golden(p, rubric_reference_names[p->reference], m);
     if (p->environment[0] != '\0' && !is_beside(r, p->environment))
         rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
                        p->environment);

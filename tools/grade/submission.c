@@ -259,21 +259,21 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
                         const char *stage, const char *work, const char *out_dir, uint64_t seed,
                         int threads, struct made *made, struct err *e)
 {
-    char text[TEXT], out[MAX_PATH], log[MAX_PATH], rates[80];
+    char text[TEXT], rates[80];
     const char *argv[MAX_ARGS];
     const char *dot = strrchr(r->output, '.');
     if (!submission_command(r, p, sub->program, seed, threads, text, sizeof text, argv, MAX_ARGS))
         return err_set(e, "%s: the command of picture '%s' is too long", r->path, p->name);
     snprintf(rates, sizeof rates, "%.*s_rate.png", (int)(dot - r->output), r->output);
-    snprintf(out, sizeof out, "%s/%s", work, p->name);
-    snprintf(log, sizeof log, "%s/%s.log", out_dir, p->name);
+    const struct path out = fs_path("%s/%s", work, p->name);
+    const struct path log = fs_path("%s/%s.log", out_dir, p->name);
     const char *const keep[] = {r->output, rates, NULL};
     const struct sandbox_job job = {.argv = argv,
                                     .tree = sub->tree,
                                     .scene = stage,
                                     .keep = keep,
-                                    .out = out,
-                                    .log = log,
+                                    .out = out.s,
+                                    .log = log.s,
                                     .limit = r->limit};
     struct sandbox_result result;
     if (!sandbox_run(box, &job, &result, e))
@@ -284,8 +284,8 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     bool there = false, has_rates = false;
     snprintf(made->path, sizeof made->path, "%s/%s%s", out_dir, p->name, dot);
     snprintf(made->rates, sizeof made->rates, "%s/%s_rate.png", out_dir, p->name);
-    bool ok = move_file(out, r->output, made->path, &there, e) &&
-              move_file(out, rates, made->rates, &has_rates, e) && fs_remove_tree(out, e);
+    bool ok = move_file(out.s, r->output, made->path, &there, e) &&
+              move_file(out.s, rates, made->rates, &has_rates, e) && fs_remove_tree(out.s, e);
     if (result.end != SANDBOX_OK)
         snprintf(made->why, sizeof made->why, "the program: %s", result.why);
     else if (!there)

@@ -3,6 +3,7 @@
 #include "student_page.h"
 
 #include "tools/html/html.h"
+#include "tools/plots/plot.h"
 #include "tools/results/results.h"
 
 #include <math.h>
@@ -24,16 +25,16 @@ static void histogram(FILE *f, const json_t *grades)
     }
     for (int b = 0; b < BARS; b++)
         most = fmax(most, count[b]);
-    fputs("<h2>Points</h2><svg width=\"420\" viewBox=\"0 0 420 120\" role=\"img\">", f);
+    struct plot p = plot_sized(f, 400, 100);
+    p.x = (struct plot_axis){.label = "points, %", .hi = 100};
+    p.y = (struct plot_axis){.label = "submissions", .hi = 1.1 * most, .step = most < 5 ? 1 : 0};
+    fputs("<h2>Points</h2>", f);
+    plot_open(&p, "How many submissions have how many points");
     for (int b = 0; b < BARS; b++)
-        fprintf(
-            f,
-            "<rect x=\"%d\" y=\"%g\" width=\"18\" height=\"%g\" fill=\"#468\"><title>%d to %d %%: %g</title></rect>",
-            10 + 20 * b, 100 - 90 * count[b] / most, 90 * count[b] / most, 100 * b / BARS,
-            100 * (b + 1) / BARS, count[b]);
-    fputs(
-        "<text x=\"10\" y=\"115\" font-size=\"10\">0 %</text><text x=\"385\" y=\"115\" font-size=\"10\">100 %</text></svg>\n",
-        f);
+        if (count[b] > 0)
+            plot_bar(&p, "bar", 100.0 * b / BARS + 0.25, 0, 100.0 * (b + 1) / BARS - 0.25, count[b],
+                     "%d to %d %%: %g", 100 * b / BARS, 100 * (b + 1) / BARS, count[b]);
+    plot_close(&p);
 }
 
 /* A path of one part for an href. */
@@ -45,9 +46,7 @@ static void link_to(FILE *f, const char *id)
             fputc(*c, f);
         else
             fprintf(f, "%%%02X", (unsigned)(unsigned char)*c);
-    fputs("/index.html\">", f);
-    html_text(f, id);
-    fputs("</a>", f);
+    html_print(f, "/index.html\">%s</a>", id);
 }
 
 static void table(FILE *f, const json_t *grades)
@@ -60,54 +59,42 @@ static void table(FILE *f, const json_t *grades)
         if (json_array_size(json_object_get(g, "parts")) > 0)
             parts = json_object_get(g, "parts");
     }
-    fputs("<h2>Submissions</h2><table><tr><th>submission</th><th class=\"n\">points</th>", f);
+    fputs("<h2>Submissions</h2><table><tr><th>submission</th><th class=\"num\">points</th>", f);
     json_array_foreach(parts, k, p)
     {
-        fputs("<th class=\"n\">", f);
-        html_text(f, student_page_text(p, "number"));
-        fputs("</th>", f);
+        html_print(f, "<th class=\"num\">%s</th>", member_text(p, "number"));
     }
     fputs("<th>bug</th><th>for you to look at</th></tr>\n", f);
     json_array_foreach(grades, i, g)
     {
         fputs("<tr><td>", f);
-        link_to(f, student_page_text(g, "id"));
-        fprintf(f, "</td><td class=\"n\">%.2f</td>", member_number(g, "points"));
+        link_to(f, member_or_empty(g, "id"));
+        fprintf(f, "</td><td class=\"num\">%.2f</td>", member_number(g, "points"));
         json_array_foreach(json_object_get(g, "parts"), k, p)
         {
-            fprintf(f, "<td class=\"n\">%.2f</td>", member_number(p, "points"));
+            fprintf(f, "<td class=\"num\">%.2f</td>", member_number(p, "points"));
         }
         if (json_array_size(json_object_get(g, "parts")) == 0)
             fprintf(f, "<td colspan=\"%zu\"></td>", json_array_size(parts));
         fputs("<td>", f);
         json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, p)
         {
-            fputs(k > 0 ? " or " : "", f);
-            html_text(f, student_page_text(p, "name"));
+            html_print(f, "%s%s", k > 0 ? " or " : "", member_text(p, "name"));
         }
         /* Of other deviations than those it was graded with: staff may want to know. */
-        const char *with = student_page_text(json_object_get(g, "diagnosis"), "with");
-        if (k > 0 && with[0] != '\0' && strcmp(with, student_page_text(g, "accepted")) != 0) {
-            fputs(" on top of ", f);
-            html_text(f, with);
-        }
-        fputs("</td><td>", f);
-        html_text(f, student_page_text(g, "trouble"));
-        html_text(f, student_page_text(g, "wrong"));
-        if (student_page_text(g, "accepted")[0] != '\0') {
-            fputs("accepted: ", f);
-            html_text(f, student_page_text(g, "accepted"));
-            fputs("; ", f);
-        }
+        const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
+        if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0)
+            html_print(f, " on top of %s", with);
+        html_print(f, "</td><td>%s%s", member_text(g, "trouble"), member_text(g, "wrong"));
+        if (member_or_empty(g, "accepted")[0] != '\0')
+            html_print(f, "accepted: %s; ", member_text(g, "accepted"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             bool judged = json_is_true(json_object_get(c, "judged"));
-            if (student_page_text(c, "flag")[0] == '\0' && judged)
+            if (member_or_empty(c, "flag")[0] == '\0' && judged)
                 continue;
-            html_text(f, student_page_text(c, "name"));
-            fputs(": ", f);
-            html_text(f, student_page_text(c, "flag"));
-            fputs(judged ? "; " : " not judged; ", f);
+            html_print(f, "%s: %s%s", member_text(c, "name"), member_text(c, "flag"),
+                       judged ? "; " : " not judged; ");
         }
         fputs("</td></tr>\n", f);
     }
@@ -146,17 +133,14 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
         const json_t *first =
             json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
         if (first != NULL)
-            num = count_one(t, num, student_page_text(first, "bug"));
+            num = count_one(t, num, member_or_empty(first, "bug"));
     }
     if (num == 0)
         return;
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Most common bugs</h2><table>\n", f);
-    for (i = 0; i < num && i < 10; i++) {
-        fprintf(f, "<tr><td class=\"n\">%g</td><td>", t[i].num);
-        html_text(f, t[i].text);
-        fputs("</td></tr>\n", f);
-    }
+    for (i = 0; i < num && i < 10; i++)
+        html_print(f, "<tr><td class=\"num\">%g</td><td>%s</td></tr>\n", t[i].num, t[i].text);
     fputs("</table>\n", f);
 }
 
@@ -165,14 +149,11 @@ static void slowest(FILE *f, const json_t *grades, struct tally *t)
     size_t i, num = 0;
     json_t *g;
     json_array_foreach(grades, i, g) t[num++] =
-        (struct tally){.text = student_page_text(g, "id"), .num = member_number(g, "cpu_s")};
+        (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
-    for (i = 0; i < num && i < SLOWEST; i++) {
-        fprintf(f, "<tr><td class=\"n\">%.1f s</td><td>", t[i].num);
-        html_text(f, t[i].text);
-        fputs("</td></tr>\n", f);
-    }
+    for (i = 0; i < num && i < SLOWEST; i++)
+        html_print(f, "<tr><td class=\"num\">%.1f s</td><td>%s</td></tr>\n", t[i].num, t[i].text);
     fputs("</table>\n", f);
 }
 
@@ -190,9 +171,9 @@ static void look_alikes(FILE *f, const json_t *grades)
             h = json_array_get(grades, k);
             json_array_foreach(json_object_get(g, "pictures"), m, p)
             {
-                const char *a = student_page_text(p, "sha256"),
-                           *b = student_page_text(json_array_get(json_object_get(h, "pictures"), m),
-                                                  "sha256");
+                const char *a = member_or_empty(p, "sha256"),
+                           *b = member_or_empty(json_array_get(json_object_get(h, "pictures"), m),
+                                                "sha256");
                 num += a[0] != '\0';
                 same += a[0] != '\0' && strcmp(a, b) == 0;
             }
@@ -204,11 +185,7 @@ static void look_alikes(FILE *f, const json_t *grades)
                     "make the same.</p><ul>\n",
                     f);
             any = true;
-            fputs("<li>", f);
-            html_text(f, student_page_text(g, "id"));
-            fputs(" and ", f);
-            html_text(f, student_page_text(h, "id"));
-            fputs("</li>\n", f);
+            html_print(f, "<li>%s and %s</li>\n", member_text(g, "id"), member_text(h, "id"));
         }
     }
     if (any)
@@ -226,7 +203,7 @@ static void join_group(const json_t *grades, size_t i, int number, int *group)
         json_array_foreach(grades, m, other)
         {
             if (group[m] == 0 &&
-                strcmp(student_page_text(other, "id"), student_page_text(like, "id")) == 0)
+                strcmp(member_or_empty(other, "id"), member_or_empty(like, "id")) == 0)
                 join_group(grades, m, number, group);
         }
     }
@@ -242,7 +219,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
         if (group[i] != number)
             continue;
         fputs(members++ > 0 ? ", " : "", f);
-        link_to(f, student_page_text(g, "id"));
+        link_to(f, member_or_empty(g, "id"));
     }
     fputs("</li>\n", f);
 }
@@ -278,16 +255,17 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
         free(group);
         return err_set(e, "out of memory for the page of the class");
     }
-    fputs(student_page_head, f);
-    fputs("<title>Grades</title>\n<h1>", f);
-    html_text(f, student_page_text(json_array_get(grades, 0), "rubric"));
-    fprintf(f, "</h1>\n<p>%zu submissions</p>\n", json_array_size(grades));
+    html_page_open(f, "Grades", NULL, 0);
+    html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n<p>%zu submissions</p>\n",
+               member_text(json_array_get(grades, 0), "rubric"), json_array_size(grades));
     histogram(f, grades);
     common_bugs(f, grades, t);
     slowest(f, grades, t);
     look_alikes(f, grades);
     show_same_noise(f, grades, group);
     table(f, grades);
+    fputs("</div>\n", f);
+    html_page_close(f);
     free(t);
     free(group);
     return true;

@@ -242,23 +242,27 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
                       json_t **grade, struct err *e)
 {
     struct submission s;
-    char out[MAX_PATH], file[MAX_PATH + 32], log[MAX_PATH + 32], key[65];
+    char key[65];
     if (!submission_open(job->rubric, path, work, &s, e) || !key_of(job, &s, key, e))
         return false;
-    snprintf(out, sizeof out, "%.4000s/%s", job->out, s.id);
-    snprintf(file, sizeof file, "%s/grade.json", out);
-    snprintf(log, sizeof log, "%s/build.log", out);
-    if (!job->again && is_done(file, key, grade))
+    const struct path out = fs_path("%s/%s", job->out, s.id);
+    const struct path file = fs_path("%s/grade.json", out.s);
+    const struct path log = fs_path("%s/build.log", out.s);
+    if (!job->again && is_done(file.s, key, grade))
         return true;
-    if (!fs_remove_tree(out, e) || !fs_make_dirs(out, e) ||
-        !submission_build(job->rubric, job->sandbox, work, log, &s, e))
+    if (!fs_remove_tree(out.s, e) || !fs_make_dirs(out.s, e) ||
+        !submission_build(job->rubric, job->sandbox, work, log.s, &s, e))
         return false;
+    json_t *command = command_of(job, path);
+    if (command == NULL && job->word != NULL && job->word[0] != NULL)
+        return err_set(e, "%s: out of memory", path);
     *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
-                       s.id, "kind", submission_kind_name[s.kind], "command", command_of(job, path),
-                       "version", assay_version, "key", key, "rubric", job->rubric->title,
-                       "sandbox", !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha",
-                       job->alpha, "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
-    if (*grade != NULL && grade_made(job, &s, work, out, *grade, e) && json_write(file, *grade, e))
+                       s.id, "kind", submission_kind_name[s.kind], "command", command, "version",
+                       assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
+                       !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
+                       "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
+    if (*grade != NULL && grade_made(job, &s, work, out.s, *grade, e) &&
+        json_write(file.s, *grade, e))
         return true;
     json_decref(*grade);
     *grade = NULL;
@@ -287,17 +291,16 @@ static void *work(void *ctx)
     struct batch *b = ctx;
     const struct grade_job *job = b->job;
     for (;;) {
-        char dir[sizeof job->sandbox->dir.path + 24];
         struct err e = {""}, ignored;
         pthread_mutex_lock(&b->lock);
         int i = b->next++;
         pthread_mutex_unlock(&b->lock);
         if (i >= job->num)
             return NULL;
-        snprintf(dir, sizeof dir, "%s/work-%d", job->sandbox->dir.path, i);
-        if (!grade_one(job, job->path[i], dir, &b->grade[i], &e))
+        const struct path dir = fs_path("%s/work-%d", job->sandbox->dir.path, i);
+        if (!grade_one(job, job->path[i], dir.s, &b->grade[i], &e))
             b->grade[i] = trouble_json(job, job->path[i], e.msg);
-        bool removed = fs_remove_tree(dir, &ignored);
+        bool removed = fs_remove_tree(dir.s, &ignored);
         (void)removed; /* goes with the sandbox's directory */
         pthread_mutex_lock(&b->lock);
         b->done++;

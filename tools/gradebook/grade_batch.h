@@ -26,22 +26,8 @@ struct grade_job {
     void *ctx;
 };
 
-/* grade.json:
- *   { "assay_grade": 1, "id": , "kind": "program", "command": | null (grades this one again), "version": , "key": hex (of rubric, its bugs, submission, seed, alpha, version: while it
- *     is the same, a submission is not graded again), "rubric": title, "sandbox": true, "seed": , "alpha": ,
- *     "points": , "of": , "trouble": null | "one line", "wrong": null | "one line" (with the submission as a whole),
- *     "chance": of any check's points being others in another run, at most (the sum of theirs),
- *     "cpu_s": , "accepted": "light_pdf" (deviations that are not the student's fault, with which it was graded) | "",
- *     "parts": [{"number": , "title": , "points": , "of": }],
- *     "checks": [{"kind": "equal", "part": , "name": , "title": , "points": , "of": , "share": , "chance": , "judged": true,
- *                 "expected": , "seen": , "hint": , "where": , "visibility": , "accepted": , "flag": , "picture": ,
- *                 "tile": [x, y] | null, "relative": [per tile, null where not judged] | null (exact: the share of
- *                 its pixels that are wrong),
- *                 "intervals": [{"what": "red", "value": , "lo": , "hi": , "full": , "none": }] (equal, agree, sum)}],
- *     "pictures": [{"name": , "file": "NAME.png" | null, "why": , "end": "ok", "cpu_s": , "wall_s": ,
- *                   "width": , "height": , "sha256": | null}] }
- *   "diagnosis": null | grade_diagnose.h
- * Texts of programs are in it: whoever shows them has to escape them. */
+/* OUT/ID/grade.json, and a grade below: tools/docs/formats/grades.md. Texts of programs are in it: whoever shows them has to
+ * escape them. */
 
 /* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
  * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in

@@ -65,7 +65,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const struct suite *suite, const struct answer_key *answers,
                      const char *const *word, const struct sandbox *box, struct err *e)
 {
-    char stage[sizeof box->dir.path + 16], views[sizeof stage];
+    char stage[sizeof box->dir.path + 16];
     struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
@@ -87,14 +87,14 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     json_t *grades = NULL;
     int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
-    snprintf(views, sizeof views, "%s/views", box->dir.path);
+    const struct path views = fs_path("%s/views", box->dir.path);
     bool ok = (bugs != NULL || err_set(e, "out of memory")) && submission_stage(r, stage, e);
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
         job.bugs = bugs;
     }
     if (ok && r->diagnose[0] != '\0') {
-        ok = grade_diagnose_open(r, s->catalogue, suite, views, &diagnosis, e);
+        ok = grade_diagnose_open(r, s->catalogue, suite, views.s, &diagnosis, e);
         job.diagnosis = &diagnosis;
     }
     ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);

@@ -75,20 +75,19 @@ static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
                  const struct submission *s, int view, const char *work, uint64_t seed, int threads,
                  double alpha, struct observation *clue, struct err *e)
 {
-    char out[4400];
     struct made made;
     const struct diagnose_gather_options opt = {
         .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
-    snprintf(out, sizeof out, "%s/diagnose", work);
-    if (!fs_make_dirs(out, e) ||
-        !submission_picture(d->rubric, box, s, view, d->stage, work, out,
+    const struct path out = fs_path("%s/diagnose", work);
+    if (!fs_make_dirs(out.s, e) ||
+        !submission_picture(d->rubric, box, s, view, d->stage, work, out.s,
                             seed * 1000u + (uint64_t)view, threads, &made, e))
         return false;
     bool ok = made.why[0] == '\0'
                   ? diagnose_gather_image(&opt, d->catalogue.view[view].name, made.path, clue, e)
                   : err_set(e, "%.500s", made.why);
     struct err ignored;
-    return fs_remove_tree(out, ok ? e : &ignored) && ok;
+    return fs_remove_tree(out.s, ok ? e : &ignored) && ok;
 }
 
 static json_t *finding_json(const struct catalogue *c, const struct diagnosis *found)

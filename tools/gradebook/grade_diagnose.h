@@ -20,15 +20,13 @@ bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
                          struct err *e) __attribute__((warn_unused_result));
 void grade_diagnose_close(struct grade_diagnosis *d);
 
-/* By the pictures, graded with the deviations of `set`, in the form below; "correct" is never said of pictures that lost points:
- * "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no picture. */
+/* By the pictures, graded with the deviations of `set`, in the form of tools/docs/formats/grades.md ("diagnosis");
+ * "correct" is never said of pictures that lost points: "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no picture. */
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
                                  const struct answer_key *a, const struct submitted_images *h,
                                  int set, double alpha);
 
-/* { "finding": "correct" | "bug" | "unknown", "gate": "one line",
- *   "named": [{"name": , "bug": "one line", "where": "place in the assignment"}] }   likeliest first
- * or { "error": "one line" } where a view could not be made. Chance of accusing a right program: alpha. A
+/* The same form, "correct" too, or an "error" where a view could not be made. Chance of accusing a right program: alpha. A
  * new reference; NULL out of memory. May be called from several threads. */
 json_t *grade_diagnose_of(const struct grade_diagnosis *d, const struct sandbox *box,
                           const struct submission *s, const char *work, uint64_t seed, int threads,

@@ -2,7 +2,7 @@
 #ifndef ASSAY_GRADE_OPTIONS_H
 #define ASSAY_GRADE_OPTIONS_H
 
-#include "renderer/base/err.h"
+#include "tools/base/data_dirs.h"
 
 #include <stdint.h>
 
@@ -15,13 +15,8 @@ struct grade_settings {
     bool only_check, prepare, again, unsafe, quiet, slurm, help;
 };
 
-/* Where the paths are kept that the options do not give. */
-struct grade_paths {
-    char pathtracer[4096], suite[4096], golden[4096], catalogue[4096];
-};
-
-/* submission: NULL out of memory, else room for argc + 1, which the caller frees. */
-struct grade_settings grade_options_default(int argc, struct grade_paths *at);
+/* at: gets the paths that the options do not give. submission: NULL out of memory, else room for argc + 1, which the caller frees. */
+struct grade_settings grade_options_default(int argc, struct data_dirs *at);
 /* On top of the defaults. */
 bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
     __attribute__((warn_unused_result));

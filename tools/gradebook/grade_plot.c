@@ -1,6 +1,7 @@
 #include "student_page.h"
 
 #include "tools/html/html.h"
+#include "tools/plots/plot.h"
 #include "tools/results/results.h"
 
 #include <math.h>
@@ -10,13 +11,15 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
 {
     const json_t *values = json_object_get(check, "relative"),
                  *tile = json_object_get(check, "tile");
-    bool exact = strcmp(student_page_text(check, "kind"), "exact") == 0;
+    bool exact = strcmp(member_or_empty(check, "kind"), "exact") == 0;
     size_t columns = (size_t)(width / GRADE_TILE), i;
     json_t *v;
     if (json_array_size(values) == 0 || columns == 0)
         return;
-    fprintf(f, "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\">", GRADE_SHOWN, width,
-            height);
+    fprintf(
+        f,
+        "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"Tiles of the picture by their difference\">",
+        GRADE_SHOWN, width, height);
     json_array_foreach(values, i, v)
     {
         double d = json_number_value(v), strength = fmin(1, fabs(d) / 0.5);
@@ -40,27 +43,21 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
                   : "difference: red too bright, blue too dark, full colour from 50 %");
 }
 
-/* Where on 0 .. 360 a difference of so many times the margin stands: twice it at the ends. */
-static double place(double v)
-{
-    return 180 + 90 * fmax(-2, fmin(2, v));
-}
-
-static void show_interval(FILE *f, const json_t *v, double y)
+/* One row, each number over that beyond which there are no points. */
+static void draw_interval(struct plot *p, const json_t *v, double y)
 {
     double none = member_number(v, "none"), full = member_number(v, "full") / none,
-           lo = place(member_number(v, "lo") / none), hi = place(member_number(v, "hi") / none);
-    fprintf(f,
-            "<rect x=\"90\" y=\"%g\" width=\"180\" height=\"16\" fill=\"#f3ead0\"/>"
-            "<rect x=\"%.1f\" y=\"%g\" width=\"%.1f\" height=\"16\" fill=\"#cfe8cf\"/>",
-            y, place(-full), y, place(full) - place(-full));
-    fprintf(f,
-            "<rect x=\"%.1f\" y=\"%g\" width=\"%.1f\" height=\"4\" fill=\"#222\"/>"
-            "<circle cx=\"%.1f\" cy=\"%g\" r=\"4\"/><text x=\"378\" y=\"%g\">",
-            lo, y + 6, fmax(1, hi - lo), place(member_number(v, "value") / none), y + 8, y + 12);
-    html_text(f, student_page_text(v, "what"));
-    fprintf(f, " %+.1f %% (%+.1f to %+.1f)</text>\n", 100 * member_number(v, "value"),
-            100 * member_number(v, "lo"), 100 * member_number(v, "hi"));
+           value = member_number(v, "value"), lo = member_number(v, "lo"),
+           hi = member_number(v, "hi");
+    char text[128];
+    snprintf(text, sizeof text, "%.60s %+.1f %% (%+.1f to %+.1f)", member_or_empty(v, "what"),
+             100 * value, 100 * lo, 100 * hi);
+    plot_bar(p, "none", -1, y + 0.1, 1, y + 0.9, "no points beyond ±%.3g %%", 100 * none);
+    plot_bar(p, "all", -full, y + 0.1, full, y + 0.9, "all points within ±%.3g %%",
+             100 * full * none);
+    plot_segment(p, "interval", lo / none, y + 0.5, hi / none, y + 0.5);
+    plot_point(p, 0, value / none, y + 0.5, "%s", text);
+    plot_text(p, 2, y + 0.5, 14, 4, "start", "%s", text);
 }
 
 void grade_plot_intervals(FILE *f, const json_t *check)
@@ -70,15 +67,19 @@ void grade_plot_intervals(FILE *f, const json_t *check)
     json_t *v;
     if (num == 0)
         return;
-    fprintf(f,
-            "<figure><svg width=\"600\" viewBox=\"0 0 600 %zu\" role=\"img\" font-size=\"11\">\n",
-            20 * num + 18);
-    json_array_foreach(list, i, v) show_interval(f, v, 20 * (double)i);
-    fprintf(
-        f,
-        "<line x1=\"180\" x2=\"180\" y1=\"0\" y2=\"%zu\" stroke=\"#888\"/>"
-        "<text x=\"110\" y=\"%zu\">too dark</text><text x=\"195\" y=\"%zu\">too bright</text></svg>"
-        "<figcaption>by how much, with the noise of your picture: all points while a bar touches "
-        "green, none once it has left yellow</figcaption></figure>\n",
-        20 * num, 20 * num + 12, 20 * num + 12);
+    struct plot p = plot_sized(f, 360, 20 * (double)num);
+    p.style = "plot grades";
+    p.left = 14;
+    p.right = 260;
+    p.x = (struct plot_axis){
+        .label = "−: too dark, +: too bright; beyond ±1 no points", .lo = -2, .hi = 2, .step = 1};
+    p.y.hi = (double)num;
+    fputs("<figure>", f);
+    plot_open(&p, "Differences with their intervals, beside the margins");
+    json_array_foreach(list, i, v) draw_interval(&p, v, (double)(num - 1 - i));
+    plot_segment(&p, "expected", 0, 0, 0, (double)num);
+    plot_close(&p);
+    fputs("<figcaption>by how much, with the noise of your picture: all points while a bar touches "
+          "green, none once it has left yellow</figcaption></figure>\n",
+          f);
 }

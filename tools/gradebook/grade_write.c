@@ -33,16 +33,16 @@ static bool is_full(const json_t *check)
 static void describe(const json_t *c, char *out, size_t size)
 {
     size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.",
-                                student_page_text(c, "expected"), student_page_text(c, "seen"));
-    if (student_page_text(c, "accepted")[0] != '\0' && n < size)
+                                member_or_empty(c, "expected"), member_or_empty(c, "seen"));
+    if (member_or_empty(c, "accepted")[0] != '\0' && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "\nExplained by what the starter code does (%s): no points lost for that.",
-            student_page_text(c, "accepted"));
-    if (!is_full(c) && student_page_text(c, "hint")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", student_page_text(c, "hint"));
-    if (!is_full(c) && student_page_text(c, "where")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", student_page_text(c, "where"));
+            member_or_empty(c, "accepted"));
+    if (!is_full(c) && member_or_empty(c, "hint")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", member_or_empty(c, "hint"));
+    if (!is_full(c) && member_or_empty(c, "where")[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", member_or_empty(c, "where"));
     if (!is_judged(c) && n < size)
         snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
 }
@@ -51,20 +51,21 @@ static void describe(const json_t *c, char *out, size_t size)
 static void describe_whole(const json_t *grade, char *out, size_t size)
 {
     const json_t *diagnosis = json_object_get(grade, "diagnosis");
-    size_t n = (size_t)snprintf(out, size, "%s%s", student_page_text(grade, "trouble"),
-                                student_page_text(grade, "wrong")),
+    size_t n = (size_t)snprintf(out, size, "%s%s", member_or_empty(grade, "trouble"),
+                                member_or_empty(grade, "wrong")),
            i;
     json_t *b;
-    if (strcmp(student_page_text(diagnosis, "finding"), "unknown") == 0 && n < size)
+    if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "Different from the right pictures in a way that no known bug explains.");
     json_array_foreach(json_object_get(diagnosis, "named"), i, b)
     {
         if (n < size)
-            n += (size_t)snprintf(out + n, size - n, "%s%s (%s)",
-                                  i == 0 ? "This looks like: " : "\nor: ",
-                                  student_page_text(b, "bug"), student_page_text(b, "where"));
+            n +=
+                (size_t)snprintf(out + n, size - n, "%s%s (%s)",
+                                 i == 0 ? "This looks like: " : "\nor: ", member_or_empty(b, "bug"),
+                                 member_or_empty(b, "where"));
     }
 }
 
@@ -79,14 +80,14 @@ static json_t *gradescope(const json_t *grade)
     {
         char output[4096], name[400], number[32];
         describe(c, output, sizeof output);
-        snprintf(name, sizeof name, "Part %s: %s", student_page_text(c, "part"),
-                 student_page_text(c, "title"));
-        snprintf(number, sizeof number, "%s.%zu", student_page_text(c, "part"), i + 1);
+        snprintf(name, sizeof name, "Part %s: %s", member_or_empty(c, "part"),
+                 member_or_empty(c, "title"));
+        snprintf(number, sizeof number, "%s.%zu", member_or_empty(c, "part"), i + 1);
         json_array_append_new(tests, json_pack("{sf, sf, ss, ss, ss, ss, ss}", "score",
                                                rounded(member_number(c, "points")), "max_score",
                                                member_number(c, "of"), "name", name, "number",
                                                number, "output", output, "visibility",
-                                               student_page_text(c, "visibility"), "status",
+                                               member_or_empty(c, "visibility"), "status",
                                                is_full(c) ? "passed" : "failed"));
     }
     char whole[2048];
@@ -133,16 +134,15 @@ static void write_csv(FILE *f, const json_t *grades)
     json_array_foreach(json_object_get(first, "checks"), k, c)
     {
         fputc(',', f);
-        csv_link_text(f, student_page_text(c, "name"));
+        csv_link_text(f, member_or_empty(c, "name"));
     }
     fputs("\r\n", f);
     json_array_foreach(grades, i, g)
     {
-        csv_link_text(f, student_page_text(g, "id"));
+        csv_link_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_link_text(f, student_page_text(g, "trouble")[0] != '\0'
-                             ? student_page_text(g, "trouble")
-                             : student_page_text(g, "wrong"));
+        csv_link_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
+                                                                  : member_or_empty(g, "wrong"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, ",%.2f", member_number(c, "points"));
@@ -173,18 +173,18 @@ static void write_tap(FILE *f, const json_t *grades)
     {
         if (json_array_size(json_object_get(g, "checks")) == 0) {
             fprintf(f, "not ok %zu - ", ++num);
-            tap_text(f, student_page_text(g, "id"));
+            tap_text(f, member_or_empty(g, "id"));
             fputs(": ", f);
-            tap_text(f, student_page_text(g, "trouble"));
+            tap_text(f, member_or_empty(g, "trouble"));
             fputc('\n', f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
             fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
-            tap_text(f, student_page_text(g, "id"));
-            fprintf(f, " %s (%.2f of %g): ", student_page_text(c, "name"),
-                    member_number(c, "points"), member_number(c, "of"));
-            tap_text(f, student_page_text(c, "seen"));
+            tap_text(f, member_or_empty(g, "id"));
+            fprintf(f, " %s (%.2f of %g): ", member_or_empty(c, "name"), member_number(c, "points"),
+                    member_number(c, "of"));
+            tap_text(f, member_or_empty(c, "seen"));
             fputc('\n', f);
         }
     }
@@ -204,7 +204,7 @@ static void write_junit(FILE *f, const json_t *grades)
     fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
     json_array_foreach(grades, i, g)
     {
-        size_t failures = 0, errors = student_page_text(g, "trouble")[0] != '\0',
+        size_t failures = 0, errors = member_or_empty(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
@@ -212,12 +212,12 @@ static void write_junit(FILE *f, const json_t *grades)
             errors += !is_judged(c);
         }
         fputs("<testsuite", f);
-        xml_pair(f, "name", student_page_text(g, "id"));
+        xml_pair(f, "name", member_or_empty(g, "id"));
         fprintf(f, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" time=\"%.2f\">\n",
                 checks + (checks == 0), failures, errors, member_number(g, "cpu_s"));
         if (checks == 0) {
             fputs("<testcase name=\"submission\"><error", f);
-            xml_pair(f, "message", student_page_text(g, "trouble"));
+            xml_pair(f, "message", member_or_empty(g, "trouble"));
             fputs("/></testcase>\n", f);
         }
         json_array_foreach(json_object_get(g, "checks"), k, c)
@@ -225,12 +225,12 @@ static void write_junit(FILE *f, const json_t *grades)
             char output[4096];
             describe(c, output, sizeof output);
             fputs("<testcase", f);
-            xml_pair(f, "classname", student_page_text(c, "part"));
-            xml_pair(f, "name", student_page_text(c, "name"));
+            xml_pair(f, "classname", member_or_empty(c, "part"));
+            xml_pair(f, "name", member_or_empty(c, "name"));
             fputc('>', f);
             if (!is_full(c)) {
                 fputs(is_judged(c) ? "<failure" : "<error", f);
-                xml_pair(f, "message", student_page_text(c, "seen"));
+                xml_pair(f, "message", member_or_empty(c, "seen"));
                 fputc('>', f);
                 html_text(f, output);
                 fputs(is_judged(c) ? "</failure>" : "</error>", f);
@@ -294,7 +294,7 @@ bool grade_write(const char *out, const json_t *grades, struct err *e)
     json_array_foreach(grades, i, g)
     {
         for (int k = 0; ok && files[k] != NULL; k++) {
-            snprintf(path, sizeof path, "%.4000s/%s/%s", out, student_page_text(g, "id"), files[k]);
+            snprintf(path, sizeof path, "%.4000s/%s/%s", out, member_or_empty(g, "id"), files[k]);
             ok = write_file(out, g, files[k], path, e);
         }
     }

@@ -101,7 +101,7 @@ double same_noise_bound(double tests, double alpha)
 static int set_of(const struct rubric *r, const json_t *grade)
 {
     int k = r->num_sets - 1;
-    while (k > 0 && strcmp(r->set[k].name, student_page_text(grade, "accepted")) != 0)
+    while (k > 0 && strcmp(r->set[k].name, member_or_empty(grade, "accepted")) != 0)
         k--;
     return k;
 }
@@ -114,8 +114,8 @@ static bool is_right(const json_t *grade, const char *picture)
     bool asked = false;
     json_array_foreach(json_object_get(grade, "checks"), i, c)
     {
-        if (strcmp(student_page_text(c, "kind"), "equal") != 0 ||
-            strcmp(student_page_text(c, "picture"), picture) != 0)
+        if (strcmp(member_or_empty(c, "kind"), "equal") != 0 ||
+            strcmp(member_or_empty(c, "picture"), picture) != 0)
             continue;
         asked = true;
         if (member_number(c, "share") < 1)
@@ -134,9 +134,9 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     struct submitted_image s;
     struct err why;
     char path[4600];
-    snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, student_page_text(grade, "id"),
-             student_page_text(made, "file"));
-    if (!is_right(grade, p->name) || student_page_text(made, "file")[0] == '\0')
+    snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, member_or_empty(grade, "id"),
+             member_or_empty(made, "file"));
+    if (!is_right(grade, p->name) || member_or_empty(made, "file")[0] == '\0')
         return true;
     if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
@@ -154,9 +154,9 @@ static void add_like(json_t *grade, const json_t *other, const char *picture, do
         json_object_set_new(grade, "alike", list);
     }
     size_t last = json_array_size(list);
-    const char *id = student_page_text(other, "id");
+    const char *id = member_or_empty(other, "id");
     for (size_t i = 0; i < last; i++)
-        if (strcmp(student_page_text(json_array_get(list, i), "id"), id) == 0)
+        if (strcmp(member_or_empty(json_array_get(list, i), "id"), id) == 0)
             return; /* by an earlier picture */
     json_array_append_new(
         list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", picture, "t", t, "bound", bound));

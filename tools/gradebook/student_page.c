@@ -3,6 +3,7 @@
  * student's picture differs from it. */
 #include "student_page.h"
 
+#include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
 #include "tools/images/image_file.h"
 #include "tools/html/html.h"
@@ -12,32 +13,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_PATH = 4400 };
-
-const char student_page_head[] =
-    "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n"
-    "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
-    "body{font:16px/1.45 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\n"
-    "table{border-collapse:collapse}td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top}\n"
-    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}section{border-top:1px solid #ccc;margin-top:1.2rem}\n"
-    "img{image-rendering:pixelated;background:#000}figure{display:inline-block;margin:.5rem 1rem .5rem 0}\n"
-    "figcaption{font-size:.85rem;color:#555}.lost{color:#a11}.full{color:#171}.where{color:#555}h2{margin-bottom:.2rem}\n"
-    "</style>\n";
-
-const char *student_page_text(const json_t *object, const char *key)
-{
-    const char *text = json_string_value(json_object_get(object, key));
-    return text != NULL ? text : "";
-}
-
 static void paragraph(FILE *f, const char *label, const char *text, const char *class)
 {
-    if (text[0] == '\0')
-        return;
-    fprintf(f, "<p class=\"%s\"><b>%s</b> ", class, label);
-    html_text(f, text);
-    fputs("</p>\n", f);
+    if (text[0] != '\0')
+        html_print(f, "<p class=\"%s\"><b>%s</b> %s</p>\n", class, label, text);
 }
 
 /* Codes as they are, floats by sRGB. */
@@ -102,9 +81,7 @@ static bool show_picture(FILE *f, const char *path, const char *name, const json
     bool ok = rgb8 != NULL || err_set(e, "out of memory");
     fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", GRADE_SHOWN);
     ok = ok && write_png(f, pic.width, pic.height, rgb8, e);
-    fputs("\"><figcaption>", f);
-    html_text(f, name);
-    fputs(", yours</figcaption></figure>\n", f);
+    html_print(f, "\"><figcaption>%s, yours</figcaption></figure>\n", name);
     ok = ok && show_crop(f, &pic, rgb8, tile, e);
     free(rgb8);
     image_file_free(&pic);
@@ -132,7 +109,7 @@ static const json_t *picture_of(const json_t *grade, const char *name)
     json_t *p;
     json_array_foreach(json_object_get(grade, "pictures"), i, p)
     {
-        if (strcmp(student_page_text(p, "name"), name) == 0)
+        if (strcmp(member_or_empty(p, "name"), name) == 0)
             return p;
     }
     return NULL;
@@ -142,26 +119,24 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
                        struct err *e)
 {
     bool full = member_number(c, "share") >= 1;
-    fputs("<section><h3>", f);
-    html_text(f, student_page_text(c, "title"));
-    fprintf(f, " <span class=\"%s\">%.2f of %g</span></h3>\n", full ? "full" : "lost",
-            member_number(c, "points"), member_number(c, "of"));
-    paragraph(f, "Expected:", student_page_text(c, "expected"), "");
-    paragraph(f, "Seen:", student_page_text(c, "seen"), "");
+    html_print(f, "<section><h3>%s <span class=\"%s\">%.2f of %g</span></h3>\n",
+               member_text(c, "title"), full ? "full" : "lost", member_number(c, "points"),
+               member_number(c, "of"));
+    paragraph(f, "Expected:", member_or_empty(c, "expected"), "");
+    paragraph(f, "Seen:", member_or_empty(c, "seen"), "");
     paragraph(f, "Explained by what you were given, no points lost for it:",
-              student_page_text(c, "accepted"), "");
+              member_or_empty(c, "accepted"), "");
     double share = member_number(c, "share");
     show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
-    const json_t *p = picture_of(grade, student_page_text(c, "picture"));
+    const json_t *p = picture_of(grade, member_or_empty(c, "picture"));
     bool ok = true;
     if (!full) {
-        paragraph(f, "Hint:", student_page_text(c, "hint"), "");
-        paragraph(f, "Where:", student_page_text(c, "where"), "where");
+        paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
+        paragraph(f, "Where:", member_or_empty(c, "where"), "where");
         if (json_is_string(json_object_get(p, "sha256"))) {
-            char path[MAX_PATH];
-            snprintf(path, sizeof path, "%.3800s/%.128s/%.128s", dir,
-                     student_page_text(grade, "id"), student_page_text(p, "file"));
-            ok = show_picture(f, path, student_page_text(p, "name"), json_object_get(c, "tile"), e);
+            const struct path path =
+                fs_path("%s/%s/%s", dir, member_or_empty(grade, "id"), member_or_empty(p, "file"));
+            ok = show_picture(f, path.s, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
             grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
             grade_plot_intervals(f, c);
         }
@@ -176,7 +151,7 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     const json_t *named = json_object_get(diagnosis, "named");
     size_t i;
     json_t *b;
-    const char *finding = student_page_text(diagnosis, "finding");
+    const char *finding = member_or_empty(diagnosis, "finding");
     if (strcmp(finding, "unknown") == 0)
         fputs(
             "<p>The pictures differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
@@ -187,11 +162,8 @@ static void show_bug(FILE *f, const json_t *diagnosis)
             json_array_size(named) > 1 ? "one of these bugs" : "a known bug");
     json_array_foreach(named, i, b)
     {
-        fputs("<li>", f);
-        html_text(f, student_page_text(b, "bug"));
-        fputs(" <span class=\"where\">(", f);
-        html_text(f, student_page_text(b, "where"));
-        fputs(")</span></li>\n", f);
+        html_print(f, "<li>%s <span class=\"where\">(%s)</span></li>\n", member_text(b, "bug"),
+                   member_text(b, "where"));
     }
     fputs("</ul>\n", f);
 }
@@ -201,40 +173,34 @@ bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     size_t i;
     json_t *p, *c;
     bool ok = true, left_out = false;
-    fputs(student_page_head, f);
-    fputs("<title>", f);
-    html_text(f, student_page_text(grade, "id"));
-    fputs("</title>\n<h1>", f);
-    html_text(f, student_page_text(grade, "id"));
-    fprintf(f, ": %.2f of %g points</h1>\n<p>", member_number(grade, "points"),
-            member_number(grade, "of"));
-    html_text(f, student_page_text(grade, "rubric"));
-    fputs("</p>\n", f);
-    if (student_page_text(grade, "trouble")[0] == '\0' &&
-        strcmp(student_page_text(grade, "kind"), "images") != 0)
+    html_page_open(f, member_or_empty(grade, "id"), NULL, 0);
+    html_print(f, "<div class=\"grade\">\n<h1>%s: %.2f of %g points</h1>\n<p>%s</p>\n",
+               member_text(grade, "id"), member_number(grade, "points"), member_number(grade, "of"),
+               member_text(grade, "rubric"));
+    if (member_or_empty(grade, "trouble")[0] == '\0' &&
+        strcmp(member_or_empty(grade, "kind"), "images") != 0)
         show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
-    paragraph(f, "Could not be graded:", student_page_text(grade, "trouble"), "lost");
-    paragraph(f, "All of it:", student_page_text(grade, "wrong"), "lost");
+    paragraph(f, "Could not be graded:", member_or_empty(grade, "trouble"), "lost");
+    paragraph(f, "All of it:", member_or_empty(grade, "wrong"), "lost");
     show_bug(f, json_object_get(grade, "diagnosis"));
     fputs("<table>\n", f);
     json_array_foreach(json_object_get(grade, "parts"), i, p)
     {
-        fputs("<tr><td>", f);
-        html_text(f, student_page_text(p, "number"));
-        fputs("</td><td>", f);
-        html_text(f, student_page_text(p, "title"));
-        fprintf(f, "</td><td class=\"n\">%.2f</td><td>of %g</td></tr>\n",
-                member_number(p, "points"), member_number(p, "of"));
+        html_print(f, "<tr><td>%s</td><td>%s</td><td class=\"num\">%.2f</td><td>of %g</td></tr>\n",
+                   member_text(p, "number"), member_text(p, "title"), member_number(p, "points"),
+                   member_number(p, "of"));
     }
     fputs("</table>\n", f);
     json_array_foreach(json_object_get(grade, "checks"), i, c)
     {
-        if (strcmp(student_page_text(c, "visibility"), "visible") == 0)
+        if (strcmp(member_or_empty(c, "visibility"), "visible") == 0)
             ok = ok && show_check(f, dir, grade, c, e);
         else
             left_out = true;
     }
     if (left_out)
         fputs("<p>Some checks are not shown yet.</p>\n", f);
+    fputs("</div>\n", f);
+    html_page_close(f);
     return ok;
 }

@@ -1,18 +1,13 @@
-/* Pages of grades: pieces that the student's and the class's page share. */
+/* Pages of grades, for a student and of a class, and their plots. */
 #ifndef ASSAY_STUDENT_PAGE_H
 #define ASSAY_STUDENT_PAGE_H
 
-#include "renderer/base/err.h"
+#include "reference/base/json_node.h"
 
 #include <jansson.h>
 #include <stdio.h>
 
 enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
-
-extern const char student_page_head[]; /* up to the title */
-
-/* "" where there is none. */
-const char *student_page_text(const json_t *object, const char *key);
 
 /* Of one grade.json (grade_batch.h); its pictures are in dir/ID. */
 bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)

@@ -45,6 +45,12 @@ void csv_link_number(struct csv *c, double v)
         fprintf(c->f, "%.6g", v);
 }
 
+void csv_link_member(struct csv *c, const json_t *object, const char *name)
+{
+    const json_t *v = json_object_get(object, name);
+    csv_link_number(c, json_is_number(v) ? json_number_value(v) : NAN);
+}
+
 void csv_link_interval(struct csv *c, const json_t *object, const char *name)
 {
     const json_t *ends = json_object_get(object, name);

@@ -1,5 +1,8 @@
 #include "html.h"
 
+#include "page_assets.h"
+
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +35,53 @@ void html_name(FILE *f, const char *s)
         if (*s == '_')
             fputs("<wbr>", f);
     }
+}
+
+/* One conversion, specifier included, of the value that comes next. */
+static void print_value(FILE *f, const char *conversion, size_t length, va_list *values)
+{
+    char type = conversion[length - 1], size = conversion[length - 2];
+    char format[24];
+    assert(length < sizeof format && (type != 's' || length == 2));
+    snprintf(format, sizeof format, "%.*s", (int)length, conversion);
+    if (type == 's')
+        html_text(f, va_arg(*values, const char *));
+    else if (strchr("aefg", type) != NULL)
+        fprintf(f, format, va_arg(*values, double));
+    else if (size == 'z')
+        fprintf(f, format, va_arg(*values, size_t));
+    else if (size == 'l')
+        fprintf(f, format, va_arg(*values, long long));
+    else
+        fprintf(f, format, va_arg(*values, int));
+}
+
+void html_vprint(FILE *f, const char *format, va_list values)
+{
+    va_list next;
+    va_copy(next, values);
+    while (*format != '\0') {
+        size_t plain = strcspn(format, "%");
+        fwrite(format, 1, plain, f);
+        format += plain;
+        if (*format == '\0')
+            break;
+        size_t length = 2 + strspn(format + 1, "+-0123456789.zl");
+        if (format[1] == '%')
+            fputc('%', f);
+        else
+            print_value(f, format, length, &next);
+        format += length;
+    }
+    va_end(next);
+}
+
+void html_print(FILE *f, const char *format, ...)
+{
+    va_list values;
+    va_start(values, format);
+    html_vprint(f, format, values);
+    va_end(values);
 }
 
 /* `text` with U+2212 for a leading hyphen, or without any sign if all its digits are zero. */
@@ -105,7 +155,8 @@ void html_base64(FILE *f, const void *bytes, size_t size)
     }
 }
 
-struct number_text html_script_hash(const char *script)
+/* "sha256-<base64>" of a script's text, as a Content-Security-Policy wants it. */
+static struct number_text script_hash(const char *script)
 {
     struct sha256_ctx ctx;
     uint8_t digest[SHA256_DIGEST_SIZE];
@@ -117,4 +168,56 @@ struct number_text html_script_hash(const char *script)
     base64_encode_raw(end, sizeof digest, digest);
     end[BASE64_ENCODE_RAW_LENGTH(sizeof digest)] = '\0';
     return out;
+}
+
+void html_page_open(FILE *f, const char *title, const char *script, double refresh_s)
+{
+    fputs(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+        "style-src 'unsafe-inline'",
+        f);
+    if (script != NULL)
+        fprintf(f, "; script-src '%s'", script_hash(script).s);
+    fputs("\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+          "<meta name=\"color-scheme\" content=\"light dark\">\n",
+          f);
+    if (refresh_s > 0) /* browsers read whole seconds */
+        fprintf(f, "<meta http-equiv=\"refresh\" content=\"%.0f\">\n", ceil(refresh_s));
+    html_print(f, "<title>%s</title>\n<style>\n", title);
+    fprintf(f, "%s</style>\n</head>\n<body>\n<main>\n", page_css);
+}
+
+void html_page_close(FILE *f)
+{
+    fputs("</main>\n</body>\n</html>\n", f);
+}
+
+void html_table_open(FILE *f, const char *id, const char *label, const char *headings)
+{
+    fprintf(f, "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"%s\">\n<table",
+            label);
+    if (id != NULL)
+        fprintf(f, " id=\"%s\"", id);
+    fputs("><thead><tr>", f);
+    while (*headings != '\0') {
+        bool number = *headings == '>';
+        size_t length = strcspn(headings += number, "|");
+        fprintf(f, "<th scope=\"col\"%s>%.*s</th>", number ? " class=\"num\"" : "", (int)length,
+                headings);
+        headings += length + (headings[length] == '|');
+    }
+    fputs("</tr></thead>\n<tbody>\n", f);
+}
+
+void html_table_close(FILE *f)
+{
+    fputs("</tbody></table>\n</div>\n", f);
+}
+
+void html_row_open(FILE *f, bool bad, const char *head)
+{
+    fputs(bad ? "<tr class=\"bad\"><th scope=\"row\">" : "<tr><th scope=\"row\">", f);
+    html_text(f, head);
+    fputs("</th>", f);
 }

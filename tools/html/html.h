@@ -1,8 +1,10 @@
-/* The report's pieces of HTML: escaped text, numbers, base64. What
+/* The pages' pieces of HTML: escaped text, numbers, tables, base64. What
  * cannot be written shows in ferror() of the stream, which out_commit() asks. */
 #ifndef ASSAY_HTML_H
 #define ASSAY_HTML_H
 
+#include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 
 /* A short formatted number, returned by value so that it can stand in a fprintf call. */
@@ -15,6 +17,11 @@ struct number_text {
 void html_text(FILE *f, const char *s);
 /* The same as text that may go on in another line behind each underscore. */
 void html_name(FILE *f, const char *s);
+
+/* As fprintf(), but that the text of each %s is escaped (NULL is "", no width or precision). Markup stands in the
+ * format. */
+void html_print(FILE *f, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void html_vprint(FILE *f, const char *format, va_list values);
 
 /* 0.0123 -> "+1.230": always three decimals and no percent sign, for a column. The minus sign is
  * U+2212. What rounds to zero has no sign. */
@@ -30,7 +37,16 @@ struct number_text html_duration(double seconds);
 
 void html_base64(FILE *f, const void *bytes, size_t size);
 
-/* "sha256-<base64>" of a script's text, as a Content-Security-Policy wants it. */
-struct number_text html_script_hash(const char *script);
+/* Up to <main>, with the style sheet of all pages and a policy that lets nothing in from elsewhere. `script`: the only
+ * one that may run, or NULL; refresh_s: seconds after which the page loads itself again, or 0. */
+void html_page_open(FILE *f, const char *title, const char *script, double refresh_s);
+void html_page_close(FILE *f);
+
+/* A table that scrolls by itself where it is too wide, up to <tbody>. id may be NULL. label says to those who do not
+ * see it what it is; headings are divided by '|', that of a column of numbers begins with '>'. All are ours. */
+void html_table_open(FILE *f, const char *id, const char *label, const char *headings);
+void html_table_close(FILE *f);
+/* The row's head, a red row if `bad`. */
+void html_row_open(FILE *f, bool bad, const char *head);
 
 #endif

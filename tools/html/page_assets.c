@@ -3,9 +3,12 @@
 /* The assembler reads the files, so that nothing has to be generated; the parts of the script become one.
  * Paths are relative to the directory in which the compiler runs: the top of the repository. */
 __asm__(".pushsection .rodata\n"
-        ".global page_css, page_js\n"
-        ".hidden page_css, page_js\n"
-        "page_css: .incbin \"tools/html/page.css\"\n"
+        ".global page_css, page_js, plot_css\n"
+        ".hidden page_css, page_js, plot_css\n"
+        "page_css: .incbin \"tools/html/page_plot.css\"\n"
+        ".incbin \"tools/html/page.css\"\n"
+        ".byte 0\n"
+        "plot_css: .incbin \"tools/html/page_plot.css\"\n"
         ".byte 0\n"
         "page_js: .incbin \"tools/html/page_layer.js\"\n"
         ".incbin \"tools/html/page_maps.js\"\n"

@@ -4,5 +4,6 @@
 
 extern const char page_css[]; /* NUL-terminated */
 extern const char page_js[];
+extern const char plot_css[]; /* the part of page_css that a plot outside a page needs */
 
 #endif

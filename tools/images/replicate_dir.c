@@ -1,4 +1,5 @@
 #include "replicate_dir.h"
+#include "renderer/base/fs.h"
 
 #include "image_file.h"
 
@@ -41,17 +42,16 @@ static bool list_names(const char *dir, struct replicate_dir *r, struct err *e)
 
 static bool read_one(const char *dir, struct replicate_dir *r, int k, struct err *e)
 {
-    char path[4096];
     struct image_file p;
-    snprintf(path, sizeof path, "%s/%s", dir, r->name[k]);
-    if (!image_file_read(path, &p, e))
+    const struct path path = fs_path("%s/%s", dir, r->name[k]);
+    if (!image_file_read(path.s, &p, e))
         return false;
     bool ok = true;
     if (p.info.type != IMAGE_FLOAT || strcmp(p.info.format, "hdr") == 0)
-        ok = err_set(e, "%s: replicates need 32-bit floats, this file has fewer bits", path);
+        ok = err_set(e, "%s: replicates need 32-bit floats, this file has fewer bits", path.s);
     else if (k > 0 && (p.width != r->width || p.height != r->height))
-        ok = err_set(e, "%s: is %d x %d pixels, %s is %d x %d", path, p.width, p.height, r->name[0],
-                     r->width, r->height);
+        ok = err_set(e, "%s: is %d x %d pixels, %s is %d x %d", path.s, p.width, p.height,
+                     r->name[0], r->width, r->height);
     if (!ok) {
         image_file_free(&p);
         return false;

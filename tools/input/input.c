@@ -4,7 +4,6 @@
 #include "tools/images/replicate_dir.h"
 #include "tools/stats/noise_estimate.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,22 +11,6 @@
 
 static const double most_censored = 0.05;     /* of the picture, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
-
-void input_notes_add(struct notes *notes, const char *format, ...)
-{
-    int most = (int)(sizeof notes->line / sizeof notes->line[0]);
-    if (notes->num == most)
-        return;
-    char *line = notes->line[notes->num];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(line, sizeof notes->line[0], format, args);
-    va_end(args);
-    for (int i = 0; i < notes->num; i++)
-        if (strcmp(notes->line[i], line) == 0)
-            return;
-    notes->num++;
-}
 
 static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
 {

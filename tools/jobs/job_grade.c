@@ -25,9 +25,8 @@ static bool prepare(const struct grade_settings *s, const char *references, int 
 
 static bool beside_rubric(struct plan *p, const struct rubric *r, const char *name, struct err *e)
 {
-    char path[PLAN_PATH + 256];
-    snprintf(path, sizeof path, "%s/%s", r->dir, name);
-    return name[0] == '\0' || plan_input(p, path, e);
+    const struct path path = fs_path("%s/%s", r->dir, name);
+    return name[0] == '\0' || plan_input(p, path.s, e);
 }
 
 /* The rubric and what it names. */
@@ -60,19 +59,20 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct
 static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, struct plan *p,
                       struct err *e)
 {
-    char assay[4096], references[PLAN_PATH + 16];
     int num = 0;
     char **words = grade_options_words(argc, argv, s, &num);
     bool ok = words != NULL || err_set(e, "out of memory");
-    fs_beside_program(assay, sizeof assay, "assay");
+    const struct path assay = fs_beside_program("assay");
     ok = ok && plan_begin(p, s->out, "grades.json", s->threads, e);
-    snprintf(references, sizeof references, "%s/references", p->dir);
-    const char *const first[] = {assay, "grade", "-q", "-o", "{out}", "--references", references};
-    ok = ok && prepare(s, references, argc, argv, e) &&
+    const struct path references = fs_path("%s/references", p->dir);
+    const char *const first[] = {assay.s, "grade",        "-q",        "-o",
+                                 "{out}", "--references", references.s};
+    ok = ok && prepare(s, references.s, argc, argv, e) &&
          plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
          plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
-         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) && plan_input(p, references, e) &&
-         plan_input(p, s->pathtracer, e) && rubric_inputs(p, s, e);
+         plan_run_words(p, &(const char *){"{job}"}, 1, false, e) &&
+         plan_input(p, references.s, e) && plan_input(p, s->pathtracer, e) &&
+         rubric_inputs(p, s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
     for (int k = 0; ok && k < s->num; k++)
         ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
@@ -83,7 +83,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
 bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                     struct err *e)
 {
-    struct grade_paths at;
+    struct data_dirs at;
     struct grade_settings s = grade_options_default(argc, &at);
     (void)w; /* a job for each submission */
     bool ok = s.submission != NULL || err_set(e, "out of memory");
@@ -111,36 +111,35 @@ static void id_of(const char *path, char id[128])
 static bool place(const struct plan *p, int k, const char *out, const char *submission,
                   struct err *e)
 {
-    char from[PLAN_PATH + 512], to[PLAN_PATH + 512], temp[PLAN_PATH + 512], id[128],
-        artefact[PLAN_PATH + 256];
+    char id[128], artefact[PLAN_PATH + 256];
     id_of(submission, id);
     job_run_artefact(p, k, NULL, artefact);
-    snprintf(from, sizeof from, "%s/%s", artefact, id);
-    snprintf(to, sizeof to, "%.4000s/%s", out, id);
-    snprintf(temp, sizeof temp, "%.4000s/.%s.tmp%ld", out, id, (long)getpid());
+    const struct path from = fs_path("%s/%s", artefact, id);
+    const struct path to = fs_path("%s/%s", out, id);
+    const struct path temp = fs_path("%s/.%s.tmp%ld", out, id, (long)getpid());
     if (!job_run_verify(p, k, e))
         return false;
-    if (access(from, F_OK) != 0)
+    if (access(from.s, F_OK) != 0)
         return true;
-    const char *const copy[] = {"cp", "-a", "--", from, temp, NULL};
+    const char *const copy[] = {"cp", "-a", "--", from.s, temp.s, NULL};
     const struct process process = {.argv = copy};
-    return fs_remove_tree(temp, e) && process_run(&process, NULL, e) && fs_remove_tree(to, e) &&
-           (rename(temp, to) == 0 || err_set(e, "%s: cannot appear: %s", to, strerror(errno)));
+    return fs_remove_tree(temp.s, e) && process_run(&process, NULL, e) && fs_remove_tree(to.s, e) &&
+           (rename(temp.s, to.s) == 0 ||
+            err_set(e, "%s: cannot appear: %s", to.s, strerror(errno)));
 }
 
 /* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
 int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
-    struct grade_paths at;
+    struct data_dirs at;
     struct grade_settings s = grade_options_default(argc, &at);
-    char references[PLAN_PATH + 16];
     bool ok = s.submission != NULL || err_set(e, "out of memory");
     ok = ok && grade_options_parse(argc, argv, &s, e) && fs_make_dirs(s.out, e);
     for (int k = 0; ok && k < p->num; k++)
         ok = place(p, k, s.out, s.submission[k], e);
-    snprintf(references, sizeof references, "%s/references", p->dir);
+    const struct path references = fs_path("%s/references", p->dir);
     if (s.references == NULL)
-        s.references = references;
+        s.references = references.s;
     int code = ok ? grade_command(&s, argc, argv, e) : EXIT_NOT_JUDGED;
     free(s.submission);
     return code;

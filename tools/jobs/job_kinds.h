@@ -25,7 +25,7 @@ void plan_may_end(struct plan *p, int code);
 /* A file or directory that all jobs read. */
 bool plan_input(struct plan *p, const char *path, struct err *e)
     __attribute__((warn_unused_result));
-/* What a validation with --live runs: Blender, and POV-Ray where it is in PATH, since not every scene needs that. */
+/* What a validation with --live runs: Blender, and the other engines that are in PATH, since not every scene needs them. */
 bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e)
     __attribute__((warn_unused_result));
 /* The next job; input: what it alone reads, NULL at the end. After all of the above. */

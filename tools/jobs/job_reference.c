@@ -3,6 +3,7 @@
  *   "references": [{"scene": , "engine": , "seed": , "key": reference_key(), "binary_sha256": of the engine,
  *                   "job": of its first pictures, "jobs": how many}] */
 #include "reference/base/process.h"
+#include "reference/external/engine_bindings.h"
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
 #include "job_kinds.h"
@@ -28,30 +29,28 @@ static const struct option_words not_of_a_job[] = {{"--only", 1},
 
 static bool add_words(struct plan *p, int argc, char **argv, int threads, struct err *e)
 {
-    char assay[4096], t[16];
-    fs_beside_program(assay, sizeof assay, "assay");
+    char t[16];
+    const struct path assay = fs_beside_program("assay");
     snprintf(t, sizeof t, "%d", threads);
-    const char *const first[] = {assay, "reference", "-t", t, "--out", "{out}", "{job}"};
+    const char *const first[] = {assay.s, "reference", "-t", t, "--out", "{out}", "{job}"};
     return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }
 
-/* What "cycles" or "povray" is besides its scene: the program, cycles.py and its modules in share_dir. *sha256 (may be
+/* What an engine is besides its scene: the program, and its scripts in share_dir. *sha256 (may be
  * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
 static bool engine_inputs(struct plan *p, const char *engine, const char *share_dir,
                           const char **sha256, struct err *e)
 {
-    static const char *const scripts[] = {"cycles", "cycles_blender", "cycles_geometry",
-                                          "cycles_light", "cycles_material"};
-    bool cycles = strcmp(engine, "cycles") == 0, ok = true;
-    const char *name = cycles ? "blender" : engine;
+    const struct engine_driver *driver = engine_driver_of(engine);
+    bool ok = true;
     char path[PLAN_PATH + 64];
-    for (size_t i = 0; ok && cycles && i < sizeof scripts / sizeof *scripts; i++) {
-        snprintf(path, sizeof path, "%.4000s/cycles/%s.py", share_dir, scripts[i]);
+    for (int i = 0; ok && driver->scripts != NULL && driver->scripts[i] != NULL; i++) {
+        snprintf(path, sizeof path, "%.4000s/%s", share_dir, driver->scripts[i]);
         ok = plan_input(p, path, e);
     }
-    if (ok && !process_find(name, path, sizeof path))
-        return err_set(e, "%s: no such program in PATH", name);
+    if (ok && !process_find(driver->program, path, sizeof path))
+        return err_set(e, "%s: no such program in PATH", driver->program);
     ok = ok && plan_input(p, path, e);
     if (ok && sha256 != NULL)
         *sha256 = json_string_value(json_object_get(json_object_get(p->head, "inputs"), path));
@@ -62,9 +61,12 @@ bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err
 {
     char path[PLAN_PATH + 64];
     snprintf(path, sizeof path, "%.4000s/import_check/blender_import.py", share_dir);
-    return plan_input(p, path, e) && engine_inputs(p, "cycles", share_dir, NULL, e) &&
-           (!process_find("povray", path, sizeof path) ||
-            engine_inputs(p, "povray", share_dir, NULL, e));
+    bool ok = plan_input(p, path, e);
+    for (int i = 0; ok && i < NUM_ENGINES_WITH_GOLDENS; i++)
+        if (i == ENGINE_cycles ||
+            process_find(engine_driver_of(engine_names[i])->program, path, sizeof path))
+            ok = engine_inputs(p, engine_names[i], share_dir, NULL, e);
+    return ok;
 }
 
 /* A reference that has to be rendered. */
@@ -111,13 +113,13 @@ static int jobs_of(const struct wanted *w, int parts, int pictures)
 static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const char *binary,
                      struct err *e)
 {
-    char json[4096 + 8], seed[16], range[32];
+    char seed[16], range[32];
     const struct suite_scene *s = w->scene;
-    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    const struct path json = fs_path("%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
     snprintf(seed, sizeof seed, "%u", (unsigned)w->state.opt.seed);
     const char *const word[] = {"--only", s->name, "--engine",   w->ref->engine,
                                 "--seed", seed,    "--pictures", range};
-    const char *const input[] = {s->dae, json, s->environment[0] != '\0' ? s->environment : NULL,
+    const char *const input[] = {s->dae, json.s, s->environment[0] != '\0' ? s->environment : NULL,
                                  NULL};
     json_t *entry = json_pack("{ss, ss, sI, ss, ss, si, si}", "scene", s->name, "engine",
                               w->ref->engine, "seed", (json_int_t)w->state.opt.seed, "key",
@@ -132,27 +134,31 @@ static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const cha
     return ok;
 }
 
+/* Of its engine in the table. */
+static ptrdiff_t index_of(const struct wanted *w)
+{
+    return engine_kind_of(w->ref->engine) - engine_table;
+}
+
 /* Inputs come before the first job. */
 static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, struct plan *p,
                       struct err *e)
 {
-    static const char *const engines[] = {"cycles", "povray"};
     const struct reference_command *c = g->c;
-    const char *binary[2] = {NULL, NULL};
+    const char *binary[NUM_ENGINES_WITH_GOLDENS] = {NULL};
     int threads = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? c->opt.threads : 1;
     if (c->last > 0)
         return err_set(e, "--pictures: these are a job already");
     bool ok = plan_begin(p, c->out, "part.json", threads, e) &&
               reference_options_each(c, look_at_one, g, e) && add_words(p, argc, argv, threads, e);
-    for (int k = 0; ok && k < 2; k++)
+    for (int k = 0; ok && k < NUM_ENGINES_WITH_GOLDENS; k++)
         for (int i = 0; ok && binary[k] == NULL && i < g->num; i++)
-            if (strcmp(g->wanted[i].ref->engine, engines[k]) == 0)
-                ok = engine_inputs(p, engines[k], c->opt.share_dir, &binary[k], e);
+            if (index_of(&g->wanted[i]) == k)
+                ok = engine_inputs(p, engine_names[k], c->opt.share_dir, &binary[k], e);
     json_object_set_new(p->head, "references", json_array());
     for (int i = 0; ok && i < g->num; i++) {
         const struct wanted *w = &g->wanted[i];
-        ok = plan_one(p, w, jobs_of(w, parts, g->pictures),
-                      binary[strcmp(w->ref->engine, engines[1]) == 0], e);
+        ok = plan_one(p, w, jobs_of(w, parts, g->pictures), binary[index_of(w)], e);
     }
     return ok;
 }

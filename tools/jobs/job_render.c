@@ -121,17 +121,16 @@ bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct 
                      struct err *e)
 {
     struct options o;
-    char beside[4096];
     int ranges = w->ranges > 0 ? w->ranges : 1;
     if (!options_parse(argc, argv, &o, e) || !check_options(&o, e) || !check_ranges(&o, ranges, e))
         return false;
-    fs_beside_program(beside, sizeof beside, "pathtracer");
+    const struct path beside = fs_beside_program("pathtracer");
     int parts = o.slurm > 0 ? o.slurm : w->parts > 0 ? w->parts : PLAN_PARTS;
     int threads = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? o.threads : 1, num = 1;
     const char *const inputs[] = {o.scene, o.camera_file, o.environment_file};
     bool ok = plan_begin(p, o.output[0], PRODUCT, threads, e) &&
-              add_words(p, argc, argv, &o, w->pathtracer != NULL ? w->pathtracer : beside, threads,
-                        ranges > 1, e);
+              add_words(p, argc, argv, &o, w->pathtracer != NULL ? w->pathtracer : beside.s,
+                        threads, ranges > 1, e);
     for (size_t i = 0; ok && i < sizeof inputs / sizeof *inputs; i++)
         ok = inputs[i] == NULL || plan_input(p, inputs[i], e);
     for (int k = 0; ok && k < num; k++) {

@@ -27,12 +27,12 @@ static const struct option_words not_of_a_job[] = {{"--only", 1},
 static bool add_words(struct plan *p, int argc, char **argv, const struct validate_options *o,
                       const char *threads, int claims, struct err *e)
 {
-    char assay[4096], n[16], seed[16];
-    fs_beside_program(assay, sizeof assay, "assay");
+    char n[16], seed[16];
+    const struct path assay = fs_beside_program("assay");
     snprintf(n, sizeof n, "%d", claims);
     snprintf(seed, sizeof seed, "%u", (unsigned)o->reference_seed);
     const char *const first[] = {
-        assay,   "validate", "-q",    "--of-claims",      n,   "-t", threads,
+        assay.s, "validate", "-q",    "--of-claims",      n,   "-t", threads,
         "--out", "{out}",    "{job}", "--reference-seed", seed};
     return plan_run_words(p, first, sizeof first / sizeof *first, false, e) &&
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
@@ -51,22 +51,22 @@ static bool plan_part(void *ctx, const struct validate_part *part, struct err *e
 {
     struct planning *g = ctx;
     const struct suite_scene *s = part->scene;
-    char json[4096 + 8], from[4096 + 80], golden[4096 + 80], threads[16];
+    char threads[16];
     const char *input[6], **next = input;
     snprintf(threads, sizeof threads, "%d", g->cpus);
     if (g->p->num == 0 && !add_words(g->p, g->argc, g->argv, g->opt, threads, part->num_claims, e))
         return false;
-    snprintf(json, sizeof json, "%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
-    snprintf(from, sizeof from, "%s/%s.json", g->opt->suite_dir, s->references_of);
-    snprintf(golden, sizeof golden, "%s/%s", g->opt->golden_dir, s->references_of);
+    const struct path json = fs_path("%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
+    const struct path from = fs_path("%s/%s.json", g->opt->suite_dir, s->references_of);
+    const struct path golden = fs_path("%s/%s", g->opt->golden_dir, s->references_of);
     *next++ = s->dae;
-    *next++ = json;
+    *next++ = json.s;
     if (strcmp(s->name, s->references_of) != 0)
-        *next++ = from;
+        *next++ = from.s;
     if (s->environment[0] != '\0')
         *next++ = s->environment;
-    if (!g->opt->live && access(golden, F_OK) == 0)
-        *next++ = golden;
+    if (!g->opt->live && access(golden.s, F_OK) == 0)
+        *next++ = golden.s;
     *next = NULL;
     const char **word = calloc(2 * (size_t)part->num_only, sizeof *word);
     if (word == NULL)

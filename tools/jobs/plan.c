@@ -25,15 +25,17 @@ enum { NUM_KINDS = sizeof kinds / sizeof kinds[0] };
 
 static bool write_plan(const struct plan *p, struct err *e)
 {
-    char path[PLAN_PATH + 32];
     struct out_file out;
-    snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
-    if (!out_open(&out, path, e))
+    const struct path path = fs_path("%s/plan.jsonl", p->dir);
+    char *head = json_dumps(p->head, JSON_COMPACT);
+    if (head == NULL)
+        return err_set(e, "%s: out of memory", path.s);
+    if (!out_open(&out, path.s, e)) {
+        free(head);
         return false;
-    if (json_dumpf(p->head, out.f, JSON_COMPACT) != 0 && !ferror(out.f)) {
-        out_abandon(&out);
-        return err_set(e, "%s: out of memory", path);
     }
+    fputs(head, out.f);
+    free(head);
     for (int k = 0; k < p->num; k++)
         fprintf(out.f, "\n%s", p->line[k]);
     fputc('\n', out.f); /* out_commit() looks at the error flag */
@@ -157,19 +159,19 @@ static bool read_lines(FILE *f, struct plan *p, struct err *e)
 
 bool plan_read(const char *dir, struct plan *out, struct err *e)
 {
-    char path[PLAN_PATH + 32], full[PATH_MAX];
+    char full[PATH_MAX];
     struct plan p = {.dir = ""};
     if (realpath(dir, full) == NULL || strlen(full) >= sizeof p.dir)
         return err_set(e, "%s: %s", dir, strerror(errno));
     strcpy(p.dir, full);
-    snprintf(path, sizeof path, "%s/plan.jsonl", p.dir);
-    FILE *f = fopen(path, "r");
+    const struct path path = fs_path("%s/plan.jsonl", p.dir);
+    FILE *f = fopen(path.s, "r");
     if (f == NULL)
-        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+        return err_set(e, "%s: cannot read: %s", path.s, strerror(errno));
     bool ok = read_lines(f, &p, e);
     fclose(f);
     if (ok && strcmp(plan_text(&p, "version"), assay_version) != 0)
-        ok = err_set(e, "%s: of version %s, this is %s", path, plan_text(&p, "version"),
+        ok = err_set(e, "%s: of version %s, this is %s", path.s, plan_text(&p, "version"),
                      assay_version);
     if (ok)
         *out = p;

@@ -1,16 +1,6 @@
 /* Work cut into jobs that can run anywhere, in any order, again: each is a program with its words, knows its inputs by
- * hash and leaves one artefact, a directory that appears by rename. tools/docs/guide-cluster.md is the manual.
- *
- * DIR/plan.jsonl: a line of JSON for the whole, then one for each job.
- *   { "assay_plan": 1, "kind": "pathtracer" | "grade" | "validate" | "reference", "version": , "cwd": , "jobs": 64,
- *     "command": ["pathtracer", ...]        that would do all of it here,
- *     "output": "OUT.exr", "product": name  of the file that every job leaves,
- *     "ends": [0], "cpus": 1,               exit codes that are as they should be; threads of a job
- *     "run": [words]                        "{job}" stands for the words of the job, "{out}" begins a path in its artefact,
- *     "inputs": {path: SHA-256} }           of all jobs; relative to cwd
- *   { "job": 0, "key": SHA-256 of words, inputs and version, "words": [...], "inputs": {...} }
- * DIR/jobs/KEY: the artefact, with job.json in it: { "key": , "sha256": of all the rest, "host": , "exit": , "cpu_s": ,
- *     "wall_s": }. Whoever has the same job, of this plan or a later one in DIR, finds it there. */
+ * hash and leaves one artefact, DIR/jobs/KEY, a directory that appears by rename. The files: tools/docs/formats/plan.md;
+ * how to use it: tools/docs/guide-cluster.md. */
 #ifndef ASSAY_PLAN_H
 #define ASSAY_PLAN_H
 

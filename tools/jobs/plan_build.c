@@ -93,12 +93,12 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
 /* And what assay loads while it runs. */
 static bool add_program(struct plan *p, const char *program, struct err *e)
 {
-    char module[IMAGE_OIIO_PATH];
+    struct path module;
     const char *slash = strrchr(program, '/');
     if (!plan_input(p, program, e))
         return false;
     return strcmp(slash != NULL ? slash + 1 : program, "assay") != 0 ||
-           (image_oiio_file(module, e) && plan_input(p, module, e));
+           (image_oiio_file(&module, e) && plan_input(p, module.s, e));
 }
 
 bool plan_run_words(struct plan *p, const char *const *word, int num, bool user, struct err *e)

@@ -185,12 +185,12 @@ static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 /* The next round: an array whose tasks each run the jobs of a line. */
 static bool submit(struct cluster *c, int lost, struct err *e)
 {
-    char assay[4096], todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM];
+    char todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM];
     int tasks = lost < MOST_TASKS ? lost : MOST_TASKS;
     c->rounds++;
     if (!write_round(c, lost, tasks, e))
         return false;
-    fs_beside_program(assay, sizeof assay, "assay");
+    const struct path assay = fs_beside_program("assay");
     round_path(c, c->rounds, todo);
     snprintf(name, sizeof name, "--job-name=%s%d", c->name, c->rounds);
     snprintf(array, sizeof array, "--array=1-%d", tasks);
@@ -200,7 +200,7 @@ static bool submit(struct cluster *c, int lost, struct err *e)
     snprintf(output, sizeof output, "--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name,
              c->rounds);
     char *run =
-        shell_quote_join("exec", (const char *const[]){assay, "run-job", c->plan->dir, NULL});
+        shell_quote_join("exec", (const char *const[]){assay.s, "run-job", c->plan->dir, NULL});
     char *jobs = shell_quote_join(NULL, (const char *const[]){todo, NULL});
     bool ok = run != NULL && jobs != NULL;
     size_t need = ok ? (size_t)snprintf(script, sizeof script,

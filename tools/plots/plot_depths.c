@@ -1,90 +1,50 @@
-#include "tools/converge/depth_ladder.h"
+#include "plot.h"
+#include "plot_convergence.h"
+
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
 #include <math.h>
 
-enum { LEFT = 58, TOP = 10, WIDTH = 340, HEIGHT = 240, BOTTOM = TOP + HEIGHT };
-
-/* From 0 to the ends. */
-struct axes {
-    double right, top;
-};
-
-static double at_x(const struct axes *a, double depth)
+static void draw(FILE *f, const json_t *rungs)
 {
-    return LEFT + 12 + (WIDTH - 24) * depth / a->right;
-}
-
-static double at_y(const struct axes *a, double v)
-{
-    return BOTTOM - HEIGHT * fmin(fmax(v, 0), a->top) / a->top;
-}
-
-static double tick(double top)
-{
-    double power = pow(10, floor(log10(top / 5))), share = top / 5 / power;
-    return power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
-}
-
-static struct axes axes_of(const json_t *rungs)
-{
-    struct axes a = {1, 0};
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
-        a.right = fmax(a.right, member_number(g, "depth"));
-        a.top = fmax(a.top, fmax(member_number(g, "mean") + 2 * member_number(g, "se"),
-                                 member_number(g, "truth")));
+    double right = 1, top = 0;
+    size_t i;
+    const json_t *g;
+    json_array_foreach(rungs, i, g)
+    {
+        right = fmax(right, member_number(g, "depth"));
+        top = fmax(top, fmax(member_number(g, "mean") + 2 * member_number(g, "se"),
+                             member_number(g, "truth")));
     }
-    a.top = a.top > 0 ? 1.08 * a.top : 1;
-    return a;
-}
-
-static void write_ticks(FILE *f, const struct axes *a)
-{
-    const double up = tick(a->top), along = fmax(1, tick(2 * a->right));
-    for (int i = 0; i * up <= a->top; i++)
-        fprintf(f,
-                "<path class=\"grid\" d=\"M%d %.1fh%d\"/><text x=\"%d\" y=\"%.1f\" "
-                "text-anchor=\"end\">%g</text>",
-                LEFT, at_y(a, i * up), WIDTH, LEFT - 6, at_y(a, i * up) + 4, i * up);
-    for (int i = 0; i * along <= a->right; i++)
-        fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>", at_x(a, i * along),
-                BOTTOM + 16, i * along);
-}
-
-static void write_line(FILE *f, const struct axes *a, const json_t *rungs, const char *name,
-                       const char *style)
-{
-    const char *op = "M";
-    fprintf(f, "<path class=\"%s\" d=\"", style);
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
-        if (json_object_get(g, name) == NULL)
-            continue;
-        fprintf(f, "%s%.1f %.1f", op, at_x(a, member_number(g, "depth")),
-                at_y(a, member_number(g, name)));
-        op = "L";
-    }
-    fputs("\"/>", f);
-}
-
-static void write_points(FILE *f, const struct axes *a, const json_t *rungs)
-{
-    fputs("<g class=\"e0\">", f);
-    write_line(f, a, rungs, "mean", "line");
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
-        double x = at_x(a, member_number(g, "depth")), mean = member_number(g, "mean"),
+    struct plot p = plot_sized(f, 340, 240);
+    p.style = "plot depths";
+    p.x = (struct plot_axis){.label = "greatest number of bounces",
+                             .lo = -0.04 * right,
+                             .hi = 1.04 * right,
+                             .step = right < 5 ? 1 : 0};
+    p.y = (struct plot_axis){
+        .label = "mean radiance, W sr⁻¹ m⁻²", .hi = top > 0 ? 1.08 * top : 1, .has_grid = true};
+    plot_open(&p, "Mean radiance against the greatest number of bounces");
+    plot_series(&p, 0, NULL);
+    json_array_foreach(rungs, i, g)
+    {
+        double x = member_number(g, "depth"), y = member_number(g, "mean"),
                se = member_number(g, "se");
-        fprintf(f,
-                "<path class=\"line\" d=\"M%.1f %.1fV%.1f\"/><circle class=\"dot\" cx=\"%.1f\" "
-                "cy=\"%.1f\" r=\"3\"><title>%.0f bounces: %.5g ± %.2g</title></circle>",
-                x, at_y(a, mean - 2 * se), at_y(a, mean + 2 * se), x, at_y(a, mean),
-                member_number(g, "depth"), mean, se);
+        plot_line_to(&p, x, y);
+        plot_segment(&p, "line", x, y - 2 * se, x, y + 2 * se);
+        plot_point(&p, 0, x, y, "%.0f bounces: %.5g ± %.2g", x, y, se);
     }
-    fputs("</g>", f);
+    plot_series_end(&p);
+    plot_path_open(&p, "expected");
+    json_array_foreach(rungs, i, g)
+    {
+        if (json_object_get(g, "truth") != NULL)
+            plot_path_to(&p, member_number(g, "depth"), member_number(g, "truth"));
+    }
+    plot_path_close(&p, false);
+    plot_close(&p);
 }
 
 static void write_caption(FILE *f, const json_t *depths)
@@ -116,13 +76,10 @@ static void write_caption(FILE *f, const json_t *depths)
             "shown, not judged. ",
             known, json_array_size(rungs), largest);
     struct csv csv = csv_link_open(f, "depths.csv", "depth,mean,standard_error,closed_form");
+    static const char *const member[] = {"depth", "mean", "se", "truth"};
     for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
-        csv_link_number(&csv, member_number(g, "depth"));
-        csv_link_number(&csv, member_number(g, "mean"));
-        csv_link_number(&csv, member_number(g, "se"));
-        csv_link_number(&csv,
-                        json_object_get(g, "truth") != NULL ? member_number(g, "truth") : NAN);
+        for (size_t k = 0; k < 4; k++)
+            csv_link_member(&csv, json_array_get(rungs, i), member[k]);
         csv_link_line(&csv);
     }
     csv_link_close(&csv);
@@ -133,27 +90,12 @@ void plot_depths(FILE *f, const json_t *depths)
 {
     const json_t *rungs = json_object_get(depths, "rungs");
     const char *error = member_text(depths, "error");
-    if (error != NULL) {
-        fputs("<p class=\"error-line\">No depth ladder: ", f);
-        html_text(f, error);
-        fputs("</p>\n", f);
-    }
+    if (error != NULL)
+        html_print(f, "<p class=\"error-line\">No depth ladder: %s</p>\n", error);
     if (json_array_size(rungs) == 0)
         return;
-    struct axes a = axes_of(rungs);
-    fprintf(f,
-            "<figure class=\"map\"><svg class=\"plot depths\" viewBox=\"0 0 %d %d\" role=\"img\" "
-            "aria-label=\"Mean radiance against the greatest number of bounces\">",
-            LEFT + WIDTH + 14, BOTTOM + 40);
-    write_ticks(f, &a);
-    fprintf(f, "<path class=\"axis\" d=\"M%d %dV%dH%d\"/>", LEFT, TOP, BOTTOM, LEFT + WIDTH);
-    write_points(f, &a, rungs);
-    write_line(f, &a, rungs, "truth", "expected");
-    fprintf(f,
-            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">greatest number of bounces</text><text "
-            "transform=\"translate(11 %d) rotate(-90)\" text-anchor=\"middle\">mean radiance, W "
-            "sr⁻¹ m⁻²</text></svg>",
-            LEFT + WIDTH / 2, BOTTOM + 34, TOP + HEIGHT / 2);
+    fputs("<figure class=\"map\">", f);
+    draw(f, rungs);
     write_caption(f, depths);
     fputs("</figure>\n", f);
 }

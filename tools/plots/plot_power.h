@@ -9,7 +9,7 @@
 
 /* The i-th smallest of n uniform p-values lies within these with 95 %: quantiles of Beta(i, n + 1 - i),
  * i in 1..n. */
-void qq_band(int i, int n, double *low, double *high);
+void plot_qq_band(int i, int n, double *low, double *high);
 
 /* <figure> of the tiles' p-values against those that uniform ones would have, with its band; nothing for
  * fewer than 4 tiles with noise. Fails only out of memory. */

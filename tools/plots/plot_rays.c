@@ -1,5 +1,7 @@
 #include "plot_rays.h"
 
+#include "plot.h"
+
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
@@ -40,49 +42,30 @@ static size_t gather(const json_t *claims, struct bar *bar)
     return num;
 }
 
-/* 1, 2 or 5 times a power of ten: the distance of at most 5 ticks up to `top`. */
-static double tick(double top)
+static void draw(FILE *f, const struct bar *bar, size_t num)
 {
-    double power = pow(10, floor(log10(top / 5))), share = top / 5 / power;
-    return power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
-}
-
-static void write_plot(FILE *f, const struct bar *bar, size_t num)
-{
-    enum { LEFT = 170, TOP = 8, WIDTH = 460, ROW = 18 };
-    int bottom = TOP + ROW * (int)num;
-    double top = 1.05 * (bar[0].boxes + bar[0].primitives);
-    fprintf(
-        f,
-        "<svg class=\"plot rays\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"Box and primitive tests of a "
-        "ray in %zu scenes; the numbers are in the CSV file\">",
-        LEFT + WIDTH + 50, bottom + 40, num);
-    const double step = tick(top);
-    for (int i = 0; i * step <= top; i++) {
-        double at = LEFT + WIDTH * i * step / top;
-        fprintf(f,
-                "<path class=\"grid\" d=\"M%.1f %dV%d\"/><text x=\"%.1f\" y=\"%d\" "
-                "text-anchor=\"middle\">%g</text>",
-                at, TOP, bottom, at, bottom + 16, i * step);
-    }
+    struct plot p = plot_sized(f, 460, 18 * (double)num);
+    p.style = "plot rays";
+    p.left = 170;
+    p.right = 50;
+    p.x = (struct plot_axis){.label = "tests of a ray",
+                             .hi = 1.05 * (bar[0].boxes + bar[0].primitives),
+                             .has_grid = true};
+    p.y.hi = (double)num;
+    plot_open(&p, "Box and primitive tests of a ray in %zu scenes; the numbers are in the CSV file",
+              num);
     for (size_t i = 0; i < num; i++) {
-        double y = TOP + ROW * (double)i, boxes = WIDTH * bar[i].boxes / top,
-               primitives = WIDTH * bar[i].primitives / top;
-        fprintf(f, "<text x=\"%d\" y=\"%.0f\" text-anchor=\"end\">", LEFT - 6, y + 13);
-        html_text(f, bar[i].scene);
-        fprintf(
-            f,
-            "</text><g><title>%.3g rays, of each %.3g box and %.3g primitive tests</title><rect class=\"bar\" "
-            "x=\"%d\" y=\"%.0f\" width=\"%.1f\" height=\"%d\"/><rect class=\"bar second\" x=\"%.1f\" y=\"%.0f\" "
-            "width=\"%.1f\" height=\"%d\"/></g><text x=\"%.1f\" y=\"%.0f\">%s</text>",
-            bar[i].rays, bar[i].boxes, bar[i].primitives, LEFT, y + 3, boxes, ROW - 6, LEFT + boxes,
-            y + 3, primitives, ROW - 6, LEFT + boxes + primitives + 5, y + 13,
-            html_number(bar[i].boxes + bar[i].primitives).s);
+        double y = (double)(num - i), boxes = bar[i].boxes, all = boxes + bar[i].primitives;
+        char hover[128];
+        snprintf(hover, sizeof hover, "%.3g rays, of each %.3g box and %.3g primitive tests",
+                 bar[i].rays, boxes, bar[i].primitives);
+        plot_text(&p, 0, y - 0.5, -6, 4, "end", "%s", bar[i].scene);
+        plot_bar(&p, "bar", 0, y - 0.83, boxes, y - 0.17, "%s", hover);
+        plot_bar(&p, "bar second", boxes, y - 0.83, all, y - 0.17, "%s", hover);
+        plot_text(&p, all, y - 0.5, 5, 4, "start", "%s", html_number(all).s);
     }
-    fprintf(f,
-            "<path class=\"axis\" d=\"M%d %dV%dH%d\"/><text x=\"%d\" y=\"%d\" "
-            "text-anchor=\"middle\">tests of a ray</text></svg></div>\n",
-            LEFT, TOP, bottom, LEFT + WIDTH, LEFT + WIDTH / 2, bottom + 34);
+    plot_close(&p);
+    fputs("</div>\n", f);
 }
 
 bool plot_rays(FILE *f, const json_t *claims, struct err *e)
@@ -95,7 +78,7 @@ bool plot_rays(FILE *f, const json_t *claims, struct err *e)
         fputs(
             "<section id=\"rays\">\n<h2>What a ray costs</h2>\n<figure><div class=\"wide plain\" tabindex=\"0\" role=\"region\" aria-label=\"Plot of tests of a ray\">",
             f);
-        write_plot(f, bar, num);
+        draw(f, bar, num);
         fputs(
             "<figcaption><b>Tests of a ray.</b> Filled: with boxes of the hierarchy; outlined: with primitives. A test is "
             "of a node or a leaf, of up to eight boxes or triangles at once, and packets of rays share some, so that "

@@ -28,21 +28,15 @@ static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
 {
     fputs("<ul class=\"lede\">\n", f);
     for (size_t i = 0; i < num; i++) {
-        fprintf(f, "<li><a href=\"#claim-%zu\">", claim[i].index);
-        html_text(f, member_text(claim[i].json, "scene"));
-        fputs(" against ", f);
+        const json_t *c = claim[i].json;
+        html_print(f, "<li><a href=\"#claim-%zu\">%s against ", claim[i].index,
+                   member_text(c, "scene"));
         report_reference(f, &claim[i]);
-        fputs("</a> ", f);
-        if (claim[i].outcome == OUTCOME_NOT_JUDGED) {
-            fputs("could not be judged: ", f);
-            html_text(f, member_text(claim[i].json, "error"));
-        } else {
-            fputs("is ", f);
-            html_text(f, member_text(claim[i].json, "verdict"));
-            fputs(", not ", f);
-            html_text(f, member_text(claim[i].json, "expected"));
-        }
-        fputs("</li>\n", f);
+        if (claim[i].outcome == OUTCOME_NOT_JUDGED)
+            html_print(f, "</a> could not be judged: %s</li>\n", member_text(c, "error"));
+        else
+            html_print(f, "</a> is %s, not %s</li>\n", member_text(c, "verdict"),
+                       member_text(c, "expected"));
     }
     fputs("</ul>\n", f);
 }
@@ -77,13 +71,9 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
     else
         fprintf(f, "%s %zu claims came out as expected.", left > 0 ? "all" : "All", num);
     fputs("</h1>\n", f);
-    if (num == 1 && errors == 0) {
-        fputs("<p class=\"lede\"><b>", f);
-        html_text(f, member_text(claim->json, "verdict"));
-        fputs("</b>: ", f);
-        html_text(f, member_text(claim->json, "reason"));
-        fputs("</p>\n", f);
-    }
+    if (num == 1 && errors == 0)
+        html_print(f, "<p class=\"lede\"><b>%s</b>: %s</p>\n", member_text(claim->json, "verdict"),
+                   member_text(claim->json, "reason"));
     if (errors + wrong > 0)
         write_claim_list(f, claim, errors + wrong);
     if (must_differ == 1)
@@ -99,11 +89,8 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
 
 static void write_fact(FILE *f, const char *label, const char *text)
 {
-    if (text == NULL)
-        return;
-    fprintf(f, "<div><dt>%s</dt><dd>", label);
-    html_text(f, text);
-    fputs("</dd></div>\n", f);
+    if (text != NULL)
+        html_print(f, "<div><dt>%s</dt><dd>%s</dd></div>\n", label, text);
 }
 
 static void write_header(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
@@ -130,9 +117,8 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     else if (mode != NULL && strcmp(mode, "live") == 0)
         mode = "live: references rendered anew";
     write_fact(f, "Mode", mode);
-    fputs("</dl>\n<pre tabindex=\"0\"><code>", f);
-    html_text(f, member_text(root, "command"));
-    fputs("</code></pre>\n</header>\n", f);
+    html_print(f, "</dl>\n<pre tabindex=\"0\"><code>%s</code></pre>\n</header>\n",
+               member_text(root, "command"));
 }
 
 /* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
@@ -188,19 +174,9 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
 {
     FILE *f = p->f;
     p->folded = num > FOLD_FROM;
-    fprintf(f,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
-            "style-src 'unsafe-inline'; script-src '%s'\">\n"
-            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-            "<meta name=\"color-scheme\" content=\"light dark\">\n",
-            html_script_hash(page_js).s);
-    double every = member_number(root, "page_every_s");
-    if (every > 0) /* browsers read whole seconds */
-        fprintf(f, "<meta http-equiv=\"refresh\" content=\"%.0f\">\n", ceil(every));
-    fputs("<title>Assay report, ", f);
-    html_text(f, member_text(root, "date"));
-    fprintf(f, "</title>\n<style>\n%s</style>\n</head>\n<body>\n<main>\n", page_css);
+    char title[128];
+    snprintf(title, sizeof title, "Assay report, %.64s", member_text(root, "date"));
+    html_page_open(f, title, page_js, member_number(root, "page_every_s"));
     write_header(f, root, claim, num);
     if (num > 0)
         report_table(f, claim, num);

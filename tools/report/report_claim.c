@@ -11,40 +11,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-void report_reference(FILE *f, const struct claim_ref *claim)
-{
-    html_text(f, member_text(claim->json, "b"));
-    const char *quantity = member_text(claim->json, "quantity");
-    if (quantity != NULL && strcmp(quantity, "mean") != 0) {
-        fputs(", ", f);
-        html_text(f, quantity);
-    }
-}
-
-void report_badge(FILE *f, const struct claim_ref *claim)
-{
-    static const char *const style[] = {"error", "bad", "bad", "good"};
-    static const char *const mark[] = {"!", "✗", "✗", "✓"};
-    fprintf(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> ",
-            style[claim->outcome], mark[claim->outcome]);
-    if (claim->outcome == OUTCOME_NOT_JUDGED && !results_claim_lacks_time(claim->json))
-        fputs("not judged", f);
-    else
-        html_text(f, member_text(claim->json, "verdict"));
-    fputs("</span>", f);
-}
-
 void report_claim_error(struct page *p, const struct claim_ref *claim)
 {
     FILE *f = p->f;
-    fprintf(f, "<article class=\"claim\" id=\"claim-%zu\">\n<h3>", claim->index);
-    html_text(f, member_text(claim->json, "a"));
-    fputs(" against ", f);
+    html_print(f, "<article class=\"claim\" id=\"claim-%zu\">\n<h3>%s against ", claim->index,
+               member_text(claim->json, "a"));
     report_reference(f, claim);
     fputs(" ", f);
     report_badge(f, claim);
-    fputs("</h3>\n<p class=\"error-line\">This claim could not be judged: ", f);
-    html_text(f, member_text(claim->json, "error"));
+    html_print(f, "</h3>\n<p class=\"error-line\">This claim could not be judged: %s",
+               member_text(claim->json, "error"));
     fputs(results_claim_lacks_time(claim->json)
               ? "</p>\n<p class=\"caption\">It counts as inconclusive. A larger budget would "
                 "judge it.</p>\n"
@@ -52,11 +28,10 @@ void report_claim_error(struct page *p, const struct claim_ref *claim)
                 "renderer. It makes the exit code 3 until the cause is gone.</p>\n",
           f);
     const char *rerun = member_text(claim->json, "rerun");
-    if (rerun != NULL) {
-        fputs("<p>To judge this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
-        html_text(f, rerun);
-        fputs("</code></pre>\n", f);
-    }
+    if (rerun != NULL)
+        html_print(f,
+                   "<p>To judge this claim again:</p>\n<pre tabindex=\"0\"><code>%s</code></pre>\n",
+                   rerun);
     fputs("</article>\n", f);
 }
 
@@ -111,11 +86,8 @@ static void write_notes(FILE *f, const json_t *claim)
     if (json_array_size(notes) == 0)
         return;
     fputs("<ul class=\"notes\">\n", f);
-    for (size_t i = 0; i < json_array_size(notes); i++) {
-        fputs("<li>", f);
-        html_text(f, json_string_value(json_array_get(notes, i)));
-        fputs("</li>\n", f);
-    }
+    for (size_t i = 0; i < json_array_size(notes); i++)
+        html_print(f, "<li>%s</li>\n", json_string_value(json_array_get(notes, i)));
     fputs("</ul>\n", f);
 }
 
@@ -130,28 +102,17 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
             claim->index, a->layer, b->layer, member_number(json, "tile"));
     write_list(f, "data-tile-p", json_object_get(json, "tile_log10_p"));
     write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
-    fputs(" data-name=\"", f);
-    html_text(f, member_text(json, "a"));
-    fputs(" against ", f);
+    html_print(f, " data-name=\"%s against ", member_text(json, "a"));
     report_reference(f, claim);
     bool expected = claim->outcome == OUTCOME_AS_EXPECTED;
-    fprintf(f, "\">\n<details class=\"evidence\"%s>\n<summary><h3>",
-            expected && p->folded ? "" : " open");
-    html_text(f, member_text(json, "a"));
-    fputs(" against ", f);
+    fprintf(f, "\">\n<details class=\"evidence\"%s>\n", expected && p->folded ? "" : " open");
+    html_print(f, "<summary><h3>%s against ", member_text(json, "a"));
     report_reference(f, claim);
     fputs(" ", f);
     report_badge(f, claim);
-    if (expected) {
-        fputs(" <small>as expected</small>", f);
-    } else {
-        fputs(" <small>expected ", f);
-        html_text(f, member_text(json, "expected"));
-        fputs("</small>", f);
-    }
-    fputs("</h3><span class=\"reason\">", f);
-    html_text(f, member_text(json, "reason"));
-    fputs("</span></summary>\n", f);
+    html_print(f, " <small>%s%s</small></h3><span class=\"reason\">%s</span></summary>\n",
+               expected ? "as expected" : "expected ",
+               expected ? "" : member_text(json, "expected"), member_text(json, "reason"));
     write_notes(f, json);
     if (!report_similarity(p, claim, a->m, b->m, white, e))
         return false;

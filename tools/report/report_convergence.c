@@ -1,12 +1,10 @@
 #include "report_convergence.h"
 
 #include "tools/results/convergence_results.h"
-#include "tools/converge/depth_ladder.h"
 #include "tools/plots/plot_convergence.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 
-#include <math.h>
 #include <string.h>
 
 static void write_badge(FILE *f, const char *verdict, enum outcome outcome)
@@ -16,22 +14,15 @@ static void write_badge(FILE *f, const char *verdict, enum outcome outcome)
         fputs("measured", f);
         return;
     }
-    fprintf(f, "<span class=\"badge %s\">", style[outcome]);
-    html_text(f, verdict);
-    fputs("</span>", f);
+    html_print(f, "<span class=\"badge %s\">%s</span>", style[outcome], verdict);
 }
 
 static void write_row(void *ctx, const struct convergence_row *r)
 {
     FILE *f = ctx;
-    fprintf(f, "<tr%s><th scope=\"row\">",
-            r->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
-    html_text(f, r->engine);
-    fputs("</th><td>", f);
-    html_text(f, r->quantity);
-    fprintf(f, "</td><td class=\"%s\">", r->outcome == OUTCOME_NOT_JUDGED ? "error-cell" : "num");
-    html_text(f, r->value);
-    fputs("</td><td>", f);
+    html_row_open(f, r->outcome != OUTCOME_AS_EXPECTED, r->engine);
+    html_print(f, "<td>%s</td><td class=\"%s\">%s</td><td>", r->quantity,
+               r->outcome == OUTCOME_NOT_JUDGED ? "error-cell" : "num", r->value);
     write_badge(f, r->verdict, r->outcome);
     fputs("</td></tr>\n", f);
 }
@@ -57,9 +48,7 @@ static void write_csv(FILE *f, const json_t *engines)
             const json_t *g = json_array_get(rungs, i);
             csv_link_text(&csv, member_text(j, "engine"));
             for (size_t n = 0; n < sizeof number / sizeof *number; n++)
-                csv_link_number(&csv, json_is_number(json_object_get(g, number[n]))
-                                          ? member_number(g, number[n])
-                                          : NAN);
+                csv_link_member(&csv, g, number[n]);
             csv_link_interval(&csv, g, "rmse_ci");
             csv_link_line(&csv);
         }
@@ -69,21 +58,16 @@ static void write_csv(FILE *f, const json_t *engines)
 
 static void write_rungs(FILE *f, const json_t *scene)
 {
-    fputs("<h4>The rungs</h4>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
-          "aria-label=\"Table of rungs\">\n<table><thead><tr><th scope=\"col\">Engine</th>"
-          "<th scope=\"col\" class=\"num\">Samples</th><th scope=\"col\" class=\"num\">RMSE %</th>"
-          "<th scope=\"col\" class=\"num\">Variance</th><th scope=\"col\" class=\"num\">RMS bias "
-          "%</th><th scope=\"col\" class=\"num\">CPU s</th><th scope=\"col\" "
-          "class=\"num\">Efficiency 1/s</th></tr></thead>\n<tbody>\n",
-          f);
+    fputs("<h4>The rungs</h4>\n", f);
+    html_table_open(f, NULL, "Table of rungs",
+                    "Engine|>Samples|>RMSE %|>Variance|>RMS bias %|>CPU s|>Efficiency 1/s");
     const json_t *engines = json_object_get(scene, "engines");
     for (size_t k = 0; k < json_array_size(engines); k++) {
         const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
         for (size_t i = 0; i < json_array_size(rungs); i++) {
             const json_t *g = json_array_get(rungs, i);
-            fputs("<tr><th scope=\"row\">", f);
-            html_text(f, member_text(j, "engine"));
-            fprintf(f, "</th><td class=\"num\">%.0f</td>", member_number(g, "spp"));
+            html_row_open(f, false, member_text(j, "engine"));
+            fprintf(f, "<td class=\"num\">%.0f</td>", member_number(g, "spp"));
             write_number(f, g, "rmse", 100);
             write_number(f, g, "variance", 1);
             write_number(f, g, "bias", 100);
@@ -92,13 +76,13 @@ static void write_rungs(FILE *f, const json_t *scene)
             fputs("</tr>\n", f);
         }
     }
-    fputs(
-        "</tbody></table>\n</div>\n<p class=\"caption\"><b>Variance</b>: of one picture, relative, mean over "
-        "the pixels. <b>RMS bias</b>: what is left of the "
-        "error when noise is taken out; negative where the noise, by chance, was more. "
-        "<b>CPU s</b>: of one picture, its share of the engine's start included. "
-        "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out. ",
-        f);
+    html_table_close(f);
+    fputs("<p class=\"caption\"><b>Variance</b>: of one picture, relative, mean over "
+          "the pixels. <b>RMS bias</b>: what is left of the "
+          "error when noise is taken out; negative where the noise, by chance, was more. "
+          "<b>CPU s</b>: of one picture, its share of the engine's start included. "
+          "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out. ",
+          f);
     write_csv(f, engines);
     fputs("</p>\n", f);
 }
@@ -106,30 +90,25 @@ static void write_rungs(FILE *f, const json_t *scene)
 static void write_scene(FILE *f, const json_t *scene)
 {
     const char *title = member_text(scene, "title");
-    fputs("<section class=\"scene\">\n<h2>Convergence: ", f);
-    html_text(f, title != NULL ? title : member_text(scene, "scene"));
-    fputs(" <code>", f);
-    html_text(f, member_text(scene, "scene"));
-    fprintf(f,
-            "</code></h2>\n<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f pictures with "
-            "seeds of their own for each number of samples. Errors are against ",
-            member_number(scene, "width"), member_number(scene, "height"),
-            member_number(scene, "depth"), member_number(scene, "replicates"));
-    html_text(f, member_text(scene, "reference"));
-    fprintf(f, " (RMS noise %s). Each interval has the level %.6g\u00a0%%.</p>\n",
-            html_percent_plain(member_number(scene, "reference_noise")).s,
-            100 * (1 - member_number(scene, "alpha")));
+    html_print(f,
+               "<section class=\"scene\">\n<h2>Convergence: %s <code>%s</code></h2>\n"
+               "<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f pictures with seeds of "
+               "their own for each number of samples. Errors are against %s (RMS noise %s). Each "
+               "interval has the level %.6g\u00a0%%.</p>\n",
+               title != NULL ? title : member_text(scene, "scene"), member_text(scene, "scene"),
+               member_number(scene, "width"), member_number(scene, "height"),
+               member_number(scene, "depth"), member_number(scene, "replicates"),
+               member_text(scene, "reference"),
+               html_percent_plain(member_number(scene, "reference_noise")).s,
+               100 * (1 - member_number(scene, "alpha")));
     fputs("<div class=\"maps\">\n", f);
     plot_convergence(f, scene, false);
     plot_convergence(f, scene, true);
     plot_depths(f, json_object_get(scene, "depths"));
-    fputs("</div>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of "
-          "quantities\">\n<table><thead><tr><th scope=\"col\">Engine</th><th "
-          "scope=\"col\">Quantity</th><th scope=\"col\" class=\"num\">Value and interval</th><th "
-          "scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n",
-          f);
+    fputs("</div>\n", f);
+    html_table_open(f, NULL, "Table of quantities", "Engine|Quantity|>Value and interval|Verdict");
     convergence_results_rows(scene, write_row, f);
-    fputs("</tbody></table>\n</div>\n", f);
+    html_table_close(f);
     write_rungs(f, scene);
     fputs("</section>\n", f);
 }

@@ -12,26 +12,22 @@ void report_cost(FILE *f, const json_t *results)
         sum += cost[i].ours_s + cost[i].references_s;
     if (sum <= 0)
         return;
-    fputs("<section>\n<h2>What the time went to</h2>\n<div class=\"wide\" tabindex=\"0\" "
-          "role=\"region\" aria-label=\"Table of costs\">\n<table><thead><tr><th "
-          "scope=\"col\">Scene</th><th scope=\"col\" class=\"num\">Ours s</th><th scope=\"col\" "
-          "class=\"num\">References s</th><th scope=\"col\" class=\"num\">Share %</th><th "
-          "scope=\"col\" class=\"num\">Looks</th><th scope=\"col\" class=\"num\">Samples at "
-          "most</th><th scope=\"col\" class=\"num\">Undecided</th></tr></thead>\n<tbody>\n",
-          f);
+    fputs("<section>\n<h2>What the time went to</h2>\n", f);
+    html_table_open(f, NULL, "Table of costs",
+                    "Scene|>Ours s|>References s|>Share %|>Looks|>Samples at most|>Undecided");
     for (int i = 0; i < num; i++) {
         const struct scene_cost *c = &cost[i];
-        fprintf(f, "<tr%s><th scope=\"row\">", c->undecided > 0 ? " class=\"bad\"" : "");
-        html_text(f, c->scene);
+        html_row_open(f, c->undecided > 0, c->scene);
         fprintf(f,
-                "</th><td class=\"num\">%.2f</td><td class=\"num\">%.2f</td><td "
+                "<td class=\"num\">%.2f</td><td class=\"num\">%.2f</td><td "
                 "class=\"num\">%.1f</td><td class=\"num\">%d</td><td class=\"num\">%.0f</td><td "
                 "class=\"num\">%d of %d</td></tr>\n",
                 c->ours_s, c->references_s, 100 * (c->ours_s + c->references_s) / sum, c->looks,
                 c->largest_n, c->undecided, c->claims);
     }
+    html_table_close(f);
     fprintf(f,
-            "</tbody></table>\n</div>\n<p class=\"caption\">Processor seconds of rendering in this "
+            "<p class=\"caption\">Processor seconds of rendering in this "
             "run, %.4g in all. Stored references and closed forms cost nothing here. What several "
             "claims share is counted once.</p>\n</section>\n",
             sum);

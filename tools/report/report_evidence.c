@@ -8,11 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static double interval_end(const json_t *object, size_t end)
-{
-    return json_number_value(json_array_get(json_object_get(object, "ci"), end));
-}
-
 static void fact_open(FILE *f, const char *label)
 {
     fprintf(f, "<div><dt>%s</dt><dd>", label);
@@ -29,8 +24,8 @@ static void write_numbers(FILE *f, const json_t *claim)
     fact_open(f, "Difference of the image mean");
     fprintf(f, "%s, %.6g\u00a0%% interval %s to %s",
             html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
-            html_percent_prose(interval_end(claim, 0)).s,
-            html_percent_prose(interval_end(claim, 1)).s);
+            html_percent_prose(member_end(claim, "ci", 0)).s,
+            html_percent_prose(member_end(claim, "ci", 1)).s);
     fact_close(f);
     const json_t *channels = json_object_get(claim, "channel_difference");
     fact_open(f, "In red, green, blue");
@@ -74,8 +69,9 @@ static void write_regions(FILE *f, const json_t *claim)
     fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
             member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
             member_number(claim, "tile"), html_percent_prose(member_number(tile, "difference")).s,
-            html_percent_prose(interval_end(tile, 0)).s,
-            html_percent_prose(interval_end(tile, 1)).s, html_number(member_number(tile, "t")).s);
+            html_percent_prose(member_end(tile, "ci", 0)).s,
+            html_percent_prose(member_end(tile, "ci", 1)).s,
+            html_number(member_number(tile, "t")).s);
     fact_close(f);
     fact_open(f, "Smallest p of all regions");
     fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels in %s: %s, t = %s", member_number(worst, "x"),
@@ -115,19 +111,15 @@ static void write_side(FILE *f, const json_t *claim, const char *side)
     snprintf(version_key, sizeof version_key, "version_%s", side);
     const char *unit = member_text(claim, unit_key), *version = member_text(claim, version_key);
     html_text(f, member_text(claim, side));
-    if (version != NULL) {
-        fputs(" (", f);
-        html_text(f, version);
-        fputs(")", f);
-    }
+    if (version != NULL)
+        html_print(f, " (%s)", version);
     if (unit == NULL || strcmp(unit, "sample") == 0) {
         write_optional_number(f, claim, n, ", %.0f samples per pixel");
     } else if (strcmp(unit, "exact") == 0) {
         fputs(", without noise", f);
     } else {
         write_optional_number(f, claim, n, ", %.0f ");
-        html_text(f, unit);
-        fputs("s", f);
+        html_print(f, "%ss", unit);
         if (member_number(claim, spp) > 0)
             write_optional_number(f, claim, spp, " of %.0f samples per pixel");
     }
@@ -147,10 +139,8 @@ static void write_provenance(FILE *f, const json_t *claim)
     if (member_number(claim, "seconds_b") > 0)
         fprintf(f, ", %s when it was made", html_duration(member_number(claim, "seconds_b")).s);
     const char *fidelity = member_text(claim, "class");
-    if (fidelity != NULL) {
-        fputs(", class ", f);
-        html_text(f, fidelity);
-    }
+    if (fidelity != NULL)
+        html_print(f, ", class %s", fidelity);
     fact_close(f);
 
     const json_t *seeds = json_object_get(claim, "seeds_b");
@@ -168,19 +158,14 @@ static void write_approval(FILE *f, const json_t *claim)
 {
     if (json_object_get(claim, "seeds_b") == NULL)
         return;
-    fputs(
+    const char *scene = member_text(claim, "scene"), *b = member_text(claim, "b");
+    html_print(
+        f,
         "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
         "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
-        "tabindex=\"0\"><code>assay golden render --fresh --engine ",
-        f);
-    html_text(f, member_text(claim, "b"));
-    fputs(" --only ", f);
-    html_text(f, member_text(claim, "scene"));
-    fputs("\nassay golden approve ", f);
-    html_text(f, member_text(claim, "scene"));
-    fputs("/", f);
-    html_text(f, member_text(claim, "b"));
-    fputs("</code></pre>\n", f);
+        "tabindex=\"0\"><code>assay golden render --fresh --engine %s --only %s\nassay golden approve "
+        "%s/%s</code></pre>\n",
+        b, scene, scene, b);
 }
 
 void report_evidence(FILE *f, const json_t *claim, bool open)
@@ -193,11 +178,11 @@ void report_evidence(FILE *f, const json_t *claim, bool open)
     write_provenance(f, claim);
     fputs("</dl>\n", f);
     report_statistics(f, claim);
-    if (member_text(claim, "rerun") != NULL) {
-        fputs("<p class=\"caption\">To run this claim again:</p>\n<pre tabindex=\"0\"><code>", f);
-        html_text(f, member_text(claim, "rerun"));
-        fputs("</code></pre>\n", f);
-    }
+    if (member_text(claim, "rerun") != NULL)
+        html_print(f,
+                   "<p class=\"caption\">To run this claim again:</p>\n<pre "
+                   "tabindex=\"0\"><code>%s</code></pre>\n",
+                   member_text(claim, "rerun"));
     write_approval(f, claim);
     fputs("</details>\n", f);
 }

@@ -1,7 +1,9 @@
 #include "report_internal.h"
 
+#include "renderer/base/fs.h"
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"
+#include "reference/suite/engine_table.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -21,10 +23,9 @@ struct scene {
     bool white_capped;
 };
 
-static bool full_path(const struct page *p, const char *file, char path[8192], struct err *e)
+static struct path full_path(const struct page *p, const char *file)
 {
-    int n = snprintf(path, 8192, "%s%s", file[0] == '/' ? "" : p->dir, file);
-    return n > 0 && n < 8192 ? true : err_set(e, "%.64s...: path too long", file);
+    return fs_path("%s%s", file[0] == '/' ? "" : p->dir, file);
 }
 
 static bool load_shot(struct page *p, struct scene *s, const json_t *claim, const char *side,
@@ -35,24 +36,25 @@ static bool load_shot(struct page *p, struct scene *s, const json_t *claim, cons
         if (strcmp(s->shot[i].file, file) == 0)
             return true;
     struct shot *shot = &s->shot[s->num_shots];
-    char path[8192];
-    if (!full_path(p, file, path, e) || !moments_read(path, &shot->m, NULL, e))
+    const struct path path = full_path(p, file);
+    if (!moments_read(path.s, &shot->m, NULL, e))
         return false;
     shot->engine = member_text(claim, side);
     shot->file = file;
     s->num_shots++;
     if (shot->m.width != s->shot[0].m.width || shot->m.height != s->shot[0].m.height)
-        return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path, shot->m.width,
+        return err_set(e, "%s: %d x %d pixels, but %s has %d x %d", path.s, shot->m.width,
                        shot->m.height, s->shot[0].file, s->shot[0].m.width, s->shot[0].m.height);
-    return report_pixel_data_add(p, path, &shot->m, &shot->layer, e);
+    return report_pixel_data_add(p, path.s, &shot->m, &shot->layer, e);
 }
 
-/* Ours first, then the references in the order that the keys 1 to 4 have in every scene, then others. */
+/* Ours first, then the references in the order that the keys 1, 2, .. have in every scene, then others. */
 static int rank_of(const struct shot *s)
 {
-    static const char *const order[] = {"pathtracer", "cycles", "povray", "truth"};
+    static const char *const order[] = {"pathtracer", ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth",
+                                        NULL};
     int rank = 0;
-    while (rank < 4 && strcmp(s->engine, order[rank]) != 0)
+    while (order[rank] != NULL && strcmp(s->engine, order[rank]) != 0)
         rank++;
     return rank;
 }
@@ -147,11 +149,8 @@ static void write_images(struct page *p, const struct scene *s)
             "data-height=\"%d\">\n<ul class=\"shots\">\n",
             m->width, m->height);
     for (size_t i = 0; i < s->num_shots; i++) {
-        fprintf(p->f, "<li data-layer=\"%zu\" data-name=\"", s->shot[i].layer);
-        html_text(p->f, s->shot[i].engine);
-        fputs("\"><b>", p->f);
-        html_text(p->f, s->shot[i].engine);
-        fputs("</b> <span>", p->f);
+        html_print(p->f, "<li data-layer=\"%zu\" data-name=\"%s\"><b>%s</b> <span>",
+                   s->shot[i].layer, s->shot[i].engine, s->shot[i].engine);
         print_observations(p->f, &s->shot[i].m);
         fputs("</span></li>\n", p->f);
     }
@@ -176,16 +175,10 @@ static void write_purpose(FILE *f, const json_t *claim)
     if (detects == NULL && blind == NULL)
         return;
     fputs("<dl class=\"purpose\">", f);
-    if (detects != NULL) {
-        fputs("<div><dt>What it can detect</dt><dd>", f);
-        html_text(f, detects);
-        fputs("</dd></div>", f);
-    }
-    if (blind != NULL) {
-        fputs("<div><dt>What it is blind to</dt><dd>", f);
-        html_text(f, blind);
-        fputs("</dd></div>", f);
-    }
+    if (detects != NULL)
+        html_print(f, "<div><dt>What it can detect</dt><dd>%s</dd></div>", detects);
+    if (blind != NULL)
+        html_print(f, "<div><dt>What it is blind to</dt><dd>%s</dd></div>", blind);
     fputs("</dl>\n", f);
 }
 
@@ -202,13 +195,10 @@ bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, str
         if (member_text(purpose, "detects") == NULL)
             purpose = claim[i].json;
     }
-    fprintf(p->f, "<section class=\"scene\" data-white=\"%.9g\" data-scene=\"", s.white);
-    html_text(p->f, name);
-    fputs("\">\n<h2>", p->f);
-    html_text(p->f, title != NULL ? title : name);
-    fputs(" <code>", p->f);
-    html_text(p->f, name);
-    fputs("</code>", p->f);
+    html_print(p->f,
+               "<section class=\"scene\" data-white=\"%.9g\" data-scene=\"%s\">\n<h2>%s "
+               "<code>%s</code>",
+               s.white, name, title != NULL ? title : name, name);
     fputs(p->folded ? "<a class=\"up\" href=\"#table\">↑ all claims</a></h2>\n" : "</h2>\n", p->f);
     write_purpose(p->f, purpose);
 

@@ -117,14 +117,12 @@ bool report_similarity(struct page *p, const struct claim_ref *claim, const stru
 static void write_row(FILE *f, const struct page_alike *n)
 {
     const json_t *c = n->claim.json;
-    fprintf(f, "<tr><th scope=\"row\"><a href=\"#claim-%zu\">", n->claim.index);
-    html_text(f, member_text(c, "scene"));
-    fputs("</a></th><td class=\"name\">", f);
-    html_text(f, member_text(c, "a"));
-    fputs("</td><td class=\"name\">", f);
+    html_print(f,
+               "<tr><th scope=\"row\"><a href=\"#claim-%zu\">%s</a></th><td "
+               "class=\"name\">%s</td><td class=\"name\">",
+               n->claim.index, member_text(c, "scene"), member_text(c, "a"));
     report_reference(f, &n->claim);
-    fputs("</td><td>", f);
-    html_text(f, member_text(c, "verdict"));
+    html_print(f, "</td><td>%s", member_text(c, "verdict"));
     if (isfinite(n->hdr))
         fprintf(f, "</td><td class=\"num\">%.4f</td><td class=\"num\">%.4f", n->hdr, n->ldr);
     else
@@ -168,16 +166,14 @@ void report_similarity_table(const struct page *p)
     fputs(
         "<section id=\"alike\">\n<h2>Beside the statistics</h2>\n"
         "<p>What two measures that know nothing of noise say of the same pictures. They are quoted to compare, and "
-        "have no part in any verdict.</p>\n"
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of FLIP and idiff\">\n"
-        "<table><thead><tr><th scope=\"col\">Scene</th><th scope=\"col\">Tested</th><th "
-        "scope=\"col\">Against</th><th scope=\"col\">Verdict</th><th scope=\"col\" class=\"num\">FLIP, "
-        "HDR</th><th scope=\"col\" class=\"num\">FLIP, LDR</th><th scope=\"col\" class=\"num\">idiff: % of "
-        "pixels</th><th scope=\"col\">idiff</th></tr></thead>\n<tbody>\n",
+        "have no part in any verdict.</p>\n",
         f);
+    html_table_open(f, NULL, "Table of FLIP and idiff",
+                    "Scene|Tested|Against|Verdict|>FLIP, HDR|>FLIP, LDR|>idiff: % of pixels|idiff");
     for (size_t i = 0; i < p->num_alike; i++)
         write_row(f, &p->alike[i]);
-    fputs("</tbody></table>\n</div>\n<p class=\"caption\">The table as a file: ", f);
+    html_table_close(f);
+    fputs("<p class=\"caption\">The table as a file: ", f);
     write_csv(p);
     fprintf(
         f,

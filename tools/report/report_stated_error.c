@@ -1,6 +1,6 @@
 #include "report_stated_error.h"
 
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/html/html.h"
 
 static size_t count_good(const json_t *consistency)
@@ -23,26 +23,21 @@ void report_stated_error_headline(FILE *f, const json_t *consistency)
 static void write_row(FILE *f, const json_t *c)
 {
     bool good = stated_error_outcome(c) == OUTCOME_AS_EXPECTED;
-    fprintf(f, "<tr%s><th scope=\"row\">", good ? "" : " class=\"bad\"");
-    html_text(f, member_text(c, "scene"));
+    html_row_open(f, !good, member_text(c, "scene"));
     if (member_text(c, "error") != NULL) {
-        fputs("</th><td colspan=\"7\" class=\"error-cell\">", f);
-        html_text(f, member_text(c, "error"));
-        fputs("</td></tr>\n", f);
+        html_print(f, "<td colspan=\"7\" class=\"error-cell\">%s</td></tr>\n",
+                   member_text(c, "error"));
         return;
     }
-    const json_t *ci = json_object_get(c, "pixels_ci");
-    fprintf(f,
-            "</th><td>%s</td><td class=\"num\">%.0f × %.0f</td><td class=\"num\">%.3f</td><td "
-            "class=\"num\">%.3f to %.3f</td><td class=\"num\">%.2f</td>",
-            member_text(c, "verdict"), member_number(c, "renders"), member_number(c, "spp"),
-            member_number(c, "pixels"), json_number_value(json_array_get(ci, 0)),
-            json_number_value(json_array_get(ci, 1)), member_number(c, "image"));
-    const json_t *noise = json_object_get(c, "noise_ci");
-    if (noise != NULL)
+    html_print(f,
+               "<td>%s</td><td class=\"num\">%.0f × %.0f</td><td class=\"num\">%.3f</td><td "
+               "class=\"num\">%.3f to %.3f</td><td class=\"num\">%.2f</td>",
+               member_text(c, "verdict"), member_number(c, "renders"), member_number(c, "spp"),
+               member_number(c, "pixels"), member_end(c, "pixels_ci", 0),
+               member_end(c, "pixels_ci", 1), member_number(c, "image"));
+    if (json_object_get(c, "noise_ci") != NULL)
         fprintf(f, "<td class=\"num\">%.3f (%.3f to %.3f)</td>", member_number(c, "noise"),
-                json_number_value(json_array_get(noise, 0)),
-                json_number_value(json_array_get(noise, 1)));
+                member_end(c, "noise_ci", 0), member_end(c, "noise_ci", 1));
     else
         fputs("<td></td>", f);
     if (json_object_get(c, "too_early") != NULL)
@@ -57,18 +52,15 @@ void report_stated_error(FILE *f, const json_t *consistency)
 {
     if (json_array_size(consistency) == 0)
         return;
-    fputs("<section>\n<h2>Stated errors</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
-          "aria-label=\"Table of stated errors\">\n<table><thead><tr><th "
-          "scope=\"col\">Scene</th><th scope=\"col\">Verdict</th><th scope=\"col\" "
-          "class=\"num\">Renders × samples</th><th scope=\"col\" class=\"num\">Pixels</th><th "
-          "scope=\"col\" class=\"num\">Interval</th><th scope=\"col\" class=\"num\">Sum of "
-          "pixels</th><th scope=\"col\" class=\"num\">Noise</th><th scope=\"col\" "
-          "class=\"num\">Stopped wrong</th></tr></thead>\n<tbody>\n",
-          f);
+    fputs("<section>\n<h2>Stated errors</h2>\n", f);
+    html_table_open(
+        f, NULL, "Table of stated errors",
+        "Scene|Verdict|>Renders × samples|>Pixels|>Interval|>Sum of pixels|>Noise|>Stopped wrong");
     for (size_t i = 0; i < json_array_size(consistency); i++)
         write_row(f, json_array_get(consistency, i));
+    html_table_close(f);
     fputs(
-        "</tbody></table>\n</div>\n<p class=\"caption\">The scene is rendered several times with "
+        "<p class=\"caption\">The scene is rendered several times with "
         "seeds of their own. <b>Pixels</b>: variance between the renders over the variance that "
         "they state; 1 if samples are independent, 2 if each is computed twice, 0 if the seed has "
         "no effect. <b>Sum of pixels</b>: the same of the whole picture's sum; large if pixels "

@@ -1,4 +1,4 @@
-/* The report's part about stated errors (stated_error_claims.h). */
+/* The report's part about stated errors (stated_error_results.h). */
 #ifndef ASSAY_REPORT_STATED_ERROR_H
 #define ASSAY_REPORT_STATED_ERROR_H
 

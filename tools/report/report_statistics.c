@@ -18,13 +18,12 @@ static void write_row(FILE *f, const json_t *s, double alpha)
     double share = member_number(s, "share"), log10_p = member_number(s, "log10_p");
     bool tested = member_number(s, "num_tests") > 0;
     bool rejects = tested && log10_p <= log10(alpha * share);
-    fprintf(f, "<tr%s><th scope=\"row\">", rejects ? " class=\"bad\"" : "");
-    html_text(f, member_text(s, "name"));
+    html_row_open(f, rejects, member_text(s, "name"));
     if (!(share > 0)) {
-        fputs("</th><td colspan=\"5\">not asked for</td></tr>\n", f);
+        fputs("<td colspan=\"5\">not asked for</td></tr>\n", f);
         return;
     }
-    fprintf(f, "</th><td class=\"num\">%.3g</td><td class=\"num\">%.0f</td>", alpha * share,
+    fprintf(f, "<td class=\"num\">%.3g</td><td class=\"num\">%.0f</td>", alpha * share,
             member_number(s, "num_tests"));
     if (!tested) {
         fputs("<td colspan=\"3\">too skewed, or no noise</td></tr>\n", f);
@@ -38,22 +37,15 @@ static void write_row(FILE *f, const json_t *s, double alpha)
     fputs("</td></tr>\n", f);
 }
 
-static double end_of(const json_t *object, size_t i)
-{
-    return json_number_value(json_array_get(json_object_get(object, "ci"), i));
-}
-
 static void write_direction(FILE *f, const json_t *d)
 {
     const char *unit = member_text(d, "unit");
-    fputs("Of the known kinds of error the difference is most like <b>", f);
-    html_text(f, member_text(d, "name"));
-    fputs("</b>", f);
-    if (unit[0] != '\0') {
-        fprintf(f, " of %s [%s, %s] ", html_number(member_number(d, "amount")).s,
-                html_number(end_of(d, 0)).s, html_number(end_of(d, 1)).s);
-        html_text(f, unit);
-    }
+    html_print(f, "Of the known kinds of error the difference is most like <b>%s</b>",
+               member_text(d, "name"));
+    if (unit[0] != '\0')
+        html_print(f, " of %s [%s, %s] %s", html_number(member_number(d, "amount")).s,
+                   html_number(member_end(d, "ci", 0)).s, html_number(member_end(d, "ci", 1)).s,
+                   unit);
     fprintf(f, ", which explains %.0f\u00a0%% of it. ", 100 * member_number(d, "explained"));
 }
 
@@ -62,16 +54,12 @@ void report_statistics(FILE *f, const json_t *claim)
     const json_t *all = json_object_get(claim, "statistics");
     const json_t *direction = json_object_get(claim, "direction");
     const json_t *ratio = json_object_get(claim, "variance_ratio");
-    fputs("<h4>Which statistic looked</h4>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" "
-          "aria-label=\"Table of statistics\">\n<table><thead><tr><th "
-          "scope=\"col\">Statistic</th><th scope=\"col\" class=\"num\">Part of alpha</th><th "
-          "scope=\"col\" class=\"num\">Tests</th><th scope=\"col\" class=\"num\">Smallest p × "
-          "tests</th><th scope=\"col\">Found</th><th scope=\"col\">Where or "
-          "what</th></tr></thead>\n<tbody>\n",
-          f);
+    fputs("<h4>Which statistic looked</h4>\n", f);
+    html_table_open(f, NULL, "Table of statistics",
+                    "Statistic|>Part of alpha|>Tests|>Smallest p × tests|Found|Where or what");
     for (size_t i = 0; i < json_array_size(all); i++)
         write_row(f, json_array_get(all, i), member_number(claim, "alpha"));
-    fputs("</tbody></table>\n</div>\n", f);
+    html_table_close(f);
     if (direction == NULL && ratio == NULL)
         return;
     fputs("<p class=\"caption\">", f);
@@ -79,7 +67,8 @@ void report_statistics(FILE *f, const json_t *claim)
         write_direction(f, direction);
     if (ratio != NULL)
         fprintf(f, "The variance of one path of A is %s times that of B [%s, %s].",
-                html_number(member_number(ratio, "ratio")).s, html_number(end_of(ratio, 0)).s,
-                html_number(end_of(ratio, 1)).s);
+                html_number(member_number(ratio, "ratio")).s,
+                html_number(member_end(ratio, "ci", 0)).s,
+                html_number(member_end(ratio, "ci", 1)).s);
     fputs("</p>\n", f);
 }

@@ -3,64 +3,146 @@
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 
-#include <math.h>
+#include <assert.h>
+#include <string.h>
+
+void report_reference(FILE *f, const struct claim_ref *claim)
+{
+    html_text(f, member_text(claim->json, "b"));
+    const char *quantity = member_text(claim->json, "quantity");
+    if (quantity != NULL && strcmp(quantity, "mean") != 0)
+        html_print(f, ", %s", quantity);
+}
+
+void report_badge(FILE *f, const struct claim_ref *claim)
+{
+    static const char *const style[] = {"error", "bad", "bad", "good"};
+    static const char *const mark[] = {"!", "✗", "✗", "✓"};
+    bool judged = claim->outcome != OUTCOME_NOT_JUDGED || results_claim_lacks_time(claim->json);
+    html_print(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> %s</span>",
+               style[claim->outcome], mark[claim->outcome],
+               judged ? member_text(claim->json, "verdict") : "not judged");
+}
+
+/* A <td>; its heading stands in it too, for where a claim is a card. */
+static void open_cell(FILE *f, const struct column *column, const char *style)
+{
+    html_print(f, "<td class=\"%s\" data-label=\"%s\">", style, column->page);
+}
+
+static void write_cell(FILE *f, const struct column *column, const struct claim_ref *claim)
+{
+    const json_t *c = claim->json;
+    const char *key = column->key;
+    switch (column->kind) {
+    case COLUMN_VERDICT:
+        fputs("<td>", f);
+        report_badge(f, claim);
+        break;
+    case COLUMN_SCENE:
+        fprintf(f, "<th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
+        html_name(f, member_text(c, key));
+        fputs("</a></th>", f);
+        return;
+    case COLUMN_TESTED:
+        open_cell(f, column, "name");
+        html_name(f, member_text(c, key));
+        break;
+    case COLUMN_REFERENCE:
+        open_cell(f, column, "name");
+        report_reference(f, claim);
+        break;
+    case COLUMN_TEXT:
+        open_cell(f, column, "text");
+        html_text(f, member_text(c, key));
+        break;
+    case COLUMN_PLOT:
+        fputs("<td>", f);
+        plot_interval(f, c);
+        break;
+    case COLUMN_DIFFERENCE:
+        open_cell(f, column, "num");
+        fputs(html_percent_column(member_number(c, key)).s, f);
+        break;
+    case COLUMN_INTERVAL:
+        open_cell(f, column, "num");
+        fprintf(f, "%s to %s", html_percent_column(member_end(c, key, 0)).s,
+                html_percent_column(member_end(c, key, 1)).s);
+        break;
+    case COLUMN_PERCENT:
+        open_cell(f, column, "num");
+        fputs(html_number(100 * member_number(c, key)).s, f);
+        break;
+    case COLUMN_SECONDS:
+        open_cell(f, column, "num");
+        if (json_object_get(c, key) != NULL)
+            fputs(html_duration(member_number(c, key)).s, f);
+        break;
+    case COLUMN_NUMBER:
+        open_cell(f, column, "num");
+        if (json_object_get(c, key) != NULL)
+            fputs(html_number(member_number(c, key)).s, f);
+        break;
+    case COLUMN_MARK: break;
+    }
+    fputs("</td>", f);
+}
 
 static void write_row(FILE *f, const struct claim_ref *claim)
 {
-    const json_t *c = claim->json;
-    fprintf(f, "<tr%s><td>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
-    report_badge(f, claim);
-    fprintf(f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
-    html_name(f, member_text(c, "scene"));
-    fputs("</a></th><td class=\"name\">", f);
-    html_name(f, member_text(c, "a"));
-    fputs("</td><td class=\"name\">", f);
-    report_reference(f, claim);
-    fputs("</td><td>", f);
-    html_text(f, member_text(c, "expected"));
-    if (claim->outcome == OUTCOME_NOT_JUDGED) {
-        fputs("</td><td colspan=\"6\" class=\"error-cell\">", f);
-        html_text(f, member_text(c, "error"));
-        fputs("</td></tr>\n", f);
-        return;
+    size_t left = 0;
+    fprintf(f, "<tr%s>", claim->outcome == OUTCOME_AS_EXPECTED ? "" : " class=\"bad\"");
+    for (size_t i = 0; i < results_num_columns; i++) {
+        const struct column *column = &results_columns[i];
+        if (column->page == NULL)
+            continue;
+        if (claim->outcome == OUTCOME_NOT_JUDGED && column->kind >= COLUMN_PLOT)
+            left++;
+        else
+            write_cell(f, column, claim);
     }
-    const json_t *ci = json_object_get(c, "ci");
-    fputs("</td><td>", f);
-    plot_interval(f, c);
-    fprintf(f,
-            "</td><td class=\"num\">%s</td><td class=\"num\">%s to %s</td><td class=\"num\">%s</td>"
-            "<td class=\"num\">%s</td>",
-            html_percent_column(member_number(c, "difference")).s,
-            html_percent_column(json_number_value(json_array_get(ci, 0))).s,
-            html_percent_column(json_number_value(json_array_get(ci, 1))).s,
-            html_number(100 * member_number(c, "mdb_global")).s,
-            html_number(100 * member_number(c, "margin_global")).s);
-    fputs("<td class=\"num\">", f);
-    if (json_object_get(c, "seconds_a") != NULL)
-        fputs(html_duration(member_number(c, "seconds_a")).s, f);
-    fputs("</td></tr>\n", f);
+    if (left > 0)
+        html_print(f, "<td colspan=\"%zu\" class=\"error-cell\">%s</td>", left,
+                   member_text(claim->json, "error"));
+    fputs("</tr>\n", f);
+}
+
+/* Headings of the page, for html_table_open(), or of CSV. */
+static const char *headings(bool is_page, char out[512])
+{
+    size_t n = 0;
+    for (size_t i = 0; i < results_num_columns; i++) {
+        const struct column *c = &results_columns[i];
+        const char *name = is_page ? c->page : c->csv;
+        if (name != NULL)
+            n += (size_t)snprintf(out + n, 512 - n, "%s%s%s",
+                                  n == 0    ? ""
+                                  : is_page ? "|"
+                                            : ",",
+                                  is_page && column_is_number(c) ? ">" : "", name);
+        assert(n < 512);
+    }
+    return out;
 }
 
 static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
 {
-    static const char *const text[] = {"scene", "a", "b", "verdict", "expected", "error"};
-    static const char *const number[] = {"difference", "mdb_global", "margin_global", "alpha",
-                                         "seconds_a"};
-    struct csv csv =
-        csv_link_open(f, "claims.csv",
-                      "scene,tested,against,verdict,expected,error,difference,mdb,margin,"
-                      "alpha,seconds,low,high");
+    char header[512];
+    struct csv csv = csv_link_open(f, "claims.csv", headings(false, header));
     for (size_t i = 0; i < num; i++) {
-        const json_t *c = claim[i].json, *ci = json_object_get(c, "ci");
-        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
-            csv_link_text(&csv, member_text(c, text[k]));
-        for (size_t k = 0; k < sizeof number / sizeof *number; k++)
-            csv_link_number(&csv,
-                            json_object_get(c, number[k]) ? member_number(c, number[k]) : NAN);
-        for (size_t k = 0; k < 2; k++)
-            csv_link_number(&csv, ci != NULL ? json_number_value(json_array_get(ci, k)) : NAN);
+        for (size_t k = 0; k < results_num_columns; k++) {
+            const struct column *c = &results_columns[k];
+            if (c->csv == NULL)
+                continue;
+            if (c->kind == COLUMN_INTERVAL)
+                csv_link_interval(&csv, claim[i].json, c->key);
+            else if (column_is_number(c))
+                csv_link_member(&csv, claim[i].json, c->key);
+            else
+                csv_link_text(&csv, member_text(claim[i].json, c->key));
+        }
         csv_link_line(&csv);
     }
     csv_link_close(&csv);
@@ -68,34 +150,21 @@ static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
 
 void report_table(FILE *f, const struct claim_ref *claim, size_t num)
 {
-    fputs(
-        "<section id=\"table\">\n<h2>The claims</h2>\n"
-        "<details class=\"help\"><summary>What the columns mean</summary>\n<p class=\"caption\">"
-        "<b>Difference</b>: how much brighter (+) or darker (−) the tested image "
-        "is than the reference, on average. <b>Interval</b>: where the true difference lies, "
-        "given the noise of both. <b>Margin</b>: a difference up to this size counts as equal; "
-        "it is declared for each scene before anything is rendered. <b>MDB</b>, the minimum "
-        "detectable bias: a true difference of this size would have come out DIFFERENT with a "
-        "probability of 95 %. In the drawing the band is the margin, the line is the interval "
-        "and the dot is the difference; an arrow head points to what lies outside. A verdict is "
-        "EQUIVALENT only where the intervals of the image and of every tile lie inside their "
-        "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few "
-        "samples to tell.</p></details>\n"
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table of claims\">\n"
-        "<table id=\"claims\"><thead><tr><th scope=\"col\">Verdict</th><th scope=\"col\">Scene</th>"
-        "<th scope=\"col\">Tested</th><th scope=\"col\">Against</th><th scope=\"col\">Expected</th>"
-        "<th scope=\"col\">In margin</th><th scope=\"col\" class=\"num\">Difference %</th><th "
-        "scope=\"col\" class=\"num\">Interval %</th><th scope=\"col\" class=\"num\">MDB %</th><th "
-        "scope=\"col\" class=\"num\">Margin %</th><th scope=\"col\" class=\"num\">Time</th></tr>"
-        "</thead>\n"
-        "<tbody>\n",
-        f);
+    char header[512];
+    fputs("<section id=\"table\">\n<h2>The claims</h2>\n"
+          "<details class=\"help\"><summary>What the columns mean</summary>\n<p class=\"caption\">",
+          f);
+    for (size_t i = 0; i < results_num_columns; i++)
+        if (results_columns[i].help != NULL)
+            fputs(results_columns[i].help, f);
+    fputs("</p></details>\n", f);
+    html_table_open(f, "claims", "Table of claims", headings(true, header));
     for (size_t i = 0; i < num; i++)
         write_row(f, &claim[i]);
-    fputs(
-        "</tbody></table>\n</div>\n<p class=\"caption\">What did not come out as expected comes first. The table as a "
-        "file: ",
-        f);
+    html_table_close(f);
+    fputs("<p class=\"caption\">What did not come out as expected comes first. The table as a "
+          "file: ",
+          f);
     write_csv(f, claim, num);
     fputs("</p>\n</section>\n", f);
 }

@@ -1,6 +1,5 @@
 #include "reproduce.h"
 
-#include "renderer/base/shell_quote.h"
 #include "reproduce_internal.h"
 #include "tools/base/temp_dir.h"
 
@@ -11,13 +10,6 @@ void reproduced_free(struct reproduced *r)
 {
     free(r->command);
     *r = (struct reproduced){0};
-}
-
-bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
-{
-    free(out->command);
-    out->command = shell_quote_join(NULL, word);
-    return out->command != NULL || err_set(e, "out of memory");
 }
 
 /* Told from an EXR by its first byte. */

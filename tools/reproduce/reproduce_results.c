@@ -114,12 +114,12 @@ static bool same_file(const char *a, const char *b)
  * another program, or the directory of cycles.py, which Blender runs; a description named without its path is one of ours. */
 static bool check_programs(const char *path, const char *const *word, struct err *e)
 {
-    char ours[4096], share[4096];
-    fs_beside_program(ours, sizeof ours, "pathtracer");
-    const char *dir = data_dir(share, sizeof share, "reference", "../share/assay"), *value;
+    const struct data_dirs at = data_dirs_find();
+    const char *value;
     for (; *word != NULL; word++)
-        if (((value = value_of(word, "--pathtracer")) != NULL && !same_file(value, ours)) ||
-            ((value = value_of(word, "--share")) != NULL && !same_file(value, dir)) ||
+        if (((value = value_of(word, "--pathtracer")) != NULL &&
+             !same_file(value, at.pathtracer.s)) ||
+            ((value = value_of(word, "--share")) != NULL && !same_file(value, at.share.s)) ||
             ((value = value_of(word, "--engine")) != NULL && strpbrk(value, "./") != NULL))
             return err_set(e,
                            "%s: its command runs a program of '%s', which is not ours: look at "
@@ -153,7 +153,7 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
                       struct reproduced *out, struct err *e)
 {
     static const struct option_words seed[] = {{"--reference-seed", 1}, {0}};
-    char assay[4096], log[MAX_PATH], file[MAX_PATH], number[24];
+    char file[MAX_PATH], number[24];
     const char *option, *verb = num > 1 ? word[1] : "";
     const json_t *drawn = json_object_get(then, "reference_seed");
     struct process_usage usage = {.exit_status = -1};
@@ -164,9 +164,9 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     if (argv == NULL)
         return err_set(e, "out of memory");
-    fs_beside_program(assay, sizeof assay, "assay");
-    snprintf(log, sizeof log, "%.4000s/log", dir);
-    const char *ours[] = {assay, verb, "-q", option, file};
+    const struct path assay = fs_beside_program("assay");
+    const struct path log = fs_path("%s/log", dir);
+    const char *ours[] = {assay.s, verb, "-q", option, file};
     memcpy(argv, ours, sizeof ours);
     int more = (int)(sizeof ours / sizeof *ours), n = together_kept(num - 2, word + 2);
     n = cli_rewrite_kept(how, n, word + 2, word + 2);
@@ -178,7 +178,7 @@ static bool run_again(const char *path, const struct reproduce_options *opt, con
     }
     memcpy(argv + more, word + 2, (size_t)n * sizeof *argv);
     struct err why = {""};
-    const struct process p = {.argv = argv, .log = log};
+    const struct process p = {.argv = argv, .log = log.s};
     bool ok =
         reproduced_command(out, argv, e) && (opt->run_foreign || check_programs(path, argv, e));
     if (ok && !process_run(&p, &usage, &why) &&

@@ -20,6 +20,13 @@
 
 enum { MAX_PATH = 4096 };
 
+bool reproduced_command(struct reproduced *out, const char *const *word, struct err *e)
+{
+    free(out->command);
+    out->command = shell_quote_join(NULL, word);
+    return out->command != NULL || err_set(e, "out of memory");
+}
+
 static const char *attr(const struct image *im, const char *name)
 {
     const char *value = image_get_attr(im, name);
@@ -118,14 +125,14 @@ static bool remake_render(const char *path, const struct image *im, char **word,
                           const struct reproduce_options *opt, const char *to,
                           struct reproduced *out, struct err *e)
 {
-    char threads[NUMBER], spp[NUMBER], log[MAX_PATH];
+    char threads[NUMBER], spp[NUMBER];
     snprintf(threads, sizeof threads, "%d", opt->threads);
-    snprintf(log, sizeof log, "%s.log", to);
+    const struct path log = fs_path("%s.log", to);
     const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
     bool ok = (argv != NULL || err_set(e, "out of memory")) &&
               command_of(path, im, opt, word, num, threads, to, spp, argv, e);
     ok = ok && reproduced_command(out, argv, e);
-    const struct process p = {.argv = argv, .log = log};
+    const struct process p = {.argv = argv, .log = log.s};
     ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
     free(argv);
     return ok;
@@ -137,14 +144,14 @@ static bool remake_ranges(const char *path, const struct image *im, char **word,
                           struct reproduced *out, struct err *e)
 {
     enum { BEFORE = 6 }; /* words that plan it */
-    char threads[NUMBER], spp[NUMBER], ranges[NUMBER], dir[MAX_PATH];
+    char threads[NUMBER], spp[NUMBER], ranges[NUMBER];
     struct plan p = {.dir = ""};
     struct plan_wishes w = {.parts = 1, .ranges = 1, .pathtracer = opt->pathtracer};
     for (const char *c = attr(im, "assay:ranges"); *c != '\0'; c++)
         w.ranges += *c == ',';
     snprintf(threads, sizeof threads, "%d", opt->threads);
     snprintf(ranges, sizeof ranges, "%d", w.ranges);
-    snprintf(dir, sizeof dir, "%.4000s.plan", to);
+    const struct path dir = fs_path("%s.plan", to);
     const char **argv = calloc((size_t)num + BEFORE + MORE_WORDS, sizeof *argv);
     if (argv == NULL)
         return err_set(e, "out of memory");
@@ -157,7 +164,7 @@ static bool remake_ranges(const char *path, const struct image *im, char **word,
     int count = 0;
     while (render[count] != NULL)
         count++;
-    ok = ok && reproduced_command(out, argv, e) && plan_make(dir, count, words, &w, &p, e);
+    ok = ok && reproduced_command(out, argv, e) && plan_make(dir.s, count, words, &w, &p, e);
     for (int k = 0; ok && k < p.num; k++) {
         bool made;
         ok = job_run(&p, k, &made, e);
@@ -182,12 +189,11 @@ static bool remake_merge(const char *path, char **word, int num,
     if (ok && shares < 2)
         ok = err_set(e, "%s: its command names no shares", path);
     for (int i = 0; ok && i < shares; i++) {
-        char part[MAX_PATH];
-        snprintf(part, sizeof part, "%.4000s.%d.exr", to, i);
+        const struct path part = fs_path("%s.%d.exr", to, i);
         ok = access(word[3 + i], R_OK) == 0 ||
              err_set(e, "%s: its share '%s' is not here: go where it was made", path, word[3 + i]);
-        ok = ok && remake(word[3 + i], opt, part, depth + 1, out, e) &&
-             share_read(part, &share[i], e);
+        ok = ok && remake(word[3 + i], opt, part.s, depth + 1, out, e) &&
+             share_read(part.s, &share[i], e);
         read += ok;
     }
     ok = ok && merge_shares(share, shares, &whole, e) && share_write(to, &whole, "assay merge", e);
@@ -264,27 +270,28 @@ static bool render_golden(const struct suite_scene *scene, const struct suite_re
                           const struct reproduce_options *opt, const char *golden_dir,
                           const char *dir, const char *to, struct reproduced *out, struct err *e)
 {
-    char share[4096], again[MAX_PATH], seed[24];
+    const struct data_dirs at = data_dirs_find();
+    char seed[24];
     struct moments then, now;
     json_t *was = NULL, *is = NULL;
     if (!golden_read(golden_dir, scene, ref, &then, &was, e))
         return false;
     moments_free(&then);
-    const struct reference_options how = {
-        .seed = (uint32_t)member_number(was, "seed"),
-        .threads = opt->threads == 0 ? cli_processors() : opt->threads,
-        .timeout_s = 7200,
-        .work_dir = dir,
-        .share_dir = data_dir(share, sizeof share, "reference", "../share/assay")};
+    const struct reference_options how = {.seed = (uint32_t)member_number(was, "seed"),
+                                          .threads =
+                                              opt->threads == 0 ? cli_processors() : opt->threads,
+                                          .timeout_s = 7200,
+                                          .work_dir = dir,
+                                          .share_dir = at.share.s};
     snprintf(seed, sizeof seed, "%u", (unsigned)how.seed);
-    snprintf(again, sizeof again, "%.3000s/%.200s/%.200s.exr", dir, scene->name, ref->engine);
+    const struct path again = fs_path("%s/%s/%s.exr", dir, scene->name, ref->engine);
     const char *const word[] = {"assay",    "reference", "--fresh", "--only", scene->name,
                                 "--engine", ref->engine, "--seed",  seed,     NULL};
     bool ok = reproduced_command(out, word, e);
     if (ok && reference_render(scene, ref, &how, &now, &is, e)) {
         compare_engines(was, is, out);
         ok = golden_write(dir, scene->name, ref->engine, &now, is, e) &&
-             (rename(again, to) == 0 || err_set(e, "%s: %s", to, strerror(errno)));
+             (rename(again.s, to) == 0 || err_set(e, "%s: %s", to, strerror(errno)));
         moments_free(&now);
         json_decref(is);
     } else {
@@ -298,7 +305,8 @@ static bool remake_golden(const char *path, const struct image *im,
                           const struct reproduce_options *opt, const char *dir, const char *to,
                           struct reproduced *out, struct err *e)
 {
-    char suite_dir[4096], golden_dir[MAX_PATH];
+    const struct data_dirs at = data_dirs_find();
+    char golden_dir[MAX_PATH];
     const char *name = image_get_attr(im, "assay:scene"),
                *engine = image_get_attr(im, "assay:engine");
     struct suite suite = {0};
@@ -306,8 +314,7 @@ static bool remake_golden(const char *path, const struct image *im,
         return err_set(e, "%s: does not say of what scene it is", path);
     if (opt->scene != NULL || opt->pathtracer != NULL)
         return err_set(e, "%s: --scene and --pathtracer are for renders of pathtracer", path);
-    const char *from =
-        data_dir(suite_dir, sizeof suite_dir, "reference/scenes", "../share/assay/scenes");
+    const char *from = at.suite.s;
     if (!directory_of(path, name, engine, golden_dir, e) || !suite_load(from, &suite, e))
         return false;
     const struct suite_scene *scene = suite_find(&suite, name);
@@ -324,19 +331,18 @@ bool rerender(const char *path, const struct reproduce_options *opt, const char 
 {
     struct image then = {0}, now = {0};
     struct reproduce_options with = *opt;
-    char to[MAX_PATH], beside[4096];
-    fs_beside_program(beside, sizeof beside, "pathtracer");
+    const struct path beside = fs_beside_program("pathtracer");
     if (with.pathtracer == NULL)
-        with.pathtracer = beside;
+        with.pathtracer = beside.s;
     if (!image_read_exr(path, &then, NULL, e))
         return false;
-    snprintf(to, sizeof to, "%s/again.exr", dir);
+    const struct path to = fs_path("%s/again.exr", dir);
     bool golden = image_get_attr(&then, "assay:engine") != NULL;
     if (!golden)
         snprintf(out->made_by, sizeof out->made_by, "%s", attr(&then, "assay:version"));
-    bool ok = golden ? remake_golden(path, &then, opt, dir, to, out, e)
-                     : remake(path, &with, to, 0, out, e);
-    ok = ok && image_read_exr(to, &now, NULL, e) && check_same(path, &then, &now, e) &&
+    bool ok = golden ? remake_golden(path, &then, opt, dir, to.s, out, e)
+                     : remake(path, &with, to.s, 0, out, e);
+    ok = ok && image_read_exr(to.s, &now, NULL, e) && check_same(path, &then, &now, e) &&
          compare(path, &then, &now, out, e);
     if (ok && opt->keep != NULL)
         ok = image_write_exr(opt->keep, &now, e);

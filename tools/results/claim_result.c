@@ -4,6 +4,7 @@
 #include "renderer/base/version.h"
 
 #include <assert.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,13 +129,15 @@ bool claim_result_add_observations(json_t *claim, const char *side, const struct
 /* "2 x AMD EPYC ...", or only the number where /proc does not say. */
 static void describe_machine(char *text, size_t size)
 {
-    char model[128] = "", line[256];
-    FILE *f = fopen("/proc/cpuinfo", "r");
-    while (f != NULL && model[0] == '\0' && fgets(line, sizeof line, f) != NULL)
-        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':') != NULL)
+    char model[128] = "", head[4096] = "";
+    const int fd = open("/proc/cpuinfo", O_RDONLY);
+    if (fd >= 0 && read(fd, head, sizeof head - 1) > 0) {
+        const char *line = strstr(head, "\nmodel name");
+        if (line != NULL && strchr(line, ':') != NULL)
             sscanf(strchr(line, ':') + 1, " %127[^\n]", model);
-    if (f != NULL)
-        fclose(f);
+    }
+    if (fd >= 0)
+        close(fd);
     snprintf(text, size, "%ld x %s", sysconf(_SC_NPROCESSORS_ONLN),
              model[0] ? model : "unknown processor");
 }

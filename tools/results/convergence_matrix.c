@@ -1,5 +1,7 @@
 #include "convergence_matrix.h"
 
+#include "reference/suite/engine_table.h"
+
 #include <string.h>
 
 static const json_t *engine_of(const json_t *scene, const char *name)
@@ -13,22 +15,18 @@ static const json_t *engine_of(const json_t *scene, const char *name)
     return NULL;
 }
 
-/* Of a over Cycles at the first or the last rung. */
+/* Of a over the engine that all are compared with, at the first or the last rung. */
 static const json_t *ratio_of(const json_t *scene, const char *a, bool last)
 {
     const json_t *ratios = json_object_get(scene, "ratios");
     for (size_t i = 0; i < json_array_size(ratios); i++) {
         const json_t *r = json_array_get(ratios, i);
         const json_t *rungs = json_object_get(r, "rungs");
-        if (strcmp(member_text(r, "a"), a) == 0 && strcmp(member_text(r, "b"), "cycles") == 0)
+        if (strcmp(member_text(r, "a"), a) == 0 &&
+            strcmp(member_text(r, "b"), engine_names[0]) == 0)
             return json_array_get(rungs, last ? json_array_size(rungs) - 1 : 0);
     }
     return NULL;
-}
-
-static double end(const json_t *object, const char *name, size_t i)
-{
-    return json_number_value(json_array_get(json_object_get(object, name), i));
 }
 
 static void print_verdict(FILE *f, const json_t *engine, const char *name)
@@ -44,7 +42,7 @@ static void print_slope(FILE *f, const json_t *engine)
     if (engine == NULL)
         return;
     fprintf(f, " %.3f ± %.3f", member_number(engine, "slope"),
-            (end(engine, "slope_ci", 1) - end(engine, "slope_ci", 0)) / 2);
+            (member_end(engine, "slope_ci", 1) - member_end(engine, "slope_ci", 0)) / 2);
     print_verdict(f, engine, "slope_verdict");
 }
 
@@ -53,7 +51,7 @@ static void print_bias(FILE *f, const json_t *engine)
     fputs(" |", f);
     if (engine == NULL)
         return;
-    fprintf(f, " %.2f", 100 * end(engine, "floor_ci", 1));
+    fprintf(f, " %.2f", 100 * member_end(engine, "floor_ci", 1));
     print_verdict(f, engine, "floor_verdict");
 }
 
@@ -64,16 +62,18 @@ static void print_ratio(FILE *f, const json_t *rung, const char *name, const cha
         return;
     fprintf(f, " %.2f", member_number(rung, name));
     if (json_array_size(json_object_get(rung, interval)) == 2)
-        fprintf(f, " [%.2f, %.2f]", end(rung, interval, 0), end(rung, interval, 1));
+        fprintf(f, " [%.2f, %.2f]", member_end(rung, interval, 0), member_end(rung, interval, 1));
 }
 
 void convergence_matrix_print(FILE *f, const json_t *convergence)
 {
-    fputs(
-        "| scene | slope, ours | Sobol | Cycles | bias at most %, ours | Sobol | variance / Cycles', ours, "
-        "first | top | Sobol, top | efficiency / Cycles', Sobol |\n"
+    const char *other = engine_table[0].title;
+    fprintf(
+        f,
+        "| scene | slope, ours | Sobol | %s | bias at most %%, ours | Sobol | variance / %s', ours, "
+        "first | top | Sobol, top | efficiency / %s', Sobol |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
-        f);
+        other, other, other);
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *scene = json_array_get(convergence, i);
         const json_t *ours = engine_of(scene, "pathtracer");
@@ -81,7 +81,7 @@ void convergence_matrix_print(FILE *f, const json_t *convergence)
         fprintf(f, "| %s", member_text(scene, "scene"));
         print_slope(f, ours);
         print_slope(f, sobol);
-        print_slope(f, engine_of(scene, "cycles"));
+        print_slope(f, engine_of(scene, engine_names[0]));
         print_bias(f, ours);
         print_bias(f, sobol);
         print_ratio(f, ratio_of(scene, "pathtracer", false), "variance", "variance_ci");

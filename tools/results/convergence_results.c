@@ -1,7 +1,6 @@
 #include "convergence_results.h"
 
 #include "reference/suite/suite.h"
-#include "tools/converge/depth_ladder.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -108,6 +107,27 @@ static bool check_ratio_rung(const json_t *g, const char *where, struct err *e)
            check_interval(g, "efficiency_ci", false, true, where, e);
 }
 
+bool convergence_results_check_depths(const json_t *depths, const char *where, struct err *e)
+{
+    const json_t *rungs = json_object_get(depths, "rungs");
+    if (json_is_string(json_object_get(depths, "error")))
+        return true;
+    if (!json_is_integer(json_object_get(depths, "samples")) || json_array_size(rungs) == 0)
+        return err_set(e, "%s: 'depths' has no whole 'samples' or no 'rungs'", where);
+    for (size_t i = 0; i < json_array_size(rungs); i++) {
+        const json_t *g = json_array_get(rungs, i), *depth = json_object_get(g, "depth"),
+                     *before = json_object_get(json_array_get(rungs, i - 1), "depth");
+        if (!json_is_integer(depth) || json_integer_value(depth) < 0 ||
+            (i > 0 && json_integer_value(depth) <= json_integer_value(before)))
+            return err_set(e, "%s: 'depths': 'depth' does not ascend in whole numbers", where);
+        const json_t *se = json_object_get(g, "se"), *truth = json_object_get(g, "truth");
+        if (!json_is_number(json_object_get(g, "mean")) || !json_is_number(se) ||
+            json_number_value(se) < 0 || (truth != NULL && !json_is_number(truth)))
+            return err_set(e, "%s: 'depths': 'mean', 'se' or 'truth' is not a number", where);
+    }
+    return true;
+}
+
 static bool check_scene(const json_t *s, const char *where, struct err *e)
 {
     static const char *const numbers[] = {"width",           "height", "depth",  "replicates",
@@ -136,7 +156,7 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
             return false;
     }
     const json_t *depths = json_object_get(s, "depths");
-    return depths == NULL || depth_ladder_check(depths, where, e);
+    return depths == NULL || convergence_results_check_depths(depths, where, e);
 }
 
 bool convergence_results_check(const json_t *convergence, const char *path, struct err *e)
@@ -169,11 +189,6 @@ enum outcome convergence_results_outcome(const json_t *engine)
     return outcome_of(member_text(engine, "verdict"));
 }
 
-static double end(const json_t *object, const char *name, size_t i)
-{
-    return json_number_value(json_array_get(json_object_get(object, name), i));
-}
-
 /* "name [lo, hi]", or without the interval where there is none; "-" where there is no number. */
 static void format_value(char *text, size_t size, const json_t *object, const char *name,
                          const char *interval)
@@ -182,7 +197,7 @@ static void format_value(char *text, size_t size, const json_t *object, const ch
         snprintf(text, size, "-");
     else if (json_array_size(json_object_get(object, interval)) == 2)
         snprintf(text, size, "%.3g [%.3g, %.3g]", member_number(object, name),
-                 end(object, interval, 0), end(object, interval, 1));
+                 member_end(object, interval, 0), member_end(object, interval, 1));
     else
         snprintf(text, size, "%.3g", member_number(object, name));
 }
@@ -212,11 +227,11 @@ static void engine_rows(const struct sink *s, const json_t *scene, const json_t 
     const json_t *rungs = json_object_get(j, "rungs");
     const json_t *top = json_array_get(rungs, json_array_size(rungs) - 1);
     snprintf(text, sizeof text, "%+.4f [%+.4f, %+.4f]", member_number(j, "slope"),
-             end(j, "slope_ci", 0), end(j, "slope_ci", 1));
+             member_end(j, "slope_ci", 0), member_end(j, "slope_ci", 1));
     emit(s, name, engine, "slope of RMSE", text, member_text(j, "slope_verdict"));
     snprintf(quantity, sizeof quantity, "RMS bias at %g spp, %%", member_number(top, "spp"));
     snprintf(text, sizeof text, "%.3f [%.3f, %.3f]", 100 * member_number(top, "bias"),
-             100 * end(j, "floor_ci", 0), 100 * end(j, "floor_ci", 1));
+             100 * member_end(j, "floor_ci", 0), 100 * member_end(j, "floor_ci", 1));
     emit(s, name, engine, quantity, text, member_text(j, "floor_verdict"));
 }
 
@@ -262,7 +277,7 @@ static void print_rungs(FILE *f, const json_t *scene)
             const json_t *g = json_array_get(rungs, i);
             char rmse[64], variance[64], efficiency[64];
             snprintf(rmse, sizeof rmse, "%.4g [%.4g, %.4g]", 100 * member_number(g, "rmse"),
-                     100 * end(g, "rmse_ci", 0), 100 * end(g, "rmse_ci", 1));
+                     100 * member_end(g, "rmse_ci", 0), 100 * member_end(g, "rmse_ci", 1));
             format_value(variance, sizeof variance, g, "variance", "variance_ci");
             format_value(efficiency, sizeof efficiency, g, "efficiency", "efficiency_ci");
             fprintf(f, "%-17s %6g  %-26s %-26s %8.3f %9.1f  %s\n", member_text(j, "engine"),

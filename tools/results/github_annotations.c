@@ -1,6 +1,6 @@
 #include "github_annotations.h"
 
-#include "tools/validate/stated_error_claims.h"
+#include "stated_error_results.h"
 #include "convergence_results.h"
 #include "results.h"
 

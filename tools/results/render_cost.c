@@ -1,5 +1,7 @@
 #include "render_cost.h"
 
+#include "reference/suite/engine_table.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,8 +42,7 @@ int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
         struct scene_cost *e = cost != NULL ? entry(out, &num, member_text(c, "scene")) : NULL;
         if (e == NULL)
             continue;
-        bool is_probe = strcmp(member_text(c, "a"), "cycles") == 0 ||
-                        strcmp(member_text(c, "a"), "povray") == 0;
+        bool is_probe = engine_with_goldens(member_text(c, "a")) != NULL;
         *(is_probe ? &e->references_s : &e->ours_s) += member_number(cost, "a");
         bool is_ours = strcmp(member_text(c, "b"), "pathtracer") == 0;
         *(is_ours ? &e->ours_s : &e->references_s) += member_number(cost, "b");

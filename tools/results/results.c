@@ -1,7 +1,7 @@
 #include "results.h"
 
 #include "reference/suite/suite.h"
-#include "tools/validate/stated_error_claims.h"
+#include "stated_error_results.h"
 #include "convergence_results.h"
 
 #include <assert.h>
@@ -323,16 +323,6 @@ bool results_read(const char *path, json_t **out, struct err *e)
     }
     *out = root;
     return true;
-}
-
-const char *member_text(const json_t *object, const char *name)
-{
-    return json_string_value(json_object_get(object, name));
-}
-
-double member_number(const json_t *object, const char *name)
-{
-    return json_number_value(json_object_get(object, name));
 }
 
 enum outcome results_claim_outcome(const json_t *claim)

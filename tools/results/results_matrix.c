@@ -1,9 +1,8 @@
 #include "results_matrix.h"
 
-#include <string.h>
+#include "reference/suite/engine_table.h"
 
-enum { NUM_COLUMNS = 3 };
-static const char *const columns[NUM_COLUMNS] = {"truth", "cycles", "povray"};
+#include <string.h>
 
 static const json_t *find(const json_t *claims, const char *scene, const char *b)
 {
@@ -47,7 +46,13 @@ static void print_cell(FILE *f, const json_t *c)
 void results_matrix_print(FILE *f, const json_t *results)
 {
     const json_t *claims = json_object_get(results, "claims");
-    fputs("| scene | truth | Cycles | POV-Ray |\n|---|--:|--:|--:|\n", f);
+    fputs("| scene | truth |", f);
+    for (int k = 0; engine_names[k] != NULL; k++)
+        fprintf(f, " %s |", engine_table[k].title);
+    fputs("\n|---|--:|", f);
+    for (int k = 0; engine_names[k] != NULL; k++)
+        fputs("--:|", f);
+    fputc('\n', f);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const char *scene = member_text(json_array_get(claims, i), "scene");
         bool is_first = true;
@@ -56,8 +61,9 @@ void results_matrix_print(FILE *f, const json_t *results)
         if (!is_first)
             continue;
         fprintf(f, "| %s |", scene);
-        for (int k = 0; k < NUM_COLUMNS; k++)
-            print_cell(f, find(claims, scene, columns[k]));
+        print_cell(f, find(claims, scene, "truth"));
+        for (int k = 0; engine_names[k] != NULL; k++)
+            print_cell(f, find(claims, scene, engine_names[k]));
         fputc('\n', f);
     }
 }

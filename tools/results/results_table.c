@@ -1,69 +1,83 @@
-#include "results.h"
+#include "results_table.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    SCENE,
-    TESTED,
-    AGAINST,
-    DIFFERENCE,
-    MDB,
-    MARGIN,
-    VERDICT,
-    EXPECTED,
-    MARK,
-    NUM_COLUMNS,
-    FIRST_OF_OURS = DIFFERENCE /* the columns before hold text that is not ours */
+const struct column results_columns[] = {
+    {"verdict", COLUMN_VERDICT, NULL, "Verdict", NULL,
+     "A <b>verdict</b> is EQUIVALENT only where the intervals of the image and of every tile lie inside their "
+     "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few samples to tell. "},
+    {"scene", COLUMN_SCENE, "scene", "Scene", "scene", NULL},
+    {"a", COLUMN_TESTED, "tested", "Tested", "tested", NULL},
+    {"b", COLUMN_REFERENCE, "against", "Against", "against", NULL},
+    {"verdict", COLUMN_TEXT, NULL, NULL, "verdict", NULL},
+    {"expected", COLUMN_TEXT, NULL, "Expected", "expected", NULL},
+    {"error", COLUMN_TEXT, NULL, NULL, "error", NULL},
+    {"ci", COLUMN_PLOT, NULL, "In margin", NULL,
+     "In the drawing the band is the margin, the line is the interval and the dot is the difference; an arrow head "
+     "points to what lies outside. "},
+    {"difference", COLUMN_DIFFERENCE, "difference % [interval]", "Difference %", "difference",
+     "<b>Difference</b>: how much brighter (+) or darker (−) the tested image is than the reference, on average. "},
+    {"ci", COLUMN_INTERVAL, NULL, "Interval %", NULL,
+     "<b>Interval</b>: where the true difference lies, given the noise of both. "},
+    {"mdb_global", COLUMN_PERCENT, "MDB %", "MDB %", "mdb",
+     "<b>MDB</b>, the minimum detectable bias: a true difference of this size would have come out DIFFERENT with a "
+     "probability of 95 %. "},
+    {"margin_global", COLUMN_PERCENT, "margin %", "Margin %", "margin",
+     "<b>Margin</b>: a difference up to this size counts as equal; it is declared for each scene before anything "
+     "is rendered. "},
+    {"alpha", COLUMN_NUMBER, NULL, NULL, "alpha", NULL},
+    {"seconds_a", COLUMN_SECONDS, NULL, "Time", "seconds", NULL},
+    {"verdict", COLUMN_VERDICT, "verdict", NULL, NULL, NULL},
+    {"expected", COLUMN_TEXT, "expected", NULL, NULL, NULL},
+    {NULL, COLUMN_MARK, "ok", NULL, NULL, NULL},
+    {"ci", COLUMN_INTERVAL, NULL, NULL, "low,high", NULL},
 };
+enum { NUM_COLUMNS = sizeof results_columns / sizeof *results_columns };
+const size_t results_num_columns = NUM_COLUMNS;
 
-static const char *const heading[NUM_COLUMNS] = {
-    "scene",   "tested",   "against", "difference % [interval]", "MDB %", "margin %",
-    "verdict", "expected", "ok"};
-static const bool right_aligned[NUM_COLUMNS] = {[DIFFERENCE] = true, [MDB] = true, [MARGIN] = true};
+bool column_is_number(const struct column *c)
+{
+    return c->kind > COLUMN_PLOT;
+}
 
-struct row {
-    /* borrowed from the claim, a literal, or one of the three below */
-    const char *cell[NUM_COLUMNS];
-    char difference[96], mdb[32], margin[32];
-};
+/* A cell: borrowed from the claim, or a literal, or in `buffer`. */
+typedef char cell_buffer[96];
 
 /* What rounds to zero is printed as zero, never as -0.000. */
-static double percent(const json_t *fraction)
+static double percent(double fraction)
 {
-    double v = 100 * json_number_value(fraction);
+    double v = 100 * fraction;
     return fabs(v) < 0.0005 ? 0 : v;
 }
 
-static void fill_row(struct row *r, const json_t *claim, bool markdown)
+static const char *cell_text(const struct column *c, const json_t *claim, bool markdown,
+                             cell_buffer buffer)
 {
     static const char *const mark[2][4] = {
         [false] = {"ERROR", "WRONG", "WRONG", "ok"},
         [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
     };
     enum outcome outcome = results_claim_outcome(claim);
-    r->cell[SCENE] = member_text(claim, "scene");
-    r->cell[TESTED] = member_text(claim, "a");
-    r->cell[AGAINST] = member_text(claim, "b");
-    r->cell[EXPECTED] = member_text(claim, "expected");
-    r->cell[MARK] = mark[markdown][results_claim_lacks_time(claim) ? OUTCOME_UNDECIDED : outcome];
-    if (outcome == OUTCOME_NOT_JUDGED) {
-        r->cell[DIFFERENCE] = r->cell[MDB] = r->cell[MARGIN] = "-";
-        r->cell[VERDICT] = results_claim_lacks_time(claim) ? "INCONCLUSIVE" : "NOT JUDGED";
-        return;
-    }
-    const json_t *ci = json_object_get(claim, "ci");
-    snprintf(r->difference, sizeof r->difference, "%+.3f [%+.3f, %+.3f]",
-             percent(json_object_get(claim, "difference")), percent(json_array_get(ci, 0)),
-             percent(json_array_get(ci, 1)));
-    snprintf(r->mdb, sizeof r->mdb, "%.3f", percent(json_object_get(claim, "mdb_global")));
-    snprintf(r->margin, sizeof r->margin, "%.3f", percent(json_object_get(claim, "margin_global")));
-    r->cell[DIFFERENCE] = r->difference;
-    r->cell[MDB] = r->mdb;
-    r->cell[MARGIN] = r->margin;
-    r->cell[VERDICT] = member_text(claim, "verdict");
+    bool lacks_time = results_claim_lacks_time(claim);
+    if (c->kind == COLUMN_MARK)
+        return mark[markdown][lacks_time ? OUTCOME_UNDECIDED : outcome];
+    if (c->kind == COLUMN_VERDICT && outcome == OUTCOME_NOT_JUDGED)
+        return lacks_time ? "INCONCLUSIVE" : "NOT JUDGED";
+    if (!column_is_number(c))
+        return member_text(claim, c->key);
+    if (outcome == OUTCOME_NOT_JUDGED)
+        return "-";
+    double v = member_number(claim, c->key);
+    if (c->kind == COLUMN_DIFFERENCE)
+        snprintf(buffer, sizeof(cell_buffer), "%+.3f [%+.3f, %+.3f]", percent(v),
+                 percent(member_end(claim, "ci", 0)), percent(member_end(claim, "ci", 1)));
+    else if (c->kind == COLUMN_PERCENT)
+        snprintf(buffer, sizeof(cell_buffer), "%.3f", percent(v));
+    else
+        snprintf(buffer, sizeof(cell_buffer), "%.3g", v);
+    return buffer;
 }
 
 /* Columns that UTF-8 text fills, taking each code point as one column wide. */
@@ -81,29 +95,42 @@ static void print_padded(FILE *f, const char *s, size_t width, bool right)
     fprintf(f, "%*s%s%*s", right ? gap : 0, "", s, right ? 0 : gap, "");
 }
 
+/* The line of a claim, or of headings (NULL). */
+static void print_line(FILE *f, const json_t *claim, const size_t width[NUM_COLUMNS])
+{
+    cell_buffer buffer;
+    for (size_t c = 0, left = 0; c < NUM_COLUMNS; c++) {
+        const struct column *column = &results_columns[c];
+        if (column->text == NULL)
+            continue;
+        const char *text = claim == NULL ? column->text : cell_text(column, claim, false, buffer);
+        fputs(left++ > 0 ? "  " : "", f);
+        if (column->kind == COLUMN_MARK)
+            fputs(text, f);
+        else
+            print_padded(f, text, width[c], column_is_number(column));
+    }
+    fputc('\n', f);
+}
+
 static void print_terminal(FILE *f, const json_t *claims)
 {
-    struct row row;
-    size_t width[NUM_COLUMNS], num = json_array_size(claims);
-    for (size_t c = 0; c < NUM_COLUMNS; c++)
-        width[c] = text_columns(heading[c]);
-    for (size_t r = 0; r < num; r++) {
-        fill_row(&row, json_array_get(claims, r), false);
-        for (size_t c = 0; c < NUM_COLUMNS; c++) {
-            size_t w = text_columns(row.cell[c]);
+    size_t width[NUM_COLUMNS] = {0}, i;
+    const json_t *claim;
+    for (size_t c = 0; c < NUM_COLUMNS; c++) {
+        const struct column *column = &results_columns[c];
+        if (column->text == NULL)
+            continue;
+        width[c] = text_columns(column->text);
+        json_array_foreach(claims, i, claim)
+        {
+            cell_buffer buffer;
+            size_t w = text_columns(cell_text(column, claim, false, buffer));
             width[c] = w > width[c] ? w : width[c];
         }
     }
-    for (size_t r = 0; r <= num; r++) {
-        if (r > 0)
-            fill_row(&row, json_array_get(claims, r - 1), false);
-        const char *const *cell = r == 0 ? heading : row.cell;
-        for (size_t c = 0; c + 1 < NUM_COLUMNS; c++) {
-            print_padded(f, cell[c], width[c], right_aligned[c]);
-            fputs("  ", f);
-        }
-        fprintf(f, "%s\n", cell[NUM_COLUMNS - 1]);
-    }
+    print_line(f, NULL, width);
+    json_array_foreach(claims, i, claim) print_line(f, claim, width);
 }
 
 /* A backslash or a character reference for what would end the cell or start markup. */
@@ -125,21 +152,27 @@ static void print_markdown_text(FILE *f, const char *s)
 
 static void print_markdown(FILE *f, const json_t *claims)
 {
-    struct row row;
+    const char *const rule = "|---|--:";
     for (size_t c = 0; c < NUM_COLUMNS; c++)
-        fprintf(f, "| %s ", heading[c]);
+        if (results_columns[c].text != NULL)
+            fprintf(f, "| %s ", results_columns[c].text);
     fputs("|\n", f);
     for (size_t c = 0; c < NUM_COLUMNS; c++)
-        fputs(right_aligned[c] ? "|--:" : "|---", f);
+        if (results_columns[c].text != NULL)
+            fprintf(f, "%.4s", column_is_number(&results_columns[c]) ? rule + 4 : rule);
     fputs("|\n", f);
     for (size_t r = 0; r < json_array_size(claims); r++) {
-        fill_row(&row, json_array_get(claims, r), true);
         for (size_t c = 0; c < NUM_COLUMNS; c++) {
+            const struct column *column = &results_columns[c];
+            cell_buffer buffer;
+            if (column->text == NULL)
+                continue;
+            const char *text = cell_text(column, json_array_get(claims, r), true, buffer);
             fputs("| ", f);
-            if (c < FIRST_OF_OURS)
-                print_markdown_text(f, row.cell[c]);
+            if (column->kind == COLUMN_MARK || column_is_number(column))
+                fputs(text, f);
             else
-                fputs(row.cell[c], f);
+                print_markdown_text(f, text);
             fputc(' ', f);
         }
         fputs("|\n", f);

@@ -243,15 +243,15 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     struct claim_context context = {
         .a = job->path[0], .b = job->path[1], .expected = expected, .opt = job->opt};
     context.opt.tile = c->tile;
-    char z[4096], relative[4096], side[2][4096];
+    char side[2][4096];
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
-    snprintf(z, sizeof z, "%s.z.exr", path);
-    snprintf(relative, sizeof relative, "%s.relative.exr", path);
+    const struct path z = fs_path("%s.z.exr", path);
+    const struct path relative = fs_path("%s.relative.exr", path);
     json_t *root = claim_result_new_results(argc, argv, job->opt.alpha, e);
     if (root == NULL)
         return false;
-    if (!fs_make_parent_dirs(path, e) || !image_write_exr(z, &c->r.z, e) ||
-        !image_write_exr(relative, &c->r.relative, e) ||
+    if (!fs_make_parent_dirs(path, e) || !image_write_exr(z.s, &c->r.z, e) ||
+        !image_write_exr(relative.s, &c->r.relative, e) ||
         !side_file(c, 0, path, side[0], sizeof side[0], e) ||
         !side_file(c, 1, path, side[1], sizeof side[1], e)) {
         json_decref(root);

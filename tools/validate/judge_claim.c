@@ -1,10 +1,10 @@
 #include "validate_internal.h"
+#include "renderer/base/fs.h"
 
 #include "tools/results/claim_result.h"
-#include "stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
 
-#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -35,7 +35,7 @@ static void rerun_command(const struct validation *v, const struct claim_run *t,
 static struct claim_context context(const struct validation *v, const struct claim_run *t,
                                     const char *rerun)
 {
-    double share = t->looks->share[t->seen ? t->look : LOOK_DECLARED];
+    double share = t->looks->share[t->seen[0] != NULL ? t->look : LOOK_DECLARED];
     return (struct claim_context){.scene = t->scene,
                                   .a = t->a->name,
                                   .b = t->ref.engine,
@@ -54,24 +54,19 @@ static bool write_maps(const struct validation *v, const struct claim_run *t, js
     static const char *const kind[2] = {"z", "rel"};
     const struct image *map[2] = {&t->c.z, &t->c.relative};
     for (int k = 0; k < 2; k++) {
-        char path[MAX_PATH], file[256];
+        char file[256];
         snprintf(file, sizeof file, "data/%s/%s_%s_%s.exr", t->scene->name, kind[k], t->a->name,
                  t->ref.engine);
-        snprintf(path, sizeof path, "%s/%s", v->opt->out_dir, file);
-        if (!image_write_exr(path, map[k], e))
+        if (!image_write_exr(fs_path("%s/%s", v->opt->out_dir, file).s, map[k], e))
             return false;
         json_object_set_new(files, k == 0 ? "z" : "relative", json_string(file));
     }
     return true;
 }
 
-static void add_provenance(json_t *claim, struct validation *v, const struct claim_run *t)
+static void add_provenance(json_t *claim, const struct validation *v, const struct claim_run *t)
 {
-    struct side_image *a, *b;
-    enum fetch_result had_a = side_at(v, t->a, t->stage, t->look, &a);
-    enum fetch_result had_b = side_at(v, t->b, t->stage, t->look, &b);
-    assert(had_a == FETCH_OK && had_b == FETCH_OK);
-    (void)had_a, (void)had_b;
+    const struct side_image *a = t->seen[0], *b = t->seen[1];
     claim_result_add_observations(claim, "a", &a->m);
     claim_result_add_observations(claim, "b", &b->m);
     json_object_set_new(claim, "seconds_a", json_real(a->seconds));
@@ -178,15 +173,14 @@ struct pair {
     struct validation *v;
     struct claim_run *t;
     bool no_time;
-    double n_a, n_b;
+    struct side_image *image[2]; /* of the last stage */
 };
 
-static bool one_of(struct pair *p, struct side *s, int stage, const struct moments **m,
+static bool one_of(struct pair *p, struct side *s, int stage, struct side_image **image,
                    struct err *e)
 {
-    struct side_image *o;
-    switch (side_at(p->v, s, stage, p->t->next, &o)) {
-    case FETCH_OK: *m = &o->m; return true;
+    switch (side_at(p->v, s, stage, p->t->next, image)) {
+    case FETCH_OK: return true;
     case FETCH_FAILED: *e = s->e; return false;
     case FETCH_NO_TIME: p->no_time = true; break;
     }
@@ -197,25 +191,23 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
                     struct err *e)
 {
     struct pair *p = ctx;
-    if (!one_of(p, p->t->a, stage, a, e) || !one_of(p, p->t->b, stage, b, e))
+    if (!one_of(p, p->t->a, stage, &p->image[0], e) || !one_of(p, p->t->b, stage, &p->image[1], e))
         return false;
-    p->n_a = (*a)->n[0];
-    p->n_b = (*b)->n[0];
+    *a = &p->image[0]->m;
+    *b = &p->image[1]->m;
     return true;
 }
 
 /* The share of a in the variance of the difference, all pixels and channels together. */
-static double noise_share(struct validation *v, const struct claim_run *t)
+static double noise_share(const struct claim_run *t)
 {
-    struct side_image *o[2];
     double sum[2] = {0, 0};
-    if (side_at(v, t->a, t->stage, t->look, &o[0]) != FETCH_OK ||
-        side_at(v, t->b, t->stage, t->look, &o[1]) != FETCH_OK)
-        return 1;
-    for (int k = 0; k < 2; k++)
-        for (size_t p = 0; p < (size_t)o[k]->m.width * (size_t)o[k]->m.height; p++)
+    for (int k = 0; k < 2; k++) {
+        const struct moments *m = &t->seen[k]->m;
+        for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
             for (int c = 0; c < 3; c++)
-                sum[k] += moments_var_of_mean(&o[k]->m, p, c);
+                sum[k] += moments_var_of_mean(m, p, c);
+    }
     return sum[0] + sum[1] > 0 ? sum[0] / (sum[0] + sum[1]) : 1;
 }
 
@@ -248,18 +240,18 @@ static void look(struct validation *v, struct claim_run *t)
     t->c = c;
     t->stage = stage;
     t->look = t->next++;
-    t->seen = true;
-    json_array_append_new(t->history,
-                          json_pack("{sf,sf,sf,si,ss}", "n_a", p.n_a, "n_b", p.n_b, "alpha",
-                                    v->alpha * t->looks->share[t->look], "stage", stage + 1,
-                                    "verdict", verdict_name(c.verdict)));
+    memcpy(t->seen, p.image, sizeof t->seen);
+    json_array_append_new(t->history, json_pack("{sf,sf,sf,si,ss}", "n_a", p.image[0]->m.n[0],
+                                                "n_b", p.image[1]->m.n[0], "alpha",
+                                                v->alpha * t->looks->share[t->look], "stage",
+                                                stage + 1, "verdict", verdict_name(c.verdict)));
     claim_next_look(t);
     if (c.verdict != VERDICT_INCONCLUSIVE)
         finish(v, t, NULL);
     else if (t->next == NUM_LOOKS)
         finish(v, t, t->looks == &alpha_spending_single ? NULL : "all looks are taken");
     else if (t->look >= LOOK_DECLARED && t->b->kind == SIDE_GOLDEN &&
-             noise_share(v, t) < least_noise_share)
+             noise_share(t) < least_noise_share)
         finish(v, t, "the noise left is that of the stored reference");
 }
 
@@ -280,7 +272,7 @@ void claim_run_give_up(struct validation *v, struct claim_run *t, const char *wh
         t->result = stated_error_run(v->opt, t->scene, v->alpha, 0);
     if (t->a == NULL)
         announce(v, t);
-    else if (t->seen)
+    else if (t->seen[0] != NULL)
         finish(v, t, why);
     else
         finish_unseen(v, t, BUDGET_SPENT " before a first look was possible", true);
@@ -295,11 +287,4 @@ bool claim_run_differs(const struct claim_run *t)
     const char *verdict = member_text(t->result, "verdict");
     return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
            results_claim_outcome(t->result) == OUTCOME_OPPOSITE;
-}
-
-void claim_run_free(struct claim_run *t)
-{
-    comparison_free(&t->c);
-    json_decref(t->history);
-    json_decref(t->result);
 }

@@ -156,7 +156,8 @@ void claim_next_look(struct claim_run *t)
         if (t->looks->share[t->next] == 0)
             continue;
         int a = side_count(t->a, t->next), b = side_count(t->b, t->next);
-        bool is_new = !t->seen || a != side_count(t->a, t->look) || b != side_count(t->b, t->look);
+        bool is_new =
+            t->seen[0] == NULL || a != side_count(t->a, t->look) || b != side_count(t->b, t->look);
         if (a > 0 && b > 0 && is_new)
             return;
     }
@@ -253,4 +254,11 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
     if (ok)
         keep_selected(v);
     return ok;
+}
+
+void claim_run_free(struct claim_run *t)
+{
+    comparison_free(&t->c);
+    json_decref(t->history);
+    json_decref(t->result);
 }

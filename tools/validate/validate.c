@@ -12,22 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-double validate_time_left(const struct validation *v)
-{
-    return v->deadline - now_seconds();
-}
-
-void validate_log(const struct validation *v, const char *scene, const char *what)
-{
-    if (v->opt->quiet)
-        return;
-    fprintf(stderr, "[%2d/%d", v->done, v->num_tasks);
-    if (isfinite(v->deadline))
-        fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, validate_time_left(v)),
-                v->opt->budget_s);
-    fprintf(stderr, "] %s: %s\n", scene, what);
-}
-
 /* What starting a program and judging its picture costs, in vertices of paths. */
 static const double start_cost = 3e5;
 
@@ -136,7 +120,7 @@ static bool take_looks(struct validation *v, const json_t *root, struct err *e)
     }
     for (int i = 0; i < v->num_tasks; i++) {
         struct claim_run *t = &v->task[i];
-        if (t->result == NULL && (t->seen || !found))
+        if (t->result == NULL && (t->seen[0] != NULL || !found))
             claim_run_give_up(v, t,
                               found ? "stopped at the difference of another claim" : BUDGET_SPENT);
     }

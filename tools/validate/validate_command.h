@@ -2,14 +2,16 @@
 #ifndef ASSAY_VALIDATE_COMMAND_H
 #define ASSAY_VALIDATE_COMMAND_H
 
+#include "tools/base/data_dirs.h"
 #include "validate.h"
 
 struct validate_command {
     struct validate_options opt;
-    struct engine engine; /* opt.engine, where there is one; the caller calls engine_free() */
-    bool slurm, help;     /* help: it was printed, and opt is not complete */
-    /* Where the paths are kept that the options do not give. */
-    char pathtracer[4096], suite[4096], golden[4096], share[4096];
+    struct engine engine;    /* opt.engine, where there is one; the caller calls engine_free() */
+    const char *engine_file; /* or a name; NULL: none */
+    bool has_reference_seed;
+    bool slurm, help;    /* help: it was printed, and opt is not complete */
+    struct data_dirs at; /* for the options that are not given */
 };
 
 /* *c has to stay where it is. */

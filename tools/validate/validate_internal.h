@@ -8,7 +8,7 @@
 #include "tools/sequential/alpha_spending.h"
 #include "validate.h"
 
-enum { MAX_PATH = 8192, MAX_REFERENCES = 3, NUM_STAGES = 2, CLAIM_NAME = 256 };
+enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
 /* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants, consistency. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 2 };
 
@@ -59,8 +59,8 @@ struct claim_run {
     int stages;   /* 1 or 2 */
     int next;     /* look; NUM_LOOKS: none is left */
     bool stalled; /* what is left of the budget is too short for it */
-    /* What the last look saw; seen is false before the first. */
-    bool seen;
+    /* What the last look saw: the images of a and b, NULL before the first. */
+    struct side_image *seen[2];
     int look, stage;
     struct comparison c;
     json_t *history; /* "looks" of the results */
@@ -124,5 +124,11 @@ void claim_run_give_up(struct validation *v, struct claim_run *t, const char *wh
 /* DIFFERENT where EQUIVALENT should be. */
 bool claim_run_differs(const struct claim_run *t);
 void claim_run_free(struct claim_run *t);
+
+/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
+ * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
+ * an "error" that says so. */
+json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline);
 
 #endif

@@ -1,24 +1,16 @@
 /* process_run() against programs whose behaviour is known: they are shell scripts of a few words.
  * Times are compared with bounds far from what is measured, so that a loaded machine passes. */
 #define _GNU_SOURCE
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "reference/base/process.h"
+#include "tests/support/test.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
 
 /* One script through sh -c. */
 static bool sh(const char *script, const char *log, double timeout_s, struct process_usage *usage,
@@ -27,13 +19,6 @@ static bool sh(const char *script, const char *log, double timeout_s, struct pro
     const char *const argv[] = {"sh", "-c", script, NULL};
     return process_run(&(struct process){.argv = argv, .log = log, .timeout_s = timeout_s}, usage,
                        e);
-}
-
-/* A fresh directory; the caller removes what it puts there. */
-static void temp_dir(char path[64])
-{
-    strcpy(path, "/tmp/assay_process_XXXXXX");
-    assert_non_null(mkdtemp(path));
 }
 
 static long read_number(const char *path)
@@ -81,9 +66,8 @@ static int count_fds(void)
     return n;
 }
 
-static void success_leaves_the_error_untouched(void **state)
+TEST(success_leaves_the_error_untouched)
 {
-    (void)state;
     struct err e = {"untouched"};
     struct process_usage u = {-1, -1, -1};
     assert_true(sh("echo hello", NULL, 60, &u, &e));
@@ -92,9 +76,8 @@ static void success_leaves_the_error_untouched(void **state)
     assert_true(u.cpu_s >= 0 && u.cpu_s < 60);
 }
 
-static void exit_status_and_last_lines_are_reported(void **state)
+TEST(exit_status_and_last_lines_are_reported)
 {
-    (void)state;
     struct err e;
     assert_false(
         sh("for i in 1 2 3 4 5 6 7 8; do echo line $i; done; echo; exit 7", NULL, 60, NULL, &e));
@@ -107,9 +90,8 @@ static void exit_status_and_last_lines_are_reported(void **state)
 }
 
 /* Bytes that would break a terminal, JSON or XML, and a line without end. */
-static void the_line_is_short_printable_ascii(void **state)
+TEST(the_line_is_short_printable_ascii)
 {
-    (void)state;
     struct err e;
     assert_false(sh("printf 'a\\033[31m\\tb\\377'; exit 1", NULL, 60, NULL, &e));
     assert_string_equal(e.msg, "sh: exit status 1: a?[31m b?");
@@ -118,18 +100,16 @@ static void the_line_is_short_printable_ascii(void **state)
     assert_true(strlen(e.msg) < 700);
 }
 
-static void a_signal_is_named(void **state)
+TEST(a_signal_is_named)
 {
-    (void)state;
     struct err e;
     assert_false(sh("echo before; kill -SEGV $$", NULL, 60, NULL, &e));
     assert_non_null(strstr(e.msg, "sh: killed by signal 11 ("));
     assert_non_null(strstr(e.msg, "): before"));
 }
 
-static void a_missing_program_is_not_found(void **state)
+TEST(a_missing_program_is_not_found)
 {
-    (void)state;
     struct err e;
     char path[4096];
     const char *const none[] = {"assay-no-such-program", NULL};
@@ -147,33 +127,25 @@ static void a_missing_program_is_not_found(void **state)
 }
 
 /* Found and executable, but the kernel refuses it: its interpreter is missing. */
-static void a_program_that_cannot_be_executed_says_why(void **state)
+TEST(a_program_that_cannot_be_executed_says_why)
 {
-    (void)state;
-    char dir[64], path[128], want[256];
-    temp_dir(dir);
-    snprintf(path, sizeof path, "%s/script", dir);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs("#!/assay/no/such/interpreter\n", f);
-    fclose(f);
+    static const char script[] = "#!/assay/no/such/interpreter\n";
+    const char *path = test_path("script");
+    char want[1024];
+    test_write(path, script, strlen(script));
     assert_int_equal(chmod(path, 0755), 0);
     struct err e;
     const char *const argv[] = {path, NULL};
     assert_false(process_run(&(struct process){.argv = argv}, NULL, &e));
     snprintf(want, sizeof want, "%s: cannot run: %s", path, strerror(ENOENT));
     assert_string_equal(e.msg, want);
-    unlink(path);
-    rmdir(dir);
 }
 
 /* The shell ignores SIGTERM and so does what it started: only SIGKILL to the group ends them. */
-static void a_hang_is_killed_with_its_grandchild(void **state)
+TEST(a_hang_is_killed_with_its_grandchild)
 {
-    (void)state;
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("hang.pid");
+    char script[2048];
     snprintf(script, sizeof script,
              "trap '' TERM; sleep 1000 & echo $! > %s; echo started; while :; do sleep 1; done",
              file);
@@ -185,34 +157,26 @@ static void a_hang_is_killed_with_its_grandchild(void **state)
     long pid = read_number(file);
     assert_true(pid > 1);
     assert_true(dies_soon(pid));
-    unlink(file);
-    rmdir(dir);
 }
 
 /* A program that ends but leaves a process behind, which holds the output open. */
-static void what_a_finished_program_leaves_behind_is_killed(void **state)
+TEST(what_a_finished_program_leaves_behind_is_killed)
 {
-    (void)state;
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("left.pid");
+    char script[2048];
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s", file);
     struct err e;
     struct process_usage u;
     assert_true(sh(script, NULL, 100, &u, &e));
     assert_true(u.wall_s < 60);
     assert_true(dies_soon(read_number(file)));
-    unlink(file);
-    rmdir(dir);
 }
 
 /* Ctrl-C, or even kill -9, of the harness must not leave an engine and its children running. */
-static void the_death_of_the_caller_ends_the_group(void **state)
+TEST(the_death_of_the_caller_ends_the_group)
 {
-    (void)state;
-    char dir[64], file[96], script[512];
-    temp_dir(dir);
-    snprintf(file, sizeof file, "%s/pid", dir);
+    const char *file = test_path("caller.pid");
+    char script[2048];
     snprintf(script, sizeof script, "sleep 1000 & echo $! > %s.new; mv %s.new %s; wait", file, file,
              file);
     pid_t caller = fork();
@@ -228,15 +192,13 @@ static void the_death_of_the_caller_ends_the_group(void **state)
     kill(caller, SIGKILL);
     assert_int_equal(waitpid(caller, NULL, 0), caller);
     assert_true(dies_soon(pid));
-    unlink(file);
-    rmdir(dir);
 }
 
-static void stdin_is_empty_and_the_directory_is_the_one_asked_for(void **state)
+TEST(stdin_is_empty_and_the_directory_is_the_one_asked_for)
 {
-    (void)state;
-    char dir[64], want[128];
-    temp_dir(dir);
+    const char *dir = test_path("gone");
+    char want[1024];
+    assert_int_equal(mkdir(dir, 0777), 0);
     struct err e;
     const char *const argv[] = {"sh", "-c", "cat; pwd -P; exit 1", NULL};
     assert_false(
@@ -251,12 +213,9 @@ static void stdin_is_empty_and_the_directory_is_the_one_asked_for(void **state)
 }
 
 /* 1e5 lines of 100 bytes go to the log whole; only the last are quoted. */
-static void a_long_output_is_logged_whole(void **state)
+TEST(a_long_output_is_logged_whole)
 {
-    (void)state;
-    char dir[64], log[128];
-    temp_dir(dir);
-    snprintf(log, sizeof log, "%s/log", dir);
+    const char *log = test_path("long.log");
     struct err e;
     assert_false(
         sh("yes 123456789012345678901234567890123456789012345678901234567890123456789012345"
@@ -267,17 +226,12 @@ static void a_long_output_is_logged_whole(void **state)
     struct stat st;
     assert_int_equal(stat(log, &st), 0);
     assert_int_equal(st.st_size, 100 * 100000 + 4);
-    unlink(log);
-    rmdir(dir);
 }
 
 /* `yes` prints for ever, faster than we can read: the clock must win and the log must end. */
-static void a_flood_is_stopped_by_the_clock_and_the_log_is_bounded(void **state)
+TEST(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded)
 {
-    (void)state;
-    char dir[64], log[128];
-    temp_dir(dir);
-    snprintf(log, sizeof log, "%s/log", dir);
+    const char *log = test_path("flood.log");
     struct err e;
     struct process_usage u;
     assert_false(sh("exec yes flood", log, 1, &u, &e));
@@ -286,13 +240,10 @@ static void a_flood_is_stopped_by_the_clock_and_the_log_is_bounded(void **state)
     struct stat st;
     assert_int_equal(stat(log, &st), 0);
     assert_true(st.st_size > 0 && st.st_size <= (64 << 20) + 64);
-    unlink(log);
-    rmdir(dir);
 }
 
-static void a_log_that_cannot_be_written_is_an_error(void **state)
+TEST(a_log_that_cannot_be_written_is_an_error)
 {
-    (void)state;
     struct err e;
     assert_false(sh("echo x", "/assay/no/such/directory/log", 60, NULL, &e));
     assert_non_null(strstr(e.msg, "/assay/no/such/directory/log: cannot write: "));
@@ -307,9 +258,8 @@ static void count_tick(void *ctx)
 
 /* Ticks come a few times a second: in about a second at least 2, and never more than 10 a second.
  */
-static void the_caller_is_called_back_while_it_runs(void **state)
+TEST(the_caller_is_called_back_while_it_runs)
 {
-    (void)state;
     int ticks = 0;
     const char *const argv[] = {"sleep", "1", NULL};
     struct err e;
@@ -320,9 +270,8 @@ static void the_caller_is_called_back_while_it_runs(void **state)
 }
 
 /* The shell's arithmetic loop burns CPU in a grandchild that the shell waits for. */
-static void cpu_time_includes_descendants(void **state)
+TEST(cpu_time_includes_descendants)
 {
-    (void)state;
     struct err e;
     struct process_usage u;
     assert_true(
@@ -330,9 +279,8 @@ static void cpu_time_includes_descendants(void **state)
     assert_true(u.cpu_s > 0.02);
 }
 
-static void nothing_is_left_open_and_no_zombie_waits(void **state)
+TEST(nothing_is_left_open_and_no_zombie_waits)
 {
-    (void)state;
     struct err e;
     int before = count_fds();
     for (int i = 0; i < 20; i++) {
@@ -352,9 +300,8 @@ static void ignore(int sig)
 }
 
 /* Signals with a handler interrupt our system calls all the time (no SA_RESTART). */
-static void interrupted_system_calls_are_repeated(void **state)
+TEST(interrupted_system_calls_are_repeated)
 {
-    (void)state;
     struct sigaction act = {.sa_handler = ignore}, old;
     sigaction(SIGALRM, &act, &old);
     timer_t timer;
@@ -368,28 +315,4 @@ static void interrupted_system_calls_are_repeated(void **state)
     timer_delete(timer);
     sigaction(SIGALRM, &old, NULL);
     assert_true(ok);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(success_leaves_the_error_untouched),
-        cmocka_unit_test(exit_status_and_last_lines_are_reported),
-        cmocka_unit_test(the_line_is_short_printable_ascii),
-        cmocka_unit_test(a_signal_is_named),
-        cmocka_unit_test(a_missing_program_is_not_found),
-        cmocka_unit_test(a_program_that_cannot_be_executed_says_why),
-        cmocka_unit_test(a_hang_is_killed_with_its_grandchild),
-        cmocka_unit_test(what_a_finished_program_leaves_behind_is_killed),
-        cmocka_unit_test(the_death_of_the_caller_ends_the_group),
-        cmocka_unit_test(stdin_is_empty_and_the_directory_is_the_one_asked_for),
-        cmocka_unit_test(a_long_output_is_logged_whole),
-        cmocka_unit_test(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded),
-        cmocka_unit_test(a_log_that_cannot_be_written_is_an_error),
-        cmocka_unit_test(the_caller_is_called_back_while_it_runs),
-        cmocka_unit_test(cpu_time_includes_descendants),
-        cmocka_unit_test(nothing_is_left_open_and_no_zombie_waits),
-        cmocka_unit_test(interrupted_system_calls_are_repeated),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

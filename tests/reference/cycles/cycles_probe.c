@@ -1,17 +1,9 @@
 #include "cycles_probe.h"
+#include "tests/support/test.h"
 
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 
 void probe_ok(bool ok, const struct err *e)

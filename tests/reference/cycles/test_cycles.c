@@ -3,18 +3,9 @@
 #include "cycles_probe.h"
 
 #include "renderer/base/fs.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 static void plain_scene(struct probe *f)
 {
@@ -69,7 +60,7 @@ static void assert_fails(struct probe *f, const char *why)
     json_decref(manifest);
 }
 
-static void replicates_are_folded_and_described(void **state)
+TEST_WITH(replicates_are_folded_and_described, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct err e;
@@ -106,7 +97,7 @@ static void replicates_are_folded_and_described(void **state)
 }
 
 /* All pixels of all replicates alike: no random number had any effect. */
-static void light_without_noise_is_exact(void **state)
+TEST_WITH(light_without_noise_is_exact, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct err e;
@@ -124,7 +115,7 @@ static void light_without_noise_is_exact(void **state)
     moments_free(&m);
 }
 
-static void equal_replicates_are_refused(void **state)
+TEST_WITH(equal_replicates_are_refused, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     plain_scene(f);
@@ -153,7 +144,7 @@ static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, st
 }
 
 /* Different pictures all, but two were made with the same random numbers up to the last row. */
-static void replicates_that_share_their_noise_are_refused(void **state)
+TEST_WITH(replicates_that_share_their_noise_are_refused, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     static const char *const names[] = {"R", "G", "B"};
@@ -182,7 +173,7 @@ static void replicates_that_share_their_noise_are_refused(void **state)
     image_free(&im);
 }
 
-static void unusable_images_are_refused(void **state)
+TEST_WITH(unusable_images_are_refused, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     plain_scene(f);
@@ -197,7 +188,7 @@ static void unusable_images_are_refused(void **state)
     assert_fails(f, "replicate_0001.exr: pixel 0,0 is negative or not finite");
 }
 
-static void a_blender_that_fails_is_quoted(void **state)
+TEST_WITH(a_blender_that_fails_is_quoted, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     plain_scene(f);
@@ -216,7 +207,7 @@ static void a_blender_that_fails_is_quoted(void **state)
     assert_fails(f, "blender: no end after 1 s");
 }
 
-static void what_is_missing_is_named(void **state)
+TEST_WITH(what_is_missing_is_named, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     plain_scene(f);
@@ -224,7 +215,7 @@ static void what_is_missing_is_named(void **state)
     assert_fails(f, "blender: no such program in PATH");
     stand_in(f, "touch started; " OK);
     f->opt.share_dir = "/assay/none";
-    assert_fails(f, "/assay/none/cycles.py: ");
+    assert_fails(f, "/assay/none/cycles/cycles.py: ");
     f->opt.share_dir = "reference";
     f->suite.depth = 2000;
     assert_fails(f, "Cycles: depth 2000");
@@ -246,7 +237,7 @@ static void point_light_radiance(const double d[3], double out[3], const void *d
         out[c] = albedo[c] / M_PI * intensity[c] * .8 / (r2 * sqrt(r2));
 }
 
-static void point_light_on_a_wall(void **state)
+TEST_WITH(point_light_on_a_wall, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -289,7 +280,7 @@ static void standing_emitter_radiance(const double d[3], double out[3], const vo
         out[c] = p[0] < .5 ? albedo[c] / M_PI * 10 * fabs(sum) / 2 : 0;
 }
 
-static void emitter_that_stands_on_the_wall(void **state)
+TEST_WITH(emitter_that_stands_on_the_wall, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -319,7 +310,7 @@ static void furnace_radiance(const double d[3], double out[3], const void *data)
         out[c] = (c + 1) * (1 - pow(albedo[c], 4)) / (1 - albedo[c]);
 }
 
-static void furnace_inside_a_sphere(void **state)
+TEST_WITH(furnace_inside_a_sphere, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -338,7 +329,7 @@ static void furnace_inside_a_sphere(void **state)
 /* Depth 0, half of the view an emitter's front and half an emitter's back, which also reflects. The
  * line between them, x = .015, runs through the middle column of pixels, which spans -.0462 .. .0462
  * at that distance, so that two thirds of it are the front. */
-static void only_fronts_emit(void **state)
+TEST_WITH(only_fronts_emit, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -361,23 +352,4 @@ static void only_fronts_emit(void **state)
     }
     moments_free(&m);
     assert_true(ok);
-}
-
-int main(void)
-{
-#define WITH_JOB(f) cmocka_unit_test_setup_teardown(f, probe_setup, probe_teardown)
-    const struct CMUnitTest tests[] = {
-        WITH_JOB(replicates_are_folded_and_described),
-        WITH_JOB(light_without_noise_is_exact),
-        WITH_JOB(equal_replicates_are_refused),
-        WITH_JOB(replicates_that_share_their_noise_are_refused),
-        WITH_JOB(unusable_images_are_refused),
-        WITH_JOB(a_blender_that_fails_is_quoted),
-        WITH_JOB(what_is_missing_is_named),
-        WITH_JOB(point_light_on_a_wall),
-        WITH_JOB(emitter_that_stands_on_the_wall),
-        WITH_JOB(furnace_inside_a_sphere),
-        WITH_JOB(only_fronts_emit),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

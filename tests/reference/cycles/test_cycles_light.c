@@ -2,15 +2,7 @@
  * without Blender. */
 #include "cycles_probe.h"
 #include "tests/support/sky.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* A wall of albedo (.5, .25, .8) at z = -2, seen from the origin, 60 degrees wide. */
 static const double ALBEDO[3] = {.5, .25, .8};
@@ -60,11 +52,11 @@ static void check_lamp(struct probe *f, bool spot)
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 64, lamp_radiance, &spot), 3e-4, false);
 }
 
-static void falloff_with_all_three_terms(void **state)
+TEST_WITH(falloff_with_all_three_terms, probe_setup, probe_teardown)
 {
     check_lamp(*state, false);
 }
-static void spot_with_a_hard_edge(void **state)
+TEST_WITH(spot_with_a_hard_edge, probe_setup, probe_teardown)
 {
     check_lamp(*state, true);
 }
@@ -83,7 +75,7 @@ static void zenith_radiance(const double d[3], double out[3], const void *data)
         out[k] = (k + 1) * seen_sky(data, w);
 }
 
-static void sky_around_the_pole(void **state)
+TEST_WITH(sky_around_the_pole, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -111,7 +103,7 @@ static void uniform_radiance(const double d[3], double out[3], const void *data)
 }
 
 /* The wall in a sky with a hot texel: radiance = albedo / pi x irradiance, by quadrature. */
-static void irradiance_of_a_sky(void **state)
+TEST_WITH(irradiance_of_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -137,7 +129,7 @@ static void ambient_radiance(const double d[3], double out[3], const void *data)
         out[k] = 2 * d[0] < .5 && 2 * d[1] < .4 ? ALBEDO[k] * ambient[k] / 2 : 0;
 }
 
-static void ambient_light_on_rough_surfaces_alone(void **state)
+TEST_WITH(ambient_light_on_rough_surfaces_alone, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -168,7 +160,7 @@ static void lens_radiance(const double d[3], double out[3], const void *data)
         out[k] = (k + 1) * (.5 + (asin(h) + h * sqrt(1 - h * h)) / M_PI);
 }
 
-static void lens_on_an_edge(void **state)
+TEST_WITH(lens_on_an_edge, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -182,18 +174,4 @@ static void lens_on_an_edge(void **state)
     probe_run(f, 1024, &m);
     /* float32 and the midpoint rule */
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 12), 16, lens_radiance, NULL), 1e-4, false);
-}
-
-int main(void)
-{
-#define PROBE(f) cmocka_unit_test_setup_teardown(f, probe_setup, probe_teardown)
-    const struct CMUnitTest tests[] = {
-        PROBE(falloff_with_all_three_terms),
-        PROBE(spot_with_a_hard_edge),
-        PROBE(sky_around_the_pole),
-        PROBE(irradiance_of_a_sky),
-        PROBE(ambient_light_on_rough_surfaces_alone),
-        PROBE(lens_on_an_edge),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

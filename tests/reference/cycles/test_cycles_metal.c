@@ -3,16 +3,9 @@
 #include "cycles_probe.h"
 #include "tests/support/optics.h"
 #include "tests/support/sky.h"
+#include "tests/support/test.h"
 
 #include <complex.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
 
 /* Index and absorption of something like gold, red to blue. */
 static const double ETA[3] = {.2, .4, 1.4}, K[3] = {3.3, 2.4, 1.8}, REFLECTANCE[3] = {.9, .6, .3};
@@ -106,22 +99,22 @@ static void check_ball(struct probe *f, struct metal is, struct metal is_not, do
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 32, ball_radiance, &a), allowed, true);
 }
 
-static void closure_in_white(void **state)
+TEST_WITH(closure_in_white, probe_setup, probe_teardown)
 {
     check_ball(*state, (struct metal){true, true, false, .5},
                (struct metal){true, false, false, .5}, 3e-4);
 }
-static void ggx_facets_in_white(void **state)
+TEST_WITH(ggx_facets_in_white, probe_setup, probe_teardown)
 {
     check_ball(*state, (struct metal){true, false, true, .5}, (struct metal){true, true, true, .5},
                3e-4);
 }
-static void beckmann_facets_in_white(void **state)
+TEST_WITH(beckmann_facets_in_white, probe_setup, probe_teardown)
 {
     check_ball(*state, (struct metal){false, false, true, .4},
                (struct metal){true, false, true, .4}, 3e-4);
 }
-static void rough_beckmann_facets_in_white(void **state)
+TEST_WITH(rough_beckmann_facets_in_white, probe_setup, probe_teardown)
 {
     check_ball(*state, (struct metal){false, true, false, 1.1},
                (struct metal){false, true, false, 1.2}, 3e-4);
@@ -185,27 +178,15 @@ static void check_lobe(struct probe *f, struct metal is)
     probe_judge(f, &m, probe_expect(f, 1, 1, uniform_radiance, want), 5e-4, true);
 }
 
-static void closure_in_a_sky(void **state)
+TEST_WITH(closure_in_a_sky, probe_setup, probe_teardown)
 {
     check_lobe(*state, (struct metal){true, true, false, .3});
 }
-static void ggx_facets_in_a_sky(void **state)
+TEST_WITH(ggx_facets_in_a_sky, probe_setup, probe_teardown)
 {
     check_lobe(*state, (struct metal){true, false, true, .3});
 }
-static void beckmann_facets_in_a_sky(void **state)
+TEST_WITH(beckmann_facets_in_a_sky, probe_setup, probe_teardown)
 {
     check_lobe(*state, (struct metal){false, true, true, .3});
-}
-
-int main(void)
-{
-#define PROBE(f) cmocka_unit_test_setup_teardown(f, probe_setup, probe_teardown)
-    const struct CMUnitTest tests[] = {
-        PROBE(closure_in_white),         PROBE(ggx_facets_in_white),
-        PROBE(beckmann_facets_in_white), PROBE(rough_beckmann_facets_in_white),
-        PROBE(closure_in_a_sky),         PROBE(ggx_facets_in_a_sky),
-        PROBE(beckmann_facets_in_a_sky),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,14 +3,8 @@
 #include "cycles_probe.h"
 #include "tests/support/optics.h"
 #include "tests/support/sky.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 static const double REFLECTANCE[3] = {.9, .8, .7}, TRANSMITTANCE[3] = {.95, .9, .6};
 
@@ -22,11 +16,6 @@ static uint32_t specular(struct scene *s, enum material_kind kind, double ior, b
     s->materials[i].ior = (float)ior;
     s->materials[i].schlick = schlick;
     return i;
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static void unit(const double d[3], double out[3])
@@ -93,7 +82,7 @@ static void mirror_ball_radiance(const double d[3], double out[3], const void *d
         out[c] = l * (c + 1) * (hit ? REFLECTANCE[c] : 1);
 }
 
-static void mirror_ball_in_a_sky(void **state)
+TEST_WITH(mirror_ball_in_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -120,7 +109,7 @@ static void glowing_mirror_radiance(const double d[3], double out[3], const void
         out[c] = (c + 1) * (1 - pow(albedo[c], depth + 1)) / (1 - albedo[c]);
 }
 
-static void mirrors_count_as_bounces(void **state)
+TEST_WITH(mirrors_count_as_bounces, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -206,11 +195,11 @@ static void check_slab(struct probe *f, bool schlick)
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 8, slab_radiance, &is), 1e-4, true);
 }
 
-static void slab_of_glass(void **state)
+TEST_WITH(slab_of_glass, probe_setup, probe_teardown)
 {
     check_slab(*state, false);
 }
-static void slab_by_schlick(void **state)
+TEST_WITH(slab_by_schlick, probe_setup, probe_teardown)
 {
     check_slab(*state, true);
 }
@@ -255,25 +244,25 @@ static void check_boundary(struct probe *f, struct boundary b, bool front)
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, boundary_radiance, &b), 4e-4, false);
 }
 
-static void eye_before_glowing_glass(void **state)
+TEST_WITH(eye_before_glowing_glass, probe_setup, probe_teardown)
 {
     check_boundary(*state, (struct boundary){.ior = 1.5, .glass = true, .glow = {.5, .25, 1}},
                    true);
 }
-static void eye_in_glass(void **state)
+TEST_WITH(eye_in_glass, probe_setup, probe_teardown)
 {
     check_boundary(*state, (struct boundary){.ior = 1 / 1.5, .glass = true}, false);
 }
-static void eye_in_glass_by_schlick(void **state)
+TEST_WITH(eye_in_glass_by_schlick, probe_setup, probe_teardown)
 {
     check_boundary(*state, (struct boundary){.ior = 1 / 1.5, .glass = true, .schlick = true},
                    false);
 }
-static void refraction_alone(void **state)
+TEST_WITH(refraction_alone, probe_setup, probe_teardown)
 {
     check_boundary(*state, (struct boundary){.ior = 1.5}, true);
 }
-static void refraction_alone_from_behind(void **state)
+TEST_WITH(refraction_alone_from_behind, probe_setup, probe_teardown)
 {
     check_boundary(*state, (struct boundary){.ior = 1 / 1.5}, false);
 }
@@ -321,7 +310,7 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
     }
 }
 
-static void glass_ball_in_a_sky(void **state)
+TEST_WITH(glass_ball_in_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -352,7 +341,7 @@ static void tilted_mirror_radiance(const double d[3], double out[3], const void 
         out[k] = REFLECTANCE[k] * l * (k + 1);
 }
 
-static void mirror_with_tilted_normals(void **state)
+TEST_WITH(mirror_with_tilted_normals, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
@@ -371,23 +360,4 @@ static void mirror_with_tilted_normals(void **state)
      * they graze it crosses the whole picture. */
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, tilted_mirror_radiance, &sky), 3e-3,
                 false);
-}
-
-int main(void)
-{
-#define PROBE(f) cmocka_unit_test_setup_teardown(f, probe_setup, probe_teardown)
-    const struct CMUnitTest tests[] = {
-        PROBE(mirror_ball_in_a_sky),
-        PROBE(mirrors_count_as_bounces),
-        PROBE(slab_of_glass),
-        PROBE(slab_by_schlick),
-        PROBE(eye_before_glowing_glass),
-        PROBE(eye_in_glass),
-        PROBE(eye_in_glass_by_schlick),
-        PROBE(refraction_alone),
-        PROBE(refraction_alone_from_behind),
-        PROBE(glass_ball_in_a_sky),
-        PROBE(mirror_with_tilted_normals),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

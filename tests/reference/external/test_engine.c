@@ -5,21 +5,13 @@
 #define _GNU_SOURCE
 #include "tests/support/build_scene.h"
 
+#include "reference/external/engine_bindings.h"
 #include "reference/external/engine_description.h"
 #include "reference/suite/features.h"
 #include "reference/replicates/engine_driver.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/shell_quote.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { W = 4, H = 3, PIXELS = W * H, K = 3, SEED = 5 };
 
@@ -33,8 +25,7 @@ static int set_up(void **state)
     struct err e;
     strcpy(dir, "/tmp/assay_engine_XXXXXX");
     assert_non_null(mkdtemp(dir));
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     const struct suite_scene *s = suite_find(&suite, "12_point_plane");
     assert_non_null(s);
     point_plane = *s;
@@ -77,8 +68,7 @@ static bool load(const char *json, struct engine *en, struct err *e)
 static void must_load(const char *json, struct engine *en)
 {
     struct err e;
-    if (!load(json, en, &e))
-        fail_msg("%s", e.msg);
+    MUST(load(json, en, &e));
 }
 
 /* Red is red(pixel), green 2, blue 0. PFM goes from the bottom row up. */
@@ -131,9 +121,8 @@ static bool render(const struct engine *en, const struct suite_scene *s, struct 
     return engine_render(en, s, &opt, m, manifest, e);
 }
 
-static void shipped_descriptions_load(void **state)
+TEST(shipped_descriptions_load)
 {
-    (void)state;
     static const char *const names[] = {"mitsuba", "pbrt", "povray_plain", "student",
                                         "pathtracer_again"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
@@ -141,16 +130,14 @@ static void shipped_descriptions_load(void **state)
         struct engine en;
         struct err e;
         snprintf(path, sizeof path, "reference/engines/%s.json", names[i]);
-        if (!engine_load(path, &en, &e))
-            fail_msg("%s", e.msg);
+        MUST(engine_load(path, &en, &e));
         assert_string_equal(en.name, names[i]);
         engine_free(&en);
     }
 }
 
-static void members_are_read(void **state)
+TEST(members_are_read)
 {
-    (void)state;
     struct engine en;
     must_load(
         "{\"name\": \"a-1\", \"format\": \"cycles\", \"output\": \"mean\", \"image\": \"hdr\","
@@ -158,7 +145,7 @@ static void members_are_read(void **state)
         "\"depth_offset\": -1, \"spp\": 9, \"replicates\": 11}",
         &en);
     assert_string_equal(en.name, "a-1");
-    assert_int_equal(en.format, FORMAT_CYCLES);
+    assert_ptr_equal(en.format, engine_kind_of("cycles"));
     assert_int_equal(en.output, OUTPUT_MEAN);
     assert_string_equal(en.image, "hdr");
     assert_int_equal(en.feature, 1u << FEATURE_MIRROR);
@@ -169,9 +156,8 @@ static void members_are_read(void **state)
 }
 
 /* Each replaces one member of a good description, or adds one; NULL: leaves it out. */
-static void bad_descriptions_are_refused(void **state)
+TEST(bad_descriptions_are_refused)
 {
-    (void)state;
     static const char *const good[][2] = {
         {"name", "\"x\""},
         {"format", "\"pbrt\""},
@@ -186,7 +172,7 @@ static void bad_descriptions_are_refused(void **state)
         {"name", "\"X\"", "a-z, 0-9"},
         {"name", "\"../x\"", "a-z, 0-9"},
         {"name", "\"cycles\"", "which this program uses itself"},
-        {"format", "\"obj\"", "'format' is 'obj', none of: mitsuba, pbrt, povray, cycles, dae"},
+        {"format", "\"obj\"", "'format' is 'obj', none of: cycles, povray, mitsuba, pbrt, dae"},
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
         {"image", "\"png\"", "none of: exr, hdr, pfm"},
@@ -246,9 +232,8 @@ static void bad_descriptions_are_refused(void **state)
     assert_non_null(strstr(e.msg, "nothing.json: cannot read"));
 }
 
-static void a_dae_needs_its_lens_on_the_command_line(void **state)
+TEST(a_dae_needs_its_lens_on_the_command_line)
 {
-    (void)state;
     const char *const head =
         "{\"name\": \"x\", \"format\": \"dae\", \"output\": \"mean\", \"command\": "
         "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": ";
@@ -276,9 +261,8 @@ static void a_dae_needs_its_lens_on_the_command_line(void **state)
     }
 }
 
-static void placeholders_are_filled_in(void **state)
+TEST(placeholders_are_filled_in)
 {
-    (void)state;
     struct engine en;
     struct err e;
     char **argv;
@@ -286,8 +270,7 @@ static void placeholders_are_filled_in(void **state)
               "\"command\": [\"run\", \"\", \"{{{seed}}}\", \"{out}{out}\", \"a b;$(c) {scene}\"]}",
               &en);
     const char *const values[] = {"scene", "s", "out", "/o", "seed", "12", NULL};
-    if (!engine_argv(&en, "command", values, &argv, &e))
-        fail_msg("%s", e.msg);
+    MUST(engine_argv(&en, "command", values, &argv, &e));
     const char *const want[] = {"run", "", "{12}", "/o/o", "a b;$(c) s"};
     for (int i = 0; i < 5; i++)
         assert_string_equal(argv[i], want[i]);
@@ -301,9 +284,8 @@ static void placeholders_are_filled_in(void **state)
     engine_free(&en);
 }
 
-static void scenes_know_what_they_need(void **state)
+TEST(scenes_know_what_they_need)
 {
-    (void)state;
     static const struct {
         const char *name;
         unsigned features;
@@ -319,8 +301,7 @@ static void scenes_know_what_they_need(void **state)
         struct camera camera;
         struct err e;
         assert_non_null(s);
-        if (!suite_open(s, &scene, &camera, &e))
-            fail_msg("%s", e.msg);
+        MUST(suite_open(s, &scene, &camera, &e));
         assert_int_equal(features_of_scene(&scene, &camera), cases[i].features);
         camera.lens_radius = 0.01f;
         assert_int_equal(features_of_scene(&scene, &camera),
@@ -334,9 +315,8 @@ static void scenes_know_what_they_need(void **state)
 }
 
 /* The features that no scene above has, one material or light at a time. */
-static void materials_and_lights_have_features(void **state)
+TEST(materials_and_lights_have_features)
 {
-    (void)state;
     const struct material materials[] = {
         {.kind = MATERIAL_MIRROR, .reflectance = {1, 1, 1}},
         {.kind = MATERIAL_GLASS, .ior = 1.5f},
@@ -381,9 +361,8 @@ static void materials_and_lights_have_features(void **state)
     }
 }
 
-static void what_cannot_be_expressed_is_said(void **state)
+TEST(what_cannot_be_expressed_is_said)
 {
-    (void)state;
     struct engine en;
     struct err e;
     must_load("{\"name\": \"x\", \"format\": \"povray\", \"output\": \"mean\", \"expresses\": "
@@ -403,9 +382,8 @@ static void what_cannot_be_expressed_is_said(void **state)
 
 /* Three pictures whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
  * sum (x - 8/3)^2 = 1 + 4 + 25 - 64/3 = 26/3, M3 = (-5/3)^3 + (-2/3)^3 + (7/3)^3 = 210/27. */
-static void replicates_are_folded(void **state)
+TEST(replicates_are_folded)
 {
-    (void)state;
     struct engine en;
     struct moments m;
     json_t *manifest;
@@ -419,8 +397,7 @@ static void replicates_are_folded(void **state)
                      ", \"version\": [\"sh\", \"-c\", \"echo; echo Fake 3.1; echo more\"], "
                      "\"depth_offset\": 1",
                      &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "replicate");
     assert_true(m.spp == 7);
     for (int p = 0; p < PIXELS; p++) {
@@ -466,17 +443,15 @@ static void replicates_are_folded(void **state)
     engine_free(&en);
 }
 
-static void pictures_without_noise_are_exact(void **state)
+TEST(pictures_without_noise_are_exact)
 {
-    (void)state;
     struct engine en;
     struct moments m;
     json_t *manifest;
     struct err e;
     write_pfm("constant.pfm", W, H, constant, 0);
     engine_of_script("cp {here}/constant.pfm $2", "", &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[0] == 1 && m.mean[0] == 0.25 && m.m2[0] == 0 && m.m3[0] == 0);
     json_decref(manifest);
@@ -488,8 +463,7 @@ static void pictures_without_noise_are_exact(void **state)
               "\"expresses\": [\"diffuse\", \"point\"], \"command\": [\"sh\", \"-c\", \"cp "
               "{here}/ramp.pfm {out} # {scene}\"]}",
               &en);
-    if (!render(&en, &point_plane, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
     assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
@@ -498,9 +472,8 @@ static void pictures_without_noise_are_exact(void **state)
     engine_free(&en);
 }
 
-static void programs_that_misbehave_are_errors(void **state)
+TEST(programs_that_misbehave_are_errors)
 {
-    (void)state;
     write_pfm("ramp.pfm", W, H, ramp, 0);
     write_pfm("large.pfm", W + 1, H, ramp, 0);
     write_pfm("nan.pfm", W, H, not_a_number, 0);
@@ -545,20 +518,31 @@ static void programs_that_misbehave_are_errors(void **state)
     engine_free(&en);
 }
 
-int main(void)
+/* No name or ending says two engines, each can be asked to export, and those with goldens, which come first, are driven. */
+TEST(the_table_is_bound)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shipped_descriptions_load),
-        cmocka_unit_test(members_are_read),
-        cmocka_unit_test(bad_descriptions_are_refused),
-        cmocka_unit_test(a_dae_needs_its_lens_on_the_command_line),
-        cmocka_unit_test(placeholders_are_filled_in),
-        cmocka_unit_test(scenes_know_what_they_need),
-        cmocka_unit_test(materials_and_lights_have_features),
-        cmocka_unit_test(what_cannot_be_expressed_is_said),
-        cmocka_unit_test(replicates_are_folded),
-        cmocka_unit_test(pictures_without_noise_are_exact),
-        cmocka_unit_test(programs_that_misbehave_are_errors),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    struct scene scene;
+    struct camera camera;
+    struct err e;
+    int num = 0;
+    MUST(suite_open(&point_plane, &scene, &camera, &e));
+    for (const struct engine_kind *k = engine_table; k->name != NULL; k++, num++) {
+        bool has_goldens = num < NUM_ENGINES_WITH_GOLDENS;
+        char name[32];
+        for (const struct engine_kind *other = engine_table; other < k; other++)
+            assert_true(strcmp(other->name, k->name) != 0 && strcmp(other->ending, k->ending) != 0);
+        snprintf(name, sizeof name, "table%s", k->ending);
+        bool ok = engine_export(k, &scene, &camera, 1, path_of(name), &e);
+        assert_true(ok || strstr(e.msg, k->title) != NULL);
+        assert_int_equal(access(path_of(name), R_OK) == 0, ok);
+        assert_int_equal(engine_driver_of(k->name) != NULL, has_goldens);
+        assert_ptr_equal(engine_with_goldens(k->name), has_goldens ? k : NULL);
+        assert_ptr_equal(engine_kind_of(k->name), k);
+    }
+    assert_null(engine_names[NUM_ENGINES_WITH_GOLDENS]);
+    assert_null(engine_kind_of("truth"));
+    assert_null(engine_driver_of("mitsuba_"));
+    scene_free(&scene);
 }
+
+TEST_GROUP(set_up, tear_down)

@@ -5,15 +5,7 @@
 #include "renderer/base/fs.h"
 #include "tools/validate/import_result.h"
 #include "tests/support/build_scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 struct fixture {
     struct scene s;
@@ -114,14 +106,12 @@ static struct import_report compare(struct fixture *f)
 {
     struct import_report r;
     struct err e;
-    if (!import_check_compare(&f->s, &f->c, f->dump, &r, &e))
-        fail_msg("%s", e.msg);
+    MUST(import_check_compare(&f->s, &f->c, f->dump, &r, &e));
     return r;
 }
 
-static void readers_that_agree(void **state)
+TEST(readers_that_agree)
 {
-    (void)state;
     for (const char *axis = "YZX"; *axis != '\0'; axis++) {
         struct fixture f;
         make(&f, *axis);
@@ -150,9 +140,8 @@ static void assert_differ(struct fixture *f, const char *why)
 }
 
 /* 1e-4 of the extent; the least that is allowed is 1e-5. */
-static void a_shifted_vertex_is_found(void **state)
+TEST(a_shifted_vertex_is_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     double extent = (double)length(sub(f.s.bounds_max, f.s.bounds_min));
@@ -164,9 +153,8 @@ static void a_shifted_vertex_is_found(void **state)
     assert_differ(&f, "polygon 0");
 }
 
-static void a_swapped_axis_is_found(void **state)
+TEST(a_swapped_axis_is_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     for (uint32_t k = 0; k < 3 * f.s.num_triangles; k++) {
@@ -179,9 +167,8 @@ static void a_swapped_axis_is_found(void **state)
     assert_differ(&f, "polygon 0");
 }
 
-static void triangles_too_many_too_few_or_turned_are_found(void **state)
+TEST(triangles_too_many_too_few_or_turned_are_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     vec3 p = f.s.position[7];
@@ -198,9 +185,8 @@ static void triangles_too_many_too_few_or_turned_are_found(void **state)
     assert_differ(&f, "1 triangles of ours are none of Blender's");
 }
 
-static void a_turned_normal_is_found(void **state)
+TEST(a_turned_normal_is_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     f.s.normal[6] = normalize(v3(-1, 1e-3f, 0));
@@ -214,9 +200,8 @@ static void a_turned_normal_is_found(void **state)
     assert_differ(&f, "0.0260 rad");
 }
 
-static void another_camera_is_found(void **state)
+TEST(another_camera_is_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     f.c.tan_h = tanf(1.01f * 3.14159265f / 8); /* an angle of view 1 % larger */
@@ -232,9 +217,8 @@ static void another_camera_is_found(void **state)
     assert_differ(&f, "Blender has 0 cameras");
 }
 
-static void lights_that_moved_or_turned_are_found(void **state)
+TEST(lights_that_moved_or_turned_are_found)
 {
-    (void)state;
     struct fixture f;
     make(&f, 'Y');
     f.s.lights[0].position.x += 1e-3f;
@@ -257,9 +241,8 @@ static void lights_that_moved_or_turned_are_found(void **state)
     assert_differ(&f, "(SUN) is none of ours");
 }
 
-static void what_cannot_be_compared_is_no_agreement(void **state)
+TEST(what_cannot_be_compared_is_no_agreement)
 {
-    (void)state;
     struct fixture f;
     struct import_report r;
     struct err e;
@@ -288,9 +271,8 @@ static void what_cannot_be_compared_is_no_agreement(void **state)
 
 /* With Blender. tests/reference/import_check/import.dae has, by its text: shapes 2 + 4 + 1 triangles (a quadrangle, a hexagon, a
  * triangle), the tent and its mirror image 2 each; 3 normals each; three lights with a place or a direction. */
-static void blender_reads_what_we_read(void **state)
+TEST(blender_reads_what_we_read)
 {
-    (void)state;
     char path[4096], dir[] = "/tmp/test_import.XXXXXX";
     if (!process_find("blender", path, sizeof path))
         skip();
@@ -329,20 +311,4 @@ static void blender_reads_what_we_read(void **state)
     json_decref(dumps);
     scene_free(&f.s);
     assert_true(fs_remove_tree(dir, &e));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(readers_that_agree),
-        cmocka_unit_test(a_shifted_vertex_is_found),
-        cmocka_unit_test(a_swapped_axis_is_found),
-        cmocka_unit_test(triangles_too_many_too_few_or_turned_are_found),
-        cmocka_unit_test(a_turned_normal_is_found),
-        cmocka_unit_test(another_camera_is_found),
-        cmocka_unit_test(lights_that_moved_or_turned_are_found),
-        cmocka_unit_test(what_cannot_be_compared_is_no_agreement),
-        cmocka_unit_test(blender_reads_what_we_read),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

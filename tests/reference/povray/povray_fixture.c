@@ -1,18 +1,11 @@
 #include "povray_fixture.h"
+#include "tests/support/test.h"
 
 #include "tests/support/build_scene.h"
 
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "renderer/transport/render.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <cmocka.h>
 
 void fixture_init(struct fixture *f, struct scene s, int size, int depth)
 {

@@ -2,7 +2,7 @@
 #ifndef ASSAY_POVRAY_FIXTURE_H
 #define ASSAY_POVRAY_FIXTURE_H
 
-#include "reference/replicates/engine_driver.h"
+#include "reference/povray/povray_driver.h"
 
 /* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
 enum { THREADS = 8 };

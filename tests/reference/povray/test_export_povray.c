@@ -5,18 +5,9 @@
 
 #include "reference/povray/povray_lamp.h"
 #include "reference/povray/povray_replicate_parts.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
-/* cmocka's own compares in single precision. */
-#define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
 
 /* A floor, a ball on it and, if asked for, a lamp above: 0.5 x 0.25 around (0, 2, 0), facing down. */
 static struct scene floor_and_ball(bool with_lamp)
@@ -47,8 +38,7 @@ static struct povray_passes plan(struct scene *s, int depth)
     struct err e;
     struct povray_passes p;
     struct camera c = finish(s);
-    if (!povray_passes(s, &c, depth, &p, &e))
-        fail_msg("%s", e.msg);
+    MUST(povray_passes(s, &c, depth, &p, &e));
     scene_free(s);
     return p;
 }
@@ -62,8 +52,7 @@ static char *text_of(const struct scene *s, const struct camera *c, int depth,
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
-    if (!export_povray(s, c, depth, v, f, &e))
-        fail_msg("%s", e.msg);
+    MUST(export_povray(s, c, depth, v, f, &e));
     assert_int_equal(fclose(f), 0);
     return text;
 }
@@ -79,9 +68,8 @@ static void numbers_after(const char *text, const char *key, double x[3])
 }
 
 /* Light sources make paths of 1 .. N+1 bounces at recursion_limit N, glowing geometry 0 .. N. */
-static void test_recursion(void **state)
+TEST(test_recursion)
 {
-    (void)state;
     static const struct {
         int depth, recursion;
     } sources[] = {{0, 0}, {1, 0}, {2, 1}, {5, 4}, {21, 20}};
@@ -104,9 +92,8 @@ static void test_recursion(void **state)
     }
 }
 
-static void test_no_indirect_light(void **state)
+TEST(test_no_indirect_light)
 {
-    (void)state;
     struct scene dark = floor_and_ball(false);
     assert_int_equal(plan(&dark, 5).pass[0].recursion, 0);
 
@@ -123,9 +110,8 @@ static void test_no_indirect_light(void **state)
     }
 }
 
-static void test_furnace_is_constant(void **state)
+TEST(test_furnace_is_constant)
 {
-    (void)state;
     for (int inside = 0; inside < 2; inside++) {
         struct scene s = build_scene();
         build_sphere(&s, v3(0, 0, 0), 2, -1, build_material(&s, grey(.5f), grey(1)));
@@ -144,9 +130,8 @@ static void refused(struct scene *s, const struct camera *c, int depth, const ch
     assert_null(strchr(e.msg, '\n'));
 }
 
-static void test_camera_refused(void **state)
+TEST(test_camera_refused)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     struct camera c = finish(&s), bad;
     bad = c;
@@ -155,10 +140,10 @@ static void test_camera_refused(void **state)
     /* The ball's nearest point is 4.2 - 0.3 away at least, the farthest floor corner about 5.3. */
     bad = c;
     bad.near = 4.5f;
-    refused(&s, &bad, 1, "nearer than 4.5");
+    refused(&s, &bad, 1, "near plane is at 4.5");
     bad = c;
     bad.far = 5;
-    refused(&s, &bad, 1, "farther than 5");
+    refused(&s, &bad, 1, "far plane is at 5");
     refused(&s, &c, 22, "depth 21 only");
     struct povray_passes p;
     struct err e;
@@ -166,9 +151,8 @@ static void test_camera_refused(void **state)
     scene_free(&s);
 }
 
-static void test_small_scene_refused(void **state)
+TEST(test_small_scene_refused)
 {
-    (void)state;
     struct scene s = build_scene();
     build_sphere(&s, v3(0, 0, 0), .01f, 1, build_material(&s, grey(.5f), grey(0)));
     build_camera(&s, v3(0, 0, 1), 60);
@@ -177,19 +161,17 @@ static void test_small_scene_refused(void **state)
     scene_free(&s);
 }
 
-static void test_normals_refused(void **state)
+TEST(test_normals_refused)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     s.normal[4] = v3(0, -1, 0);
     struct camera c = finish(&s);
-    refused(&s, &c, 1, "behind the triangle");
+    refused(&s, &c, 1, "behind its triangle");
     scene_free(&s);
 }
 
-static void test_lights_refused(void **state)
+TEST(test_lights_refused)
 {
-    (void)state;
     static const float falloff[][3] = {{0, 1, 0}, {1, 0, 1}, {1, 1, 0}};
     for (size_t i = 0; i < sizeof falloff / sizeof *falloff; i++) {
         struct scene s = floor_and_ball(false);
@@ -208,9 +190,8 @@ static void test_lights_refused(void **state)
 }
 
 /* All ways to cut a parallelogram and to number its corners give the same set of points. */
-static void test_lamp_any_numbering(void **state)
+TEST(test_lamp_any_numbering)
 {
-    (void)state;
     const vec3 corner[4] = {{0, 1, 0}, {.5f, 1.25f, 0}, {.75f, 1.25f, 1}, {.25f, 1, 1}};
     for (int cut = 0; cut < 2; cut++)
         for (int turn = 0; turn < 9; turn++) {
@@ -241,9 +222,8 @@ static void test_lamp_any_numbering(void **state)
         }
 }
 
-static void test_not_a_lamp(void **state)
+TEST(test_not_a_lamp)
 {
-    (void)state;
     for (int what = 0; what < 4; what++) {
         struct scene s = floor_and_ball(false);
         uint32_t m = build_material(&s, grey(what == 0 ? .5f : 0), grey(2));
@@ -266,9 +246,8 @@ static void test_not_a_lamp(void **state)
 /* The 2-point Gauss rule in each pair of cells is exact for cubics, so over the rectangle
  * [-1/4, 1/4] x [-1/8, 1/8] the points' mean is 0 and their mean squares are (1/4)^2/3, (1/8)^2/3.
  * Colour x points = radiance x area / (2 pi d^2), see reference/povray/README.md. */
-static void test_lamp_points(void **state)
+TEST(test_lamp_points)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     struct camera c = finish(&s);
     struct povray_variant v = povray_variant_plain();
@@ -308,9 +287,8 @@ static void test_lamp_points(void **state)
     scene_free(&s);
 }
 
-static void test_jitter_follows_seed(void **state)
+TEST(test_jitter_follows_seed)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     struct camera c = finish(&s);
     struct povray_variant v = povray_variant_plain();
@@ -334,9 +312,8 @@ static vec3 quarter_turn(vec3 v)
 }
 
 /* Writing a scene turned must be the same as turning the scene and writing it. */
-static void test_rotation(void **state)
+TEST(test_rotation)
 {
-    (void)state;
     char *text[2];
     for (int by_hand = 0; by_hand < 2; by_hand++) {
         struct scene s = floor_and_ball(true);
@@ -382,9 +359,8 @@ static void test_rotation(void **state)
 
 /* A window moved by half a picture to the right and a quarter up looks along the ray that the
  * unmoved picture has there: -backward + (2 x 1/2) tan_h right + (2 x 1/4) tan_v up. */
-static void test_shift(void **state)
+TEST(test_shift)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     struct camera c = finish(&s);
     struct povray_variant v = povray_variant_plain();
@@ -407,9 +383,8 @@ static void test_shift(void **state)
 }
 
 /* Radiosity and roulette appear only where there is indirect light to find. */
-static void test_radiosity_on_demand(void **state)
+TEST(test_radiosity_on_demand)
 {
-    (void)state;
     struct scene s = floor_and_ball(true);
     struct camera c = finish(&s);
     struct povray_variant v = povray_variant_plain();
@@ -426,25 +401,4 @@ static void test_radiosity_on_demand(void **state)
         free(text);
     }
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_recursion),
-        cmocka_unit_test(test_no_indirect_light),
-        cmocka_unit_test(test_furnace_is_constant),
-        cmocka_unit_test(test_camera_refused),
-        cmocka_unit_test(test_small_scene_refused),
-        cmocka_unit_test(test_normals_refused),
-        cmocka_unit_test(test_lights_refused),
-        cmocka_unit_test(test_lamp_any_numbering),
-        cmocka_unit_test(test_not_a_lamp),
-        cmocka_unit_test(test_lamp_points),
-        cmocka_unit_test(test_jitter_follows_seed),
-        cmocka_unit_test(test_rotation),
-        cmocka_unit_test(test_shift),
-        cmocka_unit_test(test_radiosity_on_demand),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

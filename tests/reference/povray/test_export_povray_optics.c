@@ -6,14 +6,7 @@
 #include "reference/povray/povray_glass.h"
 #include "reference/povray/povray_lamp.h"
 #include "renderer/scene/environment.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static uint32_t build_glass(struct scene *s, enum material_kind kind)
 {
@@ -55,8 +48,7 @@ static char *text_of(const struct scene *s, const struct camera *c, int depth, i
     assert_non_null(f);
     struct povray_variant v = povray_variant_plain();
     v.pass = pass;
-    if (!export_povray(s, c, depth, &v, f, &e))
-        fail_msg("%s", e.msg);
+    MUST(export_povray(s, c, depth, &v, f, &e));
     assert_int_equal(fclose(f), 0);
     return text;
 }
@@ -82,9 +74,8 @@ static void refused(struct scene *s, int depth, const char *why)
 }
 
 /* Light sources end a path of m bounces at m surfaces, a glow at m + 1. */
-static void test_passes(void **state)
+TEST(test_passes)
 {
-    (void)state;
     struct scene s = ball_of(MATERIAL_GLASS);
     struct camera c = finish(&s);
     struct povray_passes p;
@@ -103,9 +94,8 @@ static void test_passes(void **state)
     scene_free(&s);
 }
 
-static void test_glass_text(void **state)
+TEST(test_glass_text)
 {
-    (void)state;
     struct scene s = ball_of(MATERIAL_GLASS);
     struct camera c = finish(&s);
     char *lit = text_of(&s, &c, 10, 0), *seen = text_of(&s, &c, 10, 1);
@@ -127,9 +117,8 @@ static void test_glass_text(void **state)
     scene_free(&s);
 }
 
-static void test_mirror_and_refraction_text(void **state)
+TEST(test_mirror_and_refraction_text)
 {
-    (void)state;
     struct scene s = ball_of(MATERIAL_MIRROR);
     s.materials[2].reflectance = (rgb){.5f, .25f, 1};
     struct camera c = finish(&s);
@@ -147,9 +136,8 @@ static void test_mirror_and_refraction_text(void **state)
     scene_free(&s);
 }
 
-static void test_spot_text(void **state)
+TEST(test_spot_text)
 {
-    (void)state;
     struct scene s = ball_of(MATERIAL_DIFFUSE);
     build_light(&s, (struct light){.kind = LIGHT_SPOT,
                                    .value = {1, 1, 1},
@@ -186,9 +174,8 @@ static struct environment *image(int width, int height)
 }
 
 /* 2 x 1 texels (0,1,2) and (3,4,5): centres at 1/4 and 3/4 of the circle, their mean at the seam. */
-static void test_sky_text(void **state)
+TEST(test_sky_text)
 {
-    (void)state;
     struct err e;
     struct scene s = ball_of(MATERIAL_DIFFUSE);
     struct camera c = finish(&s);
@@ -212,9 +199,8 @@ static void test_sky_text(void **state)
     scene_free(&s);
 }
 
-static void test_sky_refused(void **state)
+TEST(test_sky_refused)
 {
-    (void)state;
     struct err e;
     for (int which = 0; which < 2; which++) {
         struct scene s = ball_of(MATERIAL_DIFFUSE);
@@ -227,9 +213,8 @@ static void test_sky_refused(void **state)
     }
 }
 
-static void test_glass_refused(void **state)
+TEST(test_glass_refused)
 {
-    (void)state;
     static const char *const why[] = {"no microfacets",  "Schlick",       "is not 1",
                                       "must be above 1", "that emits",    "front is inside",
                                       "the camera",      "may be inside", "at depth 7"};
@@ -257,9 +242,8 @@ static void test_glass_refused(void **state)
 
 /* A tetrahedron is closed; with one triangle less, or turned inside out, it is refused. Refraction
  * alone by triangles is refused beside a mirror, and hides total reflection else. */
-static void test_glass_meshes(void **state)
+TEST(test_glass_meshes)
 {
-    (void)state;
     const vec3 p[4] = {{0, .25f, 0}, {.5f, .25f, 0}, {0, .75f, 0}, {0, .25f, .5f}};
     static const int face[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
     for (int what = 0; what < 5; what++) {
@@ -291,9 +275,8 @@ static void test_glass_meshes(void **state)
 }
 
 /* All lights at once: two passes, and no light is left out of both. */
-static void test_mixed_lights(void **state)
+TEST(test_mixed_lights)
 {
-    (void)state;
     struct scene s = ball_of(MATERIAL_DIFFUSE);
     build_light(&s, (struct light){.kind = LIGHT_POINT,
                                    .value = {1, 1, 1},
@@ -320,9 +303,8 @@ static void test_mixed_lights(void **state)
 
 /* Points of a ball lie on it and look outwards; for a spiral of n points their mean is within 1/n or
  * so of the centre. Points of two triangles of areas 1 : 3 are shared out 1 : 3. */
-static void test_lamp_points(void **state)
+TEST(test_lamp_points)
 {
-    (void)state;
     enum { N = 256 };
     const double shift[3] = {.3, .6, .8};
     vec3 p[N], n[N], sum = {0};
@@ -361,9 +343,8 @@ static void test_lamp_points(void **state)
 }
 
 /* A sphere around the eye is turned inside out (export_povray.c says why). */
-static void test_sphere_around_the_eye(void **state)
+TEST(test_sphere_around_the_eye)
 {
-    (void)state;
     for (int around = 0; around < 2; around++) {
         struct scene s = ball_of(MATERIAL_DIFFUSE);
         build_sphere(&s, v3(0, 0, 0), around ? 9 : .125f, -1, 0);
@@ -373,22 +354,4 @@ static void test_sphere_around_the_eye(void **state)
         free(text);
         scene_free(&s);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_passes),
-        cmocka_unit_test(test_glass_text),
-        cmocka_unit_test(test_mirror_and_refraction_text),
-        cmocka_unit_test(test_spot_text),
-        cmocka_unit_test(test_sky_text),
-        cmocka_unit_test(test_sky_refused),
-        cmocka_unit_test(test_glass_refused),
-        cmocka_unit_test(test_glass_meshes),
-        cmocka_unit_test(test_mixed_lights),
-        cmocka_unit_test(test_lamp_points),
-        cmocka_unit_test(test_sphere_around_the_eye),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,21 +7,11 @@
 #include "reference/povray/povray_replicate_parts.h"
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
-#include <cmocka.h>
-
-/* cmocka's own compares in single precision. */
-#define assert_near(a, b, epsilon) assert_true(fabs((a) - (b)) <= (epsilon))
 
 static const struct povray_passes bright = {
     .pass = {{.sources = true, .glow = true, .recursion = 4, .levels = 60, .levels_indirect = 60}},
@@ -40,9 +30,8 @@ static bool same_variant(const struct povray_variant *a, const struct povray_var
 }
 
 /* The pair differs in radiosity only; two replicates differ in all that stands for a seed. */
-static void test_replicate_pair(void **state)
+TEST(test_replicate_pair)
 {
-    (void)state;
     bool seen[65] = {false};
     for (int i = 0; i < 61; i++) {
         uint32_t seed = replicate_seed(3, i);
@@ -77,9 +66,8 @@ static void test_replicate_pair(void **state)
 
 /* Each of the 32 windows has a column and a row of the sub-pixel to itself; together they are
  * centred. */
-static void test_windows(void **state)
+TEST(test_windows)
 {
-    (void)state;
     bool column[32] = {false}, row[32] = {false};
     double sum_x = 0, sum_y = 0;
     for (int j = 0; j < POVRAY_WINDOWS; j++) {
@@ -114,9 +102,8 @@ static double sum_of_component(int n, int row, int column, double power)
  * alpha = 1e-6 (4.89). Power: an axis that stays within 84 degrees of where it was moves a mean
  * square by 0.03, 6 standard errors. Negative control: turns about one axis only, whose squares have
  * mean 1/2, are rejected. */
-static void test_rotations_are_uniform(void **state)
+TEST(test_rotations_are_uniform)
 {
-    (void)state;
     const int n = 4000;
     for (int r = 0; r < 3; r++)
         for (int k = 0; k < 3; k++) {
@@ -212,9 +199,8 @@ static void engine_fails(const char *script, double timeout_s, const char *const
     fixture_free(&f);
 }
 
-static void test_engine_failures(void **state)
+TEST(test_engine_failures)
 {
-    (void)state;
     engine_fails(NULL, 60, (const char *[]){"no such program", NULL});
     engine_fails("echo; echo Parse Error: No matching brace >&2; exit 1", 60,
                  (const char *[]){"exit status 1", "No matching brace", NULL});
@@ -226,9 +212,8 @@ static void test_engine_failures(void **state)
 
 /* The one failure that is tried again, ten times at most: the script leaves a line in its count for
  * each start, with the picture's directory. */
-static void test_slow_start_is_tried_again(void **state)
+TEST(test_slow_start_is_tried_again)
 {
-    (void)state;
     char count[64] = "/tmp/fake_count.XXXXXX", script[256];
     int fd = mkstemp(count);
     assert_true(fd >= 0);
@@ -270,9 +255,8 @@ static void grey_exr(char path[64], int w, int h)
 
 /* Pictures that look fine but must not be believed. 4 x 4 pixels: windows are 8 x 8, the pictures of
  * replicates at subgrid 1 are 4 x 4. */
-static void test_implausible_pictures(void **state)
+TEST(test_implausible_pictures)
 {
-    (void)state;
     char small[64], large[64], script[512];
     grey_exr(small, 4, 4);
     grey_exr(large, 8, 8);
@@ -341,9 +325,8 @@ static double under_rectangle(double x, double z)
 /* Point light, point light without falloff, sun, rectangular lamp, over a Lambertian plane. The
  * bounds are half-float rounding with a little room (2^-11 = 4.9e-4 of a value, averaged over 128;
  * measured 1e-4 and 3e-6). Negative control: light that is 0.1 % brighter is outside. */
-static void test_direct_light(void **state)
+TEST(test_direct_light)
 {
-    (void)state;
     if (!have_povray())
         skip();
     static double (*const truth[4])(double, double) = {under_point, under_flat_point, under_sun,
@@ -383,9 +366,8 @@ static void test_direct_light(void **state)
 /* Inside a sphere that emits e and reflects a: e (1 + a + ... + a^depth). The value is the same
  * everywhere, so its rounding is too; 32 scales leave up to 2^-11 / sqrt(3 x 32) = 5e-5 (1 sigma).
  * Negative control: one bounce less or more. */
-static void test_furnace(void **state)
+TEST(test_furnace)
 {
-    (void)state;
     if (!have_povray())
         skip();
     for (int depth = 0; depth <= 5; depth += 5) {
@@ -415,9 +397,8 @@ static void test_furnace(void **state)
  * image means of 4 replicates; t-test with 5 degrees of freedom (ours, known far better, only adds
  * variance), alpha = 1e-3 two-sided for each channel. Power: the standard error is 0.3 %
  * at most; two bounces instead of five are 5 to 8 % darker and are the negative control. */
-static void test_indirect_light(void **state)
+TEST(test_indirect_light)
 {
-    (void)state;
     if (!have_povray())
         skip();
     enum { CALLS = 6 };
@@ -457,9 +438,8 @@ static void test_indirect_light(void **state)
 }
 
 /* One seed, the same bits, whatever the number of threads; another seed, other bits. */
-static void test_reproducible(void **state)
+TEST(test_reproducible)
 {
-    (void)state;
     if (!have_povray())
         skip();
     struct moments m[3];
@@ -479,21 +459,4 @@ static void test_reproducible(void **state)
     assert_memory_not_equal(m[0].mean, m[2].mean, bytes);
     for (int i = 0; i < 3; i++)
         moments_free(&m[i]);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_replicate_pair),
-        cmocka_unit_test(test_windows),
-        cmocka_unit_test(test_rotations_are_uniform),
-        cmocka_unit_test(test_engine_failures),
-        cmocka_unit_test(test_slow_start_is_tried_again),
-        cmocka_unit_test(test_implausible_pictures),
-        cmocka_unit_test(test_direct_light),
-        cmocka_unit_test(test_furnace),
-        cmocka_unit_test(test_indirect_light),
-        cmocka_unit_test(test_reproducible),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

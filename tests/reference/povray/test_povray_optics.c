@@ -7,14 +7,10 @@
 #include "reference/truth/truth.h"
 #include "reference/truth/truth_one_lamp.h"
 #include "renderer/scene/environment.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 enum { SIZE = 16 };
 
@@ -87,9 +83,8 @@ static void under_spot(double u, double v, const void *with, double out[3])
  * differ by 30 %, of which the midpoint rules on both sides are wrong by 1e-4 or so. Negative control:
  * an exponent of 1 % more. The cutoff: pixels that the cone's edge crosses are left out, outside it is
  * black. */
-static void test_spot_light(void **state)
+TEST(test_spot_light)
 {
-    (void)state;
     if (!have_povray())
         skip();
     for (int cut = 0; cut < 2; cut++) {
@@ -127,9 +122,8 @@ static void under_ball(double u, double v, const void *with, double out[3])
 }
 
 /* 256 points in each of 32 windows. Negative control: a radius of 1 % more. */
-static void test_ball_lamp(void **state)
+TEST(test_ball_lamp)
 {
-    (void)state;
     if (!have_povray())
         skip();
     struct scene s = build_scene();
@@ -173,9 +167,8 @@ static void constant(double u, double v, const void *with, double out[3])
 
 /* Inside a box of mirrors of factor r that emit e: e (1 + r + ... + r^depth), as in a furnace. The
  * bound is that of test_povray.c's furnace; negative control: one bounce more. */
-static void test_mirror_box(void **state)
+TEST(test_mirror_box)
 {
-    (void)state;
     if (!have_povray())
         skip();
     const rgb r = {.9f, .75f, .5f}, e = {.5f, 1, 2};
@@ -224,9 +217,8 @@ static void slab_radiance(double u, double v, const void *with, double out[3])
 }
 
 /* Negative control: one bounce more, which is 2 % at least of L up to depth 3. */
-static void test_glass_slab(void **state)
+TEST(test_glass_slab)
 {
-    (void)state;
     if (!have_povray())
         skip();
     for (int depth = 1; depth <= 3; depth++) {
@@ -301,9 +293,8 @@ static struct environment *sky(void)
 }
 
 /* All around the horizon. Negative control: the sky turned by half a degree. */
-static void test_sky(void **state)
+TEST(test_sky)
 {
-    (void)state;
     if (!have_povray())
         skip();
     for (int quarter = 0; quarter < 4; quarter++) {
@@ -359,9 +350,8 @@ static struct scene hall(bool with_optics)
  * of freedom, alpha = 1e-3 two-sided for each channel. Power: the standard error is 0.9 %, so that
  * 10 % are seen with 95 %; the negative control, the same without mirror and glass, is 10.8 %
  * darker. */
-static void test_optics_among_diffuse_surfaces(void **state)
+TEST(test_optics_among_diffuse_surfaces)
 {
-    (void)state;
     if (!have_povray())
         skip();
     enum { CALLS = 6 };
@@ -399,14 +389,4 @@ static void test_optics_among_diffuse_surfaces(void **state)
     }
     fixture_free(&f);
     fixture_free(&bare);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_spot_light), cmocka_unit_test(test_ball_lamp),
-        cmocka_unit_test(test_mirror_box), cmocka_unit_test(test_glass_slab),
-        cmocka_unit_test(test_sky),        cmocka_unit_test(test_optics_among_diffuse_surfaces),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,14 +2,8 @@
  * replicates are drawn here; the laws are those of simulate.h. */
 #include "reference/replicates/independence.h"
 #include "tests/support/simulate.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 
 enum { SIDE = 32, PIXELS = SIDE * SIDE };
@@ -48,9 +42,8 @@ static struct independence test(const struct replicates *r, double alpha)
  * has at most the law Binomial(1000, 1 %): more than 29 have the probability 1.8e-7. Under H0 each z
  * is standard normal: beyond 1.96 in 5 %, between 15 and 96 of 1000 but for 1e-9 (neighbours, batches).
  * That a test is not merely silent is what the lower bound and the next tests are for. */
-static void independent_replicates_pass(void **state)
+TEST(independent_replicates_pass)
 {
-    (void)state;
     static const struct {
         enum law law;
         int count;
@@ -86,9 +79,8 @@ static void independent_replicates_pass(void **state)
     }
 }
 
-static void fewer_than_it_takes_is_said(void **state)
+TEST(fewer_than_it_takes_is_said)
 {
-    (void)state;
     uint64_t seed = 5;
     struct replicates r = draw_all(LAW_NORMAL, 3, false, &seed);
     struct independence t = test(&r, 1e-6);
@@ -118,9 +110,8 @@ static void assert_refused(const struct replicates *r, const char *why)
     json_decref(manifest);
 }
 
-static void a_copy_is_found(void **state)
+TEST(a_copy_is_found)
 {
-    (void)state;
     uint64_t seed = 1;
     struct replicates r = draw_all(LAW_EXPONENTIAL, 16, false, &seed);
     memcpy(r.luminance + 11 * PIXELS, r.luminance + 4 * PIXELS, PIXELS * sizeof *r.luminance);
@@ -142,9 +133,8 @@ static void mix(struct replicates *r, int j, int i, double weight)
 /* One standard deviation of a correlation is 1/32 here, the limit 5.9 of them, 0.18: a pair of correlation
  * 0.4 (z = 12) is found, at alpha = 1e-6, in 50 of 50 sets; chance of a miss below 1e-9 each. Likewise
  * neighbours of correlation 0.1 (15 pairs: one standard deviation is 0.008, z = 12). */
-static void correlated_replicates_are_found(void **state)
+TEST(correlated_replicates_are_found)
 {
-    (void)state;
     uint64_t seed = 77;
     for (int n = 0; n < 50; n++) {
         struct replicates r = draw_all(LAW_NORMAL, 16, false, &seed);
@@ -161,9 +151,8 @@ static void correlated_replicates_are_found(void **state)
 
 /* Four groups of four that share 8 % of their variance, as replicates of one machine might: no pair
  * (correlation 0.08, z = 2.6) is conspicuous; the means of groups vary 1 + 3 x 0.08 times too much. */
-static void groups_are_found(void **state)
+TEST(groups_are_found)
 {
-    (void)state;
     uint64_t seed = 99;
     for (int n = 0; n < 50; n++) {
         struct replicates r = draw_all(LAW_NORMAL, 20, false, &seed);
@@ -182,9 +171,8 @@ static void groups_are_found(void **state)
  * two are correlated: 1/6 on average. One standard error at 32 replicates: 1/sqrt(1536 x 31) = 0.005. A row of n has
  * the variance 2n - 1 of n: in a square of 4, 7/4 = 1.75 times too much, refused (one standard error of that
  * is 15/sqrt(64 x 120 x 31) = 0.03, the limit 5 of them above 1.5). */
-static void correlated_pixels_are_measured(void **state)
+TEST(correlated_pixels_are_measured)
 {
-    (void)state;
     uint64_t seed = 3;
     struct replicates r = draw_all(LAW_NORMAL, 32, true, &seed);
     struct independence t = test(&r, 1e-6);
@@ -213,9 +201,8 @@ static void share(struct replicates *r, double variance, uint64_t *state)
 /* One number added to all pixels of a replicate, with 2 % of the variance of each: no pair of pixels is
  * conspicuous, but sums over 16 x 16 vary 1 + 255 x 0.02 = 6 times too much (48
  * replicates, 4 squares of 256 pixels: one standard error of r is 1/sqrt(4 x 32640 x 47) = 0.0004). Control: with 0.05 % the ratio is 1.13, allowed. */
-static void pixels_that_share_noise_are_refused(void **state)
+TEST(pixels_that_share_noise_are_refused)
 {
-    (void)state;
     uint64_t seed = 11;
     for (int n = 0; n < 20; n++) {
         struct replicates r = draw_all(LAW_NORMAL, 48, false, &seed);
@@ -228,18 +215,4 @@ static void pixels_that_share_noise_are_refused(void **state)
         assert_refused(&r, "pixels share their noise: sums over 16 x 16 pixels");
         replicates_free(&r);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(independent_replicates_pass),
-        cmocka_unit_test(fewer_than_it_takes_is_said),
-        cmocka_unit_test(a_copy_is_found),
-        cmocka_unit_test(correlated_replicates_are_found),
-        cmocka_unit_test(groups_are_found),
-        cmocka_unit_test(correlated_pixels_are_measured),
-        cmocka_unit_test(pixels_that_share_noise_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

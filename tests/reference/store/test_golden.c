@@ -4,17 +4,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 #include "reference/base/json_file.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { WIDTH = 4, HEIGHT = 2, REPLICATES = 3, SPP = 16 };
 
@@ -69,8 +59,7 @@ static int teardown(void **state)
 static void write_golden(struct fixture *f)
 {
     struct err e;
-    if (!golden_write(f->dir, "12_plane", "cycles", &f->m, f->manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(golden_write(f->dir, "12_plane", "cycles", &f->m, f->manifest, &e));
 }
 
 static void assert_refused(struct fixture *f, const char *why)
@@ -85,15 +74,14 @@ static void assert_refused(struct fixture *f, const char *why)
     assert_null(strchr(e.msg, '\n'));
 }
 
-static void what_was_written_comes_back(void **state)
+TEST_WITH(what_was_written_comes_back, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest;
     write_golden(f);
-    if (!golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e));
     assert_int_equal(m.width, WIDTH);
     assert_int_equal(m.height, HEIGHT);
     assert_string_equal(m.unit, "replicate");
@@ -113,7 +101,7 @@ static void what_was_written_comes_back(void **state)
 }
 
 /* No clock gets into the image: dates are the manifest's. */
-static void the_same_moments_have_the_same_bytes(void **state)
+TEST_WITH(the_same_moments_have_the_same_bytes, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -126,7 +114,7 @@ static void the_same_moments_have_the_same_bytes(void **state)
     assert_string_equal(first, second);
 }
 
-static void engines_share_a_manifest(void **state)
+TEST_WITH(engines_share_a_manifest, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -147,7 +135,7 @@ static void engines_share_a_manifest(void **state)
     json_decref(all);
 }
 
-static void a_missing_golden_is_named(void **state)
+TEST_WITH(a_missing_golden_is_named, setup, teardown)
 {
     struct fixture *f = *state;
     assert_refused(f, "cycles.exr: no golden of cycles");
@@ -156,7 +144,7 @@ static void a_missing_golden_is_named(void **state)
     assert_refused(f, "povray.exr: no golden of povray");
 }
 
-static void a_golden_of_another_scene_or_setting_is_refused(void **state)
+TEST_WITH(a_golden_of_another_scene_or_setting_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
     write_golden(f);
@@ -182,7 +170,7 @@ static void a_golden_of_another_scene_or_setting_is_refused(void **state)
 }
 
 /* A new image whose manifest was never written: the state after a crash in golden_write(). */
-static void an_image_without_its_manifest_is_refused(void **state)
+TEST_WITH(an_image_without_its_manifest_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -199,8 +187,7 @@ static void assert_first_value(struct fixture *f, double want)
     struct err e = {""};
     struct moments m;
     json_t *manifest;
-    if (!golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e));
     assert_float_equal(m.mean[0], want, 1e-6);
     moments_free(&m);
     json_decref(manifest);
@@ -208,7 +195,7 @@ static void assert_first_value(struct fixture *f, double want)
 
 /* Every state that a kill in golden_write() can leave: the new image waits, the manifest is the old one; the manifest
  * is the new one, the image waits still. Then another update. Mean of pixel 0: 5/3, by hand above. */
-static void a_killed_update_leaves_the_old_pair_or_the_new(void **state)
+TEST_WITH(a_killed_update_leaves_the_old_pair_or_the_new, setup, teardown)
 {
     struct fixture *f = *state;
     char next[160], old[160];
@@ -258,7 +245,7 @@ static void replace_manifest(struct fixture *f, const char *text)
     fclose(out);
 }
 
-static void a_broken_manifest_is_an_error_and_is_not_overwritten(void **state)
+TEST_WITH(a_broken_manifest_is_an_error_and_is_not_overwritten, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -276,7 +263,7 @@ static void a_broken_manifest_is_an_error_and_is_not_overwritten(void **state)
 }
 
 /* Both hashes fit, but the image holds other observations than its manifest says. */
-static void an_image_that_contradicts_its_manifest_is_refused(void **state)
+TEST_WITH(an_image_that_contradicts_its_manifest_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
     f->m.n[3] = 2;
@@ -288,7 +275,7 @@ static void an_image_that_contradicts_its_manifest_is_refused(void **state)
     assert_refused(f, "its unit is not that of its manifest");
 }
 
-static void a_closed_form_with_other_numbers_is_refused(void **state)
+TEST_WITH(a_closed_form_with_other_numbers_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -306,8 +293,7 @@ static void a_closed_form_with_other_numbers_is_refused(void **state)
     json_object_set_new(f->manifest, "kind", json_string("constant"));
     json_object_set(f->manifest, "values", one);
     assert_true(golden_write(f->dir, "12_plane", "truth", &f->m, f->manifest, &e));
-    if (!golden_read(f->dir, &f->scene, &f->ref, &m, &back, &e))
-        fail_msg("%s", e.msg);
+    MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &back, &e));
     moments_free(&m);
     json_decref(back);
     f->ref.values = two;
@@ -326,9 +312,8 @@ static int compare_seeds(const void *a, const void *b)
 }
 
 /* 31 bits, never 0, and no two replicates of one run alike. */
-static void seeds_are_distinct_and_in_range(void **state)
+TEST(seeds_are_distinct_and_in_range)
 {
-    (void)state;
     enum { COUNT = 100000 };
     static const uint32_t seeds[] = {0, 1, 2, 0x7fffffff, 0xffffffff, 12345};
     uint32_t *x = malloc(COUNT * sizeof *x);
@@ -374,15 +359,14 @@ static uint32_t next_sum(int i)
     return (uint32_t)i + 1;
 }
 
-static void neighbouring_seeds_have_nothing_in_common(void **state)
+TEST(neighbouring_seeds_have_nothing_in_common)
 {
-    (void)state;
     assert_true(worst_bit(next_replicate, 20000) < 5.5);
     assert_true(worst_bit(next_run, 20000) < 5.5);
     assert_true(worst_bit(next_sum, 20000) > 5.5);
 }
 
-static void a_reference_that_cannot_be_made_says_which(void **state)
+TEST_WITH(a_reference_that_cannot_be_made_says_which, setup, teardown)
 {
     struct fixture *f = *state;
     struct err e;
@@ -401,25 +385,4 @@ static void a_reference_that_cannot_be_made_says_which(void **state)
     opt.work_dir = "/assay/none";
     assert_false(reference_render(&f->scene, &f->ref, &opt, &m, &manifest, &e));
     assert_non_null(strstr(e.msg, "/assay/none: cannot make a directory in it: "));
-}
-
-int main(void)
-{
-#define WITH_FILES(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
-    const struct CMUnitTest tests[] = {
-        WITH_FILES(what_was_written_comes_back),
-        WITH_FILES(the_same_moments_have_the_same_bytes),
-        WITH_FILES(engines_share_a_manifest),
-        WITH_FILES(a_missing_golden_is_named),
-        WITH_FILES(a_golden_of_another_scene_or_setting_is_refused),
-        WITH_FILES(a_killed_update_leaves_the_old_pair_or_the_new),
-        WITH_FILES(an_image_without_its_manifest_is_refused),
-        WITH_FILES(a_broken_manifest_is_an_error_and_is_not_overwritten),
-        WITH_FILES(an_image_that_contradicts_its_manifest_is_refused),
-        WITH_FILES(a_closed_form_with_other_numbers_is_refused),
-        cmocka_unit_test(seeds_are_distinct_and_in_range),
-        cmocka_unit_test(neighbouring_seeds_have_nothing_in_common),
-        WITH_FILES(a_reference_that_cannot_be_made_says_which),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,19 +3,7 @@
 #include "renderer/scene/environment.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
-#define COUNT(a) (sizeof(a) / sizeof *(a))
+#include "tests/support/test.h"
 
 static const char shipped[] = "reference/scenes";
 
@@ -40,22 +28,19 @@ static void make_dir(char dir[64])
 static void drop_dir(const char *dir)
 {
     struct err e;
-    if (!fs_remove_tree(dir, &e))
-        fail_msg("%s", e.msg);
+    MUST(fs_remove_tree(dir, &e));
 }
 
 static void load_shipped(struct suite *s)
 {
     struct err e;
-    if (!suite_load(shipped, s, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load(shipped, s, &e));
 }
 
 /* What the families promise: closed forms in 1x, each engine a reference or a reason why not, a page
  * for each scene. */
-static void shipped_suite_loads(void **state)
+TEST(shipped_suite_loads)
 {
-    (void)state;
     struct suite s;
     load_shipped(&s);
     int closed_forms = 0, must_differ = 0;
@@ -85,9 +70,8 @@ static void shipped_suite_loads(void **state)
     suite_free(&s);
 }
 
-static void fields_are_those_of_the_file(void **state)
+TEST(fields_are_those_of_the_file)
 {
-    (void)state;
     struct suite s;
     load_shipped(&s);
     const struct suite_scene *c = suite_find(&s, "41_cornell");
@@ -188,9 +172,8 @@ static void no_line_differs(const char *line_a, const char *line_b)
 }
 
 /* A 9x scene must be the named scene but for the stated change, or its verdict says nothing. */
-static void scenes_that_differ_differ_as_stated(void **state)
+TEST(scenes_that_differ_differ_as_stated)
 {
-    (void)state;
     assert_int_equal(
         differing_lines("41_cornell", "91_albedo_2_percent", albedos_are_2_percent_apart), 4);
     assert_int_equal(differing_lines("41_cornell", "92_half_pixel", turn_is_half_a_pixel), 1);
@@ -217,9 +200,8 @@ static void scenes_that_differ_differ_as_stated(void **state)
 }
 
 /* Test vectors of FIPS 180-2, appendix B.1 and B.3, and of the empty message. */
-static void sha256_matches_the_standard(void **state)
+TEST(sha256_matches_the_standard)
 {
-    (void)state;
     char dir[64], path[128], hex[65];
     struct err e;
     make_dir(dir);
@@ -248,9 +230,8 @@ static void sha256_matches_the_standard(void **state)
     drop_dir(dir);
 }
 
-static void verdicts_have_names(void **state)
+TEST(verdicts_have_names)
 {
-    (void)state;
     static const char *const names[] = {"EQUIVALENT", "DIFFERENT", "INCONCLUSIVE"};
     for (size_t i = 0; i < COUNT(names); i++) {
         enum verdict v;
@@ -392,9 +373,8 @@ static char *edited(const char *text, const char *from, const char *to)
     return out;
 }
 
-static void faults_are_named(void **state)
+TEST(faults_are_named)
 {
-    (void)state;
     char dir[64];
     make_dir(dir);
     struct suite s;
@@ -405,8 +385,7 @@ static void faults_are_named(void **state)
     put(dir, "93_good.json", good_9x);
     put(dir, "README.md", "ignored");
     put(dir, ".hidden.json", "ignored");
-    if (!suite_load(dir, &s, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load(dir, &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[1].num_references, 3);
     suite_free(&s);
@@ -448,9 +427,8 @@ static const struct listing {
 };
 
 /* A copy of 12_point_plane with a lens and an environment of radiance 1 2 3. */
-static void environment_and_lens_are_opened(void **state)
+TEST(environment_and_lens_are_opened)
 {
-    (void)state;
     char dir[64], path[128], plain[65];
     struct err e;
     make_dir(dir);
@@ -497,9 +475,8 @@ static void environment_and_lens_are_opened(void **state)
     drop_dir(dir);
 }
 
-static void wrong_directories_are_named(void **state)
+TEST(wrong_directories_are_named)
 {
-    (void)state;
     struct suite s;
     struct err e;
     assert_false(suite_load("tests/no such directory", &s, &e));
@@ -514,19 +491,4 @@ static void wrong_directories_are_named(void **state)
         if (ok || strstr(e.msg, listings[i].message) == NULL)
             fail_msg("row %zu: %s", i, ok ? "accepted" : e.msg);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shipped_suite_loads),
-        cmocka_unit_test(fields_are_those_of_the_file),
-        cmocka_unit_test(scenes_that_differ_differ_as_stated),
-        cmocka_unit_test(sha256_matches_the_standard),
-        cmocka_unit_test(verdicts_have_names),
-        cmocka_unit_test(faults_are_named),
-        cmocka_unit_test(environment_and_lens_are_opened),
-        cmocka_unit_test(wrong_directories_are_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

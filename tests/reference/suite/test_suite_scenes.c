@@ -7,16 +7,8 @@
 #include "tests/support/render_check.h"
 #include "tests/support/suite_files.h"
 #include "reference/base/image_oiio.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #define Z_LIMIT 4.89
 
@@ -38,12 +30,10 @@ static struct scene open_shipped(const char *name)
     struct scene s;
     struct camera c;
     struct err e = {""};
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     const struct suite_scene *scene = suite_find(&suite, name);
     assert_non_null(scene);
-    if (!suite_open(scene, &s, &c, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_open(scene, &s, &c, &e));
     suite_free(&suite);
     return s;
 }
@@ -58,24 +48,6 @@ static void view_ray(const struct view *v, double x, double y, int size, double 
     double sx = (2 * x / size - 1) * v->tan_half, sy = (1 - 2 * y / size) * v->tan_half;
     for (int k = 0; k < 3; k++)
         d[k] = v->forward[k] + sx * v->right[k] + sy * v->up[k];
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross3(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-}
-
-static void unit3(double v[3])
-{
-    double length = sqrt(dot3(v, v));
-    for (int k = 0; k < 3; k++)
-        v[k] /= length;
 }
 
 /* Distance along d to the triangle and the weights of its corners, by Cramer's rule; 0 if missed. */
@@ -221,9 +193,8 @@ static void mesh_lamp_picture(int size, int n, int skip, double *out)
 /* The rule's error is that of the edges between walls, which a pixel's rows of points meet to a
  * sixteenth of its side: far below the noise of a square. Control: without the largest of the eight
  * triangles, a quarter of the surface. */
-static void mesh_lamp_direct_light_is_the_closed_form(void **state)
+TEST(mesh_lamp_direct_light_is_the_closed_form)
 {
-    (void)state;
     enum { SIZE = 32, TILE = 8 };
     static double expected[2][3 * SIZE * SIZE];
     mesh_lamp_picture(SIZE, 8, -1, expected[0]);
@@ -309,9 +280,8 @@ static void smooth_picture(const struct scene *s, int size, int n, int step, boo
 /* The only noise is where in a pixel the rays go, so the rule's error counts: between 144 and 377
  * points a square's mean must not differ by more than half the slack, which is 1e-3 of the radiance.
  * Control: geometric normals. */
-static void smooth_normals_in_sunlight_are_the_closed_form(void **state)
+TEST(smooth_normals_in_sunlight_are_the_closed_form)
 {
-    (void)state;
     enum { SIZE = 16, TILE = 8 };
     const double slack = 5e-4;
     static double coarse[3 * SIZE * SIZE], fine[3 * SIZE * SIZE], flat[3 * SIZE * SIZE];
@@ -397,9 +367,8 @@ static double worst_difference(const struct moments *a, const struct moments *b,
  * no path gets around the wall. The mirror's reflections count as bounces; at depth 30 at least 15
  * others are left, and with albedos of at most 0.9 (the ball) and 0.7 what is missing then is below
  * 1e-4 of the noise. Control: a wall that reflects 0.95. */
-static void mirror_wall_is_a_second_room(void **state)
+TEST(mirror_wall_is_a_second_room)
 {
-    (void)state;
     enum { SIZE = 32, TILE = 8, SPP = 1024, DEPTH = 30 };
     struct scene s = open_shipped("21_mirror");
     set_wall(&s, 1);
@@ -449,9 +418,8 @@ static void only_lamp(struct scene *s, uint32_t k)
 /* 45_many_lights: with all lamps one is chosen by power at each vertex, alone a lamp is always sampled.
  * What is seen of the lamps themselves is left out. Control: without one of the weakest lamps, which
  * are 48 in all. */
-static void many_lamps_are_the_sum_of_single_ones(void **state)
+TEST(many_lamps_are_the_sum_of_single_ones)
 {
-    (void)state;
     enum { SIZE = 16, SPP = 8192, EACH = 256 };
     struct scene all = open_shipped("45_many_lights");
     assert_int_equal(all.num_lights, 48);
@@ -495,35 +463,17 @@ static void many_lamps_are_the_sum_of_single_ones(void **state)
     scene_free(&all);
 }
 
-static char *whole_file(const char *path, size_t *size)
-{
-    FILE *f = fopen(path, "rb");
-    assert_non_null(f);
-    assert_int_equal(fseek(f, 0, SEEK_END), 0);
-    long end = ftell(f);
-    assert_true(end > 0);
-    rewind(f);
-    *size = (size_t)end;
-    char *text = malloc(*size);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, *size, f), *size);
-    fclose(f);
-    return text;
-}
-
 /* The mesh is what its formula says, and large enough. */
-static void mesh_is_the_generated_one(void **state)
+TEST(mesh_is_the_generated_one)
 {
-    (void)state;
-    size_t size, shipped_size;
+    size_t size;
     char *text;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
     suite_write_mesh(f);
     assert_int_equal(fclose(f), 0);
-    char *shipped = whole_file("reference/scenes/44_mesh.dae", &shipped_size);
-    assert_int_equal(size, shipped_size);
-    assert_memory_equal(text, shipped, size);
+    char *shipped = test_read("reference/scenes/44_mesh.dae");
+    assert_string_equal(text, shipped);
     free(shipped);
     free(text);
     struct scene s = open_shipped("44_mesh");
@@ -534,9 +484,8 @@ static void mesh_is_the_generated_one(void **state)
 
 /* The knot's normal, by its definition at right angles to two chords of the skin, points away from the
  * tube's middle: the mean of points around it. */
-static void knot_normals_point_outside(void **state)
+TEST(knot_normals_point_outside)
 {
-    (void)state;
     for (int i = 0; i < 40; i++) {
         double middle[3] = {0}, p[3], n[3];
         for (int k = 0; k < 36; k++) {
@@ -564,8 +513,7 @@ static struct image read_sky(const char *path)
     struct image im;
     struct err e = {""};
     bool half;
-    if (!image_read(path, &im, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read(path, &im, &half, &e));
     assert_int_equal(im.width, SKY_WIDTH);
     assert_int_equal(im.height, SKY_HEIGHT);
     assert_int_equal(im.channels, 3);
@@ -576,9 +524,8 @@ static struct image read_sky(const char *path)
 /* Both skies are the generated ones; the second is the first moved by SKY_TURN columns; the poles are
  * the same all around and the same above and below, so that it does not matter what an engine does
  * beyond the outermost rows; no texel is bright enough to be one that sampling misses. */
-static void skies_are_the_generated_ones(void **state)
+TEST(skies_are_the_generated_ones)
 {
-    (void)state;
     struct image sky = read_sky("reference/scenes/46_sky.exr");
     struct image turned = read_sky("reference/scenes/96_sky_turned.exr");
     struct image made;
@@ -603,18 +550,4 @@ static void skies_are_the_generated_ones(void **state)
     image_free(&made);
     image_free(&turned);
     image_free(&sky);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mesh_lamp_direct_light_is_the_closed_form),
-        cmocka_unit_test(smooth_normals_in_sunlight_are_the_closed_form),
-        cmocka_unit_test(mirror_wall_is_a_second_room),
-        cmocka_unit_test(many_lamps_are_the_sum_of_single_ones),
-        cmocka_unit_test(mesh_is_the_generated_one),
-        cmocka_unit_test(knot_normals_point_outside),
-        cmocka_unit_test(skies_are_the_generated_ones),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,24 +4,15 @@
 #include "reference/truth/truth.h"
 #include "reference/truth/truth_one_lamp.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 /* The sum's closed form E (1 - rho^(m+1)) / (1 - rho), and its limits rho = 0, rho = 1. */
-static void furnace_is_the_geometric_series(void **state)
+TEST(furnace_is_the_geometric_series)
 {
-    (void)state;
     static const double albedo[] = {0.1, 0.2, 0.5, 0.8, 0.99};
     for (size_t i = 0; i < COUNT(albedo); i++)
         for (int m = 0; m <= 20; m++) {
@@ -59,9 +50,8 @@ static double point_by_vectors(const double l[3], double px, double pz, enum mis
                                                                                    : r * r);
 }
 
-static void point_light_matches_vector_arithmetic(void **state)
+TEST(point_light_matches_vector_arithmetic)
 {
-    (void)state;
     const double light[3] = {0.85, 0.5, -0.375};
     for (size_t i = 0; i < COUNT(plane_points); i++) {
         double x = plane_points[i][0], z = plane_points[i][1];
@@ -81,9 +71,8 @@ static double ring(double r, void *light)
 }
 
 /* An infinite plane catches half of the 4 pi W of an isotropic light of 1 W/sr, at any height. */
-static void plane_catches_half_the_flux(void **state)
+TEST(plane_catches_half_the_flux)
 {
-    (void)state;
     static const double height[] = {0.1, 0.5, 3};
     gsl_integration_workspace *w = gsl_integration_workspace_alloc(1000);
     for (size_t i = 0; i < COUNT(height); i++) {
@@ -151,9 +140,8 @@ static const struct rectangle rectangles[] = {
     {3, {-0.01, 0.01}, {-2, 5}},
 };
 
-static void rectangle_matches_quadrature_and_edges(void **state)
+TEST(rectangle_matches_quadrature_and_edges)
 {
-    (void)state;
     static const enum mistake mistakes[] = {NO_RECEIVER_COSINE, NO_EMITTER_COSINE, NO_FALLOFF,
                                             ONE_OVER_R};
     for (size_t i = 0; i < COUNT(rectangles); i++)
@@ -174,9 +162,8 @@ static void rectangle_matches_quadrature_and_edges(void **state)
 
 /* On the axis of a rectangle 2a x 2b at height h: 2 [a/u atan(b/u) + b/w atan(a/w)],
  * u^2 = h^2 + a^2, w^2 = h^2 + b^2. Of 15_square_overhead, the number in its .md. */
-static void rectangle_on_axis(void **state)
+TEST(rectangle_on_axis)
 {
-    (void)state;
     double u = sqrt(0.25 + 0.64), w = sqrt(0.25 + 0.36);
     double axis = 2 * (0.8 / u * atan(0.6 / u) + 0.6 / w * atan(0.8 / w));
     const struct rectangle *r = &rectangles[1];
@@ -187,18 +174,16 @@ static void rectangle_on_axis(void **state)
 
 /* An infinite lid of radiance 1 gives the irradiance pi. With half-width a the error is that of the
  * far rim, 4 sides of order (h/a)^2. */
-static void wide_rectangle_gives_pi(void **state)
+TEST(wide_rectangle_gives_pi)
 {
-    (void)state;
     const double wide[2] = {-1e6, 1e6};
     assert_true(same(truth_rectangle_irradiance(1, wide, wide, 0.3, -0.2), M_PI));
     const double narrow[2] = {-1e3, 1e3};
     assert_false(same(truth_rectangle_irradiance(1, narrow, narrow, 0.3, -0.2), M_PI));
 }
 
-static void pictures_are_exact_moments(void **state)
+TEST(pictures_are_exact_moments)
 {
-    (void)state;
     static const char *const names[] = {"11_furnace", "12_point_plane", "13_square_patch"};
     for (size_t s = 0; s < COUNT(names); s++) {
         struct moments m;
@@ -218,9 +203,8 @@ static void pictures_are_exact_moments(void **state)
 
 /* 11_furnace: E = (.5, 1, 2), rho = (.8, .5, .2), five bounces, each written as a fraction:
  * .5 (1-.8^6)/.2 = 1.84464, (1-.5^6)/.5 = 1.96875, 2 (1-.2^6)/.8 = 2.49984. */
-static void furnace_picture_is_flat(void **state)
+TEST(furnace_picture_is_flat)
 {
-    (void)state;
     static const double expected[3] = {1.84464, 1.96875, 2.49984};
     struct moments m;
     render_truth("11_furnace", 64, 64, &m);
@@ -280,9 +264,8 @@ static const struct plane_scene {
      true},
 };
 
-static void pixels_are_box_filtered(void **state)
+TEST(pixels_are_box_filtered)
 {
-    (void)state;
     static const int pixels[][2] = {{0, 0},   {63, 0},  {0, 63}, {63, 63},
                                     {51, 24}, {52, 21}, {17, 40}};
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
@@ -309,9 +292,8 @@ static void pixels_are_box_filtered(void **state)
 
 /* A picture of twice the resolution, averaged 2 x 2, is the same picture: the quadrature over a
  * pixel has converged, and pixels tile the footprint. */
-static void pixels_do_not_depend_on_resolution(void **state)
+TEST(pixels_do_not_depend_on_resolution)
 {
-    (void)state;
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
         struct moments coarse, fine;
         render_truth(plane_scenes[s].name, 64, 64, &coarse);
@@ -333,9 +315,8 @@ static void pixels_do_not_depend_on_resolution(void **state)
 
 /* Where the bright spot lies (the pixel, or its neighbour if the spot is on their border), and that
  * each flip, turn or transposition of the picture would put it elsewhere. */
-static void pictures_are_the_right_way_round(void **state)
+TEST(pictures_are_the_right_way_round)
 {
-    (void)state;
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
         struct moments m;
         render_truth(plane_scenes[s].name, 64, 64, &m);
@@ -402,28 +383,8 @@ static const struct bad {
      "not converged"},
 };
 
-static void impossible_values_are_refused(void **state)
+TEST(impossible_values_are_refused)
 {
-    (void)state;
     for (size_t i = 0; i < COUNT(bad); i++)
         expect_refusal(bad[i].kind, bad[i].values, bad[i].depth, bad[i].message);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(furnace_is_the_geometric_series),
-        cmocka_unit_test(point_light_matches_vector_arithmetic),
-        cmocka_unit_test(plane_catches_half_the_flux),
-        cmocka_unit_test(rectangle_matches_quadrature_and_edges),
-        cmocka_unit_test(rectangle_on_axis),
-        cmocka_unit_test(wide_rectangle_gives_pi),
-        cmocka_unit_test(pictures_are_exact_moments),
-        cmocka_unit_test(furnace_picture_is_flat),
-        cmocka_unit_test(pixels_are_box_filtered),
-        cmocka_unit_test(pixels_do_not_depend_on_resolution),
-        cmocka_unit_test(pictures_are_the_right_way_round),
-        cmocka_unit_test(impossible_values_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

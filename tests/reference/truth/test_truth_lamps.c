@@ -4,36 +4,11 @@
 #include "reference/truth/truth_spot.h"
 #include "reference/truth/truth_sun.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-
-#include <cmocka.h>
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross3(const double a[3], const double b[3], double c[3])
-{
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void unit(double v[3])
-{
-    double length = sqrt(dot3(v, v));
-    for (int i = 0; i < 3; i++)
-        v[i] /= length;
-}
 
 /* The direction at the angle whose cosine is `cosine` from the unit vector w, turned by phi. */
 static void around(const double w[3], double cosine, double phi, double out[3])
@@ -41,7 +16,7 @@ static void around(const double w[3], double cosine, double phi, double out[3])
     double u[3] = {0}, v[3], s = sqrt(fmax(0, 1 - cosine * cosine));
     u[fabs(w[0]) < 0.6 ? 0 : 1] = 1;
     cross3(w, u, v);
-    unit(v);
+    unit3(v);
     cross3(v, w, u);
     for (int i = 0; i < 3; i++)
         out[i] = cosine * w[i] + s * (cos(phi) * u[i] + sin(phi) * v[i]);
@@ -97,9 +72,8 @@ static double wall_transfer(double cosine, double phi, const void *ctx)
 
 /* What a wall point reflects of the radiance 1 that fills the room, for each unit of albedo, by
  * quadrature over the wall; applied again for every bounce. */
-static void furnace_matches_quadrature(void **state)
+TEST(furnace_matches_quadrature)
 {
-    (void)state;
     double gather = 4 * over_cap(wall_transfer, NULL, -1);
     static const double albedo[] = {0.3, 0.6, 0.9, 0.95, 0.8};
     for (size_t i = 0; i < COUNT(albedo); i++)
@@ -114,9 +88,8 @@ static void furnace_matches_quadrature(void **state)
 }
 
 /* 10: 1.2 (1 + .3), .8 (1 + .6), .4 (1 + .9). 14: the series' closed form, 20 bounces. */
-static void furnace_pictures_are_flat(void **state)
+TEST(furnace_pictures_are_flat)
 {
-    (void)state;
     const struct {
         const char *name;
         double expected[3];
@@ -148,7 +121,7 @@ static double ball_axis(const struct ball *b, double w[3])
     w[1] = -b->centre[1];
     w[2] = b->z - b->centre[2];
     double d = sqrt(dot3(w, w));
-    unit(w);
+    unit3(w);
     return d;
 }
 
@@ -200,9 +173,8 @@ static const struct ball balls[] = {
 };
 static const double places[][2] = {{0, 0}, {0.75, -0.35}, {0.8, -0.5}, {0, 0.3}, {-6, 4}};
 
-static void sphere_matches_quadrature(void **state)
+TEST(sphere_matches_quadrature)
 {
-    (void)state;
     static const enum mistake by_area[] = {NO_RECEIVER_COSINE, NO_EMITTER_COSINE, ONE_OVER_R,
                                            WHOLE_SPHERE};
     for (size_t i = 0; i < COUNT(balls); i++)
@@ -224,9 +196,8 @@ static void sphere_matches_quadrature(void **state)
 
 /* A disc of the sphere's radius that faces the receiver fills less than its cone: the form that
  * takes one for the other must be rejected. */
-static void sphere_is_not_a_disc(void **state)
+TEST(sphere_is_not_a_disc)
 {
-    (void)state;
     const struct ball *b = &balls[0];
     double form = truth_sphere_irradiance(b->centre, b->radius, 0.75, -0.35);
     double disc = M_PI * 0.25 / (0.36 + 0.25);
@@ -256,9 +227,8 @@ static double spot_by_angles(const struct truth_spot *s, double x, double z, dou
            (mistake == ONE_OVER_R ? r : r * r);
 }
 
-static void spot_matches_angles(void **state)
+TEST(spot_matches_angles)
 {
-    (void)state;
     const struct truth_spot *s = &spots[0];
     int dark = 0;
     for (double x = -0.55; x < 1.2; x += 0.1)
@@ -284,9 +254,8 @@ static void spot_matches_angles(void **state)
 /* All that leaves the light in its cone lands on the plane: the sum over a grid that holds the
  * ellipse, cell means times area, is 2 pi (1 - c^(n+1)) / (n+1), which is the integral of cos^n over
  * the cone. The cells' edges fall anywhere. */
-static void plane_catches_the_cone(void **state)
+TEST(plane_catches_the_cone)
 {
-    (void)state;
     enum { CELLS = 31 };
     for (size_t i = 0; i < COUNT(spots); i++) {
         const struct truth_spot *s = &spots[i];
@@ -360,9 +329,8 @@ static double lit_line(double x, void *ctx)
 
 /* Pixels of 38_spot_edge that the edge crosses, lines along z in place of x and another search for
  * their ends; and pixels that are wholly lit or dark. */
-static void edge_pixels_match_quadrature(void **state)
+TEST(edge_pixels_match_quadrature)
 {
-    (void)state;
     struct truth_spot s = spots[0];
     struct moments m;
     render_truth("38_spot_edge", 64, 64, &m);
@@ -421,9 +389,8 @@ static const struct plane_scene {
     {"33_sphere_light", sphere_33, {2, 3, 4}, {0.8, 0.6, 0.5}, 0.4 - 0.4, -0.1 - 0.4, 0.8},
 };
 
-static void pixels_are_box_filtered(void **state)
+TEST(pixels_are_box_filtered)
 {
-    (void)state;
     static const int pixels[][2] = {{0, 0}, {63, 0}, {0, 63}, {63, 63}, {60, 12}, {17, 40}};
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
         const struct plane_scene *p = &plane_scenes[s];
@@ -446,9 +413,8 @@ static void pixels_are_box_filtered(void **state)
     }
 }
 
-static void pixels_do_not_depend_on_resolution(void **state)
+TEST(pixels_do_not_depend_on_resolution)
 {
-    (void)state;
     static const char *const names[] = {"17_lens_step", "31_spot_plane", "32_sun_plane",
                                         "33_sphere_light", "38_spot_edge"};
     for (size_t s = 0; s < COUNT(names); s++) {
@@ -502,8 +468,8 @@ static double sun_direction(double cosine, double phi, const void *ctx)
 static double facet_by_quadrature(const double normal[3], const double to_light[3])
 {
     struct sun s = {{to_light[0], to_light[1], to_light[2]}, {normal[0], normal[1], normal[2]}};
-    unit(s.axis);
-    unit(s.normal);
+    unit3(s.axis);
+    unit3(s.normal);
     double sine = sin(5 * M_PI / 180);
     return over_cap(sun_direction, &s, sqrt(1 - sine * sine)) / (M_PI * sine * sine);
 }
@@ -523,9 +489,8 @@ static void facet_normal(int k, double n[3])
     n[2] = -(u[0] * v[1] - v[0] * u[1]) / det;
 }
 
-static void pyramid_matches_quadrature(void **state)
+TEST(pyramid_matches_quadrature)
 {
-    (void)state;
     static const double turned[][3] = {{-6, 3, 2}, {2, 3, 6}, {6, 2, 3}, {6, 3, -2}};
     double form[4];
     truth_pyramid_cosines(&pyramid, form);
@@ -570,9 +535,8 @@ static int facet_seen(double sx, double sz)
 
 /* Each pixel is cut where the ridges' images may cross it, through its middle, into four squares
  * that show one facet each; the centres of the squares are followed into the scene. */
-static void pyramid_pixels_match_rays(void **state)
+TEST(pyramid_pixels_match_rays)
 {
-    (void)state;
     double cosine[4];
     truth_pyramid_cosines(&pyramid, cosine);
     struct moments m;
@@ -605,9 +569,8 @@ static void pyramid_pixels_match_rays(void **state)
 #define SUN    "{\"irradiance\":[1,1,1],\"albedo\":[1,1,1],\"centre\":[0.5,0.5],\"apex\":[0,0,0],"
 #define RIDGES "\"ridges\":[[1,-1,0],[0,-1,1],[-1,-1,0],[0,-1,-1]]"
 
-static void impossible_values_are_refused(void **state)
+TEST(impossible_values_are_refused)
 {
-    (void)state;
     expect_refusal("spot_over_plane", SPOT ",\"exponent\":1,\"cutoff\":45}", 1, NULL);
     expect_refusal("spot_over_plane", SPOT ",\"exponent\":1,\"cutoff\":45}", 0, "depth is 0");
     expect_refusal("spot_over_plane", SPOT ",\"exponent\":-1,\"cutoff\":45}", 1, "exponent is -1");
@@ -628,23 +591,4 @@ static void impossible_values_are_refused(void **state)
                    SUN "\"to_light\":[0,1,0],\"ridges\":[[1,-1,0],[0,1,1],[-1,-1,0],[0,1,-1]]}", 1,
                    "not convex");
     expect_refusal("sun_on_pyramid", SUN "\"to_light\":[0,1,0],\"ridges\":[[1,-1,0]]}", 1, "1");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(furnace_matches_quadrature),
-        cmocka_unit_test(furnace_pictures_are_flat),
-        cmocka_unit_test(sphere_matches_quadrature),
-        cmocka_unit_test(sphere_is_not_a_disc),
-        cmocka_unit_test(spot_matches_angles),
-        cmocka_unit_test(plane_catches_the_cone),
-        cmocka_unit_test(edge_pixels_match_quadrature),
-        cmocka_unit_test(pixels_are_box_filtered),
-        cmocka_unit_test(pixels_do_not_depend_on_resolution),
-        cmocka_unit_test(pyramid_matches_quadrature),
-        cmocka_unit_test(pyramid_pixels_match_rays),
-        cmocka_unit_test(impossible_values_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

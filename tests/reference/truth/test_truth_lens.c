@@ -2,17 +2,10 @@
  * lenses with a known mistake must be rejected. */
 #include "reference/truth/truth_lens.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-
-#include <cmocka.h>
 
 static double chord(double t, void *ctx)
 {
@@ -21,9 +14,8 @@ static double chord(double t, void *ctx)
 }
 
 /* The disc as a stack of chords of the length 2 sqrt(1 - t^2). */
-static void share_matches_chords(void **state)
+TEST(share_matches_chords)
 {
-    (void)state;
     gsl_integration_workspace *w = gsl_integration_workspace_alloc(1000);
     gsl_function g = {chord, NULL};
     for (double k = -0.99; k < 1; k += 0.06) {
@@ -49,9 +41,8 @@ static double ramp_share(double u, double v, const void *ctx)
     return truth_disc_share(r->k0 + r->a * u + r->b * v);
 }
 
-static void mean_share_matches_quadrature(void **state)
+TEST(mean_share_matches_quadrature)
 {
-    (void)state;
     static const struct ramp ramps[] = {{0, 0.1, 0.2},    {-0.7, 0.3, -0.05}, {-1.1, 0.4, 0.3},
                                         {0.9, -0.2, 0.3}, {-2, 3, 1.5},       {0.5, -4, 2}};
     for (size_t i = 0; i < COUNT(ramps); i++) {
@@ -145,9 +136,8 @@ static double lens_share(const struct pixel *p)
     return integrate_plane(over_lens, p, range, range);
 }
 
-static void pixels_match_rays(void **state)
+TEST(pixels_match_rays)
 {
-    (void)state;
     static const struct {
         int col, row, panel;
     } pixels[] = {{40, 20, 0}, {60, 45, 0}, {5, 5, 0},  {20, 17, 0},
@@ -177,9 +167,8 @@ static void pixels_match_rays(void **state)
 }
 
 /* Away from both edges the picture is one panel or the background; up is +Y and right is +X. */
-static void panels_are_where_they_belong(void **state)
+TEST(panels_are_where_they_belong)
 {
-    (void)state;
     struct moments m;
     render_truth("17_lens_step", 64, 64, &m);
     for (int c = 0; c < 3; c++) {
@@ -195,9 +184,8 @@ static void panels_are_where_they_belong(void **state)
 #define SCENE(panels)                                                                              \
     "{\"background\":[1,1,1],\"footprint\":{\"x\":[-1,1],\"y\":[1,-1]},\"panels\":[" panels "]}"
 
-static void impossible_values_are_refused(void **state)
+TEST(impossible_values_are_refused)
 {
-    (void)state;
     expect_refusal("lens_steps", SCENE(PANEL("1", "[0.6,0.8]", "0.1")), 0, NULL);
     expect_refusal("lens_steps", SCENE(PANEL("1", "[0.6,0.8]", "0.1")), 9, NULL);
     expect_refusal("lens_steps", SCENE(PANEL("2", "[0.6,0.8]", "0.1")), 0, "in focus");
@@ -208,13 +196,4 @@ static void impossible_values_are_refused(void **state)
     expect_refusal("lens_steps",
                    SCENE(PANEL("1", "[0.6,0.8]", "0.1") "," PANEL("5", "[0.6,0.8]", "0.1")), 0,
                    "two panels");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(share_matches_chords), cmocka_unit_test(mean_share_matches_quadrature),
-        cmocka_unit_test(pixels_match_rays), cmocka_unit_test(panels_are_where_they_belong),
-        cmocka_unit_test(impossible_values_are_refused)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

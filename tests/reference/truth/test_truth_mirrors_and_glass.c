@@ -4,27 +4,12 @@
  * tolerance must reject forms with a known mistake. */
 #include "reference/truth/truth_mirrors_and_glass.h"
 #include "tests/support/optics.h"
+#include "tests/support/quadrature.h"
+#include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-static const double tolerance = 1e-9; /* relative */
-
-#define COUNT(a) (sizeof(a) / sizeof *(a))
-
-static bool same(double a, double b)
-{
-    return fabs(a - b) <= tolerance * fabs(b);
-}
 
 static bool same_light(const double a[3], const double b[3])
 {
@@ -36,18 +21,6 @@ static double next_number(uint64_t *state)
 {
     *state = *state * 6364136223846793005u + 1442695040888963407u;
     return (double)(*state >> 11) / 9007199254740992.0;
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void normalize3(double v[3])
-{
-    double l = sqrt(dot3(v, v));
-    for (int k = 0; k < 3; k++)
-        v[k] /= l;
 }
 
 /* Radiance in the direction (sx, sy, -1) by any of the routes. */
@@ -106,15 +79,13 @@ static void render(const char *name, int depth, int size, struct moments *out)
 {
     struct suite suite;
     struct err e;
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     assert_non_null(suite_find(&suite, name));
     struct suite_scene scene = *suite_find(&suite, name);
     scene.depth = depth ? depth : scene.depth;
     scene.width = scene.height = size ? size : scene.width;
     assert_string_equal(scene.reference[0].engine, "truth");
-    if (!truth_render(&scene, &scene.reference[0], out, &e))
-        fail_msg("%s", e.msg);
+    MUST(truth_render(&scene, &scene.reference[0], out, &e));
     suite_free(&suite);
 }
 
@@ -179,9 +150,8 @@ static int count_box_differences(const struct truth_mirror_box *b, int depth)
     return different;
 }
 
-static void mirror_box_unfolds(void **state)
+TEST(mirror_box_unfolds)
 {
-    (void)state;
     assert_int_equal(count_box_differences(&box, BOX_DEPTH), 0);
     assert_true(count_box_differences(&box, BOX_DEPTH - 1) > 20);
     assert_true(count_box_differences(&box, BOX_DEPTH + 1) > 20);
@@ -201,9 +171,8 @@ static void marched_box(const void *scene, double sx, double sy, double light[3]
     march(scene, BOX_DEPTH, sx, sy, light);
 }
 
-static void mirror_box_pixels(void **state)
+TEST(mirror_box_pixels)
 {
-    (void)state;
     /* Of 60 x 60, whose borders the picture's edges do not share as they do those of 64 x 64: plain ones, ones
      * with an edge across, corners, fine structure of later arrivals. */
     enum { SIZE = 60 };
@@ -225,9 +194,8 @@ static void mirror_box_pixels(void **state)
     moments_free(&m);
 }
 
-static void fresnel_of_amplitudes(void **state)
+TEST(fresnel_of_amplitudes)
 {
-    (void)state;
     static const double index[] = {1.5, 1 / 1.5, 1.1, 2.4, 1 / 2.4};
     for (size_t i = 0; i < COUNT(index); i++)
         for (int k = 1; k <= 200; k++) {
@@ -342,9 +310,8 @@ static void slab_formula(double cos_i, double n, int depth, double light[3])
         light[c] = front * slab_front[c] + behind * slab_behind[c];
 }
 
-static void slab_is_a_tree_of_rays(void **state)
+TEST(slab_is_a_tree_of_rays)
 {
-    (void)state;
     static const enum mistake mistakes[] = {SCHLICK, NO_FRESNEL,      INDEX,
                                             NO_ECHO, REFLECTION_FREE, ONE_MORE};
     for (int depth = 0; depth <= 8; depth++)
@@ -363,9 +330,8 @@ static void slab_is_a_tree_of_rays(void **state)
 }
 
 /* The whole series: (1 - F)^2 / (1 - F^2) goes through and 2 F/(1 + F) comes back, which add up to 1. */
-static void slab_at_any_depth_loses_nothing(void **state)
+TEST(slab_at_any_depth_loses_nothing)
 {
-    (void)state;
     for (int k = 1; k <= 20; k++) {
         double front, behind, f = truth_fresnel(k / 20.0, 1.5, NULL);
         truth_slab_shares(k / 20.0, 1.5, 400, &front, &behind);
@@ -378,13 +344,12 @@ static void slab_scene(const void *scene, double sx, double sy, double light[3])
 {
     double d[3] = {0.6 + 0.8 * sx, sy, -0.8 + 0.6 * sx};
     (void)scene;
-    normalize3(d);
+    unit3(d);
     look_at_body(&slab, slab_eye, d, SLAB_DEPTH, NONE, light);
 }
 
-static void slab_pixels(void **state)
+TEST(slab_pixels)
 {
-    (void)state;
     static const int at[][2] = {{0, 0}, {63, 63}, {5, 31}, {40, 12}, {63, 32}};
     struct moments m;
     render("19_glass_slab", 0, 0, &m);
@@ -421,7 +386,7 @@ static bool ball_hit(const struct body *b, double p[3], const double d[3], bool 
         p[k] += t * d[k];
     for (int k = 0; k < 3; k++)
         n[k] = p[k] - s->centre[k];
-    normalize3(n);
+    unit3(n);
     return true;
 }
 
@@ -453,7 +418,7 @@ static int count_ball_differences(int depth, enum mistake m)
         double formula[3], tree[3];
         struct truth_glass_sphere s = ball;
         s.depth = depth;
-        normalize3(d);
+        unit3(d);
         truth_glass_sphere_radiance(&s, ball_eye, d, formula);
         look_at_body(&ball_body, ball_eye, d, depth, m, tree);
         different += !same_light(formula, tree);
@@ -461,9 +426,8 @@ static int count_ball_differences(int depth, enum mistake m)
     return different;
 }
 
-static void ball_is_a_tree_of_rays(void **state)
+TEST(ball_is_a_tree_of_rays)
 {
-    (void)state;
     for (int depth = 0; depth <= 8; depth++)
         assert_int_equal(count_ball_differences(depth, NONE), 0);
     /* More than half of the picture is the ball. */
@@ -475,13 +439,12 @@ static void ball_scene(const void *scene, double sx, double sy, double light[3])
 {
     double d[3] = {sx, sy, -1};
     (void)scene;
-    normalize3(d);
+    unit3(d);
     look_at_body(&ball_body, ball_eye, d, ball.depth, NONE, light);
 }
 
-static void ball_pixels(void **state)
+TEST(ball_pixels)
 {
-    (void)state;
     /* Of a picture of 16 x 16: a wall, the middle of the ball, its rim, edges of walls through it. */
     static const int at[][2] = {{1, 8}, {9, 9}, {3, 9}, {4, 13}, {9, 14}, {13, 6}};
     struct moments m;
@@ -515,9 +478,8 @@ static double worst_square(const struct moments *a, const struct moments *b)
 }
 
 /* One bounce more or less moves a square by more than twice its margin of 1 %. */
-static void depth_shows(void **state)
+TEST(depth_shows)
 {
-    (void)state;
     static const char *const names[] = {"18_mirror_box", "19_glass_slab", "22_glass_sphere"};
     static const int depth[] = {BOX_DEPTH, SLAB_DEPTH, 3};
     for (size_t i = 0; i < COUNT(names); i++) {
@@ -531,20 +493,4 @@ static void depth_shows(void **state)
         for (int k = 0; k < 3; k++)
             moments_free(&m[k]);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mirror_box_unfolds),
-        cmocka_unit_test(mirror_box_pixels),
-        cmocka_unit_test(fresnel_of_amplitudes),
-        cmocka_unit_test(slab_is_a_tree_of_rays),
-        cmocka_unit_test(slab_at_any_depth_loses_nothing),
-        cmocka_unit_test(slab_pixels),
-        cmocka_unit_test(ball_is_a_tree_of_rays),
-        cmocka_unit_test(ball_pixels),
-        cmocka_unit_test(depth_shows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

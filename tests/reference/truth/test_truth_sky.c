@@ -6,31 +6,11 @@
 #include "reference/truth/truth_pixel_mean.h"
 #include "tests/support/optics.h"
 #include "reference/base/image_oiio.h"
+#include "tests/support/quadrature.h"
+#include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <gsl/gsl_integration.h>
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-static const double tolerance = 1e-9; /* relative */
-
-#define COUNT(a) (sizeof(a) / sizeof *(a))
-
-static bool same(double a, double b)
-{
-    return fabs(a - b) <= tolerance * fabs(b);
-}
-
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static double next_number(uint64_t *state)
 {
@@ -144,9 +124,8 @@ static double albedo_by_normals(const struct metal *m)
 
 static const double metal_alpha = 0.5, metal_eta[3] = {.2, .9, 1.3}, metal_k[3] = {3.9, 2.5, 2.3};
 
-static void metal_albedo_both_ways(void **state)
+TEST(metal_albedo_both_ways)
 {
-    (void)state;
     static const double cosine[] = {1, 0.9, 0.7, 0.5, 0.35, 0.237};
     for (size_t i = 0; i < COUNT(cosine); i++)
         for (int c = 0; c < 3; c++) {
@@ -164,9 +143,8 @@ static void metal_albedo_both_ways(void **state)
         }
 }
 
-static void conductor_of_amplitudes(void **state)
+TEST(conductor_of_amplitudes)
 {
-    (void)state;
     for (int i = 1; i <= 100; i++)
         for (int c = 0; c < 3; c++)
             assert_true(same(truth_fresnel_conductor(i / 100.0, metal_eta[c], metal_k[c]),
@@ -178,9 +156,8 @@ static void conductor_of_amplitudes(void **state)
 /* White facets, alpha = 1, seen from above: D = 1/pi, G1(wo) = 1 and, with c = cos(theta_i), theta_i =
  * 2 theta_m, G2 = 2c/(1 + c). So A = integral of 2 sin cos G2 over theta_m from 0 to pi/4, which is that
  * of c/(1 + c) over c from 0 to 1: 1 - ln 2. A very large k makes facets white. */
-static void white_metal_from_above(void **state)
+TEST(white_metal_from_above)
 {
-    (void)state;
     assert_true(same(truth_ggx_albedo(1, 1, 1e12, 1, 96), 1 - M_LN2));
 }
 
@@ -201,9 +178,8 @@ static double wall_element(double y, double z, const void *data)
     return y * p->distance / (M_PI * d2 * d2);
 }
 
-static void wall_share_both_ways(void **state)
+TEST(wall_share_both_ways)
 {
-    (void)state;
     uint64_t s = 34;
     for (int i = 0; i < 60; i++) {
         struct wall_point p = {0.15 + 2 * next_number(&s), 0.5 + 2 * next_number(&s), 0};
@@ -250,9 +226,8 @@ static double sky_element(double theta, double phi, const void *data)
     return (sky.mean[p->channel] + slope) * sin(theta) * (p->no_cosine ? 0.5 : cos(theta)) / M_PI;
 }
 
-static void gradient_both_ways(void **state)
+TEST(gradient_both_ways)
 {
-    (void)state;
     uint64_t s = 35;
     for (int i = 0; i < 60; i++) {
         struct sky_point p = {.channel = i % 3};
@@ -273,8 +248,7 @@ static void read_map(struct image *im)
 {
     struct err e = {""};
     bool half;
-    if (!image_read("reference/scenes/35_sky_gradient.exr", im, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read("reference/scenes/35_sky_gradient.exr", im, &half, &e));
     assert_false(half);
     assert_int_equal(im->width, MAP_WIDTH);
     assert_int_equal(im->height, MAP_HEIGHT);
@@ -282,9 +256,8 @@ static void read_map(struct image *im)
     assert_int_equal(image_channel(im, "B"), 2);
 }
 
-static void map_is_what_make_sky_writes(void **state)
+TEST(map_is_what_make_sky_writes)
 {
-    (void)state;
     struct image im;
     read_map(&im);
     for (int row = 0; row < MAP_HEIGHT; row++)
@@ -339,9 +312,8 @@ static double reflected_under_map(const struct image *im, int channel, const dou
 }
 
 /* So the form may be used for the map: what the texels' steepness is there for. */
-static void map_stands_for_the_gradient(void **state)
+TEST(map_stands_for_the_gradient)
 {
-    (void)state;
     struct image im, plain;
     double worst = 0, worst_plain = 0;
     uint64_t s = 350;
@@ -379,13 +351,11 @@ static void render(const char *name, struct moments *out)
 {
     struct suite suite;
     struct err e;
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     const struct suite_scene *scene = suite_find(&suite, name);
     assert_non_null(scene);
     assert_string_equal(scene->reference[0].engine, "truth");
-    if (!truth_render(scene, &scene->reference[0], out, &e))
-        fail_msg("%s", e.msg);
+    MUST(truth_render(scene, &scene->reference[0], out, &e));
     suite_free(&suite);
 }
 
@@ -421,9 +391,8 @@ static double gradient_seen(double u, double v, int channel)
     return albedo[channel] * truth_gradient_reflected(&sky, channel, n);
 }
 
-static void pixels_lie_where_they_should(void **state)
+TEST(pixels_lie_where_they_should)
 {
-    (void)state;
     enum { CELLS = 40 };
     static const struct {
         const char *name;
@@ -446,19 +415,4 @@ static void pixels_lie_where_they_should(void **state)
         }
         moments_free(&m);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(metal_albedo_both_ways),
-        cmocka_unit_test(conductor_of_amplitudes),
-        cmocka_unit_test(white_metal_from_above),
-        cmocka_unit_test(wall_share_both_ways),
-        cmocka_unit_test(gradient_both_ways),
-        cmocka_unit_test(map_is_what_make_sky_writes),
-        cmocka_unit_test(map_stands_for_the_gradient),
-        cmocka_unit_test(pixels_lie_where_they_should),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

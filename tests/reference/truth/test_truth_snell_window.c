@@ -4,15 +4,7 @@
 #include "reference/truth/truth_snell_window.h"
 #include "tests/support/optics.h"
 #include "tests/support/quadrature.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* What is left of the sky's radiance in glass: the power of a thin bundle of rays is that outside times
  * the transmittance, over a solid angle and a cross-section that refraction has changed. Solid angles by
@@ -26,9 +18,8 @@ static double sky_by_power(double theta, double n)
     return optics_transmitted(cos(theta), 1 / n) * solid_angles * cos(outside) / cos(theta);
 }
 
-static void window_keeps_power(void **state)
+TEST(window_keeps_power)
 {
-    (void)state;
     const double n = 1.5;
     for (int i = 1; i <= 40; i++) {
         double theta = i * M_PI / 180, floor, sky;
@@ -48,9 +39,8 @@ static void window_keeps_power(void **state)
 
 /* Pixels of the window from the directions that the .md gives, by 40 x 40 points: those of one piece to
  * 1e-5; and one at the edge, where the points' own error is more. */
-static void window_pixels_lie_where_they_should(void **state)
+TEST(window_pixels_lie_where_they_should)
 {
-    (void)state;
     enum { CELLS = 40 };
     static const double sky_radiance[3] = {.4, .3, .2}, floor_radiance[3] = {.3, .5, .8};
     static const int at[][2] = {{0, 0}, {32, 32}, {40, 20}, {63, 10}, {10, 60}, {56, 32}};
@@ -107,9 +97,8 @@ static double albedo_by_normals(const struct metal *m)
     return 2 * integrate_plane(visible_normal, m, (double[]){0, M_PI}, (double[]){0, 1});
 }
 
-static void beckmann_albedo_both_ways(void **state)
+TEST(beckmann_albedo_both_ways)
 {
-    (void)state;
     static const double cosine[] = {1, 0.9, 0.7, 0.5, 0.35, 0.237};
     static const double eta[3] = {.2, .9, 1.3}, k[3] = {3.9, 2.5, 2.3};
     for (size_t i = 0; i < COUNT(cosine); i++)
@@ -150,9 +139,8 @@ static double three_lamps(double x, double z, int channel, bool with_point)
 }
 
 /* Mean over pixels by Gauss's rule of 3 x 3 points, off by (0.01/0.6)^6 = 2e-11. */
-static void three_lamps_both_ways(void **state)
+TEST(three_lamps_both_ways)
 {
-    (void)state;
     static const double node[3] = {-0.7745966692414834, 0, 0.7745966692414834};
     static const double weight[3] = {5. / 18, 8. / 18, 5. / 18};
     static const int at[][2] = {{0, 0}, {95, 0}, {20, 40}, {60, 45}, {95, 63}};
@@ -177,9 +165,8 @@ static void three_lamps_both_ways(void **state)
     moments_free(&m);
 }
 
-static void impossible_values_are_refused(void **state)
+TEST(impossible_values_are_refused)
 {
-    (void)state;
 #define LAMPS(lamps)                                                                               \
     "{\"albedo\": [0.5, 0.5, 0.5], \"footprint\": {\"x\": [0, 1], \"z\": [0, 1]}, \"lamps\": "     \
     "[" lamps "]}"
@@ -200,16 +187,4 @@ static void impossible_values_are_refused(void **state)
     expect_refusal("snell_window", WINDOW("[0, 1, 0]", "[0, 1, 0]", "1.5"), 1, "not below");
     expect_refusal("snell_window", WINDOW("[0, -1, 0]", "[0, -1, 0]", "1.5"), 1, "not look up");
     expect_refusal("snell_window", WINDOW("[0, -1, 0]", "[0, 1, 0]", "1"), 1, "not above 1");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(window_keeps_power),
-        cmocka_unit_test(window_pixels_lie_where_they_should),
-        cmocka_unit_test(beckmann_albedo_both_ways),
-        cmocka_unit_test(three_lamps_both_ways),
-        cmocka_unit_test(impossible_values_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

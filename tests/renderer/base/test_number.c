@@ -1,15 +1,7 @@
 /* number_parse() against strtod(), bit for bit, and on what is not a number. */
 #include "renderer/base/number.h"
 #include "renderer/math/sampler.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static void check(const char *text)
 {
@@ -22,9 +14,8 @@ static void check(const char *text)
     assert_true(*end == '\0' || *end == ' ');
 }
 
-static void like_strtod(void **state)
+TEST(like_strtod)
 {
-    (void)state;
     static const char *const formats[] = {"%.9g", "%.17g",    "%.6f", "%.3e",
                                           "%g ",  "%+.12g 7", "%.1f", "%.20f"};
     char text[512];
@@ -71,9 +62,8 @@ static void like_strtod(void **state)
         check(cases[i]);
 }
 
-static void what_is_no_number(void **state)
+TEST(what_is_no_number)
 {
-    (void)state;
     static const char *const cases[] = {
         "",  " 1",  "nan", "inf",   "-inf", "0x10", "1e",    "1e+",   "e5",     ".",    "-",
         "+", "--1", "1-",  "1.2.3", "1,5",  "1f",   "1e5e5", "1e999", "-1e999", "1e5.", "five"};
@@ -83,11 +73,4 @@ static void what_is_no_number(void **state)
         if (number_parse(cases[i], &end, &v))
             fail_msg("'%s' is read as %g", cases[i], v);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(like_strtod),
-                                       cmocka_unit_test(what_is_no_number)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,16 +1,7 @@
 /* Words to a command line and back: by a shell, and by our own reader. */
 #include "renderer/base/shell_quote.h"
 #include "tools/results/claim_result.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static const char *const words[] = {
     "pathtracer", "-f",      "it's here.exr", "",           "a  b", "$(id)", "\\",
@@ -30,9 +21,8 @@ static void expect_words(const char *text, const char *const *want)
     free(got);
 }
 
-static void what_was_joined_is_split(void **state)
+TEST(what_was_joined_is_split)
 {
-    (void)state;
     char *text = shell_quote_join(NULL, words);
     expect_words(text, words);
     free(text);
@@ -45,9 +35,8 @@ static void what_was_joined_is_split(void **state)
 }
 
 /* Three quarters of a megabyte, each word of it as long in quotes as a word can get. */
-static void no_word_is_lost_however_many(void **state)
+TEST(no_word_is_lost_however_many)
 {
-    (void)state;
     enum { MANY = 6000 };
     static const char *many[MANY + 1];
     for (int i = 0; i < MANY; i++)
@@ -59,9 +48,8 @@ static void no_word_is_lost_however_many(void **state)
 }
 
 /* What results.json says of its origin, too. */
-static void the_command_of_results_is_read_back(void **state)
+TEST(the_command_of_results_is_read_back)
 {
-    (void)state;
     static const char *const want[] = {"assay", "compare", "it's a.exr", "b  c.exr", "", NULL};
     char *argv[] = {"compare", "it's a.exr", "b  c.exr", "", NULL};
     struct err e = {""};
@@ -72,9 +60,8 @@ static void the_command_of_results_is_read_back(void **state)
 }
 
 /* The shell is another reader: printf prints each of its arguments and a bar. */
-static void a_shell_reads_the_same_words(void **state)
+TEST(a_shell_reads_the_same_words)
 {
-    (void)state;
     char command[1200], got[1024] = "", want[1024] = "", *text = shell_quote_join(NULL, words);
     snprintf(command, sizeof command, "printf '%%s|' %s", text);
     free(text);
@@ -90,9 +77,8 @@ static void a_shell_reads_the_same_words(void **state)
     assert_string_equal(got, want);
 }
 
-static void what_a_shell_would_act_on_is_refused(void **state)
+TEST(what_a_shell_would_act_on_is_refused)
 {
-    (void)state;
     static const char *const bad[] = {"a; b",  "a | b", "$HOME", "`id`", "a > b", "'open",
                                       "\"a\"", "a & b", "*",     "a\nb", "~"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -102,16 +88,4 @@ static void what_a_shell_would_act_on_is_refused(void **state)
             fail_msg("'%s' is accepted", bad[i]);
         assert_non_null(strstr(e.msg, "not a plain command"));
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_was_joined_is_split),
-        cmocka_unit_test(no_word_is_lost_however_many),
-        cmocka_unit_test(the_command_of_results_is_read_back),
-        cmocka_unit_test(a_shell_reads_the_same_words),
-        cmocka_unit_test(what_a_shell_would_act_on_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,12 +5,7 @@
 #include "renderer/scene/shape.h"
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { KINDS = BVH_WIDE + 1 };
 
@@ -44,8 +39,7 @@ static struct scene make_scene(enum layout layout)
             build_triangle(&s, neg(c), neg(d), neg(f), m);
     }
     struct err e = {0};
-    if (!scene_finish(&s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(&s, "test", &e));
     return s;
 }
 
@@ -63,9 +57,8 @@ static ray make_ray(const struct scene *s, uint32_t i)
     return (ray){o, normalize(d), 0, i % 4 ? INFINITY : 0.5f + u.u[2]};
 }
 
-static void hierarchies_equal_brute_force(void **state)
+TEST(hierarchies_equal_brute_force)
 {
-    (void)state;
     struct err e = {0};
     for (enum layout layout = SCATTERED; layout < NUM_LAYOUTS; layout++) {
         struct scene s = make_scene(layout);
@@ -122,9 +115,8 @@ static bool meets(const struct triangle *tri, const ray *r, float *t, float *u, 
 }
 
 /* Triangle (0,0,0) (1,0,0) (0,1,0) and rays along -Z at places with known barycentrics. */
-static void triangle_closed_form(void **state)
+TEST(triangle_closed_form)
 {
-    (void)state;
     const struct triangle tri = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
     static const struct {
         float x, y;
@@ -150,9 +142,8 @@ static void triangle_closed_form(void **state)
 }
 
 /* At distance D from the centre and impact parameter b: t = sqrt(D^2-b^2) -+ sqrt(r^2-b^2). */
-static void sphere_closed_form(void **state)
+TEST(sphere_closed_form)
 {
-    (void)state;
     const struct sphere s = {{0, 0, 0}, 0.5f, 1};
     for (int k = 0; k < 100; k++) {
         float b = 0.006f * (float)k;
@@ -174,9 +165,8 @@ static void sphere_closed_form(void **state)
 
 /* A ray that leaves a surface does not meet it again: from 10^5 places of a slanted triangle with
  * large coordinates and of a sphere, in grazing directions too. */
-static void no_self_intersection(void **state)
+TEST(no_self_intersection)
 {
-    (void)state;
     struct scene s = build_scene();
     uint32_t m = build_material(&s, grey(0.5f), grey(0));
     build_triangle(&s, v3(100, 3, -50), v3(103, 7, -48), v3(99, 8, -53), m);
@@ -210,15 +200,4 @@ static void no_self_intersection(void **state)
     }
     bvh_free(bvh);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hierarchies_equal_brute_force),
-        cmocka_unit_test(triangle_closed_form),
-        cmocka_unit_test(sphere_closed_form),
-        cmocka_unit_test(no_self_intersection),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

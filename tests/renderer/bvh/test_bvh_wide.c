@@ -8,13 +8,9 @@
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/mesh.h"
+#include "tests/support/test.h"
 
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <cmocka.h>
 
 static vec3 random_point(uint32_t i, uint32_t k)
 {
@@ -190,9 +186,8 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
 
 /* 196 batches are 5 10^4 rays, of seven kinds. Brute force is tried on all of these: its strides have no
  * divisor in common with 7. */
-static void generated_meshes(void **state)
+TEST(generated_meshes)
 {
-    (void)state;
     compare("terrain", mesh_terrain(70, 1), 196, 30);
     compare("ball", mesh_ball(70, 70, 0.3f), 196, 30);
     compare("soup", mesh_soup(10000), 196, 30);
@@ -203,9 +198,8 @@ static void generated_meshes(void **state)
     compare("50", mesh_terrain(5, 1), 105, 1);
 }
 
-static void huge_and_tiny(void **state)
+TEST(huge_and_tiny)
 {
-    (void)state;
     compare("1e-12", mesh_terrain(30, 1e-12f), 70, 11);
     compare("1e-4", mesh_terrain(30, 1e-4f), 70, 11);
     compare("1e5", mesh_terrain(30, 1e5f), 70, 11);
@@ -213,9 +207,8 @@ static void huge_and_tiny(void **state)
 }
 
 /* Triangles that are points and lines among others are never hit and do no harm. */
-static void degenerate_triangles(void **state)
+TEST(degenerate_triangles)
 {
-    (void)state;
     struct scene s = mesh_terrain(30, 1);
     for (uint32_t i = 0; i < s.num_triangles; i += 3) {
         vec3 *p = s.position + 3 * (size_t)i;
@@ -227,9 +220,8 @@ static void degenerate_triangles(void **state)
 }
 
 /* Boxes of the suite's kind, with spheres: lists, and trees in which both kinds meet. */
-static void spheres_and_triangles(void **state)
+TEST(spheres_and_triangles)
 {
-    (void)state;
     static const uint32_t counts[] = {1, 2, 9, 31, 33, 60, 500};
     for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
         struct scene s = build_scene();
@@ -263,9 +255,8 @@ static void add_large(struct scene *s, uint32_t m, bool second_half)
 
 /* Large primitives, which are a list, among small ones: triangles anywhere, and tiles that lie in the floor
  * and at the very same distance as it. */
-static void walls_beside_a_tree(void **state)
+TEST(walls_beside_a_tree)
 {
-    (void)state;
     for (int half = 0; half < 2; half++) {
         struct scene s = build_scene();
         struct err e = {0};
@@ -293,9 +284,8 @@ static void walls_beside_a_tree(void **state)
 }
 
 /* A shadow ray ignores the sphere that it goes to, and nothing else. */
-static void ignored_sphere(void **state)
+TEST(ignored_sphere)
 {
-    (void)state;
     for (uint32_t others = 0; others < 80; others += 40) {
         struct scene s = build_scene();
         uint32_t m = build_material(&s, grey(0.5f), grey(0));
@@ -331,9 +321,8 @@ static void ignored_sphere(void **state)
 }
 
 /* At 10^5 triangles no more than 60 bytes each. */
-static void small_enough(void **state)
+TEST(small_enough)
 {
-    (void)state;
     struct scene s = mesh_ball(224, 224, 0.5f);
     struct err e = {0};
     struct bvh *b = bvh_build(&s, BVH_WIDE, &e);
@@ -346,9 +335,8 @@ static void small_enough(void **state)
 
 /* The same nodes and leaves, bit for bit, however many threads build them; also where half of the triangles
  * lie in one place and splits are lopsided. */
-static void same_on_any_threads(void **state)
+TEST(same_on_any_threads)
 {
-    (void)state;
     struct scene scenes[] = {mesh_ball(180, 180, 0.5f), mesh_soup(40000), mesh_twins(100)};
     for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; i++) {
         struct scene *s = &scenes[i];
@@ -369,15 +357,4 @@ static void same_on_any_threads(void **state)
         wide_free(one);
         scene_free(s);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(generated_meshes),     cmocka_unit_test(huge_and_tiny),
-        cmocka_unit_test(degenerate_triangles), cmocka_unit_test(spheres_and_triangles),
-        cmocka_unit_test(walls_beside_a_tree),  cmocka_unit_test(ignored_sphere),
-        cmocka_unit_test(small_enough),         cmocka_unit_test(same_on_any_threads),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,16 +19,10 @@
 #include "renderer/math/warp.h"
 #include "tests/studies/bench/embree_mesh.h"
 #include "tests/support/mesh.h"
+#include "tests/support/test.h"
 
 #include <embree3/rtcore.h>
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
 
 static vec3 random_point(uint32_t i, uint32_t k)
 {
@@ -314,32 +308,28 @@ static void check_and_free(const char *name, struct scene s, const double limit[
     scene_free(&s);
 }
 
-static void generated_meshes(void **state)
+TEST(generated_meshes)
 {
-    (void)state;
     check_and_free("terrain", mesh_terrain(223, 1), ordinary);
     check_and_free("ball", mesh_ball(224, 224, 0), ordinary);
     check_and_free("soup", mesh_soup(100000), ordinary);
 }
 
-static void tiny_and_huge(void **state)
+TEST(tiny_and_huge)
 {
-    (void)state;
     check_and_free("1e-4", mesh_terrain(100, 1e-4f), ordinary);
     check_and_free("1e5", mesh_terrain(100, 1e5f), ordinary);
 }
 
-static void needles_and_twins(void **state)
+TEST(needles_and_twins)
 {
-    (void)state;
     check_and_free("needles", mesh_needles(20000), needles);
     check_and_free("twins", mesh_twins(100), ordinary);
 }
 
 /* Minutes under sanitizers, so only on request: ASSAY_EMBREE_MILLION=1. */
-static void a_million_triangles(void **state)
+TEST(a_million_triangles)
 {
-    (void)state;
     if (getenv("ASSAY_EMBREE_MILLION") == NULL) {
         print_message("SKIPPED: 10^6 triangles (set ASSAY_EMBREE_MILLION=1)\n");
         skip();
@@ -350,9 +340,8 @@ static void a_million_triangles(void **state)
 }
 
 /* The assignment's meshes, which are not ours to ship. */
-static void course_meshes(void **state)
+TEST(course_meshes)
 {
-    (void)state;
     static const char *const files[] = {"sky/CBbunny.dae", "meshedit/cow.dae",
                                         "meshedit/maxplanck.dae"};
     const char *root = getenv("ASSAY_CS184");
@@ -368,8 +357,7 @@ static void course_meshes(void **state)
         fclose(f);
         struct scene s = {0};
         struct err e = {""};
-        if (!collada_load(path, DIALECT_CGL, &s, &e))
-            fail_msg("%s", e.msg);
+        MUST(collada_load(path, DIALECT_CGL, &s, &e));
         assert_true(s.num_spheres == 0);
         check_and_free(strchr(files[i], '/') + 1, s, ordinary);
     }
@@ -377,9 +365,8 @@ static void course_meshes(void **state)
 
 /* Negative control: one corner of Embree's copy is moved by a fifth of its triangle, and the rays at
  * that triangle find it out. */
-static void moved_corner_is_found(void **state)
+TEST(moved_corner_is_found)
 {
-    (void)state;
     struct scene s = mesh_terrain(10, 1), moved = mesh_terrain(10, 1);
     vec3 *p = moved.position + 3 * 110;
     p[0] = mad(p[0], 0.2f, sub(p[1], p[0]));
@@ -406,9 +393,8 @@ static bool moller_trumbore(const vec3 p[3], const ray *r)
 /* From inside a closed ball of 10^5 triangles at its vertices (every other ray) and edges: none gets
  * out, by any structure, nor is the occlusion test blind to one. Negative control: of the same rays
  * some get through Moller and Trumbore's test, all triangles tried. */
-static void nothing_leaks(void **state)
+TEST(nothing_leaks)
 {
-    (void)state;
     enum { LEAK_RAYS = 100000, CONTROL_RAYS = 100 };
     struct scene s = mesh_ball(224, 224, 0);
     struct err e = {0};
@@ -449,15 +435,4 @@ static void nothing_leaks(void **state)
                 unseen == 0);
     assert_true(control > 0);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(generated_meshes),  cmocka_unit_test(tiny_and_huge),
-        cmocka_unit_test(needles_and_twins), cmocka_unit_test(a_million_triangles),
-        cmocka_unit_test(course_meshes),     cmocka_unit_test(moved_corner_is_found),
-        cmocka_unit_test(nothing_leaks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

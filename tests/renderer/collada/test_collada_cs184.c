@@ -2,16 +2,7 @@
  * those of the course's files as counted by hand and by the staff's renderer. */
 #include "renderer/collada/collada.h"
 #include "renderer/scene/environment.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static const double DEGREE = 3.14159265358979323846 / 180;
 
@@ -34,8 +25,7 @@ static struct scene must_load(const char *name, enum dialect dialect)
     fclose(f);
     struct scene s = {0};
     struct err e = {""};
-    if (!collada_load(path, dialect, &s, &e))
-        fail_msg("%s", e.msg);
+    MUST(collada_load(path, dialect, &s, &e));
     return s;
 }
 
@@ -75,9 +65,8 @@ static void must_fail(const char *name, enum dialect dialect, const char *keywor
 
 /* 5 walls of 2 triangles, the lamp of 2, 2 spheres. Box 2 x 1.5 x 2. The lamp's node is
  * diag(0.6, 0.8, 1) at z = 1.49 of a Z-up file: corners (+-0.3, 1.49, +-0.4), area 0.48, downwards. */
-static void spheres_lambertian(void **state)
+TEST(spheres_lambertian)
 {
-    (void)state;
     struct scene s = must_load("sky/CBspheres_lambertian.dae", DIALECT_AUTO);
     assert_int_equal(s.dialect, DIALECT_CGL);
     assert_int_equal(s.num_triangles, 12);
@@ -109,9 +98,8 @@ static void spheres_lambertian(void **state)
 }
 
 /* 28588 triangles with the two of the lamp; the eye is on the other side. */
-static void bunny(void **state)
+TEST(bunny)
 {
-    (void)state;
     struct scene s = must_load("sky/CBbunny.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles + s.num_degenerate, 28588);
     assert_int_equal(s.num_lights, 1);
@@ -120,9 +108,8 @@ static void bunny(void **state)
 }
 
 /* The light mesh is commented out and there is no area light: a point of 5 without falloff. */
-static void empty_box(void **state)
+TEST(empty_box)
 {
-    (void)state;
     struct scene s = must_load("sky/CBempty.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles, 10);
     assert_int_equal(s.num_lights, 1);
@@ -135,9 +122,8 @@ static void empty_box(void **state)
 
 /* By itself no CGL file; its phong has a highlight. Direction of the light: M (0,0,-1,1) =
  * (1 - .5, 1 - .5, 1.5 - .7071068), to Y up (-.5, .7928932, .5), over its length 1.0624. */
-static void meshes_of_assignment_two(void **state)
+TEST(meshes_of_assignment_two)
 {
-    (void)state;
     must_fail("meshedit/cow.dae", DIALECT_AUTO, "--dialect cgl");
     struct scene s = must_load("meshedit/cow.dae", DIALECT_CGL);
     assert_int_equal(s.num_triangles + s.num_degenerate, 5856);
@@ -157,9 +143,8 @@ static void assert_rgb(rgb c, float r, float g, float b)
 }
 
 /* One mirror of 1, one glass of 1.45, both clear; the box as in CBspheres_lambertian. */
-static void mirror_and_glass(void **state)
+TEST(mirror_and_glass)
 {
-    (void)state;
     struct scene s = must_load("sky/CBspheres.dae", DIALECT_AUTO);
     assert_int_equal(s.dialect, DIALECT_CGL);
     assert_int_equal(s.num_triangles, 12);
@@ -184,9 +169,8 @@ static void mirror_and_glass(void **state)
 }
 
 /* Three tinted glasses; 252 triangles. The camera's matrix has 15 numbers. */
-static void gems(void **state)
+TEST(gems)
 {
-    (void)state;
     struct scene s = must_load("sky/CBgems.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles + s.num_degenerate, 252);
     assert_int_equal(s.num_lights, 1);
@@ -210,9 +194,8 @@ static void gems(void **state)
 }
 
 /* An ambient light, which the camera does not see, and a directional one. */
-static void banana(void **state)
+TEST(banana)
 {
-    (void)state;
     struct scene s = must_load("keenan/banana.dae", DIALECT_CGL);
     assert_int_equal(s.num_triangles + s.num_degenerate, 2458);
     assert_int_equal(s.num_lights, 2);
@@ -220,18 +203,4 @@ static void banana(void **state)
     assert_int_equal(s.lights[1 - s.environment_light].kind, LIGHT_DIRECTIONAL);
     assert_true(environment_radiance(s.environment, v3(0, 1, 0)).g == 1);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spheres_lambertian),
-        cmocka_unit_test(bunny),
-        cmocka_unit_test(empty_box),
-        cmocka_unit_test(meshes_of_assignment_two),
-        cmocka_unit_test(mirror_and_glass),
-        cmocka_unit_test(gems),
-        cmocka_unit_test(banana),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

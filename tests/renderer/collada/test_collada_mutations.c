@@ -2,16 +2,7 @@
  * must either load it or say one line; crashes, leaks and undefined behaviour are for the sanitizers
  * to see. */
 #include "renderer/collada/collada.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { MOST = 1 << 16, RUNS = 12000 };
 
@@ -85,9 +76,8 @@ static size_t spoil_lines(char *text, size_t size, uint32_t *state)
     return size + n;
 }
 
-static void damaged_scenes_load_or_say_a_line(void **state)
+TEST(damaged_scenes_load_or_say_a_line)
 {
-    (void)state;
     static size_t (*const DAMAGES[])(char *, size_t, uint32_t *) = {
         truncate_text, flip_bits, spoil_number, remove_run, spoil_lines};
     enum { KINDS = sizeof DAMAGES / sizeof *DAMAGES };
@@ -122,12 +112,4 @@ static void damaged_scenes_load_or_say_a_line(void **state)
     for (int kind = 0; kind < KINDS; kind++)
         assert_true(refused[kind] > 100);
     assert_true(loaded[2] > 100 && loaded[4] > 20);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(damaged_scenes_load_or_say_a_line),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

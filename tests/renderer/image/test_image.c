@@ -4,16 +4,7 @@
 #include "reference/base/image_oiio.h"
 #include "renderer/math/sampler.h"
 #include "reference/base/process.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { WIDTH = 37, HEIGHT = 29, CHANNELS = 5, MAX_FILE = 1 << 16 };
 static const char *const channel[CHANNELS] = {"R", "G", "B", "variance.R", "Z"};
@@ -46,8 +37,7 @@ static void write_source(void)
     char path[256];
     struct err e = {""};
     struct image im = make_image();
-    if (!image_write_exr(path_of(path, "source.exr"), &im, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_write_exr(path_of(path, "source.exr"), &im, &e));
     image_free(&im);
 }
 
@@ -63,8 +53,7 @@ static void oiiotool(const char *const *options, const char *to)
     argv[n++] = "-o";
     argv[n++] = path_of(path, to);
     const struct process p = {.argv = argv, .timeout_s = 60};
-    if (!process_run(&p, NULL, &e))
-        fail_msg("%s", e.msg);
+    MUST(process_run(&p, NULL, &e));
 }
 
 static void assert_same(const struct image *a, const struct image *b)
@@ -94,17 +83,15 @@ static struct image read_both(const char *name, bool is_half)
     bool is_hdr = strstr(name, ".hdr") != NULL;
     if (is_hdr ? !image_read_hdr(path, &ours, &e) : !image_read_exr(path, &ours, &half, &e))
         fail_msg("%s", e.msg);
-    if (!image_read(path, &theirs, NULL, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read(path, &theirs, NULL, &e));
     assert_true(is_hdr || half == is_half);
     assert_same(&ours, &theirs);
     image_free(&theirs);
     return ours;
 }
 
-static void exr_round_trip(void **state)
+TEST(exr_round_trip)
 {
-    (void)state;
     struct image want = make_image(), got = read_both("source.exr", false);
     assert_same(&want, &got);
     assert_string_equal(image_get_attr(&got, "assay:unit"), "sample");
@@ -115,9 +102,8 @@ static void exr_round_trip(void **state)
 
 /* Chunks of sixteen rows, whole, cut short or of a single number, of noise in every bit, which no packing makes
  * shorter, and of one value. */
-static void exr_of_any_shape(void **state)
+TEST(exr_of_any_shape)
 {
-    (void)state;
     static const int shape[][3] = {{1, 1, 1}, {3, 16, 1}, {61, 17, 3}, {40, 33, 5}};
     for (size_t k = 0; k < 2 * sizeof shape / sizeof shape[0]; k++) {
         const int *s = shape[k / 2];
@@ -134,8 +120,7 @@ static void exr_of_any_shape(void **state)
                 bits = 0x3f800000;
             memcpy(&im.data[i], &bits, sizeof bits);
         }
-        if (!image_write_exr(path_of(path, "shape.exr"), &im, &e))
-            fail_msg("%s", e.msg);
+        MUST(image_write_exr(path_of(path, "shape.exr"), &im, &e));
         struct image got = read_both("shape.exr", false);
         assert_same(&im, &got);
         image_free(&im);
@@ -143,9 +128,8 @@ static void exr_of_any_shape(void **state)
     }
 }
 
-static void exr_as_others_write_it(void **state)
+TEST(exr_as_others_write_it)
 {
-    (void)state;
     static const struct {
         const char *options[8];
         bool is_half;
@@ -168,9 +152,8 @@ static void exr_as_others_write_it(void **state)
     }
 }
 
-static void hdr_as_others_write_it(void **state)
+TEST(hdr_as_others_write_it)
 {
-    (void)state;
     static const char *const wide[] = {"--ch", "R,G,B", NULL};
     static const char *const narrow[] = {"--ch",    "R,G,B",        "--crop",
                                          "5x4+0+0", "--fullpixels", NULL};
@@ -183,9 +166,8 @@ static void hdr_as_others_write_it(void **state)
     }
 }
 
-static void png_round_trip(void **state)
+TEST(png_round_trip)
 {
-    (void)state;
     char path[256], copy[256];
     uint8_t pixel[WIDTH * HEIGHT * 3], *bytes = NULL;
     size_t size = 0;
@@ -202,8 +184,7 @@ static void png_round_trip(void **state)
     assert_int_equal(fclose(f), 0);
     free(bytes);
     for (int k = 0; k < 2; k++) {
-        if (!image_read(k == 0 ? path : copy, &got, NULL, &e))
-            fail_msg("%s", e.msg);
+        MUST(image_read(k == 0 ? path : copy, &got, NULL, &e));
         assert_true(got.width == WIDTH && got.height == HEIGHT && got.channels == 3);
         for (size_t i = 0; i < sizeof pixel; i++)
             assert_int_equal(lroundf(got.data[i] * 255), pixel[i]);
@@ -214,9 +195,8 @@ static void png_round_trip(void **state)
 }
 
 /* Read back by OpenImageIO. */
-static void png_texts(void **state)
+TEST(png_texts)
 {
-    (void)state;
     char path[256];
     static char words[20000];
     memset(words, 'w', sizeof words - 1);
@@ -260,9 +240,8 @@ static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, stru
 
 /* Every file that ends too early is refused, with a line that names it. Damage to a byte is refused or
  * read as other numbers; the sanitizers watch. */
-static void damaged_files(void **state)
+TEST(damaged_files)
 {
-    (void)state;
     static const char *const names[] = {"source.exr", "tiled.exr", "other.hdr", "texts.png"};
     static const char *const tiles[] = {"--compression", "zip", "--tile", "16", "8", NULL};
     oiiotool(tiles, "tiled.exr");
@@ -311,13 +290,4 @@ static int teardown(void **state)
     return fs_remove_tree(dir, &e) ? 0 : -1;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_round_trip),         cmocka_unit_test(exr_of_any_shape),
-        cmocka_unit_test(exr_as_others_write_it), cmocka_unit_test(hdr_as_others_write_it),
-        cmocka_unit_test(png_round_trip),         cmocka_unit_test(png_texts),
-        cmocka_unit_test(damaged_files),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

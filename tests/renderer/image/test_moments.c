@@ -1,16 +1,7 @@
 /* Moments against two passes over the same numbers, and their files. */
 #include "renderer/image/moments.h"
 #include "renderer/math/sampler.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { N = 1000 };
 
@@ -54,9 +45,8 @@ static void check(const struct moments *m, uint32_t first, uint32_t last)
     }
 }
 
-static void online_equals_two_pass(void **state)
+TEST(online_equals_two_pass)
 {
-    (void)state;
     struct err e;
     struct moments m;
     assert_true(moments_alloc(&m, 1, 1, &e));
@@ -66,9 +56,8 @@ static void online_equals_two_pass(void **state)
     moments_free(&m);
 }
 
-static void merged_in_any_grouping(void **state)
+TEST(merged_in_any_grouping)
 {
-    (void)state;
     struct err e;
     static const uint32_t cuts[][4] = {
         {0, 1, 2, N}, {0, 500, 999, N}, {0, 0, 0, N}, {0, N, N, N}, {0, 333, 666, N}};
@@ -87,9 +76,8 @@ static void merged_in_any_grouping(void **state)
     }
 }
 
-static void unlike_moments_do_not_merge(void **state)
+TEST(unlike_moments_do_not_merge)
 {
-    (void)state;
     struct err e;
     struct moments a, b;
     assert_true(moments_alloc(&a, 2, 2, &e));
@@ -104,28 +92,12 @@ static void unlike_moments_do_not_merge(void **state)
     moments_free(&b);
 }
 
-static char dir[] = "/tmp/assay_moments_XXXXXX";
-
-static int make_dir(void **state)
+TEST(write_and_read)
 {
-    (void)state;
-    return mkdtemp(dir) == NULL;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
-}
-
-static void write_and_read(void **state)
-{
-    (void)state;
     struct err e = {0};
     struct moments m, back;
     struct image im;
-    char path[64];
-    snprintf(path, sizeof path, "%s/m.exr", dir);
+    const char *path = test_path("m.exr");
     assert_true(moments_alloc(&m, 3, 2, &e));
     for (size_t p = 0; p < 6; p++)
         for (uint32_t i = 0; i < 10 + p; i++)
@@ -149,13 +121,11 @@ static void write_and_read(void **state)
     moments_free(&m);
     moments_free(&back);
     image_free(&im);
-    unlink(path);
 }
 
 /* Each fault has its own line and no moments. */
-static void bad_files(void **state)
+TEST(bad_files)
 {
-    (void)state;
     static const char *const names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
                                           "M2.B", "M3.R", "M3.G", "M3.B", "n"};
     static const struct {
@@ -174,8 +144,7 @@ static void bad_files(void **state)
                  {10, "fortnight", "1", 0, 1, "unknown unit"},
                  {10, "sample", "-2", 0, 1, "spp"},
                  {10, "sample", "many", 0, 1, "spp"}};
-    char path[64];
-    snprintf(path, sizeof path, "%s/bad.exr", dir);
+    const char *path = test_path("bad.exr");
     for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
         struct err e = {0};
         struct image im;
@@ -206,26 +175,12 @@ static void bad_files(void **state)
 }
 
 /* Nothing appears where a write fails, and no temporary stays. */
-static void failed_write_leaves_nothing(void **state)
+TEST(failed_write_leaves_nothing)
 {
-    (void)state;
     struct err e = {0};
     struct moments m;
     assert_true(moments_alloc(&m, 2, 2, &e));
     assert_false(moments_write("/nonexistent/m.exr", &m, NULL, 0, &e));
     assert_true(strncmp(e.msg, "/nonexistent/m.exr", 18) == 0);
     moments_free(&m);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(online_equals_two_pass),
-        cmocka_unit_test(merged_in_any_grouping),
-        cmocka_unit_test(unlike_moments_do_not_merge),
-        cmocka_unit_test(write_and_read),
-        cmocka_unit_test(bad_files),
-        cmocka_unit_test(failed_write_leaves_nothing),
-    };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }

@@ -7,17 +7,7 @@
  * 8 K u in the worst case; and if roundings were of random sign, about 8 sqrt(K) u. Drift would be an error that grows as K:
  * the test asks for 100 sqrt(K) u, a tenth of the worst case already at K = 15000, a thousandth of it at the end. */
 #include "renderer/image/moments.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 __extension__ typedef __int128 wide;
 
@@ -78,8 +68,7 @@ static double worst_error(const struct moments *m, const struct sums *s, double 
 static void merge(struct moments *dst, const struct moments *src)
 {
     struct err e;
-    if (!moments_merge(dst, src, &e))
-        fail_msg("%s", e.msg);
+    MUST(moments_merge(dst, src, &e));
 }
 
 enum { BLOCK = 10000, NUM_BLOCKS = 16 };
@@ -133,9 +122,8 @@ static void merge_in_turn(const struct blocks *b, int merges, struct moments *al
 }
 
 /* One after the other, as passes come: 10^6 blocks of 10^4. */
-static void a_long_row_of_merges_does_not_drift(void **state)
+TEST(a_long_row_of_merges_does_not_drift)
 {
-    (void)state;
     enum { MERGES = 1000000 };
     struct blocks b;
     struct moments all;
@@ -150,9 +138,8 @@ static void a_long_row_of_merges_does_not_drift(void **state)
 }
 
 /* A tree, as machines would: 16 blocks, doubled 16 times: 1.05 10^10. */
-static void a_tree_of_merges_does_not_drift(void **state)
+TEST(a_tree_of_merges_does_not_drift)
 {
-    (void)state;
     struct blocks b;
     struct sums sums = {0};
     make_blocks(&b);
@@ -168,9 +155,8 @@ static void a_tree_of_merges_does_not_drift(void **state)
 }
 
 /* The test can fail: one block merged with its mean off by 10^-9 of itself, each time, is seen. */
-static void drift_would_be_seen(void **state)
+TEST(drift_would_be_seen)
 {
-    (void)state;
     enum { MERGES = 100000 };
     struct blocks b;
     struct moments all;
@@ -184,14 +170,4 @@ static void drift_would_be_seen(void **state)
     assert_true(worst_error(&all, &sums, each) > 100 * sqrt(MERGES) * 0x1p-53);
     moments_free(&all);
     free_blocks(&b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_long_row_of_merges_does_not_drift),
-        cmocka_unit_test(a_tree_of_merges_does_not_drift),
-        cmocka_unit_test(drift_would_be_seen),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

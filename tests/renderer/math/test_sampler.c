@@ -1,19 +1,13 @@
 /* The random function and the warps. */
 #include "renderer/math/sampler.h"
 #include "renderer/math/warp.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <cmocka.h>
 
 /* Known answers of the generator's authors (Random123, file kat_vectors) [Salmon11]. */
-static void known_answers(void **state)
+TEST(known_answers)
 {
-    (void)state;
     static const struct {
         int rounds;
         uint32_t counter[4], key[2], expected[4];
@@ -36,9 +30,8 @@ static void known_answers(void **state)
 }
 
 /* Every index matters, and the numbers stay inside [0, 1). */
-static void every_index_matters(void **state)
+TEST(every_index_matters)
 {
-    (void)state;
     struct sample4 a = sampler_get(7, 1, 2, 3, 4);
     const struct sample4 others[5] = {sampler_get(8, 1, 2, 3, 4), sampler_get(7, 0, 2, 3, 4),
                                       sampler_get(7, 1, 0, 3, 4), sampler_get(7, 1, 2, 0, 4),
@@ -121,9 +114,8 @@ static void unwarp(enum warp w, const float u[4], double *a, double *b)
     *b = turn(d.x, d.y);
 }
 
-static void warps_have_their_density(void **state)
+TEST(warps_have_their_density)
 {
-    (void)state;
     for (enum warp w = COSINE; w < NUM_WARPS; w++) {
         double count[BINS] = {0};
         for (uint32_t i = 0; i < SAMPLES; i++) {
@@ -139,9 +131,8 @@ static void warps_have_their_density(void **state)
 }
 
 /* Negative control: uniform directions taken for cosine ones are found out. */
-static void wrong_density_is_rejected(void **state)
+TEST(wrong_density_is_rejected)
 {
-    (void)state;
     double count[BINS] = {0};
     for (uint32_t i = 0; i < SAMPLES; i++) {
         struct sample4 s = sampler_get(20260102, i, 0, 0, 0);
@@ -153,9 +144,8 @@ static void wrong_density_is_rejected(void **state)
 
 /* Pairs of neighbouring pixels, samples, vertices and purposes fill the square evenly: H0 no
  * dependence between streams, same test. */
-static void streams_are_independent(void **state)
+TEST(streams_are_independent)
 {
-    (void)state;
     for (uint32_t which = 0; which < 4; which++) {
         double count[BINS] = {0};
         for (uint32_t i = 0; i < SAMPLES; i++) {
@@ -166,16 +156,4 @@ static void streams_are_independent(void **state)
         }
         assert_true(chi2_p(count) > 1e-6);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(known_answers),
-        cmocka_unit_test(every_index_matters),
-        cmocka_unit_test(warps_have_their_density),
-        cmocka_unit_test(wrong_density_is_rejected),
-        cmocka_unit_test(streams_are_independent),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

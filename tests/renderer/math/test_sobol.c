@@ -2,16 +2,10 @@
  * independence of its scrambles, and how fast the variance of a mean falls. All statistical tests:
  * alpha = 1e-6, seeds and n fixed, no retry. */
 #include "renderer/math/sampler.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
 
 #define ALPHA   1e-6
 #define Z_LIMIT 4.89
@@ -59,9 +53,8 @@ static uint32_t by_entries_4(uint32_t digits)
     return out;
 }
 
-static void sequence_is_as_defined(void **state)
+TEST(sequence_is_as_defined)
 {
-    (void)state;
     for (uint32_t i = 0; i < 300; i++) {
         uint32_t index = i < 200 ? i : i * 2654435761u, x[4], reversed = 0;
         for (int b = 0; b < 32; b++)
@@ -109,9 +102,8 @@ static bool one_in_each(enum sampler_kind kind, uint32_t block, uint32_t first, 
 }
 
 /* Every net that sampler.h promises, up to 2^12 points in two dimensions and 4^5 in four. */
-static void points_are_nets(void **state)
+TEST(points_are_nets)
 {
-    (void)state;
     for (uint32_t block = 0; block < 12; block++) {
         for (int m = 0; m <= 12; m += 1 + (m > 6))
             for (int a = 0; a <= m; a++) {
@@ -163,9 +155,8 @@ static double square_p(const struct square *q)
 
 /* Over seeds, each number of each sample is uniform and independent of the other numbers of the same
  * sample. */
-static void numbers_are_uniform(void **state)
+TEST(numbers_are_uniform)
 {
-    (void)state;
     static const uint32_t samples[] = {0, 1, 6, 1023};
     static const int pairs[][2] = {{0, 1}, {2, 3}, {0, 2}, {1, 3}};
     for (size_t k = 0; k < sizeof samples / sizeof *samples; k++) {
@@ -183,9 +174,8 @@ static void numbers_are_uniform(void **state)
 }
 
 /* The same sample of two blocks that differ in one index, over many such pairs: independent. */
-static void blocks_are_independent(void **state)
+TEST(blocks_are_independent)
 {
-    (void)state;
     enum { PIXEL, VERTEX, PURPOSE, SEED, SAME, CHANGES };
     for (int change = 0; change < CHANGES; change++)
         for (int d = 0; d < 4; d++) {
@@ -241,9 +231,8 @@ static double variance_of_mean(enum sampler_kind kind, enum integrand f, int d, 
  * into an interval of its own [Owen95], so the mean of u has variance 1/(12 n^3). H0: it has. The
  * sum of 8 or more such numbers is normal enough for var s^2 = 2 sigma^4/(seeds - 1): with 4000 seeds
  * 2.2 %, so the test takes 10.9 % off either way, and finds 20 % with certainty. */
-static void variance_on_a_line_is_owens(void **state)
+TEST(variance_on_a_line_is_owens)
 {
-    (void)state;
     enum { R = 4000 };
     double limit = Z_LIMIT * sqrt(2.0 / (R - 1));
     for (int d = 0; d < 4; d++)
@@ -283,9 +272,8 @@ static double slope(enum sampler_kind kind, enum integrand f, double *std_error)
  * 4, and as n^-1.5 where a plane region has a smooth edge, since only the n^0.5 boxes on the edge
  * count. H0 for Sobol: the slope is no steeper than the limit; the standard error is 0.03, so these
  * limits are rejected with certainty if the rates are those. */
-static void variance_falls_faster(void **state)
+TEST(variance_falls_faster)
 {
-    (void)state;
     static const double limit[NUM_INTEGRANDS] = {
         [LINE] = -2.7, [SMOOTH_2] = -2.4, [STEP_2] = -1.25, [SMOOTH_4] = -1.5};
     for (enum integrand f = LINE; f < NUM_INTEGRANDS; f++) {
@@ -300,14 +288,4 @@ static void variance_falls_faster(void **state)
             fail_msg("integrand %d: slope of independent samples %.3f +- %.3f", (int)f, b, se);
         assert_true(b + Z_LIMIT * se > limit[f]);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sequence_is_as_defined),      cmocka_unit_test(points_are_nets),
-        cmocka_unit_test(numbers_are_uniform),         cmocka_unit_test(blocks_are_independent),
-        cmocka_unit_test(variance_on_a_line_is_owens), cmocka_unit_test(variance_falls_faster),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

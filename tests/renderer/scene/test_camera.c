@@ -1,15 +1,6 @@
 /* Camera files: what is refused, with the file's name, and where the rays of one that is read go. */
 #include "renderer/scene/camera.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* The lines of a file: angles and clip distances; position and target; the assignment's own idea of
  * both; the matrix by rows; the screen; focal distance and lens radius. */
@@ -34,9 +25,8 @@ static bool read_text(const char *text, struct camera *c, struct err *e)
     return ok;
 }
 
-static void refuses_what_has_no_rays(void **state)
+TEST(refuses_what_has_no_rays)
 {
-    (void)state;
     static const struct {
         const char *text, *why;
     } bad[] = {
@@ -67,9 +57,8 @@ static void refuses_what_has_no_rays(void **state)
  * the image plane looks at eye + 2 (sx tan(25), sy tan(17.5), -1) for a focal distance of 2, by the
  * thin lens. The eye is 2^20 away, where float32 has steps of 1/8: the positions are lost in them, the
  * directions must not be. */
-static void lens_far_from_the_origin(void **state)
+TEST(lens_far_from_the_origin)
 {
-    (void)state;
     struct camera c;
     struct err e = {""};
     assert_true(read_text(ANGLES "1048576 0 0 0 0 0\n" ORBIT UPRIGHT SCREEN "2 0.01\n", &c, &e));
@@ -98,9 +87,8 @@ static bool near(vec3 a, double x, double y, double z)
 /* A box of 4 x 4 x 7 about (1, 2, 3): its diagonal is 9, so the eye stands 13.5 from (1, 2, 3) towards where the file's camera
  * looks from, whatever place the file gives it. The angle is the vertical one of 35 degrees at 800 x 600 where the file's angles
  * are those of a wider shape, else such that the horizontal one fits; fewer pixels see less. */
-static void the_assignment_frames_the_scene(void **state)
+TEST(the_assignment_frames_the_scene)
 {
-    (void)state;
     const double degree = acos(-1) / 180;
     struct scene s = {.dialect = DIALECT_CGL,
                       .frame_min = {-1, 0, -0.5f},
@@ -140,9 +128,8 @@ static void the_assignment_frames_the_scene(void **state)
 }
 
 /* COLLADA: the file's horizontal angle, or its vertical one, and square pixels. */
-static void collada_keeps_the_angle_of_the_file(void **state)
+TEST(collada_keeps_the_angle_of_the_file)
 {
-    (void)state;
     struct scene s = {.dialect = DIALECT_COLLADA, .camera = {.present = true, .vfov = 1}};
     struct camera c;
     struct err e = {""};
@@ -156,15 +143,4 @@ static void collada_keeps_the_angle_of_the_file(void **state)
     s.camera.present = false;
     assert_false(camera_init(&c, &s, 300, 200, &e));
     assert_non_null(strstr(e.msg, "no camera"));
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(refuses_what_has_no_rays),
-        cmocka_unit_test(lens_far_from_the_origin),
-        cmocka_unit_test(the_assignment_frames_the_scene),
-        cmocka_unit_test(collada_keeps_the_angle_of_the_file),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 #include "renderer/shading/light.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "tests/support/build_scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* A lamp of unit radiance that faces down, about (0, height, 0). */
 static struct scene lamp(float width, float depth, float height, unsigned bits)
@@ -15,8 +11,7 @@ static struct scene lamp(float width, float depth, float height, unsigned bits)
     struct err e = {""};
     uint32_t m = build_material(&s, grey(0), grey(1));
     build_quad(&s, v3(-width / 2, height, -depth / 2), v3(width, 0, 0), v3(0, 0, depth), m);
-    if (!scene_finish(&s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(&s, "test", &e));
     assert_int_equal(s.num_lights, 1);
     cs184_deviations_apply(&s, bits);
     return s;
@@ -66,9 +61,8 @@ static void expect(double got, double want)
 }
 
 /* Without a defect this is the rectangle; each of three heights, so that 1/r is told from 1/r^2. */
-static void a_density_without_a_distance(void **state)
+TEST(a_density_without_a_distance)
 {
-    (void)state;
     const vec3 p = v3(0.3f, 0, -0.2f);
     for (float height = 0.5f; height < 3; height *= 2)
         for (int defect = 0; defect < 2; defect++) {
@@ -80,9 +74,8 @@ static void a_density_without_a_distance(void **state)
 }
 
 /* Seen is the turned rectangle, sampled the one of the file, with its own density. */
-static void a_lamp_that_is_turned(void **state)
+TEST(a_lamp_that_is_turned)
 {
-    (void)state;
     const vec3 p = v3(1.2f, 0, 0.1f);
     vec3 most;
     struct scene s = lamp(2, 0.5f, 1, 1u << CS184_TURNED_LAMP);
@@ -102,25 +95,13 @@ static void a_lamp_that_is_turned(void **state)
 }
 
 /* Only lamps of two triangles are rectangles. */
-static void other_lamps_stay(void **state)
+TEST(other_lamps_stay)
 {
-    (void)state;
     struct err e = {""};
     struct scene s = build_scene();
     build_triangle(&s, v3(0, 1, 0), v3(1, 1, 0), v3(0, 1, 1), build_material(&s, grey(0), grey(1)));
-    if (!scene_finish(&s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(&s, "test", &e));
     cs184_deviations_apply(&s, 1u << CS184_TURNED_LAMP);
     assert_true(s.position[1].x == 1 && s.position[1].z == 0 && s.position[2].z == 1);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_density_without_a_distance),
-        cmocka_unit_test(a_lamp_that_is_turned),
-        cmocka_unit_test(other_lamps_stay),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,23 +3,13 @@
 #include "renderer/math/discrete.h"
 #include "renderer/math/sampler.h"
 #include "tests/support/sky.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 /* All 2^24 numbers of the sampler are counted: each thing is picked as often as it says. */
-static void choice_is_exact(void **state)
+TEST(choice_is_exact)
 {
-    (void)state;
     enum { N = 7 };
     const double weight[N] = {0, 1e-12, 3, 0, 1, 1e-30, 0};
     uint32_t end[N];
@@ -42,9 +32,8 @@ static void choice_is_exact(void **state)
 /* The left edge of the map is -X, and columns go from there by +Z, +X and -Z. 4 x 2 texels, so the
  * middle of column 0 faces between -X and +Z, at 45 degrees above the horizon in row 0; towards an
  * axis all texels around it have equal parts. */
-static void orientation(void **state)
+TEST(orientation)
 {
-    (void)state;
     const struct sky s = {.width = 4, .height = 2, .value = {1, 2, 4, 8, 16, 32, 64, 128}};
     static const float signs[4][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}; /* of x and z */
     static const struct {
@@ -78,9 +67,8 @@ static struct sample4 draw(uint32_t i)
 /* A sample is told the radiance of its direction, which is that of the tents; and the density of
  * its direction, but for those that float32 puts into the next cell, of which 1 in 1000 is
  * allowed. */
-static void samples_are_what_they_say(void **state)
+TEST(samples_are_what_they_say)
 {
-    (void)state;
     enum { N = 20000 };
     struct sky s = sky_uneven(64, 32);
     struct environment *env = sky_environment(&s);
@@ -147,9 +135,8 @@ static double chi_square(const double *p, const uint32_t *count, uint32_t n)
 /* H0: directions have the density that is told. Pearson's chi-square, up to 288 bins, n = 50000,
  * alpha = 1e-5 each, fixed numbers. Power: a map turned by one texel of 32, and a density that
  * forgets the sine of theta, are rejected. */
-static void directions_have_their_density(void **state)
+TEST(directions_have_their_density)
 {
-    (void)state;
     enum { N = 50000 };
     struct err e;
     struct sky uneven = sky_uneven(32, 16), turned = uneven;
@@ -197,9 +184,8 @@ static void directions_have_their_density(void **state)
 
 /* The sum over directions, which power is made of: 4 pi and 2 pi of luminance 1; of a map, within
  * 1 % the tents summed over 128 x 128 pieces of the sphere. */
-static void totals(void **state)
+TEST(totals)
 {
-    (void)state;
     struct err e;
     struct environment *all = environment_constant(grey(1), &e);
     struct environment *half = environment_upper_half(grey(1), &e);
@@ -236,9 +222,8 @@ static void must_refuse(const struct sky *s, const char *drop, const char *keywo
         fail_msg("expected '%s', got '%s'", keyword, e.msg);
 }
 
-static void bad_texels_are_named(void **state)
+TEST(bad_texels_are_named)
 {
-    (void)state;
     const struct sky good = {.width = 4, .height = 2, .value = {1, 2, 4, 8, 16, 32, 64, 128}};
     struct sky s = good;
     s.value[6] = NAN;
@@ -349,9 +334,8 @@ static void check_two_texels(const char *path)
     assert_true(fabsf(back.g - 1) < 1e-5f && fabsf(back.b - 1.5f) < 1e-5f);
 }
 
-static void files(void **state)
+TEST(files)
 {
-    (void)state;
     char dir[] = "/tmp/assay-sky-XXXXXX", path[64];
     uint8_t bytes[1024];
     struct err e = {""};
@@ -381,18 +365,4 @@ static void files(void **state)
     assert_null(environment_read(path, &e));
     assert_non_null(strstr(e.msg, "sky.png: an environment map must be an .exr or .hdr file"));
     assert_int_equal(rmdir(dir), 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(choice_is_exact),
-        cmocka_unit_test(orientation),
-        cmocka_unit_test(samples_are_what_they_say),
-        cmocka_unit_test(directions_have_their_density),
-        cmocka_unit_test(totals),
-        cmocka_unit_test(bad_texels_are_named),
-        cmocka_unit_test(files),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

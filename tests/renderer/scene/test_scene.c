@@ -1,14 +1,6 @@
 /* scene_finish(): lights of emissive objects, areas, bounds, and what it refuses. */
 #include "renderer/scene/scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static void *copy(const void *data, size_t size)
 {
@@ -54,9 +46,8 @@ static struct scene make_scene(void)
                           .objects = copy(objects, sizeof objects)};
 }
 
-static void area_lights_follow_delta_lights(void **state)
+TEST(area_lights_follow_delta_lights)
 {
-    (void)state;
     struct scene s = make_scene();
     struct err e = {""};
     assert_true(scene_finish(&s, "test", &e));
@@ -80,9 +71,8 @@ static void area_lights_follow_delta_lights(void **state)
 }
 
 /* Corners by hand: the first sphere reaches x = -5, y = 2, z = +-2; the second y = -7.5. */
-static void bounds_hold_triangles_and_spheres(void **state)
+TEST(bounds_hold_triangles_and_spheres)
 {
-    (void)state;
     struct scene s = make_scene();
     struct err e = {""};
     assert_true(scene_finish(&s, "test", &e));
@@ -94,9 +84,8 @@ static void bounds_hold_triangles_and_spheres(void **state)
     scene_free(&s);
 }
 
-static void free_zeroes(void **state)
+TEST(free_zeroes)
 {
-    (void)state;
     struct scene s = make_scene();
     static const struct scene zero;
     scene_free(&s);
@@ -205,9 +194,8 @@ static void spoil_lamp_area(struct scene *s)
         s->position[k] = v3(1, 1, 1);
 }
 
-static void bad_scenes_are_refused(void **state)
+TEST(bad_scenes_are_refused)
 {
-    (void)state;
     static const struct spoil SPOILS[] = {
         {spoil_empty, "no triangles"},
         {spoil_position, "triangle 2: position"},
@@ -242,15 +230,4 @@ static void bad_scenes_are_refused(void **state)
             fail_msg("expected '%s', got '%s'", SPOILS[i].keyword, e.msg);
         scene_free(&s);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(area_lights_follow_delta_lights),
-        cmocka_unit_test(bounds_hold_triangles_and_spheres),
-        cmocka_unit_test(free_zeroes),
-        cmocka_unit_test(bad_scenes_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

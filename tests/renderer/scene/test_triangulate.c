@@ -1,15 +1,7 @@
 /* Polygons into triangles, against the shoelace formula (area) and the crossing-number rule
  * (coverage), which share nothing with ear clipping. */
 #include "renderer/scene/triangulate.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { MOST = 400 };
 
@@ -108,9 +100,8 @@ static struct flat reversed(const struct flat *f)
     return g;
 }
 
-static void concave_shapes(void **state)
+TEST(concave_shapes)
 {
-    (void)state;
     const struct flat shapes[] = {
         {{0, 2, 2, 1, 1, 0}, {0, 0, 1, 1, 2, 2}, 6},                          /* L */
         {{0, 3, 1, 1}, {0, 0, 0.4, 3}, 4},                                    /* dart */
@@ -129,9 +120,8 @@ static void concave_shapes(void **state)
 
 /* Radii drawn freely at ordered angles make simple polygons that are concave at about every other
  * vertex. */
-static void random_star_shapes(void **state)
+TEST(random_star_shapes)
 {
-    (void)state;
     uint32_t seed = 7;
     for (uint32_t n = 4; n <= 200; n += 7) {
         struct flat f = {.n = n};
@@ -145,9 +135,8 @@ static void random_star_shapes(void **state)
 }
 
 /* Two arms of a spiral of five turns: every ear must look past the other arm. */
-static void spiral(void **state)
+TEST(spiral)
 {
-    (void)state;
     struct flat f = {.n = MOST};
     for (uint32_t i = 0; i < MOST / 2; i++) {
         double angle = 31.4 * i / (MOST / 2), r = 0.2 + angle / 31.4;
@@ -159,9 +148,8 @@ static void spiral(void **state)
     check(&f, 1.3);
 }
 
-static void crossed_polygons_are_refused(void **state)
+TEST(crossed_polygons_are_refused)
 {
-    (void)state;
     uint32_t index[3 * MOST];
     const struct flat bow = {{0, 1, 1, 0}, {0, 1, 0, 1}, 4};    /* no area at all */
     const struct flat uneven = {{0, 3, 3, 0}, {0, 1, 0, 2}, 4}; /* some area */
@@ -186,22 +174,11 @@ static void crossed_polygons_are_refused(void **state)
     assert_int_equal(run(&band, index), TRIANGULATE_CROSSED);
 }
 
-static void line_is_flat(void **state)
+TEST(line_is_flat)
 {
-    (void)state;
     uint32_t index[3 * MOST];
     const struct flat line = {{0, 1, 2, 3}, {0, 1, 2, 3}, 4};
     const struct flat point = {{1, 1, 1, 1}, {2, 2, 2, 2}, 4};
     assert_int_equal(run(&line, index), TRIANGULATE_FLAT);
     assert_int_equal(run(&point, index), TRIANGULATE_FLAT);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(concave_shapes), cmocka_unit_test(random_star_shapes),
-        cmocka_unit_test(spiral),         cmocka_unit_test(crossed_polygons_are_refused),
-        cmocka_unit_test(line_is_flat),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,14 +13,9 @@
 #include "renderer/shading/microfacet.h"
 #include "renderer/math/sampler.h"
 #include "tests/support/optics.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 enum { SAMPLES = 40000, TAUS = 10, PSIS = 8, PATCHES = TAUS * PSIS, ANGLES = 5, ROUGH = 5 };
 enum { SPECS = 1 + 2 * ROUGH, ROWS = SPECS * ANGLES, TESTS = 3 * ROWS };
@@ -214,9 +209,8 @@ static void check_row(int i, int a)
 
 /* GGX of roughness 1 is D = 1/pi. Seen from above G2 is G1(wi) = 2c/(1 + c), c = cos(theta_i), and the
  * albedo is the integral of G1/(4 pi) over directions, of c/(1 + c) over c: 1 - ln 2. */
-static void albedo_in_closed_form(void **state)
+TEST(albedo_in_closed_form)
 {
-    (void)state;
     for (int separable = 0; separable < 2; separable++) {
         struct material m = metal(MICROFACET_GGX, 1);
         m.separable = separable;
@@ -233,9 +227,8 @@ static void albedo_in_closed_form(void **state)
     }
 }
 
-static void samples_have_their_density(void **state)
+TEST(samples_have_their_density)
 {
-    (void)state;
     for (int i = 0; i < SPECS; i++)
         for (int a = 0; a < ANGLES; a++)
             check_row(i, a);
@@ -245,9 +238,8 @@ static void samples_have_their_density(void **state)
  * conductor's Fresnel factor; f(wo, wi) = f(wi, wo). Float32 resolves a normal to 6e-8, that is 3e-6
  * of alpha = .02, and D is at most of the power 4 in it (GGX) or of exponent 2 tan^2/alpha^2
  * (Beckmann, below 40 where f is not negligible). */
-static void values_and_reciprocity(void **state)
+TEST(values_and_reciprocity)
 {
-    (void)state;
     const double complex n[3] = {0.2 + 3.9 * _Complex_I, 0.92 + 2.45 * _Complex_I,
                                  1.1 + 1.8 * _Complex_I};
     for (uint32_t i = 0; i < 20000; i++) {
@@ -323,9 +315,8 @@ static double lambda_of_the_assignment(double alpha, double cos_o)
 
 /* The facets of a unit of surface have its area as their projection [Heitz14 eq. 7], and those that
  * are visible its area seen from wo, cos_o [Heitz14 eq. 14]. */
-static void facets_cover_the_surface(void **state)
+TEST(facets_cover_the_surface)
 {
-    (void)state;
     for (int kind = 0; kind < 2; kind++)
         for (int r = 0; r < ROUGH; r++) {
             struct facet f = {(enum microfacet_kind)kind, roughness[r], NULL, -1};
@@ -353,9 +344,8 @@ static void facets_cover_the_surface(void **state)
 }
 
 /* On purpose: its shadowing with that masking, by its text G = 1/(1 + lambda + lambda) in double precision. */
-static void starter_code_shadows_as_its_header_says(void **state)
+TEST(starter_code_shadows_as_its_header_says)
 {
-    (void)state;
     for (int i = 0; i < ANGLES; i++)
         for (int o = 0; o < ANGLES; o++) {
             double ci = cos(angle[i] * DEGREE), co = cos(angle[o] * DEGREE);
@@ -374,9 +364,8 @@ static void starter_code_shadows_as_its_header_says(void **state)
 }
 
 /* Every corner of what the sampler can return, down to directions in the surface itself. */
-static void nothing_becomes_nan(void **state)
+TEST(nothing_becomes_nan)
 {
-    (void)state;
     static const float edge[] = {0, 0x1p-24f, 0.25f, 0.5f, 0.75f, 1 - 0x1p-24f};
     static const float height[] = {1, 0.1f, 1e-3f, 1e-7f, 1e-12f, 1e-20f, 1e-38f, 1e-45f};
     static const float alpha[] = {MICROFACET_MIN_ALPHA, 1e-3f, 0.3f, 10};
@@ -431,9 +420,8 @@ static float cosine_step(int i)
     return i == 0 ? 1e-6f : (float)sin(i * M_PI / 2000);
 }
 
-static void dielectric_by_complex_amplitudes(void **state)
+TEST(dielectric_by_complex_amplitudes)
 {
-    (void)state;
     static const double index[] = {0.1,    0.5,   1 / 1.5, 0.9,  0.999, 1 / 1.0003, 1,
                                    1.0003, 1.001, 1.1,     1.33, 1.5,   2.42,       10};
     for (size_t j = 0; j < sizeof index / sizeof *index; j++)
@@ -461,9 +449,8 @@ static void dielectric_by_complex_amplitudes(void **state)
  * cos_i = 1/sqrt(1+n^2) and cos_t = n cos_i, half of ((n^2-1)/(n^2+1))^2. Beyond sin = n < 1: all.
  * Stokes: what is reflected and what is transmitted is everything, and the reflectance from behind
  * at the refracted angle is that from in front. */
-static void dielectric_in_closed_form(void **state)
+TEST(dielectric_in_closed_form)
 {
-    (void)state;
     static const double index[] = {1.1, 1.33, 1.5, 2.42, 1 / 1.1, 1 / 1.5, 0.3};
     for (size_t j = 0; j < sizeof index / sizeof *index; j++) {
         double n = index[j], b = 1 / sqrt(1 + n * n), even = pow((n - 1) / (n + 1), 2);
@@ -498,9 +485,8 @@ static void dielectric_in_closed_form(void **state)
 }
 
 /* Schlick's curve meets the exact one at normal incidence and ends at 1; in between it is another. */
-static void schlick_at_both_ends(void **state)
+TEST(schlick_at_both_ends)
 {
-    (void)state;
     static const float index[] = {1.1f, 1.45f, 2.42f, 1 / 1.45f};
     for (size_t j = 0; j < sizeof index / sizeof *index; j++) {
         float t, u;
@@ -515,9 +501,8 @@ static void schlick_at_both_ends(void **state)
                 1e-3f);
 }
 
-static void conductor_by_complex_amplitudes(void **state)
+TEST(conductor_by_complex_amplitudes)
 {
-    (void)state;
     /* Metals, a poor one, a dielectric without absorption, none at all, and the loader's extremes. */
     static const double index[][2] = {
         {0.05, 4}, {0.2, 3.9}, {1.1, 1.8}, {2.9, 3.1},   {0.9, 0.02},  {1.5, 0},  {1, 0},
@@ -540,9 +525,8 @@ static void conductor_by_complex_amplitudes(void **state)
 }
 
 /* Mirror and glass as functions: one or two directions, shares and weights. */
-static void smooth_surfaces(void **state)
+TEST(smooth_surfaces)
 {
-    (void)state;
     struct material glass = {.kind = MATERIAL_GLASS,
                              .reflectance = {1, 0.5f, 0.25f},
                              .transmittance = {0.25f, 1, 0.5f},
@@ -576,22 +560,4 @@ static void smooth_surfaces(void **state)
     assert_true(s.delta && s.wi.x == -wo.x && s.wi.z == wo.z && s.weight.b == 0.7f);
     assert_true(bsdf_is_delta(&mirror) && bsdf_is_delta(&glass) && bsdf_is_delta(&refraction));
     assert_true(rgb_is_zero(bsdf_eval(&glass, wo, wo)) && bsdf_pdf_w(&mirror, wo, wo) == 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_have_their_density),
-        cmocka_unit_test(albedo_in_closed_form),
-        cmocka_unit_test(values_and_reciprocity),
-        cmocka_unit_test(facets_cover_the_surface),
-        cmocka_unit_test(starter_code_shadows_as_its_header_says),
-        cmocka_unit_test(nothing_becomes_nan),
-        cmocka_unit_test(dielectric_by_complex_amplitudes),
-        cmocka_unit_test(dielectric_in_closed_form),
-        cmocka_unit_test(schlick_at_both_ends),
-        cmocka_unit_test(conductor_by_complex_amplitudes),
-        cmocka_unit_test(smooth_surfaces),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

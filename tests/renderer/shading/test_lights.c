@@ -3,16 +3,9 @@
  * would give, which the same test must reject. */
 #include "tests/support/render_check.h"
 #include "tests/support/sky.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .direct = DIRECT_MIS,
@@ -52,9 +45,8 @@ static void give_sky(struct scene *s, struct environment *env)
 
 /* Nothing but sky over a plate that reflects rho, or around a sphere: rho L, whatever the depth, as
  * neither sees itself. Beside the sphere: L. */
-static void constant_sky(void **state)
+TEST(constant_sky)
 {
-    (void)state;
     struct err e;
     for (int around = 0; around < 2; around++) {
         struct scene s = plate(v3(0, 1, 0), 0.6f);
@@ -91,9 +83,8 @@ static void constant_sky(void **state)
 
 /* An uneven map over plates that face five ways: rho/pi times the irradiance by quadrature. The
  * wrong values are those of the plate that faces the other way, and 5 %. */
-static void uneven_sky(void **state)
+TEST(uneven_sky)
 {
-    (void)state;
     static const double normals[5][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}, {0, 1, 0}};
     const struct sky sky = sky_uneven(16, 8);
     for (int k = 0; k < 5; k++) {
@@ -122,9 +113,8 @@ static void uneven_sky(void **state)
  *         = L 2pi/32 (sin(2 theta_c)/2) sin(d)^2/d,
  * which is L times solid angle times cosine for a small one. Sampled well: a standard error of
  * less than 1 % from 65536 paths, where uniform directions leave 10 %. */
-static void bright_texel(void **state)
+TEST(bright_texel)
 {
-    (void)state;
     struct sky sky = {.width = 32, .height = 16};
     sky.value[3 * 32 + 11] = 1000;
     struct scene s = plate(v3(0, 1, 0), 0.5f);
@@ -184,9 +174,8 @@ static struct scene catalogue_view_scene(enum view view, vec3 w, float reflectan
     return s;
 }
 
-static void seen_directly_and_in_mirrors(void **state)
+TEST(seen_directly_and_in_mirrors)
 {
-    (void)state;
     static const float directions[7][3] = {{-1, 0, 0},
                                            {0, 0, 1},
                                            {1, 0, 0},
@@ -223,9 +212,8 @@ static void seen_directly_and_in_mirrors(void **state)
             }
 }
 
-static void glass_in_a_constant_sky(void **state)
+TEST(glass_in_a_constant_sky)
 {
-    (void)state;
     struct err e;
     struct scene s = catalogue_view_scene(VIEW_NO_GLASS, v3(0, 0, -1), 1);
     s.materials[0].ior = 1.5f;
@@ -247,9 +235,8 @@ static void glass_in_a_constant_sky(void **state)
 
 /* The assignment's ambient light: a plate that looks up gets pi L, one that looks sideways half of
  * it, one that looks down nothing; camera and mirror see black. */
-static void upper_half(void **state)
+TEST(upper_half)
 {
-    (void)state;
     struct err e;
     static const float normals[3][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}};
     for (int k = 0; k < 3; k++)
@@ -296,9 +283,8 @@ static struct scene corner_scene(void)
 /* A constant environment, and a sphere of radius 50 around everything that emits the same to its
  * inside: two ways through the code, one picture. 32 x 24 pixels, 256 samples, standard error of the
  * difference about 0.2 %. */
-static void sky_or_sphere_of_emitters(void **state)
+TEST(sky_or_sphere_of_emitters)
 {
-    (void)state;
     struct err e;
     struct integrator_options io = path_options;
     io.max_bounces = 3;
@@ -327,9 +313,8 @@ static void sky_or_sphere_of_emitters(void **state)
 
 /* rho/pi I cos(alpha)^e cos(theta)/d^2 inside the cone, 0 outside; no noise. The lamp is at
  * (0.6, 0.8, -0.5), so d^2 = 1.25. */
-static void spot_light(void **state)
+TEST(spot_light)
 {
-    (void)state;
     static const struct {
         double off, half_angle, exponent; /* degrees between axis and the plate's middle */
     } spots[] = {{0, 30, 0},    {0, 5, 8},   {20, 25, 0}, {20, 25, 3}, {20, 19, 3},
@@ -374,9 +359,8 @@ static void spot_light(void **state)
 }
 
 /* A lamp of every kind, with their powers; R is half the diagonal of the bounds. */
-static void choice_is_by_power(void **state)
+TEST(choice_is_by_power)
 {
-    (void)state;
     struct err e;
     struct scene s = plate(v3(0, 1, 0), 0.5f);
     build_light(&s, (struct light){.kind = LIGHT_POINT,
@@ -476,9 +460,8 @@ static double rectangle_irradiance(vec3 p, float width, float depth)
 /* 60 point lights below 40 rectangular lamps that face down, of powers from 1 to 1000, over a
  * plate: nothing is in anything's way, so the sum of the closed forms. All of them sampled, one
  * chosen by power, and what the renderer does by itself, which is the latter to the bit. */
-static void a_hundred_lights(void **state)
+TEST(a_hundred_lights)
 {
-    (void)state;
     struct scene s = plate(v3(0, 1, 0), 0.6f);
     double irradiance = 0, lamps = 0, brightest = 0;
     for (int i = 0; i < 60; i++) {
@@ -530,9 +513,8 @@ static void a_hundred_lights(void **state)
 
 /* A sky map, spheres, lamps and a spot together, three bounces: every estimator, all lights or one
  * of them. 32 x 24 pixels; relative standard error below 1 % but for uniform directions. */
-static void all_or_one_of_the_lights(void **state)
+TEST(all_or_one_of_the_lights)
 {
-    (void)state;
     const struct sky sky = sky_uneven(16, 8);
     struct scene s = corner_scene();
     give_sky(&s, sky_environment(&sky));
@@ -574,9 +556,8 @@ static void all_or_one_of_the_lights(void **state)
 }
 
 /* One environment, on a finished scene too, and it is a light. */
-static void one_environment(void **state)
+TEST(one_environment)
 {
-    (void)state;
     struct err e = {""};
     struct scene s = plate(v3(0, 1, 0), 0.5f);
     check_finish(&s);
@@ -599,23 +580,4 @@ static void one_environment(void **state)
     assert_false(scene_finish(&s, "test", &e));
     assert_non_null(strstr(e.msg, "light 0: more than one environment, or none"));
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(constant_sky),
-        cmocka_unit_test(uneven_sky),
-        cmocka_unit_test(bright_texel),
-        cmocka_unit_test(seen_directly_and_in_mirrors),
-        cmocka_unit_test(glass_in_a_constant_sky),
-        cmocka_unit_test(upper_half),
-        cmocka_unit_test(sky_or_sphere_of_emitters),
-        cmocka_unit_test(spot_light),
-        cmocka_unit_test(choice_is_by_power),
-        cmocka_unit_test(a_hundred_lights),
-        cmocka_unit_test(all_or_one_of_the_lights),
-        cmocka_unit_test(one_environment),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,13 +4,9 @@
  * negative control that the same test must reject. */
 #include "tests/support/optics.h"
 #include "tests/support/render_check.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <cmocka.h>
 
 static const double DEGREE = M_PI / 180;
 
@@ -66,9 +62,8 @@ static uint32_t lamp(struct scene *s, rgb radiance)
 /* Two mirrors, y = 0 and y = 1, and at the far end z = -10 an emitter of 1 below the middle and 3 above.
  * Unfolded, the ray ends at Y = 0.5 + 10 tan(angle): floor(Y) reflections, every other one at the
  * upper mirror, and it arrives at Y's place in the last image. */
-static void corridor_of_mirrors(void **state)
+TEST(corridor_of_mirrors)
 {
-    (void)state;
     const double upper[3] = {1, 0.9, 0.5}, lower[3] = {0.8, 1, 0.3};
     for (int n = 0; n <= 6; n++)
         for (int high = 0; high < 2; high++) {
@@ -158,9 +153,8 @@ static struct scene plate_scene(rgb reflectance, rgb transmittance, bool use_sch
     return s;
 }
 
-static void plate_of_glass(void **state)
+TEST(plate_of_glass)
 {
-    (void)state;
     static const double angle[] = {0, 30, 56.309932, 70, 80};
     static const int depths[] = {1, 2, 3, 4, 6, 60};
     for (int kind = 0; kind < 3; kind++) /* clear, tinted, Schlick */
@@ -226,9 +220,8 @@ static void check_furnace(const struct scene *s, double factor, const char *what
 
 /* Clear glass neither adds nor takes: outside every ray brings the furnace's radiance, without noise.
  * A bubble (index below 1, total reflection at its rim) and a smaller one in it do the same. */
-static void glass_ball_in_a_furnace(void **state)
+TEST(glass_ball_in_a_furnace)
 {
-    (void)state;
     static const float ior[] = {1.5f, 1 / 1.5f, 1, 2.42f};
     for (size_t i = 0; i < sizeof ior / sizeof *ior; i++)
         for (int hollow = 0; hollow < 2; hollow++)
@@ -258,9 +251,8 @@ static void glass_ball_in_a_furnace(void **state)
 
 /* In glass of index n radiance is n^2 as large: all of it in equilibrium. Rays from 0.3 off the centre
  * meet the surface at sines below 0.3 < 1/n, so that all get out. */
-static void camera_inside_glass(void **state)
+TEST(camera_inside_glass)
 {
-    (void)state;
     for (int kind = 0; kind < 2; kind++) {
         struct scene s = furnace();
         uint32_t glass =
@@ -276,9 +268,8 @@ static void camera_inside_glass(void **state)
 /* A body in equilibrium with the furnace cannot be seen in it: inside glass a diffuse ball that reflects
  * rho and emits (1-rho) n^2 times the furnace's radiance. Light sampling never finds an emitter
  * through the glass, only the path does. */
-static void warm_ball_inside_glass(void **state)
+TEST(warm_ball_inside_glass)
 {
-    (void)state;
     static const float rho[] = {0, 0.5f, 1};
     for (int i = 0; i < 3; i++) {
         struct scene s = furnace();
@@ -296,9 +287,8 @@ static void warm_ball_inside_glass(void **state)
 
 /* Refraction alone: no Fresnel factor, so a plate passes t^2 and its inside shows n^2 t up to the
  * critical angle (41.8 degrees) and nothing beyond. */
-static void refraction_alone(void **state)
+TEST(refraction_alone)
 {
-    (void)state;
     static const double angle[] = {0, 20, 41, 42.5, 70};
     for (size_t a = 0; a < sizeof angle / sizeof *angle; a++)
         for (int inside = 0; inside < 2; inside++) {
@@ -346,9 +336,8 @@ static struct material rough(int kind, int shadowing, float alpha, bool conducto
 }
 
 /* A flat plate in the furnace shows its directional albedo. */
-static void rough_plate_in_a_furnace(void **state)
+TEST(rough_plate_in_a_furnace)
 {
-    (void)state;
     static const float alpha[] = {0.1f, 0.5f, 1};
     static const double angle[] = {0, 45, 80};
     for (int i = 0; i < 3 * 3 * 2 * 2 * 2; i++) {
@@ -431,9 +420,8 @@ static double reflected_sphere(const struct optics_metal *metal, const double wo
 }
 
 /* A lamp beside the mirror direction, so that the lobe's shape and not only its volume counts. */
-static void lamp_in_a_rough_plate(void **state)
+TEST(lamp_in_a_rough_plate)
 {
-    (void)state;
     static const float alpha[] = {0.15f, 0.5f};
     const double centre[3] = {0.5, 1.2, 1.5}, wo[3] = {0, -sin(50 * DEGREE), cos(50 * DEGREE)};
     for (int i = 0; i < 4; i++) {
@@ -470,15 +458,4 @@ static void lamp_in_a_rough_plate(void **state)
         }
         scene_free(&s);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(corridor_of_mirrors),      cmocka_unit_test(plate_of_glass),
-        cmocka_unit_test(glass_ball_in_a_furnace),  cmocka_unit_test(camera_inside_glass),
-        cmocka_unit_test(warm_ball_inside_glass),   cmocka_unit_test(refraction_alone),
-        cmocka_unit_test(rough_plate_in_a_furnace), cmocka_unit_test(lamp_in_a_rough_plate),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,29 +4,7 @@
 #include "renderer/pathtracer/output.h"
 #include "renderer/pathtracer/checkpoint.h"
 #include "tests/support/build_scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
-
-static char dir[] = "/tmp/assay_film_XXXXXX";
-
-static int make_dir(void **state)
-{
-    (void)state;
-    return mkdtemp(dir) == NULL;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
-}
+#include "tests/support/test.h"
 
 struct fixture {
     struct scene scene;
@@ -91,8 +69,7 @@ static struct render_stats go_on(const struct fixture *f, const struct render_op
     struct render_stats stats;
     struct progress p;
     progress_start(&p, "test", NULL, true);
-    if (!render_film(&f->scene, &f->camera, f->bvh, o, c, &p, film, &stats, &e))
-        fail_msg("%s", e.msg);
+    MUST(render_film(&f->scene, &f->camera, f->bvh, o, c, &p, film, &stats, &e));
     return stats;
 }
 
@@ -141,13 +118,11 @@ static const struct render_id some_id = {.scene = "5ce4e",
 
 /* Stopped after every pass, written, read and gone on with, with 1 and 2 threads in turn: the same bits
  * as without. Plain, with layers, with the assignment's rule, with a pilot. */
-static void resumed_equals_uninterrupted(void **state)
+TEST(resumed_equals_uninterrupted)
 {
-    (void)state;
     struct fixture f;
     rare_bright_samples(&f);
-    char path[64];
-    snprintf(path, sizeof path, "%s/x.state", dir);
+    const char *path = test_path("x.state");
     for (int mode = 0; mode < 4; mode++) {
         struct render_options o = options_of(13);
         o.first_sample = 5;
@@ -182,9 +157,8 @@ static void resumed_equals_uninterrupted(void **state)
 
 /* Negative control of the above: sums that went through float32, as pictures have them, and another
  * seed do not give the same bits. */
-static void rounded_state_differs(void **state)
+TEST(rounded_state_differs)
 {
-    (void)state;
     struct fixture f;
     rare_bright_samples(&f);
     struct render_options half = options_of(11), all = options_of(23), other = all;
@@ -229,9 +203,8 @@ static bool near_films(const struct film *a, const struct film *b)
 
 /* Samples 5 .. 17 in three ranges, each added row by row to those before, against one render of all: plain, with layers, with a pilot,
  * which decides for all ranges alike. Negative controls: without the second range, which is one sample, and from it on with another seed. */
-static void ranges_add_up(void **state)
+TEST(ranges_add_up)
 {
-    (void)state;
     const uint32_t at[] = {5, 9, 10, 18};
     struct fixture f;
     struct err e = {0};
@@ -254,8 +227,7 @@ static void ranges_add_up(void **state)
                     continue;
                 }
                 for (size_t row = 0; row < SIZE && (bug != 1 || r != 1); row++)
-                    if (!film_merge(&sum, &range, row * SIZE, SIZE, &e))
-                        fail_msg("%s", e.msg);
+                    MUST(film_merge(&sum, &range, row * SIZE, SIZE, &e));
                 film_free(&range);
             }
             assert_true(near_films(&whole, &sum) == (bug == 0));
@@ -276,13 +248,11 @@ static void expect_no_state(const char *path, const struct render_id *id, const 
     film_free(&film);
 }
 
-static void bad_states(void **state)
+TEST(bad_states)
 {
-    (void)state;
-    char path[64];
+    const char *path = test_path("bad.state");
     struct err e = {0};
     struct film film;
-    snprintf(path, sizeof path, "%s/bad.state", dir);
     expect_no_state(path, &some_id, "No such file");
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
     assert_true(checkpoint_write(path, &some_id, &film, &e));
@@ -320,14 +290,12 @@ static void bad_states(void **state)
     fflush(f);
     expect_no_state(path, &some_id, "not a state file");
     fclose(f);
-    unlink(path);
 }
 
 /* The relative error against two passes over the same numbers; and a render that stops by it stops at the
  * same sample on any number of threads, at the first multiple of 16 that is good enough. */
-static void stops_by_error(void **state)
+TEST(stops_by_error)
 {
-    (void)state;
     struct fixture f;
     rare_bright_samples(&f);
     struct render_options o = options_of(4096);
@@ -357,9 +325,8 @@ static void stops_by_error(void **state)
     drop(&f);
 }
 
-static void stops_by_time(void **state)
+TEST(stops_by_time)
 {
-    (void)state;
     struct fixture f;
     rare_bright_samples(&f);
     struct render_options o = options_of(1 << 24);
@@ -428,9 +395,8 @@ static struct estimate rule_in_closed_form(void)
  * errors, so it is rejected with power 1, and that is the negative control. The pilot's mean is not, with
  * a standard error near 0.03: half of the rule's bias would be seen with power 1 - 1e-7, a tenth hardly
  * ever. */
-static void rule_is_biased_and_pilot_is_not(void **state)
+TEST(rule_is_biased_and_pilot_is_not)
 {
-    (void)state;
     const double truth = DIM + PART * (BRIGHT - DIM);
     struct fixture f;
     rare_bright_samples(&f);
@@ -478,9 +444,8 @@ static void rule_is_biased_and_pilot_is_not(void **state)
 
 /* A wall that fills the left half of the view, parallel to the picture, 3 away from a camera that looks along
  * -X: depth 3 everywhere on it, whatever the angle; normal towards the camera. */
-static void layers_of_a_wall(void **state)
+TEST(layers_of_a_wall)
 {
-    (void)state;
     struct fixture f = {.scene = build_scene()};
     uint32_t m = build_material(&f.scene, (rgb){0.25f, 0.5f, 0.75f}, grey(1));
     build_quad(&f.scene, v3(50, 50, 50), v3(1, 0, 0), v3(0, 1, 0), m);
@@ -524,9 +489,8 @@ static void layers_of_a_wall(void **state)
 }
 
 /* cs184: s <= 1/2 blue to green, else green to red, linearly. */
-static void rate_colours(void **state)
+TEST(rate_colours)
 {
-    (void)state;
     static const struct {
         double rate;
         uint8_t rgb8[3];
@@ -554,9 +518,8 @@ static double cie_lightness(const uint8_t rgb8[3])
     return y > 0.008856 ? 116 * cbrt(y) - 16 : 903.3 * y;
 }
 
-static void heatmap_of_one_triangle(void **state)
+TEST(heatmap_of_one_triangle)
 {
-    (void)state;
     double last = -1;
     for (int i = 0; i <= 20; i++) {
         uint8_t c[3];
@@ -572,11 +535,10 @@ static void heatmap_of_one_triangle(void **state)
     build_triangle(&f.scene, v3(0, 0, -1), v3(1, 0, -1), v3(0, 1, -1), m);
     build_camera(&f.scene, v3(0, 0, 0), 60);
     finish(&f, 8, 4);
-    char path[64];
+    const char *path = test_path("heat.png");
     struct err e = {0};
     struct image im;
     uint64_t most;
-    snprintf(path, sizeof path, "%s/heat.png", dir);
     if (!heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) ||
         !image_read(path, &im, NULL, &e))
         fail_msg("%s", e.msg);
@@ -588,21 +550,4 @@ static void heatmap_of_one_triangle(void **state)
     image_free(&im);
     unlink(path);
     drop(&f);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(resumed_equals_uninterrupted),
-        cmocka_unit_test(rounded_state_differs),
-        cmocka_unit_test(ranges_add_up),
-        cmocka_unit_test(bad_states),
-        cmocka_unit_test(stops_by_error),
-        cmocka_unit_test(stops_by_time),
-        cmocka_unit_test(rule_is_biased_and_pilot_is_not),
-        cmocka_unit_test(layers_of_a_wall),
-        cmocka_unit_test(rate_colours),
-        cmocka_unit_test(heatmap_of_one_triangle),
-    };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }

@@ -3,13 +3,7 @@
  * more samples of moderate skew the normal limit is good to a factor of two there. Each group has a
  * negative control: a value that a known bug would give must be rejected by the same test. */
 #include "tests/support/render_check.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 #define Z_LIMIT 4.89
 
@@ -22,9 +16,8 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
 
 /* A sphere seen from inside that reflects rho and emits E: L = E sum_{k=0..m} rho^k for every m,
  * because every point sees the same radiance in all directions. */
-static void furnace_at_every_depth(void **state)
+TEST(furnace_at_every_depth)
 {
-    (void)state;
     const double rho[3] = {0.8, 0.5, 0.2}, emitted[3] = {1, 2, 4};
     struct scene s = build_scene();
     uint32_t m = build_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
@@ -84,9 +77,8 @@ static struct scene floor_scene(float albedo)
     return s;
 }
 
-static void rectangle_light(void **state)
+TEST(rectangle_light)
 {
-    (void)state;
     /* Parallel, off axis; upright and near (grazing); both face the patch. */
     static const float quads[2][9] = {{0.2f, 1, -0.7f, 0.9f, 0, 0, 0, 0, 0.5f},
                                       {0.3f, 0.05f, 0.5f, 0, 0, -1, 0, 0.8f, 0}};
@@ -124,9 +116,8 @@ static void rectangle_light(void **state)
 
 /* E = pi L (r/d)^2 cos(theta) for a sphere wholly above the horizon [a uniform sphere is seen as a
  * disk of that solid angle's projection]. */
-static void sphere_light(void **state)
+TEST(sphere_light)
 {
-    (void)state;
     static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
     for (int q = 0; q < 3; q++) {
         struct scene s = floor_scene(0.5f);
@@ -149,9 +140,8 @@ static void sphere_light(void **state)
 }
 
 /* Point: rho/pi I cos/d^2. Directional: rho/pi E cos. No noise but that of the pixel's width. */
-static void delta_lights(void **state)
+TEST(delta_lights)
 {
-    (void)state;
     struct scene s = floor_scene(0.7f);
     build_light(&s, (struct light){.kind = LIGHT_POINT,
                                    .value = {2, 3, 4},
@@ -175,9 +165,8 @@ static void delta_lights(void **state)
 }
 
 /* A plate between light and patch: no light; taken away from the line of sight: all of it. */
-static void shadow(void **state)
+TEST(shadow)
 {
-    (void)state;
     for (int blocked = 0; blocked < 2; blocked++) {
         struct scene s = floor_scene(0.7f);
         uint32_t black = build_material(&s, grey(0), grey(0));
@@ -223,9 +212,8 @@ static bool same_bits(const struct moments *a, const struct moments *b)
            memcmp(a->m3, b->m3, 3 * n * sizeof *a->m3) == 0;
 }
 
-static void same_bits_for_any_threads(void **state)
+TEST(same_bits_for_any_threads)
 {
-    (void)state;
     struct scene s = box_scene(10);
     struct integrator_options io = path_options;
     io.max_bounces = 5;
@@ -245,9 +233,8 @@ static void same_bits_for_any_threads(void **state)
 }
 
 /* A cell, and a range of samples, are the same numbers as in the whole picture. */
-static void cells_and_sample_ranges_add_up(void **state)
+TEST(cells_and_sample_ranges_add_up)
 {
-    (void)state;
     struct err e = {0};
     struct scene s = box_scene(10);
     struct camera c;
@@ -293,9 +280,8 @@ static void cells_and_sample_ranges_add_up(void **state)
 
 /* Bounces 0..4 rendered one by one add up to the picture that accumulates them: the same random
  * numbers, so up to float rounding and not only in the mean. */
-static void bounces_add_up(void **state)
+TEST(bounces_add_up)
 {
-    (void)state;
     struct scene s = box_scene(10);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
         struct integrator_options io = path_options;
@@ -317,9 +303,8 @@ static void bounces_add_up(void **state)
     scene_free(&s);
 }
 
-static void twice_the_light_twice_the_image(void **state)
+TEST(twice_the_light_twice_the_image)
 {
-    (void)state;
     struct integrator_options io = path_options;
     io.max_bounces = 4;
     struct scene one = box_scene(5), two = box_scene(10);
@@ -335,9 +320,8 @@ static void twice_the_light_twice_the_image(void **state)
 
 /* All estimators, roulette or not, have the same mean. Cornell-like box, depth 4, 64 x 48 pixels,
  * 64 samples: relative standard error about 0.3 % (light, mis), so a loss of 3 % is found. */
-static void estimators_agree(void **state)
+TEST(estimators_agree)
 {
-    (void)state;
     struct scene s = box_scene(10);
     struct integrator_options io = path_options;
     io.max_bounces = 4;
@@ -362,21 +346,4 @@ static void estimators_agree(void **state)
     moments_free(&shallow);
     moments_free(&reference);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(furnace_at_every_depth),
-        cmocka_unit_test(rectangle_light),
-        cmocka_unit_test(sphere_light),
-        cmocka_unit_test(delta_lights),
-        cmocka_unit_test(shadow),
-        cmocka_unit_test(same_bits_for_any_threads),
-        cmocka_unit_test(cells_and_sample_ranges_add_up),
-        cmocka_unit_test(bounces_add_up),
-        cmocka_unit_test(twice_the_light_twice_the_image),
-        cmocka_unit_test(estimators_agree),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

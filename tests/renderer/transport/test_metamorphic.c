@@ -5,13 +5,7 @@
  * seed each, fixed n, no retry. With 1024 samples of 24 x 18 pixels the standard error of each
  * difference is below 1.5 % (checked), so that a quarter off by 10 % is found with 96 %. */
 #include "tests/support/render_check.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 #define Z_LIMIT 4.89
 
@@ -179,9 +173,8 @@ static double worst_z(const struct moments *a, const struct moments *b)
     return worst;
 }
 
-static void rigid_motion_and_scale(void **state)
+TEST(rigid_motion_and_scale)
 {
-    (void)state;
     struct scene s = build(&original);
     struct moments still = look(&s, 0);
     static const float sizes[] = {1, 37.5f, 0.004f};
@@ -218,9 +211,8 @@ static void rigid_motion_and_scale(void **state)
 
 /* The channels know nothing of each other but in how far a path goes on, which is symmetric, and in
  * the choice of one of many lights, of which there are too few here: so the bits are the same. */
-static void channels_permute(void **state)
+TEST(channels_permute)
 {
-    (void)state;
     static const int permutations[][3] = {{1, 2, 0}, {2, 1, 0}, {0, 2, 1}};
     struct scene s = build(&original);
     struct moments plain = look(&s, 0);
@@ -243,9 +235,8 @@ static void channels_permute(void **state)
 }
 
 /* The picture by all lights is the sum of the pictures by each. */
-static void lights_add(void **state)
+TEST(lights_add)
 {
-    (void)state;
     static const enum lamps single[] = {AREA, POINT, SPOT};
     struct scene s = build(&original);
     struct moments all = look(&s, 20), sum = {0};
@@ -270,14 +261,4 @@ static void lights_add(void **state)
     }
     moments_free(&sum);
     moments_free(&all);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rigid_motion_and_scale),
-        cmocka_unit_test(channels_permute),
-        cmocka_unit_test(lights_add),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

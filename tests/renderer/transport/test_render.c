@@ -1,12 +1,7 @@
 /* Whole pictures: the samplers agree, threads change nothing, and the counts are right. */
 #include "renderer/transport/render.h"
 #include "tests/support/build_scene.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { WIDTH = 40, HEIGHT = 30 };
 
@@ -25,8 +20,7 @@ static struct scene room(void)
     build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
     build_camera(&s, v3(0, 0.75f, 3), 49);
     struct err e = {0};
-    if (!scene_finish(&s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(&s, "test", &e));
     return s;
 }
 
@@ -56,8 +50,7 @@ static struct moments picture(const struct scene *s, struct how how, struct rend
                                .height = HEIGHT,
                                .num_samples = (uint32_t)how.spp,
                                .threads = how.threads};
-    if (!render(s, &c, bvh, &o, &p, &m, stats, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(s, &c, bvh, &o, &p, &m, stats, &e));
     bvh_free(bvh);
     return m;
 }
@@ -71,9 +64,8 @@ static bool same_bits(const struct moments *a, const struct moments *b)
 
 /* The same picture, and the same rays and tests counted, by 1, 2 and 7 threads: every ray is traced
  * once whoever does it, so the sums over threads have to be those of one thread, to the last ray. */
-static void threads_change_nothing(void **state)
+TEST(threads_change_nothing)
 {
-    (void)state;
     struct scene s = room();
     for (int sampler = SAMPLER_INDEPENDENT; sampler <= SAMPLER_SOBOL; sampler++)
         for (int accel = BVH_BRUTE_FORCE; accel <= BVH_WIDE; accel++) {
@@ -102,9 +94,8 @@ static void threads_change_nothing(void **state)
 
 /* What can be counted by hand: with no bounce there is one ray per path, and brute force tests each
  * of the primitives (11: ten triangles and a ball) for each. A hierarchy tests the root for all. */
-static void counts_are_right(void **state)
+TEST(counts_are_right)
 {
-    (void)state;
     struct scene s = room();
     struct render_stats stats;
     for (int accel = BVH_BRUTE_FORCE; accel <= BVH_SAH; accel++) {
@@ -148,9 +139,8 @@ static void replicates(const struct scene *s, struct how how, int count, double 
 /* H0: Sobol and independent samples have the same mean. Welch's t of 32 replicates each, 16 samples;
  * alpha = 1e-6 two-sided, 6.2 for the 31 degrees of freedom that are there at least; one fixed set of
  * seeds. The relative standard error is about 0.25 %, so 2 % is found with certainty. */
-static void samplers_agree(void **state)
+TEST(samplers_agree)
 {
-    (void)state;
     struct scene s = room();
     struct how how = {{SAMPLER_INDEPENDENT, 100}, BVH_SAH, 3, 16, 2};
     double mean[3], var[3];
@@ -187,9 +177,8 @@ static double noise(const struct scene *s, struct how how)
  * 10 % even where a tenth of the pixels has most of the noise. Sobol has to have less than half, and
  * independent samples with another seed neither half nor twice (negative control). The moments say
  * that their M2 is no error. */
-static void sobol_has_less_noise(void **state)
+TEST(sobol_has_less_noise)
 {
-    (void)state;
     struct scene s = room();
     struct how how = {{SAMPLER_INDEPENDENT, 1}, BVH_SAH, 1, 64, 2};
     double independent = noise(&s, how);
@@ -211,15 +200,4 @@ static void sobol_has_less_noise(void **state)
     assert_false(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);
     scene_free(&s);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(threads_change_nothing),
-        cmocka_unit_test(counts_are_right),
-        cmocka_unit_test(samplers_agree),
-        cmocka_unit_test(sobol_has_less_noise),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

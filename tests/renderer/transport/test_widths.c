@@ -5,12 +5,7 @@
 #include "renderer/math/trig.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/sky.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* Not a multiple of a tile, nor of eight. */
 enum { WIDTH = 37, HEIGHT = 21, MAX_ISAS = 4 };
@@ -153,8 +148,7 @@ static struct moments picture(const struct scene *s, const struct how *how)
                                .height = height,
                                .num_samples = (uint32_t)how->spp,
                                .threads = how->threads};
-    if (!render(s, &c, bvh, &o, &p, &m, &stats, &e))
-        fail_msg("%s", e.msg);
+    MUST(render(s, &c, bvh, &o, &p, &m, &stats, &e));
     bvh_free(bvh);
     return m;
 }
@@ -219,16 +213,14 @@ static void complete(struct scene *s, bool image)
     struct err e = {0};
     const struct sky sky = sky_uneven(8, 4);
     build_camera(s, v3(0, 0.75f, 3), 49);
-    if (!scene_finish(s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(s, "test", &e));
     struct environment *env =
         image ? sky_environment(&sky) : environment_upper_half((rgb){1, 2, 3}, &e);
     assert_true(scene_add_environment(s, env, &e));
 }
 
-static void bits_are_those_of_one_lane(void **state)
+TEST(bits_are_those_of_one_lane)
 {
-    (void)state;
     struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
     for (int which = 0; which < 6; which++) {
         struct scene s = make[which / 2]();
@@ -255,9 +247,8 @@ static void bits_are_those_of_one_lane(void **state)
 }
 
 /* Depths at which paths end in every way, and rows of fewer than eight. */
-static void depths_and_threads_do_not_matter(void **state)
+TEST(depths_and_threads_do_not_matter)
 {
-    (void)state;
     struct scene s = all_kinds();
     complete(&s, true);
     for (int bounces = 0; bounces < 9; bounces += 1 + bounces / 2) {
@@ -274,9 +265,8 @@ static void depths_and_threads_do_not_matter(void **state)
 }
 
 /* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the picture's edge. */
-static void small_pictures_with_several_light_samples(void **state)
+TEST(small_pictures_with_several_light_samples)
 {
-    (void)state;
     struct scene s = all_kinds();
     complete(&s, false);
     for (int lights = 2; lights <= 9; lights++)
@@ -292,9 +282,8 @@ static void small_pictures_with_several_light_samples(void **state)
 }
 
 /* What the starter code does wrong, to rectangles, to a lamp of many triangles and to rough metals. */
-static void defects_of_the_starter_code(void **state)
+TEST(defects_of_the_starter_code)
 {
-    (void)state;
     struct scene (*const make[])(void) = {all_kinds, mesh_lamp};
     for (int which = 0; which < 2; which++) {
         struct scene s = make[which]();
@@ -311,9 +300,8 @@ static void defects_of_the_starter_code(void **state)
 }
 
 /* Triangles and spheres, smooth and flat, seen and missed. */
-static void normals_too(void **state)
+TEST(normals_too)
 {
-    (void)state;
     struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
     for (int which = 0; which < 3; which++) {
         struct scene s = make[which]();
@@ -328,9 +316,8 @@ static void normals_too(void **state)
 }
 
 /* Against the library's functions in double: 1.5e-7 at every 2^-16 of a turn. */
-static void sine_and_cosine_are_near(void **state)
+TEST(sine_and_cosine_are_near)
 {
-    (void)state;
     const double two_pi = 6.28318530717958647693;
     for (int i = 0; i < 65536; i++) {
         float s, c, v = (float)i / 65536;
@@ -342,17 +329,4 @@ static void sine_and_cosine_are_near(void **state)
         assert_true(fabs((double)s - sin((double)x)) < 1.5e-7);
         assert_true(fabs((double)c - cos((double)x)) < 1.5e-7);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bits_are_those_of_one_lane),
-        cmocka_unit_test(depths_and_threads_do_not_matter),
-        cmocka_unit_test(small_pictures_with_several_light_samples),
-        cmocka_unit_test(defects_of_the_starter_code),
-        cmocka_unit_test(normals_too),
-        cmocka_unit_test(sine_and_cosine_are_near),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

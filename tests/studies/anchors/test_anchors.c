@@ -7,30 +7,17 @@
 #include "reference/base/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "tests/support/simulate.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
-
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
 
 enum { SIDE = 64, PIXELS = SIDE * SIDE };
 
 /* XYZ of the primaries is their chromaticity times a weight; the weights make white (1, 1, 1) the
  * chromaticity of D65 with Y = 1. All four pairs are those of BT.709. */
-static void test_xyz(void **state)
+TEST(test_xyz)
 {
-    (void)state;
     static const double xy[4][2] = {{.64, .33}, {.30, .60}, {.15, .06}, {.3127, .3290}};
     double weight[3] = {0};
     for (int c = 0; c < 3; c++) {
@@ -65,9 +52,8 @@ static struct mitsuba_reference black_reference(double var)
  * has Z = 0.0071, z 5.7, over the critical 4.71; X = 0.00135 and Y = 0.00054, z 1.1 and 0.4, are not.
  * So each blue pixel is one failing channel. 12288 channels, 4096 pixels: (12288 - k)/3 >= 4085.76 as
  * long as k <= 30.72. */
-static void test_mitsuba_boundary(void **state)
+TEST(test_mitsuba_boundary)
 {
-    (void)state;
     struct mitsuba_reference r = black_reference(0);
     struct moments a = new_moments(SIDE, SIDE, "sample");
     double *z = calloc(3 * PIXELS, sizeof *z), critical = mitsuba_critical_z(MITSUBA_LEVEL, PIXELS);
@@ -88,9 +74,8 @@ static void test_mitsuba_boundary(void **state)
 
 /* Variance 4 and 64 samples: the standard error is 1/4. A grey of 1 has Y = 1: z = 4. The critical z
  * has the two-sided normal p 1 - 0.99^(1/4096) (GSL). */
-static void test_mitsuba_z(void **state)
+TEST(test_mitsuba_z)
 {
-    (void)state;
     struct mitsuba_reference r = black_reference(4);
     struct moments a = new_moments(SIDE, SIDE, "sample");
     double *z = calloc(3 * PIXELS, sizeof *z);
@@ -115,9 +100,8 @@ static void test_mitsuba_z(void **state)
 /* n = 4 and M2 = 12 on both sides: the means have variance 1 each, so a difference of d has
  * t = d/sqrt 2 with 6 degrees of freedom. k such values and the rest without noise: the family p is
  * 1 - (1-p)^k with p from GSL. */
-static void test_welch(void **state)
+TEST(test_welch)
 {
-    (void)state;
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     constant(&a, 5, 4);
     constant(&b, 5, 4);
@@ -138,9 +122,8 @@ static void test_welch(void **state)
 
 /* sRGB of 0.5 is 1.055 0.5^(1/2.4) - 0.055 = 0.73536, times 255 is 187.5; of 0.002 12.92 0.002 =
  * 0.02584, 6.6. 4/255 = 0.01569 is not over 0.016, 5/255 is. 1 % of 4096 is 40.96: 40 may fail. */
-static void test_idiff_boundary(void **state)
+TEST(test_idiff_boundary)
 {
-    (void)state;
     struct moments m = new_moments(2, 1, "sample");
     const double light[6] = {0, 1, 3, 0.5, 0.002, -1};
     memcpy(m.mean, light, sizeof light);
@@ -184,9 +167,8 @@ static bool real_idiff(const char *program, const char *a, const char *b)
 
 /* Pictures with a few differences around the threshold, in a number of pixels around what is allowed,
  * 40 of 4096, and noise: differences of 5 in about 1 - (5/6)^3 = 42 % of the pixels fail, of 3 do not. */
-static void test_idiff_program(void **state)
+TEST(test_idiff_program)
 {
-    (void)state;
     char program[4096], dir[] = "/tmp/test_anchors_XXXXXX", path[2][64];
     struct err e = {""};
     if (!process_find("idiff", program, sizeof program)) {
@@ -215,8 +197,7 @@ static void test_idiff_program(void **state)
         }
         for (int k = 0; k < 2; k++) {
             snprintf(path[k], sizeof path[k], "%s/%d.png", dir, k);
-            if (!image_write_png(path[k], SIDE, SIDE, picture[k], &e))
-                fail_msg("%s", e.msg);
+            MUST(image_write_png(path[k], SIDE, SIDE, picture[k], &e));
         }
         idiff_histogram(picture[0], picture[1], PIXELS, count);
         bool ours = idiff_differs(count, PIXELS, BLENDER_FAIL, BLENDER_PERCENT);
@@ -238,9 +219,8 @@ static double at_most(int k, int n, double p)
     return sum;
 }
 
-static void test_intervals(void **state)
+TEST(test_intervals)
 {
-    (void)state;
     double lo, hi;
     anchors_clopper_pearson(0, 200, &lo, &hi);
     assert_near(lo, 0, 0);
@@ -266,9 +246,8 @@ static void test_intervals(void **state)
 }
 
 /* Every kind of error on a made-up pool, value by value. */
-static void test_make_wrong(void **state)
+TEST(test_make_wrong)
 {
-    (void)state;
     struct anchor_pool p = {.side = SIDE, .num_places = 2, .place = {{4, 24}, {44, 4}}};
     struct moments in = new_moments(SIDE, SIDE, "sample"), out = new_moments(SIDE, SIDE, "sample");
     p.bounced = calloc(3 * PIXELS, sizeof *p.bounced);
@@ -319,8 +298,7 @@ static void check_kept(const struct anchor_job *job, const struct anchor_pool *r
 {
     struct anchor_pool p;
     struct err e = {""};
-    if (!anchor_render(job, &p, &e))
-        fail_msg("%s", e.msg);
+    MUST(anchor_render(job, &p, &e));
     assert_same_pool(rendered, &p);
     anchor_pool_free(&p);
     long values = 3L * job->side * job->side, first = -(3L * job->num_renders + 3) * values;
@@ -338,8 +316,7 @@ static void check_kept(const struct anchor_job *job, const struct anchor_pool *r
             fseek(f, (marks[i].back < 0 ? marks[i].back : first) * (long)sizeof mark, SEEK_END), 0);
         assert_int_equal(fwrite(&mark, sizeof mark, 1, f), 1);
         fclose(f);
-        if (!anchor_render(job, &p, &e))
-            fail_msg("%s", e.msg);
+        MUST(anchor_render(job, &p, &e));
         got = p.bounced[values - 1];
         if (marks[i].believed)
             assert_near(got, mark, 0);
@@ -353,9 +330,8 @@ static void check_kept(const struct anchor_job *job, const struct anchor_pool *r
  * mean; Welch at 1e-6 must not reject it, and the mean of the long reference must be that of the pool
  * (|z| < 4.89 of the whole picture's luminance, alpha 1e-6). Power: a picture twice as bright is
  * rejected by every rule (its z per pixel is about 1/0.31 sqrt(64/2) = 18). */
-static void test_real_renders(void **state)
+TEST(test_real_renders)
 {
-    (void)state;
     enum { SMALL = 24, N = 4, CELLS = SMALL * SMALL };
     struct anchor_pool p;
     struct err e = {""};
@@ -370,8 +346,7 @@ static void test_real_renders(void **state)
                              .seed = 77,
                              .threads = 2,
                              .kept = kept};
-    if (!anchor_render(&job, &p, &e))
-        fail_msg("%s", e.msg);
+    MUST(anchor_render(&job, &p, &e));
     check_kept(&job, &p);
     assert_true(fs_remove_tree(dir, &e));
     double difference = 0, var = 0, *z = calloc(3 * CELLS, sizeof *z);
@@ -422,15 +397,13 @@ static char *contents(const char *path)
 /* The page in the repository is what its record gives, byte for byte; the record was made with the
  * settings, scenes and rules of the code; and its figures can be: intervals hold their estimate, and
  * each bias is found in 95 % of the 200 pairs when a rule is asked again. */
-static void test_page(void **state)
+TEST(test_page)
 {
-    (void)state;
     struct anchor_results *r = calloc(1, sizeof *r);
     struct err e = {""};
     char dir[] = "/tmp/test_anchors_XXXXXX";
     assert_non_null(r);
-    if (!anchors_load("tests/studies/anchors/results.json", r, &e))
-        fail_msg("%s", e.msg);
+    MUST(anchors_load("tests/studies/anchors/results.json", r, &e));
     const struct anchor_settings *got = &r->settings, *want = &anchor_settings;
     assert_int_equal(got->side, want->side);
     assert_int_equal(got->spp, want->spp);
@@ -453,8 +426,7 @@ static void test_page(void **state)
             }
     }
     assert_non_null(mkdtemp(dir));
-    if (!anchors_write_page(dir, r, &e))
-        fail_msg("%s", e.msg);
+    MUST(anchors_write_page(dir, r, &e));
     static const char *const files[] = {"README.md", "global.svg", "bounced.svg", "region.svg"};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         char made[128], kept[128];
@@ -472,9 +444,8 @@ static void test_page(void **state)
 }
 
 /* A record that is damaged is a line, not a page. */
-static void test_damaged_record(void **state)
+TEST(test_damaged_record)
 {
-    (void)state;
     struct anchor_results *r = calloc(1, sizeof *r);
     struct err e = {""};
     char dir[] = "/tmp/test_anchors_XXXXXX", path[64];
@@ -494,22 +465,4 @@ static void test_damaged_record(void **state)
     assert_true(fs_remove_tree(dir, &e));
     assert_false(anchors_load(path, r, &e));
     free(r);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_xyz),
-        cmocka_unit_test(test_mitsuba_boundary),
-        cmocka_unit_test(test_mitsuba_z),
-        cmocka_unit_test(test_welch),
-        cmocka_unit_test(test_idiff_boundary),
-        cmocka_unit_test(test_idiff_program),
-        cmocka_unit_test(test_intervals),
-        cmocka_unit_test(test_make_wrong),
-        cmocka_unit_test(test_real_renders),
-        cmocka_unit_test(test_damaged_record),
-        cmocka_unit_test(test_page),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

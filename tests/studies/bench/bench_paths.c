@@ -258,27 +258,27 @@ static bool plot(const struct bench_options *o, const struct bench_view *v,
     char path[4096], title[128];
     snprintf(path, sizeof path, "%s/error_%s.svg", o->out, v->name);
     snprintf(title, sizeof title, "%s: error of a picture against its CPU time", v->name);
-    struct plot p = {.title = title,
-                     .x_label = "CPU s",
-                     .y_label = "root of relMSE",
-                     .is_log_x = true,
-                     .is_log_y = true,
-                     .x0 = 1e-3,
-                     .x1 = 1e3,
-                     .y0 = 1e-2,
-                     .y1 = 1e1};
+    struct drawing p = {.title = title,
+                        .x.label = "CPU s",
+                        .y.label = "root of relMSE",
+                        .x.is_log = true,
+                        .y.is_log = true,
+                        .x.lo = 1e-3,
+                        .x.hi = 1e3,
+                        .y.lo = 1e-2,
+                        .y.hi = 1e1};
     for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
         if (!runs[k].done)
             continue;
-        struct plot_series *s = &p.series[p.num++];
+        struct drawing_series *s = &p.series[p.num++];
         snprintf(s->name, sizeof s->name, "%s", bench_engine_names[k]);
         double seconds = v->camera.width * v->camera.height / (runs[k].mpaths * 1e6);
         for (int r = 0; r < NUM_RUNGS; r++) {
             double y = sqrt(runs[k].relmse[r]);
-            plot_add(s, runs[k].spp[r] * seconds, y, y, y);
+            drawing_add(s, runs[k].spp[r] * seconds, y, y, y);
         }
     }
-    return plot_write(path, &p, e);
+    return drawing_write(path, &p, e);
 }
 
 static bool measure(const struct bench_options *o, const struct bench_view *v, json_t *scenes,

@@ -13,26 +13,26 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static bool write_plot(const struct bench_options *o, const char *file, struct plot *p,
+static bool write_plot(const struct bench_options *o, const char *file, struct drawing *p,
                        struct err *e)
 {
     char path[4096];
     snprintf(path, sizeof path, "%s/%s.svg", o->out, file);
-    p->is_log_x = p->is_log_y = true;
+    p->x.is_log = p->y.is_log = true;
     /* A decade more than is needed, in powers of ten. */
-    p->x0 = p->y0 = INFINITY;
-    p->x1 = p->y1 = 0;
+    p->x.lo = p->y.lo = INFINITY;
+    p->x.hi = p->y.hi = 0;
     for (int k = 0; k < p->num; k++)
         for (int i = 0; i < p->series[k].num; i++) {
-            p->x0 = fmin(p->x0, p->series[k].x[i]);
-            p->x1 = fmax(p->x1, p->series[k].x[i]);
-            p->y0 = fmin(p->y0, p->series[k].y[i]);
-            p->y1 = fmax(p->y1, p->series[k].y[i]);
+            p->x.lo = fmin(p->x.lo, p->series[k].x[i]);
+            p->x.hi = fmax(p->x.hi, p->series[k].x[i]);
+            p->y.lo = fmin(p->y.lo, p->series[k].y[i]);
+            p->y.hi = fmax(p->y.hi, p->series[k].y[i]);
         }
-    p->y0 = pow(10, floor(log10(p->y0)));
-    p->y1 = pow(10, ceil(log10(p->y1 * 1.001)));
-    p->x1 *= 1.001;
-    return plot_write(path, p, e);
+    p->y.lo = pow(10, floor(log10(p->y.lo)));
+    p->y.hi = pow(10, ceil(log10(p->y.hi * 1.001)));
+    p->x.hi *= 1.001;
+    return drawing_write(path, p, e);
 }
 
 struct at_size {
@@ -89,14 +89,14 @@ static struct at_size measure_mesh(const struct bench_options *o, uint32_t trian
 static bool by_triangles(const struct bench_options *o, json_t *all, struct err *e)
 {
     static const char *const names[] = {"ours", "Embree"};
-    struct plot build = {.title = "Building the hierarchy, one thread",
-                         .x_label = "triangles",
-                         .y_label = "CPU s",
-                         .num = 2},
-                rays = {.title = "A ray in a random direction from the surface",
-                        .x_label = "triangles",
-                        .y_label = "CPU s",
-                        .num = 2};
+    struct drawing build = {.title = "Building the hierarchy, one thread",
+                            .x.label = "triangles",
+                            .y.label = "CPU s",
+                            .num = 2},
+                   rays = {.title = "A ray in a random direction from the surface",
+                           .x.label = "triangles",
+                           .y.label = "CPU s",
+                           .num = 2};
     json_t *rows = json_array();
     printf("%-10s %11s %11s %8s %10s %10s %8s %7s\n", "triangles", "build s", "Embree's", "ratio",
            "Mrays/s", "Embree's", "ratio", "B/tri");
@@ -106,9 +106,9 @@ static bool by_triangles(const struct bench_options *o, json_t *all, struct err 
                r.build[1], r.build[1] / r.build[0], r.mrays[0], r.mrays[1], r.mrays[0] / r.mrays[1],
                r.bytes);
         for (int j = 0; j < 2; j++) {
-            plot_add(&build.series[j], r.triangles, r.build[j], r.build[j], r.build[j]);
+            drawing_add(&build.series[j], r.triangles, r.build[j], r.build[j], r.build[j]);
             double each = 1e-6 / r.mrays[j];
-            plot_add(&rays.series[j], r.triangles, each, each, each);
+            drawing_add(&rays.series[j], r.triangles, each, each, each);
             snprintf(build.series[j].name, sizeof build.series[j].name, "%s", names[j]);
             snprintf(rays.series[j].name, sizeof rays.series[j].name, "%s", names[j]);
         }
@@ -168,7 +168,7 @@ static bool by(const struct bench_options *o, const struct bench_scene *s, enum 
                int first, int last, json_t *all, struct err *e)
 {
     static const char *const words[] = {"threads", "pixels", "samples"};
-    struct plot p = {.title = "44_mesh", .x_label = words[kind], .y_label = "s", .num = 2};
+    struct drawing p = {.title = "44_mesh", .x.label = words[kind], .y.label = "s", .num = 2};
     char file[64];
     json_t *rows = json_array();
     bool ok = true;
@@ -186,8 +186,8 @@ static bool by(const struct bench_options *o, const struct bench_scene *s, enum 
         double x = kind == BY_PIXELS ? (double)n * n : n;
         printf("%-10.0f %11.4f %11.4f %14.3f\n", x, wall, cpu,
                cpu / ((double)width * width * samples) * 1e6);
-        plot_add(&p.series[0], x, cpu, cpu, cpu);
-        plot_add(&p.series[1], x, wall, wall, wall);
+        drawing_add(&p.series[0], x, cpu, cpu, cpu);
+        drawing_add(&p.series[1], x, wall, wall, wall);
         json_array_append_new(
             rows, json_pack("{s:f,s:f,s:f}", words[kind], x, "wall_s", wall, "cpu_s", cpu));
     }

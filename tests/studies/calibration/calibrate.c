@@ -1,5 +1,241 @@
 #include "calibrate.h"
 
+#include "renderer/base/sha256.h"
+
+#include <assert.h>
+
+static const enum law laws[] = {LAW_NORMAL, LAW_EXPONENTIAL, LAW_BLACK, LAW_PARETO, LAW_LOGNORMAL};
+enum { NUM_LAWS = sizeof laws / sizeof *laws };
+
+static size_t part(double share, double num)
+{
+    double n = share * num;
+    return n < 50 ? 50 : (size_t)n;
+}
+
+static void add_synthetic(struct settings *s, enum law law, int n_a, int n_b)
+{
+    assert(s->num_synthetic < MAX_SYNTHETIC);
+    uint64_t seed = 1000 + (uint64_t)s->num_synthetic;
+    s->synthetic[s->num_synthetic++] = (struct synthetic_cell){law, n_a, n_b, seed};
+}
+
+static void add_tail(struct settings *s, enum law law, int n_a, int n_b, size_t regions)
+{
+    assert(s->num_tail < MAX_TAIL);
+    s->tail_regions[s->num_tail] = regions;
+    uint64_t seed = 2000 + (uint64_t)s->num_tail;
+    s->tail[s->num_tail++] = (struct synthetic_cell){law, n_a, n_b, seed};
+}
+
+static void add_render(struct settings *s, const char *scene, int side, int spp, int replicates)
+{
+    assert(s->num_render < MAX_RENDER);
+    uint64_t seed = 3000 + (uint64_t)s->num_render;
+    s->render[s->num_render++] = (struct render_cell){scene, side, spp, replicates, seed};
+}
+
+static void add_power(struct settings *s, struct power_cell cell)
+{
+    assert(s->num_power < MAX_POWER);
+    cell.seed = 4000 + (uint64_t)s->num_power;
+    s->power[s->num_power++] = cell;
+}
+
+static void add_cover(struct settings *s, enum law law, int n_a, int n_b, double alpha)
+{
+    assert(s->num_cover < MAX_COVER);
+    uint64_t seed = 5000 + (uint64_t)s->num_cover;
+    s->cover[s->num_cover++] = (struct cover_cell){law, n_a, n_b, alpha, seed};
+}
+
+static void add_margin(struct settings *s, enum law law, int n, double alpha, double margin_global,
+                       double margin_tile)
+{
+    assert(s->num_margin < MAX_MARGIN);
+    uint64_t seed = 6000 + (uint64_t)s->num_margin;
+    s->margin[s->num_margin++] =
+        (struct margin_cell){law, n, alpha, margin_global, margin_tile, seed};
+}
+
+static void add_stages(struct settings *s, enum law law, int n, double alpha)
+{
+    assert(s->num_stages < MAX_STAGES);
+    uint64_t seed = 7000 + (uint64_t)s->num_stages;
+    s->stages[s->num_stages++] = (struct stages_cell){law, n, alpha, seed};
+}
+
+static void add_permutation(struct settings *s, enum law law)
+{
+    assert(s->num_permutation < MAX_PERMUTATION);
+    uint64_t seed = 8000 + (uint64_t)s->num_permutation;
+    s->permutation[s->num_permutation++] = (struct permutation_cell){law, seed};
+}
+
+struct settings settings_published(double share)
+{
+    static const char *const scenes[] = {"25_ggx_metal",     "33_sphere_light", "41_cornell",
+                                         "42_cornell_glass", "45_many_lights",  "46_sky"};
+    static const double interval_alpha[] = {0.05, 0.005, 0.0005}; /* 90, 99, 99.9 % */
+    static const double margin_alpha[] = {0.05, 0.01, 0.001};
+    struct settings s = {
+        .blocks = 65536,
+        .synthetic_pairs = {part(share, 2e4), part(share, 1e5), 0},
+        .render_pairs = part(share, 200),
+        .power_pairs = part(share, 2000),
+        .cover_pairs = part(share, 2e4),
+        .margin_pairs = part(share, 1e4),
+        .stages_pairs = part(share, 2e4),
+        .permutation_pairs = part(share, 1e4),
+    };
+    for (int i = 0; i < NUM_LAWS; i++) {
+        static const int n[][2] = {{16, 16}, {64, 64}, {1024, 1024}, {64, 1024}, {1024, 0}};
+        for (size_t k = 0; k < sizeof n / sizeof *n; k++)
+            add_synthetic(&s, laws[i], n[k][0], n[k][1]);
+        add_tail(&s, laws[i], 64, 64, part(share, 5e6));
+    }
+    add_tail(&s, LAW_NORMAL, 16, 16, part(share, 5e6));
+    add_tail(&s, LAW_EXPONENTIAL, 64, 1024, part(share, 1e5));
+    add_tail(&s, LAW_EXPONENTIAL, 1024, 0, part(share, 1e5));
+    for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
+        add_render(&s, scenes[i], 16, 64, 0);
+        add_render(&s, scenes[i], 32, 16, 0);
+        add_render(&s, scenes[i], 16, 32, 8);
+    }
+    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels",
+                                      .law = LAW_NORMAL,
+                                      .n = 16,
+                                      .side = 32,
+                                      .is_grey = true});
+    add_power(&s, (struct power_cell){.name = "normal, 16; one tile of 16 x 16",
+                                      .law = LAW_NORMAL,
+                                      .n = 16,
+                                      .side = 32,
+                                      .is_grey = true,
+                                      .one_tile = true});
+    add_power(&s, (struct power_cell){.name = "exponential, 64; all pixels",
+                                      .law = LAW_EXPONENTIAL,
+                                      .n = 64,
+                                      .side = 32,
+                                      .is_grey = true});
+    add_power(&s, (struct power_cell){.name = "exponential, 64; one tile of 16 x 16",
+                                      .law = LAW_EXPONENTIAL,
+                                      .n = 64,
+                                      .side = 32,
+                                      .is_grey = true,
+                                      .one_tile = true});
+    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels, margins 1 % and 4 %",
+                                      .law = LAW_NORMAL,
+                                      .n = 16,
+                                      .side = 32,
+                                      .is_grey = true,
+                                      .margin_global = 0.01,
+                                      .margin_tile = 0.04});
+    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels, channels independent",
+                                      .law = LAW_NORMAL,
+                                      .n = 16,
+                                      .side = 32});
+    for (size_t i = 0; i < 3; i++) {
+        add_cover(&s, LAW_NORMAL, 16, 16, interval_alpha[i]);
+        add_cover(&s, LAW_EXPONENTIAL, 64, 64, interval_alpha[i]);
+        add_cover(&s, LAW_BLACK, 64, 64, interval_alpha[i]);
+        add_cover(&s, LAW_LOGNORMAL, 64, 1024, interval_alpha[i]);
+        add_cover(&s, LAW_EXPONENTIAL, 1024, 0, interval_alpha[i]);
+        add_margin(&s, LAW_NORMAL, 16, margin_alpha[i], 0.03, 0.08);
+        add_margin(&s, LAW_EXPONENTIAL, 64, margin_alpha[i], 0.05, 0.15);
+    }
+    add_stages(&s, LAW_NORMAL, 16, 0.01);
+    add_stages(&s, LAW_EXPONENTIAL, 64, 0.01);
+    add_stages(&s, LAW_NORMAL, 16, 0.001);
+    add_stages(&s, LAW_EXPONENTIAL, 64, 0.001);
+    add_permutation(&s, LAW_NORMAL);
+    add_permutation(&s, LAW_BLACK);
+    add_permutation(&s, LAW_PARETO);
+    return s;
+}
+
+struct settings settings_short(void)
+{
+    struct settings s = {
+        .blocks = 4096,
+        .synthetic_pairs = {400, 400, 0},
+        .render_pairs = 60,
+        .power_pairs = 800,
+        .cover_pairs = 400,
+        .margin_pairs = 300,
+    };
+    add_synthetic(&s, LAW_NORMAL, 16, 16);
+    add_synthetic(&s, LAW_EXPONENTIAL, 64, 64);
+    add_synthetic(&s, LAW_BLACK, 64, 0);
+    add_synthetic(&s, LAW_PARETO, 64, 0);
+    add_tail(&s, LAW_EXPONENTIAL, 64, 64, 20000);
+    add_render(&s, "41_cornell", 16, 16, 0);
+    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels",
+                                      .law = LAW_NORMAL,
+                                      .n = 16,
+                                      .side = 16,
+                                      .is_grey = true,
+                                      .is_short = true});
+    add_cover(&s, LAW_NORMAL, 16, 16, 0.005);
+    add_margin(&s, LAW_NORMAL, 16, 0.01, 0.03, 0.08);
+    return s;
+}
+
+void settings_hash(const struct settings *s, char hex[65])
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&text, &size);
+    if (f == NULL)
+        abort();
+    fprintf(f, "blocks %zu\n", s->blocks);
+    for (int i = 0; i < s->num_synthetic; i++) {
+        const struct synthetic_cell *c = &s->synthetic[i];
+        fprintf(f, "synthetic %s %d %d %ju\n", law_name[c->law], c->n_a, c->n_b,
+                (uintmax_t)c->seed);
+    }
+    for (int l = 0; l < NUM_LEVELS; l++)
+        fprintf(f, "%zu pairs at %g\n", s->synthetic_pairs[l], null_level[l]);
+    for (int i = 0; i < s->num_tail; i++) {
+        const struct synthetic_cell *c = &s->tail[i];
+        fprintf(f, "tail %s %d %d %ju %zu\n", law_name[c->law], c->n_a, c->n_b, (uintmax_t)c->seed,
+                s->tail_regions[i]);
+    }
+    for (int i = 0; i < s->num_render; i++) {
+        const struct render_cell *c = &s->render[i];
+        fprintf(f, "render %s %d %d %d %ju\n", c->scene, c->side, c->spp, c->replicates,
+                (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_power; i++) {
+        const struct power_cell *c = &s->power[i];
+        fprintf(f, "power %s %s %d %d %d %d %d %g %g %ju\n", c->name, law_name[c->law], c->n,
+                c->side, c->is_grey, c->one_tile, c->is_short, c->margin_global, c->margin_tile,
+                (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_cover; i++) {
+        const struct cover_cell *c = &s->cover[i];
+        fprintf(f, "cover %s %d %d %g %ju\n", law_name[c->law], c->n_a, c->n_b, c->alpha,
+                (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_margin; i++) {
+        const struct margin_cell *c = &s->margin[i];
+        fprintf(f, "margin %s %d %g %g %g %ju\n", law_name[c->law], c->n, c->alpha,
+                c->margin_global, c->margin_tile, (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_stages; i++) {
+        const struct stages_cell *c = &s->stages[i];
+        fprintf(f, "stages %s %d %g %ju\n", law_name[c->law], c->n, c->alpha, (uintmax_t)c->seed);
+    }
+    for (int i = 0; i < s->num_permutation; i++)
+        fprintf(f, "permutation %s %ju\n", law_name[s->permutation[i].law],
+                (uintmax_t)s->permutation[i].seed);
+    fprintf(f, "pairs %zu %zu %zu %zu %zu %zu\n", s->render_pairs, s->power_pairs, s->cover_pairs,
+            s->margin_pairs, s->stages_pairs, s->permutation_pairs);
+    fclose(f);
+    sha256_text(text, hex);
+    free(text);
+}
+
 double calibrate_cost(const struct settings *s)
 {
     double sum = 0;

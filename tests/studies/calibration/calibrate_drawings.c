@@ -1,4 +1,4 @@
-#include "calibrate_page.h"
+#include "calibrate.h"
 
 #include "calibrate_plot.h"
 #include "tests/support/rates.h"
@@ -11,30 +11,30 @@ static const enum law laws[] = {LAW_NORMAL, LAW_EXPONENTIAL, LAW_BLACK, LAW_PARE
 enum { NUM_LAWS = sizeof laws / sizeof *laws };
 
 /* Observed rate against p, from a pool of results, down to where one pair in the pool is left. */
-static void add_curve(struct plot_series *s, const struct null_result *pool, int column,
+static void add_curve(struct drawing_series *s, const struct null_result *pool, int column,
                       const char *name)
 {
     snprintf(s->name, sizeof s->name, "%s", name);
     for (int i = 0; i < CURVE_POINTS; i++) {
         double rate = pool->curve[column][i];
         if (rate > 0)
-            plot_add(s, pow(10, -i / 8.0), rate, 0, 0);
+            drawing_add(s, pow(10, -i / 8.0), rate, 0, 0);
     }
 }
 
 static bool draw_false_alarms(const char *dir, const struct settings *s, const struct results *r,
                               struct err *e)
 {
-    struct plot p = {.title = "False alarms of the gate",
-                     .x_label = "alpha asked for",
-                     .y_label = "rate of DIFFERENT at equal means",
-                     .is_log_x = true,
-                     .is_log_y = true,
-                     .x0 = 1e-4,
-                     .x1 = 1,
-                     .y0 = 1e-5,
-                     .y1 = 1,
-                     .is_diagonal = true};
+    struct drawing p = {.title = "False alarms of the gate",
+                        .x.label = "alpha asked for",
+                        .y.label = "rate of DIFFERENT at equal means",
+                        .x.is_log = true,
+                        .y.is_log = true,
+                        .x.lo = 1e-4,
+                        .x.hi = 1,
+                        .y.lo = 1e-5,
+                        .y.hi = 1,
+                        .is_diagonal = true};
     for (int k = 0; k < NUM_LAWS; k++) {
         struct null_result part[MAX_SYNTHETIC], pool;
         int num = 0;
@@ -49,22 +49,22 @@ static bool draw_false_alarms(const char *dir, const struct settings *s, const s
     add_curve(&p.series[p.num++], &pool, COLUMN_GATE, "renders");
     char path[4096];
     snprintf(path, sizeof path, "%s/false_alarms.svg", dir);
-    return plot_write(path, &p, e);
+    return drawing_write(path, &p, e);
 }
 
 static bool draw_statistics(const char *dir, const struct settings *s, const struct results *r,
                             struct err *e)
 {
-    struct plot p = {.title = "p-values at equal means, all laws together",
-                     .x_label = "p",
-                     .y_label = "share of pairs with a smaller p",
-                     .is_log_x = true,
-                     .is_log_y = true,
-                     .x0 = 1e-4,
-                     .x1 = 1,
-                     .y0 = 1e-5,
-                     .y1 = 1,
-                     .is_diagonal = true};
+    struct drawing p = {.title = "p-values at equal means, all laws together",
+                        .x.label = "p",
+                        .y.label = "share of pairs with a smaller p",
+                        .x.is_log = true,
+                        .y.is_log = true,
+                        .x.lo = 1e-4,
+                        .x.hi = 1,
+                        .y.lo = 1e-5,
+                        .y.hi = 1,
+                        .is_diagonal = true};
     struct null_result pool;
     null_pool(r->synthetic, s->num_synthetic, "", &pool);
     for (int c = 0; c < NUM_COLUMNS; c++)
@@ -72,54 +72,54 @@ static bool draw_statistics(const char *dir, const struct settings *s, const str
             add_curve(&p.series[p.num++], &pool, c, column_name[c]);
     char path[4096];
     snprintf(path, sizeof path, "%s/statistics.svg", dir);
-    return plot_write(path, &p, e);
+    return drawing_write(path, &p, e);
 }
 
 static bool draw_tail(const char *dir, const struct settings *s, const struct results *r,
                       struct err *e)
 {
-    struct plot p = {.title = "Far tails of single regions",
-                     .x_label = "p",
-                     .y_label = "rate over p, with 99.9 % intervals",
-                     .is_log_x = true,
-                     .x0 = 1e-7,
-                     .x1 = 1e-3,
-                     .y0 = 0,
-                     .y1 = 2,
-                     .mark_y = 1};
-    for (int i = 0; i < s->num_tail && p.num < PLOT_SERIES; i++) {
+    struct drawing p = {.title = "Far tails of single regions",
+                        .x.label = "p",
+                        .y.label = "rate over p, with 99.9 % intervals",
+                        .x.is_log = true,
+                        .x.lo = 1e-7,
+                        .x.hi = 1e-3,
+                        .y.lo = 0,
+                        .y.hi = 2,
+                        .mark_y = 1};
+    for (int i = 0; i < s->num_tail && p.num < DRAWING_SERIES; i++) {
         const struct tail_result *t = &r->tail[i];
         if (t->tested < 1e5) /* less than ten expected at 1e-4: a bar over all of the drawing */
             continue;
-        struct plot_series *series = &p.series[p.num++];
+        struct drawing_series *series = &p.series[p.num++];
         snprintf(series->name, sizeof series->name, "%s", t->name);
         for (int l = 0; l < 3; l++) /* side by side, not on top of each other */
-            plot_add(series, tail_level[l] * pow(10, 0.06 * (i - 3.5)),
-                     t->rejected[l] / t->tested / tail_level[l],
-                     rate_lower(t->rejected[l], t->tested, check_tail) / tail_level[l],
-                     rate_upper(t->rejected[l], t->tested, check_tail) / tail_level[l]);
+            drawing_add(series, tail_level[l] * pow(10, 0.06 * (i - 3.5)),
+                        t->rejected[l] / t->tested / tail_level[l],
+                        rate_lower(t->rejected[l], t->tested, check_tail) / tail_level[l],
+                        rate_upper(t->rejected[l], t->tested, check_tail) / tail_level[l]);
     }
     char path[4096];
     snprintf(path, sizeof path, "%s/tail.svg", dir);
-    return plot_write(path, &p, e);
+    return drawing_write(path, &p, e);
 }
 
 static bool draw_power(const char *dir, const struct settings *s, const struct results *r,
                        struct err *e)
 {
-    struct plot p = {.title = "Power against the printed MDB",
-                     .x_label = "bias, in units of the MDB",
-                     .y_label = "rate of DIFFERENT",
-                     .x0 = 0,
-                     .x1 = 1.25,
-                     .y0 = 0,
-                     .y1 = 1,
-                     .mark_x = 1,
-                     .mark_text = "MDB",
-                     .mark_y = 0.95};
+    struct drawing p = {.title = "Power against the printed MDB",
+                        .x.label = "bias, in units of the MDB",
+                        .y.label = "rate of DIFFERENT",
+                        .x.lo = 0,
+                        .x.hi = 1.25,
+                        .y.lo = 0,
+                        .y.hi = 1,
+                        .mark_x = 1,
+                        .mark_text = "MDB",
+                        .mark_y = 0.95};
     for (int i = 0; i < s->num_power; i++) {
         const struct power_result *w = &r->power[i];
-        struct plot_series *series = &p.series[p.num++];
+        struct drawing_series *series = &p.series[p.num++];
         const char *colon = strchr(w->name, ';');
         snprintf(series->name, sizeof series->name, "%.*s%s",
                  colon != NULL ? (int)(colon - w->name) : 63, w->name,
@@ -128,13 +128,13 @@ static bool draw_power(const char *dir, const struct settings *s, const struct r
                  : !s->power[i].is_grey        ? ", colour"
                                                : "");
         for (int k = 0; k < POWER_POINTS; k++)
-            plot_add(series, power_bias[k], w->found[k] / w->pairs,
-                     rate_lower(w->found[k], w->pairs, check_tail),
-                     rate_upper(w->found[k], w->pairs, check_tail));
+            drawing_add(series, power_bias[k], w->found[k] / w->pairs,
+                        rate_lower(w->found[k], w->pairs, check_tail),
+                        rate_upper(w->found[k], w->pairs, check_tail));
     }
     char path[4096];
     snprintf(path, sizeof path, "%s/power.svg", dir);
-    return plot_write(path, &p, e);
+    return drawing_write(path, &p, e);
 }
 
 bool page_draw(const char *dir, const struct settings *s, const struct results *r, struct err *e)

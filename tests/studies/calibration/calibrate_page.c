@@ -1,4 +1,4 @@
-#include "calibrate_page.h"
+#include "calibrate.h"
 
 #include "tests/support/rates.h"
 

@@ -1,33 +1,33 @@
-/* The drawings of the calibration's page: lines with error bars on linear or logarithmic axes, as an
- * SVG file of its own that is readable on light and on dark ground. */
+/* The drawings of studies: lines with error bars, as an SVG file of its own that is readable on light and on dark
+ * ground. */
 #ifndef ASSAY_CALIBRATE_PLOT_H
 #define ASSAY_CALIBRATE_PLOT_H
 
 #include "renderer/base/err.h"
+#include "tools/plots/plot.h"
 
-enum { PLOT_POINTS = 48, PLOT_SERIES = 8 };
+enum { DRAWING_POINTS = 48, DRAWING_SERIES = 8 };
 
-struct plot_series {
+struct drawing_series {
     char name[64];
     int num;
-    double x[PLOT_POINTS], y[PLOT_POINTS];
-    double lo[PLOT_POINTS], hi[PLOT_POINTS]; /* of the error bar; equal: none */
+    double x[DRAWING_POINTS], y[DRAWING_POINTS];
+    double lo[DRAWING_POINTS], hi[DRAWING_POINTS]; /* of the error bar; equal: none */
 };
 
-struct plot {
-    const char *title, *x_label, *y_label;
-    bool is_log_x, is_log_y;
-    double x0, x1, y0, y1; /* what is drawn: above 0 on a logarithmic axis */
+struct drawing {
+    const char *title;
+    struct plot_axis x, y;
     bool is_diagonal;      /* the line y = x */
     double mark_x, mark_y; /* dashed lines; 0: none */
     const char *mark_text; /* beside the first */
     int num;
-    struct plot_series series[PLOT_SERIES];
+    struct drawing_series series[DRAWING_SERIES];
 };
 
 /* Appends a point; what the axes cannot show is cut at their ends. */
-void plot_add(struct plot_series *s, double x, double y, double lo, double hi);
-bool plot_write(const char *path, const struct plot *p, struct err *e)
+void drawing_add(struct drawing_series *s, double x, double y, double lo, double hi);
+bool drawing_write(const char *path, const struct drawing *d, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -1,7 +1,7 @@
 /* make_calibration [--threads N] [--share S | --short] [--scenes DIR] OUT: measures the tester (calibrate.h)
  * and writes the page OUT/README.md with its plots. --share: that part of the pairs. Exits 0 if every
  * acceptance line holds, 1 if not, 3 if it could not measure. */
-#include "calibrate_page.h"
+#include "calibrate.h"
 
 #include <stdlib.h>
 #include <string.h>

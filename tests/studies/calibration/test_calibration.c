@@ -1,6 +1,6 @@
 /* The calibration itself: its mathematics against known values, the short version on the tester as it
  * is and on testers weakened on purpose, each of which must be rejected, and the published page.
- * Seeds and numbers of pairs (calibrate_settings.c) were fixed beforehand, nothing is retried. A line
+ * Seeds and numbers of pairs (calibrate.c) were fixed beforehand, nothing is retried. A line
  * fails by chance with 5e-4 at most where a rate is just what it may be; most are far below, so that
  * the short version of a right tester fails with about 1 %, over all its lines. What it can find
  * is what the weakened testers show. */
@@ -8,25 +8,12 @@
 #include "tests/support/rates.h"
 
 #include "renderer/base/sha256.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
-#include <string.h>
-
-static void assert_near(double value, double expected, double tolerance)
-{
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%.17g, expected %.17g", value, expected);
-}
+#include "tests/support/test.h"
 
 /* Closed forms: no success in 10 has the upper bound 1 - tail^(1/10), 10 of 10 the lower bound
  * tail^(1/10); 5 of 10 at 95 % is [0.1871, 0.8129] in every table of [ClopperPearson34]. */
-static void test_bounds(void **state)
+TEST(test_bounds)
 {
-    (void)state;
     assert_near(rate_upper(0, 10, 0.05), 1 - pow(0.05, 0.1), 1e-12);
     assert_near(rate_lower(10, 10, 0.05), pow(0.05, 0.1), 1e-12);
     assert_near(rate_lower(5, 10, 0.025), 0.1871, 5e-5);
@@ -37,9 +24,8 @@ static void test_bounds(void **state)
 /* Critical values from the tables: Kolmogorov 1.3581 (5 %), 1.6276 (1 %) over sqrt n for large n;
  * Anderson-Darling 2.492 (5 %), 3.878 (1 %) [Stephens74]. The statistics of three numbers by hand (KS)
  * and by quadrature of their definitions: n integral (F_n - x)^2 / (x (1 - x)) dx. */
-static void test_uniformity(void **state)
+TEST(test_uniformity)
 {
-    (void)state;
     assert_near(ks_p(1.3581e-3, 1000000), 0.05, 5e-5);
     assert_near(ks_p(1.6276e-3, 1000000), 0.01, 5e-5);
     assert_near(ad_p(2.492), 0.05, 2e-4);
@@ -64,9 +50,8 @@ static void test_uniformity(void **state)
  * blocks renewed in between. Each pixel's variance: 1/n; about (mu4 - 1)/n = 8/n; for the third the
  * sample's own. |z| < 5 on each (the blocks are used twice, so that a z has the spread 1.4 at most;
  * 4e-4 in all). Control: the law has not the mean 1.02. */
-static void test_library(void **state)
+TEST(test_library)
 {
-    (void)state;
     enum { SIDE = 64, IMAGES = 4 };
     struct library l;
     struct err e;
@@ -117,9 +102,8 @@ static void run_short(enum weakness weakness, int threads, struct results *r, st
 }
 
 /* The tester as it is: every line holds. The results do not depend on the number of threads. */
-static void test_short_calibration(void **state)
+TEST(test_short_calibration)
 {
-    (void)state;
     static struct results r, again;
     static struct checks c;
     run_short(WEAK_NOT, 1, &r, &c);
@@ -158,40 +142,34 @@ static void expect_caught(enum weakness weakness, const char *line)
     assert_true(found);
 }
 
-static void test_ten_times_alpha_is_caught(void **state)
+TEST(test_ten_times_alpha_is_caught)
 {
-    (void)state;
     expect_caught(WEAK_LENIENT, "gate at 0.01");
 }
 
-static void test_tenth_of_alpha_is_caught(void **state)
+TEST(test_tenth_of_alpha_is_caught)
 {
-    (void)state;
     expect_caught(WEAK_STRICT, "found at the MDB");
 }
 
-static void test_copied_observations_are_caught(void **state)
+TEST(test_copied_observations_are_caught)
 {
-    (void)state;
     expect_caught(WEAK_COPIED, "gate at 0.01");
 }
 
-static void test_variance_of_one_side_is_caught(void **state)
+TEST(test_variance_of_one_side_is_caught)
 {
-    (void)state;
     expect_caught(WEAK_ONE_SIDED, "gate at 0.01");
 }
 
-static void test_blindness_to_skew_is_caught(void **state)
+TEST(test_blindness_to_skew_is_caught)
 {
-    (void)state;
     expect_caught(WEAK_NO_SKEW, "gate at 0.01");
 }
 
 /* The page in the repository: made by the settings of this source, and every line of it holds. */
-static void test_published_page(void **state)
+TEST(test_published_page)
 {
-    (void)state;
     static char text[200000];
     char hex[65], line[96];
     struct settings s = settings_published(1);
@@ -220,21 +198,4 @@ static void test_published_page(void **state)
         snprintf(line, sizeof line, "(%s.svg)", plots[i]);
         assert_non_null(strstr(text, line));
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bounds),
-        cmocka_unit_test(test_uniformity),
-        cmocka_unit_test(test_library),
-        cmocka_unit_test(test_short_calibration),
-        cmocka_unit_test(test_ten_times_alpha_is_caught),
-        cmocka_unit_test(test_tenth_of_alpha_is_caught),
-        cmocka_unit_test(test_copied_observations_are_caught),
-        cmocka_unit_test(test_variance_of_one_side_is_caught),
-        cmocka_unit_test(test_blindness_to_skew_is_caught),
-        cmocka_unit_test(test_published_page),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

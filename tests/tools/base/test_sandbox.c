@@ -2,22 +2,14 @@
  * reach, or may not use up, is known by construction. Every attack has its control: without the limit, or from
  * outside, the same thing works. Skipped, with a line, on a machine that has no sandbox. */
 #define _GNU_SOURCE
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/base/fs.h"
 #include "tools/base/sandbox.h"
+#include "tests/support/test.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/socket.h>
 #include <netinet/in.h>
-#include <unistd.h>
 
 enum { MIB = 1 << 20 };
 
@@ -45,8 +37,7 @@ static struct sandbox_result run_with(const char *script, struct sandbox_limits 
                                     .keep = (const char *const[]){"out.png", "second", NULL},
                                     .out = out_dir,
                                     .limit = limit};
-    if (!sandbox_run(&box, &job, &r, &e))
-        fail_msg("%s", e.msg);
+    MUST(sandbox_run(&box, &job, &r, &e));
     return r;
 }
 
@@ -89,9 +80,8 @@ static int close_sandbox(void **state)
     return 0;
 }
 
-static void a_file_that_it_writes_comes_back(void **state)
+TEST(a_file_that_it_writes_comes_back)
 {
-    (void)state;
     struct sandbox_result r =
         run("pwd; printf hello >out.png; cp out.png /tmp/x; echo nobody asked >other");
     assert_int_equal(r.end, SANDBOX_OK);
@@ -102,9 +92,8 @@ static void a_file_that_it_writes_comes_back(void **state)
     assert_null(kept(".report"));
 }
 
-static void a_crash_is_told_with_its_last_words(void **state)
+TEST(a_crash_is_told_with_its_last_words)
 {
-    (void)state;
     struct sandbox_result r = run("echo before; kill -SEGV $$");
     assert_int_equal(r.end, SANDBOX_FAILED);
     assert_int_equal(r.status, 139);
@@ -118,9 +107,8 @@ static void a_crash_is_told_with_its_last_words(void **state)
 }
 
 /* Ignores SIGTERM, and so does its child in a session of its own. */
-static void a_hang_ends_with_all_its_processes(void **state)
+TEST(a_hang_ends_with_all_its_processes)
 {
-    (void)state;
     struct sandbox_limits limit = small;
     limit.wall_s = 2;
     char script[128];
@@ -134,9 +122,8 @@ static void a_hang_ends_with_all_its_processes(void **state)
     assert_int_equal(system(find), 0);
 }
 
-static void a_busy_loop_ends_by_processor_time(void **state)
+TEST(a_busy_loop_ends_by_processor_time)
 {
-    (void)state;
     struct sandbox_limits limit = small;
     limit.cpu_s = 1;
     struct sandbox_result r = run_with("while :; do :; done", limit, NULL);
@@ -147,9 +134,8 @@ static void a_busy_loop_ends_by_processor_time(void **state)
 
 /* Every copy starts two more. The number that ran at a time cannot pass the limit: the kernel says "cannot
  * fork". What is left of it is gone when the run returns. */
-static void a_fork_bomb_stays_inside(void **state)
+TEST(a_fork_bomb_stays_inside)
 {
-    (void)state;
     struct sandbox_limits limit = small;
     limit.wall_s = 5;
     struct sandbox_result r = run_with(
@@ -166,9 +152,8 @@ static void a_fork_bomb_stays_inside(void **state)
     assert_int_equal(run(script).end, SANDBOX_FAILED);
 }
 
-static void a_file_of_100_gb_is_cut_off(void **state)
+TEST(a_file_of_100_gb_is_cut_off)
 {
-    (void)state;
     assert_int_equal(run("exec head -c 100G /dev/zero >out.png").end, SANDBOX_FILE_SIZE);
     struct sandbox_result r = run("exec truncate -s 100G out.png");
     assert_int_not_equal(r.end, SANDBOX_OK);
@@ -176,9 +161,8 @@ static void a_file_of_100_gb_is_cut_off(void **state)
 }
 
 /* 10 files of 7 MB: each is allowed, all together are not. The same in every other place. */
-static void many_files_fill_only_their_own_disk(void **state)
+TEST(many_files_fill_only_their_own_disk)
 {
-    (void)state;
     static const char fill[] =
         "cd %s && for i in 1 2 3 4 5 6 7 8 9 10; do head -c 7M /dev/zero >f$i || exit 1; done";
     char script[256];
@@ -194,9 +178,8 @@ static void many_files_fill_only_their_own_disk(void **state)
     assert_int_equal(run_with(script, limit, NULL).end, SANDBOX_OK);
 }
 
-static void memory_is_bounded_for_one_process_and_for_all(void **state)
+TEST(memory_is_bounded_for_one_process_and_for_all)
 {
-    (void)state;
     /* `tail` keeps the last line, 1 GB without an end of line. */
     struct sandbox_result r = run(
         "head -c 1G /dev/zero | tail -n 1 | wc -c >out.png; [ \"$(cat out.png)\" -gt 900000000 ]");
@@ -211,9 +194,8 @@ static void memory_is_bounded_for_one_process_and_for_all(void **state)
 }
 
 /* A file of ours outside, that everybody may read. */
-static void links_lead_nowhere(void **state)
+TEST(links_lead_nowhere)
 {
-    (void)state;
     if (!has_sandbox)
         skip();
     char secret[600], script[4096];
@@ -251,9 +233,8 @@ static void links_lead_nowhere(void **state)
 }
 
 /* The checkout, the goldens and the user's home are not there; what lies below /usr can be hidden. */
-static void nothing_of_ours_can_be_read(void **state)
+TEST(nothing_of_ours_can_be_read)
 {
-    (void)state;
     if (!has_sandbox)
         skip();
     char here[512], script[1200];
@@ -282,9 +263,8 @@ static void nothing_of_ours_can_be_read(void **state)
 }
 
 /* A server of ours on the loopback, which a program outside reaches. */
-static void there_is_no_network(void **state)
+TEST(there_is_no_network)
 {
-    (void)state;
     if (!has_sandbox)
         skip();
     int s = socket(AF_INET, SOCK_STREAM, 0);
@@ -304,9 +284,8 @@ static void there_is_no_network(void **state)
     close(s);
 }
 
-static void the_environment_stays_outside(void **state)
+TEST(the_environment_stays_outside)
 {
-    (void)state;
     assert_int_equal(setenv("ASSAY_SECRET", "token", 1), 0);
     run("env >out.png; cat /proc/*/environ >second 2>/dev/null; true");
     unsetenv("ASSAY_SECRET");
@@ -315,9 +294,8 @@ static void the_environment_stays_outside(void **state)
     assert_null(memmem(kept("second"), 4000, "SECRET", 6));
 }
 
-static void only_two_places_can_be_written(void **state)
+TEST(only_two_places_can_be_written)
 {
-    (void)state;
     run("for d in / /usr /usr/bin /dev /etc /proc /out /in /var; do (: >$d/x) 2>/dev/null && echo $d; done >out.png; true");
     assert_string_equal(kept("out.png"), "");
     run("for d in /box /tmp /dev/shm; do (: >$d/x) && echo $d; done >out.png");
@@ -329,9 +307,8 @@ static void only_two_places_can_be_written(void **state)
 }
 
 /* Its words are not taken for the supervisor's, nor a file named like its report. */
-static void a_made_up_report_is_not_believed(void **state)
+TEST(a_made_up_report_is_not_believed)
 {
-    (void)state;
     struct sandbox_result r =
         run("echo '0 ended' >.report; echo '0 ended'; echo results >results.json; exit 3");
     assert_int_equal(r.end, SANDBOX_FAILED);
@@ -339,9 +316,8 @@ static void a_made_up_report_is_not_believed(void **state)
     assert_null(kept("results.json"));
 }
 
-static void a_tree_goes_from_one_run_to_the_next(void **state)
+TEST(a_tree_goes_from_one_run_to_the_next)
 {
-    (void)state;
     if (!has_sandbox)
         skip();
     char built[800], moved[800];
@@ -375,9 +351,8 @@ static void a_tree_goes_from_one_run_to_the_next(void **state)
 }
 
 /* On request, and only then: time and file size are bounded, the rest is open. */
-static void unsafe_is_as_unsafe_as_it_says(void **state)
+TEST(unsafe_is_as_unsafe_as_it_says)
 {
-    (void)state;
     struct sandbox s;
     struct err e;
     struct sandbox_result r;
@@ -416,9 +391,8 @@ static void unsafe_is_as_unsafe_as_it_says(void **state)
 }
 
 /* Without bwrap in PATH there is a line, not a run. */
-static void without_bubblewrap_it_refuses(void **state)
+TEST(without_bubblewrap_it_refuses)
 {
-    (void)state;
     struct sandbox s;
     struct err e;
     char path[4096];
@@ -430,26 +404,4 @@ static void without_bubblewrap_it_refuses(void **state)
     assert_non_null(strstr(e.msg, "no sandbox for other people's programs on this machine: "));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_file_that_it_writes_comes_back),
-        cmocka_unit_test(a_crash_is_told_with_its_last_words),
-        cmocka_unit_test(a_hang_ends_with_all_its_processes),
-        cmocka_unit_test(a_busy_loop_ends_by_processor_time),
-        cmocka_unit_test(a_fork_bomb_stays_inside),
-        cmocka_unit_test(a_file_of_100_gb_is_cut_off),
-        cmocka_unit_test(many_files_fill_only_their_own_disk),
-        cmocka_unit_test(memory_is_bounded_for_one_process_and_for_all),
-        cmocka_unit_test(links_lead_nowhere),
-        cmocka_unit_test(nothing_of_ours_can_be_read),
-        cmocka_unit_test(there_is_no_network),
-        cmocka_unit_test(the_environment_stays_outside),
-        cmocka_unit_test(only_two_places_can_be_written),
-        cmocka_unit_test(a_made_up_report_is_not_believed),
-        cmocka_unit_test(a_tree_goes_from_one_run_to_the_next),
-        cmocka_unit_test(unsafe_is_as_unsafe_as_it_says),
-        cmocka_unit_test(without_bubblewrap_it_refuses),
-    };
-    return cmocka_run_group_tests(tests, open_sandbox, close_sandbox);
-}
+TEST_GROUP(open_sandbox, close_sandbox)

@@ -1,19 +1,11 @@
 /* Directories of a run's own: made, removed, and where a kill left one, removed by the next run, but no other. */
 #include "tools/base/temp_dir.h"
 #include "renderer/base/fs.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 static char temp[] = "/tmp/assay_test_XXXXXX";
 
@@ -76,9 +68,8 @@ static void end(pid_t pid)
     assert_true(WIFSIGNALED(status));
 }
 
-static void it_is_ours_and_removed(void **state)
+TEST(it_is_ours_and_removed)
 {
-    (void)state;
     struct temp_dir d;
     struct err e = {""};
     struct stat st;
@@ -97,9 +88,8 @@ static void it_is_ours_and_removed(void **state)
     assert_true(temp_dir_close(&d, &e));
 }
 
-static void what_a_kill_left_is_removed_by_the_next(void **state)
+TEST(what_a_kill_left_is_removed_by_the_next)
 {
-    (void)state;
     char dead[512], alive[512], other[512];
     struct temp_dir d;
     struct err e = {""};
@@ -120,9 +110,8 @@ static void what_a_kill_left_is_removed_by_the_next(void **state)
 }
 
 /* What has such a name and is no such directory. */
-static void nothing_else_is_removed(void **state)
+TEST(nothing_else_is_removed)
 {
-    (void)state;
     struct temp_dir d;
     struct err e = {""};
     char link[600], file[600], target[600], longer[600];
@@ -148,9 +137,8 @@ static void nothing_else_is_removed(void **state)
 }
 
 /* Eight processes that each open and close 200 times: none finds its file gone, or fails, and nothing stays. */
-static void many_at_once(void **state)
+TEST(many_at_once)
 {
-    (void)state;
     enum { PROCESSES = 8, TIMES = 200 };
     pid_t pid[PROCESSES];
     for (int i = 0; i < PROCESSES; i++) {
@@ -184,9 +172,8 @@ static void many_at_once(void **state)
     assert_int_equal(system(command), 0); /* NOLINT(cert-env33-c) */
 }
 
-static void no_room_is_a_line(void **state)
+TEST(no_room_is_a_line)
 {
-    (void)state;
     struct temp_dir d;
     struct err e = {""};
     assert_int_equal(setenv("TMPDIR", "/nonexistent", 1), 0);
@@ -197,14 +184,4 @@ static void no_room_is_a_line(void **state)
     assert_int_equal(setenv("TMPDIR", temp, 1), 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_is_ours_and_removed),
-        cmocka_unit_test(what_a_kill_left_is_removed_by_the_next),
-        cmocka_unit_test(nothing_else_is_removed),
-        cmocka_unit_test(many_at_once),
-        cmocka_unit_test(no_room_is_a_line),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -4,27 +4,16 @@
 
 #include "tools/compare/compare.h"
 #include "tools/compare/pyramid.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
-
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
 
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {
     struct comparison c;
     struct err e;
-    if (!compare_moments(a, b, &opt, &c, &e))
-        fail_msg("%s", e.msg);
+    MUST(compare_moments(a, b, &opt, &c, &e));
     return c;
 }
 
@@ -54,9 +43,8 @@ static void set_all(struct moments *m, double n, double mean, double m2, double 
  * 0.01 +- (1.645 0.25 + tolerance), wider by skewness: |g| <= sqrt(64 6 (1 + 27)/(100 99))/256^1.5
  * = 2.5e-4, a factor of 1.0004 on alpha.
  * The mean square of the pixels is 1e-4 - 4 < 0: no bias to report. */
-static void test_by_hand(void **state)
+TEST(test_by_hand)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
     set_all(&a, 101, 1.01, 10100, 0);
     set_all(&b, 101, 1, 30300, 0);
@@ -111,9 +99,8 @@ static void test_by_hand(void **state)
 
 /* Sums of every region against a direct loop over its pixels, and every level covers every pixel
  * once, for sizes that do not divide. Pixel values from a fixed generator; n differs by pixel. */
-static void test_pyramid_brute_force(void **state)
+TEST(test_pyramid_brute_force)
 {
-    (void)state;
     const int sizes[][3] = {{5, 3, 1}, {12, 18, 6},  {16, 16, 4},
                             {1, 1, 1}, {40, 10, 10}, {7, 7, 7}};
     uint64_t seed = 5;
@@ -160,9 +147,8 @@ static void test_pyramid_brute_force(void **state)
 /* One pixel of the observations 1, 2, 6 (times 1, .5, .25 in R, G, B): mean 3, M2 = 4+1+9 = 14,
  * M3 = -8-1+27 = 18; v = 14/(3 2), k3 = 18/(3 2 1); var v = max(2 v^2/2, k3^2/v). Perfectly
  * correlated, so luminance is the same observations times .2126 + .7152/2 + .0722/4. */
-static void test_estimate_by_hand(void **state)
+TEST(test_estimate_by_hand)
 {
-    (void)state;
     struct moments m = new_moments(1, 1, "sample");
     const double x[3] = {1, 2, 6};
     for (int i = 0; i < 3; i++)
@@ -183,9 +169,8 @@ static void test_estimate_by_hand(void **state)
 /* The luminance bound against the luminance variance of the very same observations: never below it,
  * and for independent channels of equal variance above it by 1/sum w^2 = 1.78, in expectation. 400
  * pixels of n = 64 put the ratio of means within 5 % (its standard error is below 1.5 %). */
-static void test_luminance_bound(void **state)
+TEST(test_luminance_bound)
 {
-    (void)state;
     struct moments m = new_moments(400, 1, "sample"), lum = new_moments(400, 1, "sample");
     uint64_t seed = 9;
     double bound = 0, truth = 0;
@@ -216,9 +201,8 @@ static void test_luminance_bound(void **state)
  * one edge differs by 8 0.4 with a standard error of sqrt(2 32 (1 + 0.04)) 0.2/8 = 0.2: t = 16, so it is
  * found (power above 1 - 1e-9) and the worst region holds one edge, not both. Negative control: the
  * same strip on both sides is not DIFFERENT (alpha = 1e-3, one claim). */
-static void test_half_pixel_shift(void **state)
+TEST(test_half_pixel_shift)
 {
-    (void)state;
     enum { SIDE = 16, N = 64 };
     struct moments m[3];
     uint64_t seed = 11;
@@ -252,9 +236,8 @@ static void test_half_pixel_shift(void **state)
 
 /* Pixels without noise: float32 rounding is no difference, more than that is; and a difference needs
  * more observations than could all have missed something as bright as what is seen. */
-static void test_noise_free(void **state)
+TEST(test_noise_free)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
     struct compare_options opt = {1e-3, 0, 0, 4, 0}, margin = {1e-3, 0.01, 0.02, 4, 0};
     constant(&a, 15, 64);
@@ -301,9 +284,8 @@ static double most_likely(double n, double m)
  * event of brightness 1000 was seen elsewhere. Missed events could explain it (0.0002 * 20 / 1000 of one
  * is expected); one law for both sides cannot. Where a side is black, or not observed but exact, rare
  * events may make up for it, and nothing is said; nor where samples differ, or inside the margin. */
-static void test_one_value_each(void **state)
+TEST(test_one_value_each)
 {
-    (void)state;
     struct compare_options opt = {1e-6, 0, 0, 4, 0}, margin = {1e-6, 0.01, 0.02, 4, 0};
     enum { SEEN, BLACK, EXACT, VARIED, INSIDE, FEW, CASES };
     for (int k = 0; k < CASES; k++) {
@@ -343,9 +325,8 @@ static void test_one_value_each(void **state)
 
 /* Rounding noise (relative sd 1e-8 of an observation) around values 1e-7 apart: hundreds of standard
  * errors, and nothing. Control: 1e-3 apart is DIFFERENT. */
-static void test_rounding_noise(void **state)
+TEST(test_rounding_noise)
 {
-    (void)state;
     struct moments a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
     struct compare_options opt = {1e-3, 0, 0, 2, 0};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
@@ -361,9 +342,8 @@ static void test_rounding_noise(void **state)
  * n = 1000 against the exact value: V = 64 v, g = 64 k3/(64 v)^1.5 = k/8 with k = k3/v^1.5 the
  * skewness of a pixel's mean. k = 0.001: tested. k = 2: |g| = 0.25, at x > 3 a factor of e^2: neither
  * test nor interval, so INCONCLUSIVE although the means differ by 8 standard errors. */
-static void test_skew_guard(void **state)
+TEST(test_skew_guard)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
     const double n = 1000, v = 0.01 * 0.01;
     double m2 = v * n * (n - 1);
@@ -393,9 +373,8 @@ static void test_skew_guard(void **state)
 
 /* A tile that is too skewed is judged within what is around it: its MDB is that of the image times
  * their ratio of radiance. And a moderately skewed interval is widened, never narrowed. */
-static void test_skewed_tile(void **state)
+TEST(test_skewed_tile)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
     const double n = 1000, v = 1e-6;
     double m2 = v * n * (n - 1);
@@ -425,9 +404,8 @@ static void test_skewed_tile(void **state)
 
 /* Dark regions are measured against 5 % of the mean luminance: the left half of the image is black in
  * B and 0.0004 in A, beside 0.5: mean 0.25, unit 0.0125, so 3.2 %. */
-static void test_floor(void **state)
+TEST(test_floor)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
     constant(&a, 0.5, 1);
     constant(&b, 0.5, 1);
@@ -452,9 +430,8 @@ static void test_floor(void **state)
  * of the side. 16 x 16, tile 4, margins 1 % and 3 %: an 8 x 8 square has 2 %. Exact sides; in the
  * top left 8 x 8 the difference is 1.9 % or 2.1 %; neither any tile nor the image is beyond its own
  * margin. */
-static void test_margin_between(void **state)
+TEST(test_margin_between)
 {
-    (void)state;
     struct moments a = new_moments(16, 16, "exact"), b = new_moments(16, 16, "exact");
     constant(&b, 1, 1);
     for (int over = 0; over < 2; over++) {
@@ -477,9 +454,8 @@ static void test_margin_between(void **state)
 /* INCONCLUSIVE with few samples turns EQUIVALENT with the factor it asks for, in at least 90 % of 60
  * claims (planned for 95 %; below 51 of 60 by chance 7e-4 at a true 95 %). Control: a quarter of that
  * factor leaves most INCONCLUSIVE. Normal law sd 0.3, n = 8 on 16 x 16, margins 2 % and 10 %. */
-static void test_extra_factor(void **state)
+TEST(test_extra_factor)
 {
-    (void)state;
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0};
     uint64_t seed = 21;
@@ -508,9 +484,8 @@ static void test_extra_factor(void **state)
 }
 
 /* A channel swap that keeps luminance: caught in R, G and B. */
-static void test_channels(void **state)
+TEST(test_channels)
 {
-    (void)state;
     struct moments a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
     constant(&a, 1, 1);
     constant(&b, 1, 1);
@@ -580,9 +555,8 @@ static void inject(enum fault fault, struct moments *m, struct compare_options *
 }
 
 /* Each fault on its own, in B: refused with its own line. Control: without it, judged. */
-static void test_hygiene(void **state)
+TEST(test_hygiene)
 {
-    (void)state;
     const struct {
         enum fault fault;
         const char *line;
@@ -626,26 +600,4 @@ static void test_hygiene(void **state)
         moments_free(&a);
         moments_free(&b);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_by_hand),
-        cmocka_unit_test(test_pyramid_brute_force),
-        cmocka_unit_test(test_estimate_by_hand),
-        cmocka_unit_test(test_luminance_bound),
-        cmocka_unit_test(test_half_pixel_shift),
-        cmocka_unit_test(test_noise_free),
-        cmocka_unit_test(test_one_value_each),
-        cmocka_unit_test(test_rounding_noise),
-        cmocka_unit_test(test_skew_guard),
-        cmocka_unit_test(test_skewed_tile),
-        cmocka_unit_test(test_floor),
-        cmocka_unit_test(test_margin_between),
-        cmocka_unit_test(test_extra_factor),
-        cmocka_unit_test(test_channels),
-        cmocka_unit_test(test_hygiene),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

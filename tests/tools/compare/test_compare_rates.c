@@ -12,21 +12,16 @@
 
 #include "tools/compare/compare.h"
 #include "tools/stats/distributions.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
 
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {
     struct comparison c;
     struct err e;
-    if (!compare_moments(a, b, &opt, &c, &e))
-        fail_msg("%s", e.msg);
+    MUST(compare_moments(a, b, &opt, &c, &e));
     return c;
 }
 
@@ -94,9 +89,8 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
  * breaks the plain t test (n = 16 against 1024 or the exact value), the negative control shows it:
  * tested without the guard, the tiles of the same claims are wrong significantly more often than
  * alpha. */
-static void test_false_different(void **state)
+TEST(test_false_different)
 {
-    (void)state;
     const struct null_case cases[] = {
         {"normal, 16 and 16, grey", LAW_NORMAL, 8, 4, 16, 16, true, 2000, false},
         {"normal, 16 and 16, independent RGB", LAW_NORMAL, 8, 4, 16, 16, false, 2000, false},
@@ -121,9 +115,8 @@ static void test_false_different(void **state)
  * distribution of p by at most 2 z phi(z) s = 0.48 s (at z = 1); the critical distance for 4800 is
  * 1.95/sqrt(4800) = 0.028, so 8 % is found with about 0.9. Negative control: p from a standard
  * error that is 15 % too small. */
-static void test_p_uniform(void **state)
+TEST(test_p_uniform)
 {
-    (void)state;
     enum { CLAIMS = 300, TILES = 16, IMAGES = 2000 };
     static double tile_p[CLAIMS * TILES], wrong_p[CLAIMS * TILES], image_p[IMAGES];
     struct null_case tiles = {"normal, tiles", LAW_NORMAL, 16, 4, 16, 16, true, CLAIMS, false};
@@ -145,9 +138,8 @@ static void test_p_uniform(void **state)
 /* Power: a bias of the printed MDB comes out of the image's own test with 95 % (both-sided
  * Clopper-Pearson 0.999 over 1000 claims: +-2.3 %), and the claim is DIFFERENT at least that often.
  * Normal law, n = 16 each, alpha = 0.01. Negative control: half the MDB must not reach 95 %. */
-static void test_power(void **state)
+TEST(test_power)
 {
-    (void)state;
     enum { CLAIMS = 1000 };
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
     struct compare_options opt = {alpha, 0, 0, 4, 0};
@@ -189,9 +181,8 @@ static void test_power(void **state)
  * more, as mdb_tile is the largest of the tiles: with 16 x 2 x 127 degrees of freedom a tile's standard error
  * varies by 1.1 %, the largest of 16 is about 2 % up, so that up to 96.5 % are found. 1000 claims, alpha = 0.01,
  * n = 128. Control: half of it. */
-static void test_tile_power(void **state)
+TEST(test_tile_power)
 {
-    (void)state;
     enum { CLAIMS = 1000, N = 128 };
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {.alpha = alpha, .tile = 4};
@@ -267,9 +258,8 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
  * Controls: without bias EQUIVALENT in at least 95 % (the margins are 4.5 and 5.6 standard errors);
  * with twice the margin DIFFERENT in at least 95 % (a test at alpha over at most 1364 regions needs
  * 4.5 standard errors). */
-static void test_false_equivalent(void **state)
+TEST(test_false_equivalent)
 {
-    (void)state;
     enum { CLAIMS = 2000 };
     struct compare_options opt = {0.05, 0.03, 0.15, 4, 0};
     const double edge = 1 + 1e-6;
@@ -289,16 +279,4 @@ static void test_false_equivalent(void **state)
     struct verdict_rate twice = rate_with_bias(0.065, false, true, 500, opt, 35);
     assert_true(upper_bound(twice.different, 500) >= 0.95);
     assert_true(twice.equivalent == 0);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_false_different),
-        cmocka_unit_test(test_p_uniform),
-        cmocka_unit_test(test_power),
-        cmocka_unit_test(test_tile_power),
-        cmocka_unit_test(test_false_equivalent),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,13 +3,9 @@
 #include "tests/support/simulate.h"
 
 #include "tools/compare/permutation.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
 
 static struct replicate_dir new_renders(int num, int width, int height)
 {
@@ -52,8 +48,7 @@ static struct permutation test_pair(const struct replicate_dir *a, const struct 
 {
     struct permutation p;
     struct err e;
-    if (!permutation_test(a, b, &opt, &p, &e))
-        fail_msg("%s", e.msg);
+    MUST(permutation_test(a, b, &opt, &p, &e));
     return p;
 }
 
@@ -76,9 +71,8 @@ static double largest_t(const double v[6][4], int labels)
     return best;
 }
 
-static void test_by_enumeration(void **state)
+TEST(test_by_enumeration)
 {
-    (void)state;
     uint64_t seed = 3;
     for (int run = 0; run < 20; run++) {
         struct replicate_dir a = new_renders(3, 2, 2), b = new_renders(3, 2, 2);
@@ -109,9 +103,8 @@ static void test_by_enumeration(void **state)
 
 /* 2/C(2K,K): 2/252, 2/924, 2/3432, 2/12870, 2/48620, 2/184756; 12 of a side are 2.7 million labellings, so
  * that 1/200001 is the least. */
-static void test_smallest(void **state)
+TEST(test_smallest)
 {
-    (void)state;
     assert_int_equal(permutation_needed(0.05, 2), 4);
     assert_int_equal(permutation_needed(8e-3, 2), 5);
     assert_int_equal(permutation_needed(1e-3, 2), 7);
@@ -155,9 +148,8 @@ static int count_rejected(enum law_of_pictures law, double scale, double alpha, 
 /* H0 holds exactly: P(p <= 5 %) = 12/252 = 4.76 % (a multiple of 2/252, ties aside). 2000 pairs a law:
  * 95 expected, sd 9.5; two-sided chance 1e-3: 65 to 128. Fireflies tie where all is dark, so only the
  * upper end. Negative control: A brighter by a third must go beyond. */
-static void test_level(void **state)
+TEST(test_level)
 {
-    (void)state;
     for (int law = 0; law < NUM_LAWS; law++) {
         int got = count_rejected((enum law_of_pictures)law, 1, 0.05, 2000, 40 + (uint64_t)law);
         print_message("law %d: %d of 2000 at 5 %%\n", law, got);
@@ -169,9 +161,8 @@ static void test_level(void **state)
 }
 
 /* A second stage tests the one region, one-sided: p a multiple of 1/252. */
-static void test_confirm(void **state)
+TEST(test_confirm)
 {
-    (void)state;
     uint64_t seed = 60;
     struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
     struct permutation_options opt = {0.01, 2};
@@ -204,9 +195,8 @@ static void test_confirm(void **state)
 
 /* 10 a side are 184 756 labellings, 11 are 705 432 and drawn at random. Both must agree on what is far out,
  * and p of a random test is a multiple of 1/200 001. */
-static void test_random_labellings(void **state)
+TEST(test_random_labellings)
 {
-    (void)state;
     uint64_t seed = 70;
     struct replicate_dir a = new_renders(11, 2, 2), b = new_renders(11, 2, 2);
     paint(&a, NORMAL, 1, &seed);
@@ -222,9 +212,8 @@ static void test_random_labellings(void **state)
     replicate_dir_free(&b);
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
-    (void)state;
     uint64_t seed = 80;
     struct replicate_dir a = new_renders(3, 4, 4), b = new_renders(3, 4, 4),
                          c = new_renders(3, 2, 2);
@@ -242,17 +231,4 @@ static void test_refused(void **state)
     replicate_dir_free(&a);
     replicate_dir_free(&b);
     replicate_dir_free(&c);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_by_enumeration),
-        cmocka_unit_test(test_smallest),
-        cmocka_unit_test(test_level),
-        cmocka_unit_test(test_confirm),
-        cmocka_unit_test(test_random_labellings),
-        cmocka_unit_test(test_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

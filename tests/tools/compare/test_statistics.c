@@ -11,31 +11,20 @@
 #include "tools/compare/compare.h"
 #include "tools/compare/error_modes.h"
 #include "tools/stats/distributions.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
-#include <string.h>
 #include <sys/resource.h>
 
 static const double pi = 3.14159265358979323846;
-
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.12g, want %.12g", got, want);
-}
 
 static struct comparison compare(const struct moments *a, const struct moments *b,
                                  struct compare_options opt)
 {
     struct comparison c;
     struct err e;
-    if (!compare_moments(a, b, &opt, &c, &e))
-        fail_msg("%s", e.msg);
+    MUST(compare_moments(a, b, &opt, &c, &e));
     return c;
 }
 
@@ -87,9 +76,8 @@ struct size_case {
  * picture with edges and colours, 16 x 16, in which the noise is proportional to radiance. The interval
  * of the variance ratio holds 1 in at least its 98 %. A statistic that tests nothing at all in a row is
  * no proof of its size: dense and directed must test in all rows but those named. */
-static void test_sizes(void **state)
+TEST(test_sizes)
 {
-    (void)state;
     enum { SIDE = 16, CLAIMS = 2000 };
     static const struct size_case cases[] = {
         {"normal, 64 and 64, grey", LAW_NORMAL, 64, 64, true},
@@ -150,9 +138,8 @@ static double noncentral_q(double x, double k, double lambda)
  * testable. Normal law, sd 0.3. Measured in 400 claims, within Clopper-Pearson of it. No pixel and no
  * region of them stands out: the pyramid finds it in less than a quarter as many. Control: without the
  * errors dense finds at most 1 %. */
-static void test_dense_power(void **state)
+TEST(test_dense_power)
 {
-    (void)state;
     enum { SIDE = 8, N = 1024, CLAIMS = 400 };
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     const double size = 1.06, se = 0.3 * sqrt(2.0 / N);
@@ -200,9 +187,8 @@ static void test_dense_power(void **state)
 /* With margins every pixel may be off by them: at 5 % in each, up or down at random, H0 holds for pixels and
  * tiles of 4 (margins 5 %) but for no dense statistic without margins. At most 1 % of 500 claims. Control:
  * with margins of 1 % all are found: pixels are off by 0.04/0.0265 = 1.5 standard errors more. */
-static void test_dense_margin(void **state)
+TEST(test_dense_margin)
 {
-    (void)state;
     enum { SIDE = 16, N = 256, CLAIMS = 500 };
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 61, coin = 7;
@@ -258,9 +244,8 @@ static double bugged(const double *truth, int side, int bug, int x, int y, int c
 /* Thirteen bugs, each with a name; 32 x 32, 5 claims each at alpha = 1e-3: DIFFERENT, and the sentence says
  * what it looks like, in every one. The differences are of many standard errors. Controls: the same
  * picture without a bug is not DIFFERENT; a hole in one tile is DIFFERENT and is called none of these. */
-static void test_names(void **state)
+TEST(test_names)
 {
-    (void)state;
     enum { SIDE = 32, N = 64, CLAIMS = 5 };
     static const char *const name[15] = {"scale",
                                          "offset",
@@ -317,9 +302,8 @@ static void test_names(void **state)
  * for an offset of 3 % of the mean. Coverage is at least 98 % by Clopper-Pearson, and at most
  * 99.9 %: the noise is grey, for which the standard error is exact. The noise is the
  * same everywhere: where it follows radiance the mean of both sides is not halfway between them. */
-static void test_amounts(void **state)
+TEST(test_amounts)
 {
-    (void)state;
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
     const double k = 2 * pi / SIDE, s = 0.5;
     const double expected[3] = {2 * tan(k * s / 2) / sin(k), 3, 3};
@@ -372,9 +356,8 @@ static void test_amounts(void **state)
  * 14 x 14 inner pixels, computed below. Of 400 claims the statistic finds what that predicts at
  * alpha share / 13 tests, less what 5 % of noise in the direction may cost: within Clopper-Pearson of the interval
  * [power at 0.93 T, power at T]. Control: 0 pixels, at most alpha. */
-static void test_directed_power(void **state)
+TEST(test_directed_power)
 {
-    (void)state;
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
     const double k = 2 * pi / SIDE, s = 0.1;
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
@@ -419,9 +402,8 @@ static void test_directed_power(void **state)
 
 /* A bias of the margin in every pixel, upward: inside the margins, and the direction "scale" is just that.
  * At most alpha = 1 % of 500 claims; twice the margin is found by it in all. */
-static void test_directed_margin(void **state)
+TEST(test_directed_margin)
 {
-    (void)state;
     enum { SIDE = 16, N = 64, CLAIMS = 500 };
     static double truth[3 * SIDE * SIDE], wrong[3 * SIDE * SIDE];
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
@@ -452,9 +434,8 @@ static void test_directed_margin(void **state)
  * Tested against a margin of 100 %, a true ratio of 2 is within it: at most alpha; against one of 50 % it
  * is found: ln(2/1.5) = 0.29, and the standard error of ln R for 1024 normal pixels of n = 16 and 32 is
  * about sqrt(2 (1/15 + 1/31)/1024) = 0.014, times 1.2 as not all pixels weigh the same. Without a margin nothing is tested and all shares add to 1. */
-static void test_variance_ratio(void **state)
+TEST(test_variance_ratio)
 {
-    (void)state;
     enum { SIDE = 32, N = 16, CLAIMS = 1000 };
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     static double truth[3 * SIDE * SIDE];
@@ -527,9 +508,8 @@ static void test_variance_ratio(void **state)
  * seeds; an exact picture compared with itself; and laws of two values, in which independent pixels can
  * agree in every moment: 500 claims of the rare and of the firefly law, none refused (each has less than
  * 1e-6 of it). */
-static void test_shared_seeds(void **state)
+TEST(test_shared_seeds)
 {
-    (void)state;
     enum { SIDE = 8, N = 16 };
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-3, .tile = 4};
@@ -577,9 +557,8 @@ static void test_shared_seeds(void **state)
  * and half of it is not. And p has no floor: a bias of 1000 standard errors of normal noise has, by the
  * tail of the normal law, log10 p = -1e6/2/ln 10 = -217147 within 1 % (nu = 61440 lowers it: the exact
  * Student tail is compared with its own closed form below). */
-static void test_small_alpha(void **state)
+TEST(test_small_alpha)
 {
-    (void)state;
     enum { SIDE = 16, N = 121, CLAIMS = 500 };
     struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-9, .tile = 4};
@@ -623,9 +602,8 @@ static void test_small_alpha(void **state)
 
 /* 512 x 512, 8 replicates a side: below 0.5 s and 200 MiB on an idle core. The bounds here are for a busy
  * machine, and with a sanitizer for that. */
-static void test_cost(void **state)
+TEST(test_cost)
 {
-    (void)state;
 #ifdef __SANITIZE_ADDRESS__
     const double seconds = 30, mib = 1000;
 #else
@@ -648,17 +626,4 @@ static void test_cost(void **state)
     comparison_free(&c);
     moments_free(&a);
     moments_free(&b);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cost),           cmocka_unit_test(test_sizes),
-        cmocka_unit_test(test_dense_power),    cmocka_unit_test(test_dense_margin),
-        cmocka_unit_test(test_names),          cmocka_unit_test(test_amounts),
-        cmocka_unit_test(test_directed_power), cmocka_unit_test(test_directed_margin),
-        cmocka_unit_test(test_variance_ratio), cmocka_unit_test(test_shared_seeds),
-        cmocka_unit_test(test_small_alpha),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

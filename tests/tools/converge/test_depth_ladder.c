@@ -3,20 +3,14 @@
 #include "reference/suite/suite.h"
 #include "renderer/base/fs.h"
 #include "tools/converge/depth_ladder.h"
+#include "tests/support/test.h"
+#include "tools/plots/plot_convergence.h"
+#include "tools/results/convergence_results.h"
 
 #include <libgen.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #include <libxml/HTMLparser.h>
 #include <libxml/xpath.h>
-
-#include <cmocka.h>
 
 static double number(const json_t *rungs, size_t i, const char *name)
 {
@@ -28,9 +22,8 @@ static double number(const json_t *rungs, size_t i, const char *name)
 /* H0: the mean at each depth is the closed form of the suite's 11_furnace, within its standard error (an upper bound) and
  * 1e-5 for single precision. Two-sided at 1e-6 over 6 depths: 5.2 standard errors. n: 16 x 16 pixels of 16 samples, one
  * seed. Control: one bounce more or fewer, a change of at least 0.2^5 in blue and 0.8^5 in red, is rejected everywhere. */
-static void furnace(void **state)
+TEST(furnace)
 {
-    (void)state;
     struct suite suite;
     struct err e = {""};
     char self[4096], program[4200], dir[] = "/tmp/test_depths_XXXXXX";
@@ -39,8 +32,7 @@ static void furnace(void **state)
     self[n] = '\0';
     snprintf(program, sizeof program, "%.4000s/../pathtracer", dirname(self));
     assert_non_null(mkdtemp(dir));
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load("reference/scenes", &suite, &e));
     const struct suite_scene *scene = suite_find(&suite, "11_furnace");
     assert_non_null(scene);
     struct suite_scene small = *scene;
@@ -52,9 +44,8 @@ static void furnace(void **state)
                                      .threads = 1,
                                      .timeout_s = 60};
     json_t *depths;
-    if (!depth_ladder_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e))
-        fail_msg("%s", e.msg);
-    assert_true(depth_ladder_check(depths, "x", &e));
+    MUST(depth_ladder_measure(&job, suite_reference_of(scene, "truth"), 16, &depths, &e));
+    assert_true(convergence_results_check_depths(depths, "x", &e));
     const json_t *rungs = json_object_get(depths, "rungs");
     assert_int_equal(json_array_size(rungs), 6);
     /* Emission 0.5, 1, 2 and albedo 0.8, 0.5, 0.2 (11_furnace.json). */
@@ -93,7 +84,7 @@ static htmlDocPtr page_of(const char *json)
     struct err e = {""};
     FILE *f = open_memstream(&text, &size);
     assert_non_null(depths);
-    assert_true(depth_ladder_check(depths, "x", &e));
+    assert_true(convergence_results_check_depths(depths, "x", &e));
     plot_depths(f, depths);
     fclose(f);
     htmlDocPtr doc =
@@ -115,9 +106,8 @@ static double evaluate(htmlDocPtr doc, const char *xpath)
     return v;
 }
 
-static void plot(void **state)
+TEST(plot)
 {
-    (void)state;
     htmlDocPtr doc = page_of(
         "{\"samples\": 64, \"rungs\": [{\"depth\": 0, \"mean\": 0, \"se\": 0, \"truth\": 0}, "
         "{\"depth\": 1, \"mean\": 1, \"se\": 0.1, \"truth\": 0.8}, "
@@ -144,9 +134,8 @@ static void plot(void **state)
     xmlFreeDoc(doc);
 }
 
-static void bad_ladders(void **state)
+TEST(bad_ladders)
 {
-    (void)state;
     static const char *const bad[] = {
         "{}",
         "{\"samples\": 1, \"rungs\": []}",
@@ -161,18 +150,8 @@ static void bad_ladders(void **state)
         struct err e = {""};
         json_t *j = json_loads(bad[i], 0, NULL);
         assert_non_null(j);
-        assert_false(depth_ladder_check(j, "file: scene", &e));
+        assert_false(convergence_results_check_depths(j, "file: scene", &e));
         assert_non_null(strstr(e.msg, "file: scene: 'depths'"));
         json_decref(j);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(furnace),
-        cmocka_unit_test(plot),
-        cmocka_unit_test(bad_ladders),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

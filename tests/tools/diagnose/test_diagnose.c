@@ -4,16 +4,10 @@
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose.h"
 #include "tests/support/simulate.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
 
 #define CATALOGUE "golden/diagnose"
 #define PATCHES   "tests/mutants"
@@ -82,15 +76,14 @@ static void copy_patches(const struct fixture *f, const char *to, const char *ch
     }
 }
 
-static void test_every_patch_is_in_the_catalogue(void **state)
+TEST(test_every_patch_is_in_the_catalogue)
 {
     struct fixture *f = *state;
     struct err e = {""};
-    if (!catalogue_current(&f->c, PATCHES, &e))
-        fail_msg("%s", e.msg);
+    MUST(catalogue_current(&f->c, PATCHES, &e));
 }
 
-static void test_what_a_patch_is_by(void **state)
+TEST(test_what_a_patch_is_by)
 {
     struct fixture *f = *state;
     static const char head[] = "Bug: b\nWhere: w\n\n--- a/x.c\n+++ b/x.c\n";
@@ -122,7 +115,7 @@ static void test_what_a_patch_is_by(void **state)
     }
 }
 
-static void test_a_stale_catalogue_is_refused(void **state)
+TEST(test_a_stale_catalogue_is_refused)
 {
     struct fixture *f = *state;
     struct err e = {""};
@@ -152,7 +145,7 @@ static void test_a_stale_catalogue_is_refused(void **state)
     assert_non_null(strstr(e.msg, "a_new_one"));
 }
 
-static void test_a_damaged_catalogue_is_refused(void **state)
+TEST(test_a_damaged_catalogue_is_refused)
 {
     struct fixture *f = *state;
     struct err e = {""};
@@ -178,9 +171,8 @@ static void test_a_damaged_catalogue_is_refused(void **state)
 
 /* Cells by brute force: the mean of the pixels, and the sum of their variances of the mean over the square of
  * their number. */
-static void test_a_sight_pools_pixels(void **state)
+TEST(test_a_sight_pools_pixels)
 {
-    (void)state;
     struct err e;
     struct signature s;
     uint64_t seed = 4;
@@ -214,9 +206,8 @@ static void test_a_sight_pools_pixels(void **state)
 }
 
 /* Two averaged renders are one of twice the samples: half the variance. */
-static void test_an_average_of_sights(void **state)
+TEST(test_an_average_of_sights)
 {
-    (void)state;
     struct err e;
     struct signature s[2];
     uint64_t seed = 5;
@@ -292,8 +283,7 @@ static struct diagnosis look(struct fixture *f, int bug, double amplitude, const
         draw_look(f, v, bug >= 0 ? f->c.view[v].effect[bug] : NULL, amplitude,
                   understated(f, bug, f->c.view[v].correct.cell));
     const struct diagnose_options opt = {.alpha = alpha, .without = without};
-    if (!diagnose(&f->c, f->clue, f->c.num_views, &opt, &d, &e))
-        fail_msg("%s", e.msg);
+    MUST(diagnose(&f->c, f->clue, f->c.num_views, &opt, &d, &e));
     return d;
 }
 
@@ -306,7 +296,7 @@ static bool is_named(const struct diagnosis *d, int bug)
 }
 
 /* H0: correct. Each look accuses with at most 1e-6, so any of 500 with 5e-4. */
-static void test_a_correct_look_is_not_accused(void **state)
+TEST(test_a_correct_look_is_not_accused)
 {
     struct fixture *f = *state;
     double largest = -INFINITY;
@@ -322,7 +312,7 @@ static void test_a_correct_look_is_not_accused(void **state)
 }
 
 /* Negative control: stripes, brighter and darker, are wrong and no known bug. */
-static void test_an_unknown_difference_is_not_named(void **state)
+TEST(test_an_unknown_difference_is_not_named)
 {
     struct fixture *f = *state;
     struct err e;
@@ -340,7 +330,7 @@ static void test_an_unknown_difference_is_not_named(void **state)
     assert_true(d.gate[0] != '\0');
 }
 
-static void test_every_bug_is_named(void **state)
+TEST(test_every_bug_is_named)
 {
     struct fixture *f = *state;
     int named = 0, first = 0;
@@ -359,7 +349,7 @@ static void test_every_bug_is_named(void **state)
 }
 
 /* A bug at 40 % of its strength is named as that bug, or as unknown, and its amplitude is found. */
-static void test_an_amplitude_is_found(void **state)
+TEST(test_an_amplitude_is_found)
 {
     struct fixture *f = *state;
     int named = 0, right = 0;
@@ -376,7 +366,7 @@ static void test_an_amplitude_is_found(void **state)
     assert_true(right >= 0.6 * ((f->c.num_bugs + 3) / 4));
 }
 
-static void test_another_shape_is_refused(void **state)
+TEST(test_another_shape_is_refused)
 {
     struct fixture *f = *state;
     struct err e = {""};
@@ -388,20 +378,4 @@ static void test_another_shape_is_refused(void **state)
     assert_non_null(strstr(e.msg, "another shape"));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_patch_is_in_the_catalogue),
-        cmocka_unit_test(test_what_a_patch_is_by),
-        cmocka_unit_test(test_a_stale_catalogue_is_refused),
-        cmocka_unit_test(test_a_damaged_catalogue_is_refused),
-        cmocka_unit_test(test_a_sight_pools_pixels),
-        cmocka_unit_test(test_an_average_of_sights),
-        cmocka_unit_test(test_a_correct_look_is_not_accused),
-        cmocka_unit_test(test_an_unknown_difference_is_not_named),
-        cmocka_unit_test(test_every_bug_is_named),
-        cmocka_unit_test(test_an_amplitude_is_found),
-        cmocka_unit_test(test_another_shape_is_refused),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

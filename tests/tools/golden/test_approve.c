@@ -5,15 +5,7 @@
 #include "renderer/base/sha256.h"
 #include "tools/golden/approve.h"
 #include "tests/support/simulate.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { SIDE = 64, REPLICATES = 16 };
 
@@ -74,8 +66,7 @@ static void render(struct fixture *f, const char *dir, double scale, uint64_t se
         m.height, "depth", 5, "replicates", REPLICATES, "spp", 4, "subgrid", 0, "seed",
         (json_int_t)seed, "version", "Blender 3.4.1", "key", "k", "seeds", (json_int_t)77);
     struct err e;
-    if (!golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e));
     json_decref(manifest);
     moments_free(&m);
 }
@@ -97,8 +88,8 @@ static void hash(const char *dir, const char *file, char hex[65])
     snprintf(path, sizeof path, "%s/12_plane/%s", dir, file);
     if (access(path, F_OK) != 0)
         strcpy(hex, "none");
-    else if (!sha256_file(path, hex, &e))
-        fail_msg("%s", e.msg);
+    else
+        MUST(sha256_file(path, hex, &e));
 }
 
 /* Both files of the store, so that a refusal can be shown to leave them alone. */
@@ -150,7 +141,7 @@ static void assert_accepted(struct fixture *f, size_t count, const char *verdict
     json_decref(change);
 }
 
-static void a_new_one_has_to_be_called_new(void **state)
+TEST_WITH(a_new_one_has_to_be_called_new, setup, teardown)
 {
     struct fixture *f = *state;
     render(f, f->from, 1, 1);
@@ -167,7 +158,7 @@ static void a_new_one_has_to_be_called_new(void **state)
 
 /* A kill before the image's last rename: the manifest is the new one, so nothing is left to approve, but the image is not yet
  * in its place. */
-static void an_interrupted_approval_is_ended(void **state)
+TEST_WITH(an_interrupted_approval_is_ended, setup, teardown)
 {
     struct fixture *f = *state;
     char exr[256], next[sizeof exr + 8], old[65], now[65];
@@ -187,7 +178,7 @@ static void an_interrupted_approval_is_ended(void **state)
     assert_string_equal(now, "none");
 }
 
-static void other_seeds_are_accepted_with_their_effect(void **state)
+TEST_WITH(other_seeds_are_accepted_with_their_effect, setup, teardown)
 {
     struct fixture *f = *state;
     render(f, f->golden, 1, 1);
@@ -208,7 +199,7 @@ static void other_seeds_are_accepted_with_their_effect(void **state)
     json_decref(change);
 }
 
-static void a_difference_needs_a_reason(void **state)
+TEST_WITH(a_difference_needs_a_reason, setup, teardown)
 {
     struct fixture *f = *state;
     render(f, f->golden, 1, 1);
@@ -229,7 +220,7 @@ static void a_difference_needs_a_reason(void **state)
 }
 
 /* Equal means, but margins far below what the noise of the two can show. */
-static void an_inconclusive_one_is_refused_whatever_is_said(void **state)
+TEST_WITH(an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
 {
     struct fixture *f = *state;
     render(f, f->golden, 1, 1);
@@ -241,7 +232,7 @@ static void an_inconclusive_one_is_refused_whatever_is_said(void **state)
     assert_refused(f, APPROVE_INCONCLUSIVE, "INCONCLUSIVE");
 }
 
-static void what_is_missing_or_damaged_is_refused(void **state)
+TEST_WITH(what_is_missing_or_damaged_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
     char path[256];
@@ -265,7 +256,7 @@ static void what_is_missing_or_damaged_is_refused(void **state)
 }
 
 /* The stored one is of the scene as it was; only its size cannot be compared. */
-static void a_stale_one_is_what_is_compared_with(void **state)
+TEST_WITH(a_stale_one_is_what_is_compared_with, setup, teardown)
 {
     struct fixture *f = *state;
     strcpy(f->scene.sha256, "old");
@@ -282,7 +273,7 @@ static void a_stale_one_is_what_is_compared_with(void **state)
     assert_accepted(f, 2, "NOT COMPARABLE");
 }
 
-static void states_have_names_and_orphans_are_found(void **state)
+TEST_WITH(states_have_names_and_orphans_are_found, setup, teardown)
 {
     struct fixture *f = *state;
     struct suite suite = {.scene = &f->scene, .num_scenes = 1};
@@ -357,32 +348,14 @@ static const struct suite_scene small_box = {.name = "41_cornell",
                                              .height = 8,
                                              .depth = 2};
 
-static void cycles_gives_the_same_bits_again(void **state)
+TEST_WITH(cycles_gives_the_same_bits_again, setup, teardown)
 {
     render_twice(*state, "blender", small_box,
                  (struct suite_reference){.engine = "cycles", .replicates = 3, .spp = 4});
 }
 
-static void povray_gives_the_same_bits_again(void **state)
+TEST_WITH(povray_gives_the_same_bits_again, setup, teardown)
 {
     render_twice(*state, "povray", small_box,
                  (struct suite_reference){.engine = "povray", .replicates = 2, .subgrid = 1});
-}
-
-int main(void)
-{
-#define WITH_FILES(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
-    const struct CMUnitTest tests[] = {
-        WITH_FILES(a_new_one_has_to_be_called_new),
-        WITH_FILES(an_interrupted_approval_is_ended),
-        WITH_FILES(other_seeds_are_accepted_with_their_effect),
-        WITH_FILES(a_difference_needs_a_reason),
-        WITH_FILES(an_inconclusive_one_is_refused_whatever_is_said),
-        WITH_FILES(what_is_missing_or_damaged_is_refused),
-        WITH_FILES(a_stale_one_is_what_is_compared_with),
-        WITH_FILES(states_have_names_and_orphans_are_found),
-        WITH_FILES(cycles_gives_the_same_bits_again),
-        WITH_FILES(povray_gives_the_same_bits_again),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,22 +3,13 @@
  *
  * The scene: a gradient of mean .02 to .4, a lamp of radiance 8 in a corner. A sample is exponential (a pixel of spp of
  * them is gamma), one draw for all three channels. The reference has 4096 samples; noise is known from it alone. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/image/tone.h"
 #include "tools/grade/grade_checks.h"
 #include "tools/grade/rate_image.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, SPP = 256, REFERENCE = 4096 };
 
@@ -74,8 +65,7 @@ static void write_picture(const char *name, const struct bug *b, double spp, cha
             rgb8[3 * p + c] = tone_map(TONE_CGL, with_bug(b, p, c) * (is_lamp(p) ? 1 : g));
     }
     snprintf(path, 128, "%s/%s.png", dir, name);
-    if (!image_write_png(path, WIDTH, HEIGHT, rgb8, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
 }
 
 /* M2 and M3 of an exponential law of the mean that was found: n mean^2, 2 n mean^3. */
@@ -118,8 +108,7 @@ static struct submitted_image read_back(const char *path)
 {
     struct submitted_image s;
     struct err e;
-    if (!submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e))
-        fail_msg("%s", e.msg);
+    MUST(submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
     return s;
 }
 
@@ -165,8 +154,7 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
         if (asked != NULL)
             r->picture[i].spp = asked[i];
     }
-    if (!grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e))
-        fail_msg("%s", e.msg);
+    MUST(grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e));
     for (int i = 0; i < num; i++)
         submitted_image_free(&h->picture[i]);
     free(r);
@@ -181,9 +169,8 @@ static struct result equal(const struct bug *bug, double spp, double alpha)
 }
 
 /* By hand: distance 0 inside, linear between, the width of the interval counted. */
-static void points_follow_the_interval(void **state)
+TEST(points_follow_the_interval)
 {
-    (void)state;
     const struct margin m = {0.02, 0.06, true};
     const struct {
         double lo, hi, share;
@@ -212,9 +199,8 @@ static void points_follow_the_interval(void **state)
 
 /* What is printed is the chance itself: 20 000 further runs, normal around the estimate, for each place of it. H0: they get
  * other points as often as it says; 5 standard deviations of that count (binomial), over 60 places, alpha below 1e-4. */
-static void the_chance_is_that_of_another_run(void **state)
+TEST(the_chance_is_that_of_another_run)
 {
-    (void)state;
     enum { RUNS = 20000 };
     const struct margin m = {0.02, 0.06, true};
     int places = 0, likely = 0;
@@ -239,9 +225,8 @@ static void the_chance_is_that_of_another_run(void **state)
 }
 
 /* Of a right program: below 1e-4, printed, and no point is lost. Control: one that is off by as much as costs nothing. */
-static void a_right_program_keeps_its_score(void **state)
+TEST(a_right_program_keeps_its_score)
 {
-    (void)state;
     enum { RUNS = 100 };
     double most = 0;
     for (int k = 0; k < RUNS; k++) {
@@ -260,9 +245,8 @@ static void a_right_program_keeps_its_score(void **state)
 
 /* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 pictures; by
  * chance more than 34 have a probability below 1e-3 (binomial). Control: 3 % too bright. */
-static void a_right_picture_keeps_its_points(void **state)
+TEST(a_right_picture_keeps_its_points)
 {
-    (void)state;
     enum { RUNS = 400 };
     int misses = 0, lost = 0, found = 0;
     for (int k = 0; k < RUNS; k++) {
@@ -291,9 +275,8 @@ static void a_right_picture_keeps_its_points(void **state)
 }
 
 /* Noisier than ours by 4, or by a quarter: known from the picture, still right. By 100: too noisy to be worth points. */
-static void noise_is_not_bias(void **state)
+TEST(noise_is_not_bias)
 {
-    (void)state;
     static const double samples[] = {0.25, 1, 4};
     for (int i = 0; i < 3; i++) {
         struct bug b = none;
@@ -311,9 +294,8 @@ static void noise_is_not_bias(void **state)
     result_free(&r);
 }
 
-static void bugs_cost_points(void **state)
+TEST(bugs_cost_points)
 {
-    (void)state;
     static const struct {
         const char *name;
         struct bug bug;
@@ -336,9 +318,8 @@ static void bugs_cost_points(void **state)
 }
 
 /* The reference as a file, with the noise that it has and no other. */
-static void a_copy_of_the_reference_is_seen(void **state)
+TEST(a_copy_of_the_reference_is_seen)
 {
-    (void)state;
     static uint8_t rgb8[3 * PIXELS];
     char path[128];
     struct err e;
@@ -364,9 +345,8 @@ static void a_copy_of_the_reference_is_seen(void **state)
 
 /* What is accepted: everything 1.2 times as bright. A program that does that loses nothing, one that has a dark square besides
  * does, one that is right or 1.5 times too bright is not said to have it. */
-static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
+TEST(what_is_accepted_costs_nothing_and_hides_nothing)
 {
-    (void)state;
     static const struct {
         struct bug bug;
         int set;
@@ -397,8 +377,7 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
         assert_non_null(h);
         write_picture("accepted", &cases[k].bug, SPP, path);
         h->picture[0] = read_back(path);
-        if (!grade_all_checks(r, a, h, 1e-5, &out, &set, &e))
-            fail_msg("%s", e.msg);
+        MUST(grade_all_checks(r, a, h, 1e-5, &out, &set, &e));
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");
@@ -412,9 +391,8 @@ static void what_is_accepted_costs_nothing_and_hides_nothing(void **state)
 }
 
 /* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
-static void a_watermark_is_masked(void **state)
+TEST(a_watermark_is_masked)
 {
-    (void)state;
     static const struct {
         int mask[4];
         struct bug bug;
@@ -447,9 +425,8 @@ static void a_watermark_is_masked(void **state)
         }
 }
 
-static void two_estimators_agree_or_not(void **state)
+TEST(two_estimators_agree_or_not)
 {
-    (void)state;
     const struct bug bright = {.scale = 1.2, .square = 1, .noise = 1},
                      noisy = {.scale = 1, .square = 1, .noise = 0.3};
     const double spp[] = {SPP, SPP};
@@ -464,9 +441,8 @@ static void two_estimators_agree_or_not(void **state)
 }
 
 /* A third and two thirds; the lamp in all of them is saturated and says nothing. */
-static void parts_add_up_or_not(void **state)
+TEST(parts_add_up_or_not)
 {
-    (void)state;
     const struct bug third = {.scale = 1.0 / 3, .square = 1, .noise = 1},
                      rest = {.scale = 2.0 / 3, .square = 1, .noise = 1};
     const double spp[] = {4 * SPP, 4 * SPP, 4 * SPP};
@@ -481,9 +457,8 @@ static void parts_add_up_or_not(void **state)
 }
 
 /* The second picture is asked for with 16 times the samples, and has them; or has as many as the first. */
-static void noise_falls_or_not(void **state)
+TEST(noise_falls_or_not)
 {
-    (void)state;
     const struct bug *const two[] = {&none, &none};
     const int asked[] = {SPP / 4, 4 * SPP};
     struct result r = check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 4 * SPP}, asked, 1e-5);
@@ -496,9 +471,8 @@ static void noise_falls_or_not(void **state)
     result_free(&r);
 }
 
-static void pixels_are_exact_or_not(void **state)
+TEST(pixels_are_exact_or_not)
 {
-    (void)state;
     const struct bug *right = &none;
     const struct bug square = {.scale = 1, .square = 0.2, .noise = 1};
     const struct bug *wrong = &square;
@@ -514,9 +488,8 @@ static void pixels_are_exact_or_not(void **state)
 }
 
 /* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
-static void rates_are_whole_batches_or_not(void **state)
+TEST(rates_are_whole_batches_or_not)
 {
-    (void)state;
     static uint8_t rgb8[3 * PIXELS];
     char path[128];
     struct rate_image r;
@@ -543,9 +516,8 @@ static void rates_are_whole_batches_or_not(void **state)
 }
 
 /* Files that are no pictures, and one that says it is large: the header alone is read. */
-static void bad_pictures_get_a_line(void **state)
+TEST(bad_pictures_get_a_line)
 {
-    (void)state;
     static const unsigned char bomb[] = {
         0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49,
         0x48, 0x44, 0x52, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x08, 0x02,
@@ -587,24 +559,4 @@ static void bad_pictures_get_a_line(void **state)
     assert_string_equal(e.msg, "the picture is 64 x 48 pixels, not 64 x 64");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_follow_the_interval),
-        cmocka_unit_test(the_chance_is_that_of_another_run),
-        cmocka_unit_test(a_right_program_keeps_its_score),
-        cmocka_unit_test(a_right_picture_keeps_its_points),
-        cmocka_unit_test(noise_is_not_bias),
-        cmocka_unit_test(bugs_cost_points),
-        cmocka_unit_test(a_copy_of_the_reference_is_seen),
-        cmocka_unit_test(what_is_accepted_costs_nothing_and_hides_nothing),
-        cmocka_unit_test(a_watermark_is_masked),
-        cmocka_unit_test(two_estimators_agree_or_not),
-        cmocka_unit_test(parts_add_up_or_not),
-        cmocka_unit_test(noise_falls_or_not),
-        cmocka_unit_test(pixels_are_exact_or_not),
-        cmocka_unit_test(rates_are_whole_batches_or_not),
-        cmocka_unit_test(bad_pictures_get_a_line),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -1,17 +1,8 @@
 /* Rubrics: what is read, and that every mistake is named with its line. Each text below has one mistake (or those
  * that are listed), put in by hand. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "tools/grade/rubric.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "tests/support/test.h"
 
 static struct suite suite;
 static struct rubric *rubric;
@@ -43,8 +34,7 @@ static void read_text(const char *text)
     assert_true(fd >= 0);
     assert_int_equal(write(fd, text, strlen(text)), (ssize_t)strlen(text));
     close(fd);
-    if (!rubric_read(path, &suite, rubric, &mistakes, &e))
-        fail_msg("%s", e.msg);
+    MUST(rubric_read(path, &suite, rubric, &mistakes, &e));
     unlink(path);
 }
 
@@ -88,9 +78,8 @@ static const char *with(int line, const char *other)
     return out;
 }
 
-static void a_right_one_is_read(void **state)
+TEST(a_right_one_is_read)
 {
-    (void)state;
     read_text(with(0, ""));
     if (mistakes.num > 0)
         fail_msg("%d: %s", mistakes.at[0].line, mistakes.at[0].text);
@@ -110,9 +99,8 @@ static void a_right_one_is_read(void **state)
     assert_true(rubric_points(rubric) == 4);
 }
 
-static void the_shipped_ones_are_right(void **state)
+TEST(the_shipped_ones_are_right)
 {
-    (void)state;
     static const char *const paths[] = {"tools/rubrics/cs184.rubric",
                                         "tools/rubrics/template.rubric",
                                         "tools/rubrics/deviations.rubric"};
@@ -134,9 +122,8 @@ static void the_shipped_ones_are_right(void **state)
     assert_non_null(strstr(e.msg, "/nowhere.rubric: cannot read"));
 }
 
-static void each_mistake_is_named_with_its_line(void **state)
+TEST(each_mistake_is_named_with_its_line)
 {
-    (void)state;
     static const struct {
         int at, line;
         const char *other, *words;
@@ -205,9 +192,8 @@ static void each_mistake_is_named_with_its_line(void **state)
            with(11, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2"));
 }
 
-static void all_mistakes_are_found_at_once(void **state)
+TEST(all_mistakes_are_found_at_once)
 {
-    (void)state;
     read_text(with(4, " size 64 64\n sise 4 4\n spp -1"));
     assert_true(mistakes.num >= 2);
     for (int i = 1; i < mistakes.num; i++)
@@ -217,9 +203,8 @@ static void all_mistakes_are_found_at_once(void **state)
 }
 
 /* Bytes that are no text, lines without end, more of everything than there is room for. */
-static void rubbish_is_survived(void **state)
+TEST(rubbish_is_survived)
 {
-    (void)state;
     static char text[1 << 18];
     srand(7);
     for (int round = 0; round < 50; round++) {
@@ -244,14 +229,4 @@ static void rubbish_is_survived(void **state)
     assert_non_null(strstr(mistakes.at[0].text, "longer than"));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_right_one_is_read),
-        cmocka_unit_test(the_shipped_ones_are_right),
-        cmocka_unit_test(each_mistake_is_named_with_its_line),
-        cmocka_unit_test(all_mistakes_are_found_at_once),
-        cmocka_unit_test(rubbish_is_survived),
-    };
-    return cmocka_run_group_tests(tests, load, unload);
-}
+TEST_GROUP(load, unload)

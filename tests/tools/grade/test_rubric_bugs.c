@@ -2,22 +2,13 @@
  * cells of the right mean and of the bug's effect, normal noise of as much as a render of ours has, written as PNG by the
  * assignment's curve and read back. So this is about codes, clipping and noise; what real renders give is measured by
  * make grade-show. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
 #include "tools/grade/rubric_bugs.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 static gsl_rng *rng;
 static struct suite suite;
@@ -30,8 +21,7 @@ static const struct view *view_of(int picture, int set)
 {
     char name[128], key[65];
     struct err e;
-    if (!rubric_bugs_key(rubric, picture, set, name, key, &e))
-        fail_msg("%s", e.msg);
+    MUST(rubric_bugs_key(rubric, picture, set, name, key, &e));
     return catalogue_view(&bugs.catalogue, name);
 }
 
@@ -136,8 +126,7 @@ static const char *name(int set, int bug, double noise, int graded, int *with, i
     struct err e;
     assert_non_null(h);
     hand_in(set, bug, noise, h);
-    if (!rubric_bugs_diagnose(&bugs, rubric, answers, h, graded, 1e-5, &found, with, &e))
-        fail_msg("%s", e.msg);
+    MUST(rubric_bugs_diagnose(&bugs, rubric, answers, h, graded, 1e-5, &found, with, &e));
     for (int i = 0; i < rubric->num_pictures; i++)
         submitted_image_free(&h->picture[i]);
     free(h);
@@ -147,9 +136,8 @@ static const char *name(int set, int bug, double noise, int graded, int *with, i
 
 /* H0: right programs are told a name with a probability of at most 1e-5 a set. 6 of them, as noisy as ours and 4 times so; and
  * those with the first accepted deviation, which are graded with it. */
-static void right_pictures_have_no_name(void **state)
+TEST(right_pictures_have_no_name)
 {
-    (void)state;
     for (int k = 0; k < 6; k++) {
         int with, named, set = k % 2;
         const char *bug = name(set, -1, k % 4 < 2 ? 1 : 4, set, &with, &named);
@@ -159,7 +147,7 @@ static void right_pictures_have_no_name(void **state)
 }
 
 /* Bugs of all parts, each with its name first; on top of the accepted deviation as well, graded with it or not. */
-static void bugs_have_their_names(void **state)
+TEST(bugs_have_their_names)
 {
     static const char *const known[] = {
         "cosine_missing", "diffuse_without_pi",      "depth_one_short", "emission_twice",
@@ -180,7 +168,7 @@ static void bugs_have_their_names(void **state)
     }
 }
 
-static void every_bug_is_in_it(void **state)
+TEST(every_bug_is_in_it)
 {
     struct err e;
     (void)state;
@@ -189,7 +177,7 @@ static void every_bug_is_in_it(void **state)
 }
 
 /* A catalogue of other pictures is refused. */
-static void another_rubric_is_refused(void **state)
+TEST(another_rubric_is_refused)
 {
     struct rubric_bugs other;
     struct err e;
@@ -203,10 +191,4 @@ static void another_rubric_is_refused(void **state)
         }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(right_pictures_have_no_name), cmocka_unit_test(bugs_have_their_names),
-        cmocka_unit_test(every_bug_is_in_it), cmocka_unit_test(another_rubric_is_refused)};
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -1,20 +1,12 @@
 /* Whose noise is the same? Pictures made here, gamma noise of 64 exponential samples a pixel on a gradient, as 8-bit PNG would
  * have them by the assignment's curve; the reference has 1024 samples, and its noise is in all of them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/image/tone.h"
 #include "tools/images/tone_curve.h"
 #include "tools/gradebook/same_noise.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, SPP = 64, REFERENCE = 1024 };
 
@@ -83,15 +75,14 @@ static struct noise_print noise_of(const double *own, const double *other, doubl
         mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
         tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;
     }
-    if (!same_noise_of(&s, &reference, SPP, &out, &e))
-        fail_msg("%s", e.msg);
+    MUST(same_noise_of(&s, &reference, SPP, &out, &e));
     return out;
 }
 
 /* H0: pictures with noise of their own. All 1770 pairs of 60: T above 2.33 in about 1 % of them (normal law; the bound says
  * 6.6 %), at most 40 of 1770, and none above the bound at alpha 1e-3 over all. All are 1 % too bright, as within margins a bug
  * that they share may make them. */
-static void noise_of_their_own(void **state)
+TEST(noise_of_their_own)
 {
     enum { CLASS = 60, PAIRS = CLASS * (CLASS - 1) / 2 };
     static struct noise_print noise[CLASS];
@@ -120,7 +111,7 @@ static void noise_of_their_own(void **state)
 
 /* Power, each of 20 times, over the pairs and pictures of a class of 300: the same noise, retouched to be 2 % brighter; half of
  * it and half of one's own. */
-static void noise_of_others(void **state)
+TEST(noise_of_others)
 {
     static double one[PIXELS], two[PIXELS];
     double bound = same_noise_bound(300 * 299 / 2 * 20.0, 1e-3), least = INFINITY, half = INFINITY;
@@ -141,7 +132,7 @@ static void noise_of_others(void **state)
 }
 
 /* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of pictures without noise. */
-static void too_fine_to_tell(void **state)
+TEST(too_fine_to_tell)
 {
     static double one[PIXELS], two[PIXELS];
     (void)state;
@@ -153,10 +144,4 @@ static void too_fine_to_tell(void **state)
     same_noise_free(&b);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(noise_of_their_own),
-                                       cmocka_unit_test(noise_of_others),
-                                       cmocka_unit_test(too_fine_to_tell)};
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

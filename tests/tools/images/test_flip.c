@@ -4,16 +4,7 @@
  * publish are not here. */
 #include "tools/images/flip.h"
 #include "tools/images/flip_colour.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static void near(double got, double wanted, double tolerance, const char *what)
 {
@@ -21,11 +12,11 @@ static void near(double got, double wanted, double tolerance, const char *what)
         fail_msg("%s: %.9g instead of %.9g", what, got, wanted);
 }
 
-static uint32_t state = 1;
+static uint32_t random_state = 1;
 static double uniform(void)
 {
-    state = state * 1664525u + 1013904223u;
-    return ((state >> 8) + 0.5) / 16777216.0;
+    random_state = random_state * 1664525u + 1013904223u;
+    return ((random_state >> 8) + 0.5) / 16777216.0;
 }
 
 /* XYZ = M RGB from the chromaticities x, y of red, green, blue and white [BT.709-6, table 1]: columns are the primaries,
@@ -53,9 +44,8 @@ static void matrix_of_chromaticities(double m[3][3], double white[3])
     }
 }
 
-static void test_matrix(void **state_)
+TEST(test_matrix)
 {
-    (void)state_;
     struct flip_colours c = flip_colours();
     double m[3][3], white[3];
     matrix_of_chromaticities(m, white);
@@ -72,9 +62,8 @@ static void test_matrix(void **state_)
 
 /* The authors' own constants, to the nine digits of their published program (NVlabs/flip, version 1.4, FLIP.h): the white
  * of D65, one over it, and RGB of XYZ. Ours are made from the matrix of sRGB. */
-static void test_published(void **state_)
+TEST(test_published)
 {
-    (void)state_;
     static const double white[3] = {0.950428545, 1.000000000, 1.088900371};
     static const double one_over_white[3] = {1.052156925, 1.000000000, 0.918357670};
     static const double from_xyz[3][3] = {{3.241003275, -1.537398934, -0.498615861},
@@ -104,9 +93,8 @@ static void lab_of(const struct flip_colours *c, const double rgb[3], float lab[
     flip_lab(c, (const float[3]){(float)rgb[0], (float)rgb[1], (float)rgb[2]}, lab);
 }
 
-static void test_lab(void **state_)
+TEST(test_lab)
 {
-    (void)state_;
     struct flip_colours c = flip_colours();
     float lab[3];
     for (int i = 0; i < 3; i++) {
@@ -126,9 +114,8 @@ static void test_lab(void **state_)
 }
 
 /* Green and blue are the furthest apart, by the published L*a*b*; no two colours of a grid are further. */
-static void test_largest(void **state_)
+TEST(test_largest)
 {
-    (void)state_;
     enum { STEPS = 8, COLOURS = (STEPS + 1) * (STEPS + 1) * (STEPS + 1) };
     struct flip_colours c = flip_colours();
     const double *g = lab_of_primaries[1], *b = lab_of_primaries[2];
@@ -165,9 +152,8 @@ static void test_largest(void **state_)
  * blue-yellow a1 sqrt(b1) exp(-b1 f^2) + a2 sqrt(b2) exp(-b2 f^2) over its value at 0, as both axes are weighted with the
  * amplitude of one. Three standard deviations of the widest hold all but exp(-4.5) = 1.1 % of it;
  * of the others pixels add the alias at 67 - f, exp(-.0047 47^2) = 3e-5 at most. */
-static void test_csf(void **state_)
+TEST(test_csf)
 {
-    (void)state_;
     double ppd = FLIP_PPD;
     near(ppd, 67.0206, 1e-4, "pixels per degree"); /* as the papers print it */
     int r = flip_csf_radius(ppd);
@@ -207,9 +193,8 @@ static void fill(double *rgb, size_t pixels, double r, double g, double b)
 enum { SIDE = 24, OTHER = 19, PIXELS = SIDE * OTHER };
 
 /* Flat pictures have no features, and filters leave them alone: the error is that of two colours. */
-static void test_flat(void **state_)
+TEST(test_flat)
 {
-    (void)state_;
     static double a[3 * PIXELS], b[3 * PIXELS];
     static float map[PIXELS];
     struct err e = {""};
@@ -398,9 +383,8 @@ static double furthest(const double *wanted, const float *got)
 /* Single precision, and a white that differs in the fifth digit: within 5e-4 everywhere. */
 #define AGREES 5e-4
 
-static void test_brute_force(void **state_)
+TEST(test_brute_force)
 {
-    (void)state_;
     static double a[3 * PIXELS], b[3 * PIXELS], wanted[PIXELS];
     static float got[PIXELS];
     struct err e = {""};
@@ -420,9 +404,8 @@ static void test_brute_force(void **state_)
 }
 
 /* Controls: each constant a little off is seen by that comparison. */
-static void test_brute_force_sees(void **state_)
+TEST(test_brute_force_sees)
 {
-    (void)state_;
     static double a[3 * PIXELS], b[3 * PIXELS], wanted[PIXELS];
     static float got[PIXELS];
     struct err e = {""};
@@ -439,9 +422,8 @@ static void test_brute_force_sees(void **state_)
 
 /* The exposures, by bisection of the tone curve; the published example's file is named after its range, -12.5423 to
  * +0.9427, and its number of exposures, 14. */
-static void test_exposures(void **state_)
+TEST(test_exposures)
 {
-    (void)state_;
     struct err e = {""};
     double low = 0, high = 8;
     for (int i = 0; i < 60; i++)
@@ -484,9 +466,8 @@ static void test_exposures(void **state_)
 }
 
 /* The largest over exposures, by the second implementation; and twice the light is the same. */
-static void test_hdr(void **state_)
+TEST(test_hdr)
 {
-    (void)state_;
     static double a[3 * PIXELS], b[3 * PIXELS], shown[2][3 * PIXELS], one[PIXELS], wanted[PIXELS];
     static float got[PIXELS], twice[PIXELS];
     struct err e = {""};
@@ -520,16 +501,4 @@ static void test_hdr(void **state_)
         near((double)twice[i], (double)got[i], 2e-5, "twice the light");
     assert_true(flip_hdr(a, a, SIDE, OTHER, FLIP_PPD, &x, got, &e));
     near(flip_mean(got, PIXELS), 0, 0, "identical");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_published),   cmocka_unit_test(test_matrix),
-        cmocka_unit_test(test_lab),         cmocka_unit_test(test_largest),
-        cmocka_unit_test(test_csf),         cmocka_unit_test(test_flat),
-        cmocka_unit_test(test_brute_force), cmocka_unit_test(test_brute_force_sees),
-        cmocka_unit_test(test_exposures),   cmocka_unit_test(test_hdr),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,17 +3,9 @@
 #include "tools/images/pixel_codec.h"
 
 #include "layer_reader.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
+#include "tests/support/test.h"
 
 #include <zlib.h>
-
-#include <cmocka.h>
 
 /* Uniform on (0, 1). */
 static double noise(uint32_t *state)
@@ -47,8 +39,7 @@ static size_t assert_round_trip(const struct moments *m)
     uint8_t *bytes;
     size_t size;
     bool uniform;
-    if (!pixel_codec_encode(m, &bytes, &size, &uniform, &e))
-        fail_msg("%s", e.msg);
+    MUST(pixel_codec_encode(m, &bytes, &size, &uniform, &e));
     struct layer_numbers l = layer_read(bytes, size, m->width, m->height);
     size_t pixels = (size_t)m->width * (size_t)m->height;
     assert_int_equal(uniform, l.n == NULL);
@@ -89,9 +80,8 @@ static double normal(uint32_t *state)
  * = 4.13) and a prediction from four neighbours costs 0.16 bits, so 6 bits in the first channel and next
  * to nothing in the others, 1 byte a pixel with deflate's loss; noise of the error is 0.09 of itself for n
  * of 64, 1.5 steps, so 2.7 bits. 1.5 bytes a pixel are allowed. */
-static void noisy_grey_is_small(void **state)
+TEST(noisy_grey_is_small)
 {
-    (void)state;
     struct moments m = blank(64, 64, "sample");
     uint32_t seed = 5;
     for (size_t i = 0; i < 64 * 64; i++) {
@@ -105,9 +95,8 @@ static void noisy_grey_is_small(void **state)
     moments_free(&m);
 }
 
-static void hard_pictures_are_exact(void **state)
+TEST(hard_pictures_are_exact)
 {
-    (void)state;
     uint32_t seed = 7;
     for (int kind = 0; kind < 6; kind++) {
         struct moments m = blank(33, 17, kind == 1 ? "exact" : "sample");
@@ -135,9 +124,8 @@ static void hard_pictures_are_exact(void **state)
     }
 }
 
-static void small_pictures(void **state)
+TEST(small_pictures)
 {
-    (void)state;
     static const int size[][2] = {{1, 1}, {1, 5}, {5, 1}, {2, 2}};
     uint32_t seed = 9;
     for (size_t k = 0; k < 4; k++) {
@@ -151,9 +139,8 @@ static void small_pictures(void **state)
 }
 
 /* Variance that is not known (one observation) is none. */
-static void one_observation(void **state)
+TEST(one_observation)
 {
-    (void)state;
     struct moments m = blank(4, 4, "sample");
     for (size_t i = 0; i < 16; i++) {
         m.n[i] = 1;
@@ -164,9 +151,8 @@ static void one_observation(void **state)
 }
 
 /* Each root within half a step of 1/128, what is none of them at the end of the range, NaN at 0. */
-static void map_round_trip(void **state)
+TEST(map_round_trip)
 {
-    (void)state;
     enum { WIDTH = 37, HEIGHT = 11, PIXELS = WIDTH * HEIGHT };
     static float map[PIXELS];
     static uint8_t raw[PIXELS];
@@ -190,14 +176,4 @@ static void map_round_trip(void **state)
         }
     }
     free(bytes);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(noisy_grey_is_small), cmocka_unit_test(hard_pictures_are_exact),
-        cmocka_unit_test(small_pictures),      cmocka_unit_test(one_observation),
-        cmocka_unit_test(map_round_trip),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

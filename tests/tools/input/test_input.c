@@ -7,13 +7,7 @@
 #include "renderer/base/fs.h"
 #include "tools/images/tone_curve.h"
 #include "tools/input/input.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
-#include <string.h>
-#include <unistd.h>
+#include "tests/support/test.h"
 
 static char folder[64];
 static char path_text[4][128];
@@ -24,22 +18,14 @@ static const char *file(int slot, const char *name)
     return path_text[slot];
 }
 
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("got %.15g, want %.15g", got, want);
-}
-
 static void write_floats(const char *path, int width, int height, int channels,
                          const char *const *names, const float *v)
 {
     struct image im;
     struct err e;
-    if (!image_alloc(&im, width, height, channels, names, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_alloc(&im, width, height, channels, names, &e));
     memcpy(im.data, v, (size_t)(width * height * channels) * sizeof *v);
-    if (!image_write_exr(path, &im, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_write_exr(path, &im, &e));
     image_free(&im);
 }
 
@@ -49,8 +35,7 @@ static struct input read_side(const char *path, struct input_options opt, struct
 {
     struct input in;
     struct err e;
-    if (!input_read(path, 'a', &opt, &in, notes, &e))
-        fail_msg("%s", e.msg);
+    MUST(input_read(path, 'a', &opt, &in, notes, &e));
     return in;
 }
 
@@ -76,9 +61,8 @@ static bool has_note(const struct notes *notes, const char *part)
 
 /* Three replicates of 2 x 1 pixels. First pixel: red 1, 2, 6: mean 3, M2 = 4 + 1 + 9 = 14, M3 = -8 -
  * 1 + 27 = 18; green always 5; blue 0, 0, 3: mean 1, M2 = 6, M3 = -1 - 1 + 8 = 6. */
-static void test_directory(void **state)
+TEST(test_directory)
 {
-    (void)state;
     struct err e;
     struct notes notes = {0};
     static const float v[3][6] = {{1, 5, 0, 7, 7, 7}, {2, 5, 0, 7, 7, 7}, {6, 5, 3, 7, 7, 7}};
@@ -119,9 +103,8 @@ static void test_directory(void **state)
 /* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.
  * Y: 1, 1: none. Z: 3, 13: 4, M2 = 400. Skewness, log-normal: c = sd/mean = 1/2: 3/2 + 1/8 = 13/8 for
  * X, so M3 = 100 x 13/8; Z: c = 2/3: 2 + 8/27 = 62/27, M3 = 100 x 62/27 x 8. */
-static void test_mitsuba_integrator(void **state)
+TEST(test_mitsuba_integrator)
 {
-    (void)state;
     static const char *const names[9] = {"R",      "G",         "B",         "path.X",   "path.Y",
                                          "path.Z", "m2_path.X", "m2_path.Y", "m2_path.Z"};
     static const float v[9] = {1, 1, 1, 2, 1, 3, 5, 1, 13};
@@ -198,9 +181,8 @@ static enum verdict compare_without_skewness(int n, double scale, uint64_t *stat
 /* The image: N n = 1024 n samples a side, tested if (4/sqrt 2)/sqrt(N n) x^3/3 <= 0.2, x about 3.3 at 5 %
  * over four tests: from 3e4 samples on. n = 8 is too few whatever differs; n = 128 finds 3 %: sd
  * sqrt(2/131072) = 0.4 %. Equal: at most 9 of 60 (chance 1e-3 at a true 5 %). */
-static void test_unknown_skewness(void **state)
+TEST(test_unknown_skewness)
 {
-    (void)state;
     uint64_t seed = 12;
     int different = 0;
     assert_int_equal(compare_without_skewness(8, 1.5, &seed), VERDICT_INCONCLUSIVE);
@@ -213,9 +195,8 @@ static void test_unknown_skewness(void **state)
 
 /* A reference and its variance: R, G, B of the variance are the matrix' inverse times Var X, Y, Z. With
  * red alone 1 in both: mean and variance (.412453, .212671, .019334); n = 50. */
-static void test_mitsuba_reference(void **state)
+TEST(test_mitsuba_reference)
 {
-    (void)state;
     static const float red[3] = {1, 0, 0};
     struct notes notes = {0};
     write_floats(file(0, "ref.exr"), 1, 1, 3, rgb_names, red);
@@ -237,9 +218,8 @@ static void test_mitsuba_reference(void **state)
 
 /* Codes and what they stand for, by the curves' definitions. sRGB: code 255 x 0.5 = 127.5 is 0.214041
  * (IEC 61966-2-1). */
-static void test_curves(void **state)
+TEST(test_curves)
 {
-    (void)state;
     struct curve c;
     struct err e;
     double lo, hi;
@@ -264,9 +244,8 @@ static void test_curves(void **state)
 }
 
 /* Linear, 16 bits, code 1000: mean 1000/65535, +- half a step, step^2/12. A grey PNG is all three. */
-static void test_codes(void **state)
+TEST(test_codes)
 {
-    (void)state;
     struct notes notes = {0};
     struct input_options opt = {.curve = "linear"};
     odd_png(file(0, "deep.png"), 2, 1, 3, 16, (uint16_t[6]){1000, 1, 65534, 0, 5, 5});
@@ -296,9 +275,8 @@ static void test_codes(void **state)
 
 /* Half floats: 1.5 has 10 binary digits behind the point, so that half a step is 2^-11 of 2^0 <= v < 2^1;
  * at most 2^-11 v is said. RGBE (128, 64, 0, 129) is (1, 1/2, 0), steps of 2^-7. */
-static void test_rounded_floats(void **state)
+TEST(test_rounded_floats)
 {
-    (void)state;
     struct notes notes = {0};
     odd_exr(file(0, "half.exr"), 1, 1, "BGR", true, 1, (float[3]){0, 2.5, 1.5});
     struct input in = read_side(file(0, "half.exr"), (struct input_options){0}, &notes);
@@ -325,9 +303,8 @@ static void test_rounded_floats(void **state)
     input_free(&in);
 }
 
-static void test_hygiene(void **state)
+TEST(test_hygiene)
 {
-    (void)state;
     struct input_options none = {0};
     float v[4] = {1, 1, 1, 1};
     odd_exr(file(0, "crop.exr"), 1, 1, "BGR", false, 2, v);
@@ -370,8 +347,7 @@ static enum verdict compare_files(const char *a, const char *b, struct notes *no
     struct compare_options opt = {
         .alpha = 1e-3, .tile = 16, .margin_global = 0.05, .margin_tile = 0.2};
     for (int i = 0; i < 2; i++)
-        if (!input_read(i ? b : a, "ab"[i], &io, &in[i], notes, &e))
-            fail_msg("%s", e.msg);
+        MUST(input_read(i ? b : a, "ab"[i], &io, &in[i], notes, &e));
     if (!input_pair(&in[0], &in[1], notes, &e) ||
         !compare_moments(&in[0].m, &in[1].m, &opt, &c, &e))
         fail_msg("%s", e.msg);
@@ -384,9 +360,8 @@ static enum verdict compare_files(const char *a, const char *b, struct notes *no
     return v;
 }
 
-static void test_censored(void **state)
+TEST(test_censored)
 {
-    (void)state;
     static uint16_t a[3 * 64 * 64], b[3 * 64 * 64];
     uint64_t seed = 7;
     size_t censored;
@@ -425,9 +400,8 @@ static void test_censored(void **state)
 /* Half a code is allowed for: pictures of one code, and of the next, are equal within two halves; two
  * codes apart they are not. 100 -> 101 -> 102 of 255, margins of 0. Noise: one pixel in 16 one code up
  * in A, elsewhere in B. */
-static void test_rounding_is_no_difference(void **state)
+TEST(test_rounding_is_no_difference)
 {
-    (void)state;
     static uint16_t a[3 * 64 * 64], b[3 * 64 * 64];
     for (int step = 1; step <= 2; step++) {
         uint64_t seed = 11;
@@ -446,8 +420,7 @@ static void test_rounding_is_no_difference(void **state)
             in[i] = read_side(file(i, i ? "b.png" : "a.png"),
                               (struct input_options){.curve = "linear"}, &notes);
         assert_true(input_pair(&in[0], &in[1], &notes, &e));
-        if (!compare_moments(&in[0].m, &in[1].m, &opt, &c, &e))
-            fail_msg("%s", e.msg);
+        MUST(compare_moments(&in[0].m, &in[1].m, &opt, &c, &e));
         assert_int_equal(c.verdict, step == 1 ? VERDICT_EQUIVALENT : VERDICT_DIFFERENT);
         comparison_free(&c);
         input_free(&in[0]);
@@ -469,19 +442,4 @@ static int tear_down(void **state)
     return !fs_remove_tree(folder, &e);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_directory),
-        cmocka_unit_test(test_mitsuba_integrator),
-        cmocka_unit_test(test_mitsuba_reference),
-        cmocka_unit_test(test_unknown_skewness),
-        cmocka_unit_test(test_curves),
-        cmocka_unit_test(test_codes),
-        cmocka_unit_test(test_rounded_floats),
-        cmocka_unit_test(test_hygiene),
-        cmocka_unit_test(test_censored),
-        cmocka_unit_test(test_rounding_is_no_difference),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

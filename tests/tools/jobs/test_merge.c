@@ -2,16 +2,7 @@
 #include "renderer/transport/film.h"
 #include "renderer/math/sampler.h"
 #include "tools/jobs/merge.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 enum { WIDTH = 4, HEIGHT = 2, MAX_SHARES = 4 };
 static char dir[] = "/tmp/assay_merge_XXXXXX";
@@ -92,8 +83,7 @@ static void write_part(const char *path, const struct part *p)
                                        {"assay:seed", p->seed ? p->seed : "1"},
                                        {"assay:cell", cell},
                                        {"assay:samples", p->samples ? p->samples : samples}};
-    if (!moments_write_layers(path, &m, p->layers ? &layers : NULL, attrs, 7, &e))
-        fail_msg("%s", e.msg);
+    MUST(moments_write_layers(path, &m, p->layers ? &layers : NULL, attrs, 7, &e));
     moments_free(&m);
     image_free(&layers);
 }
@@ -156,9 +146,8 @@ static void check_whole(const struct share *whole, uint32_t first, uint32_t last
     moments_free(&m);
 }
 
-static void parts_make_the_whole(void **state)
+TEST(parts_make_the_whole)
 {
-    (void)state;
     static const struct {
         struct part part[MAX_SHARES];
         int num;
@@ -220,8 +209,7 @@ static void read_floats(const char *path, struct image *im)
 {
     struct err e;
     bool half;
-    if (!image_read_exr(path, im, &half, &e))
-        fail_msg("%s", e.msg);
+    MUST(image_read_exr(path, im, &half, &e));
 }
 
 /* Merges the files `of`, a digit each, into one that takes the number `to`. */
@@ -233,8 +221,7 @@ static void merge_files(const char *of, int to)
     int num = (int)strlen(of);
     for (int i = 0; i < num; i++) {
         snprintf(path[i], sizeof path[i], "%s/part%c.exr", dir, of[i]);
-        if (!share_read(path[i], &share[i], &e))
-            fail_msg("%s", e.msg);
+        MUST(share_read(path[i], &share[i], &e));
     }
     snprintf(out, sizeof out, "%s/part%d.exr", dir, to);
     if (!merge_shares(share, num, &whole, &e) || !share_write(out, &whole, "test", &e))
@@ -247,9 +234,8 @@ static void merge_files(const char *of, int to)
 /* Groupings of the same four shares: 4, 5 .. are what the ones before made; the last of each is the whole. The values of a file
  * are compared bit by bit with those of all four at once. Shares of the same cell, of two cells with
  * the same ranges, and of two cells cut at other samples. */
-static void any_grouping_has_the_same_bits(void **state)
+TEST(any_grouping_has_the_same_bits)
 {
-    (void)state;
     static const struct part cases[][MAX_SHARES] = {{{.x = 0, 0, 4, 2, 0, 7, .layers = true},
                                                      {.x = 0, 0, 4, 2, 7, 40, .layers = true},
                                                      {.x = 0, 0, 4, 2, 40, 41, .layers = true},
@@ -303,9 +289,8 @@ static void any_grouping_has_the_same_bits(void **state)
 }
 
 /* Without its parts a merge is merged further by its rounded sums: the bits differ, so the test above can fail. */
-static void rounded_sums_have_other_bits(void **state)
+TEST(rounded_sums_have_other_bits)
 {
-    (void)state;
     struct share whole[2] = {{0}, {0}}, share[MAX_SHARES] = {0};
     struct err e;
     char path[64];
@@ -323,14 +308,12 @@ static void rounded_sums_have_other_bits(void **state)
             for (int i = 0; i < im.num_attrs; i++)
                 if (strcmp(im.attr[2 * i], "assay:parts") == 0)
                     im.attr[2 * i][0] = 'x';
-            if (!image_write_exr(path, &im, &e))
-                fail_msg("%s", e.msg);
+            MUST(image_write_exr(path, &im, &e));
             image_free(&im);
         }
         for (int i = 0; i < 3 - g; i++) {
             snprintf(path, sizeof path, "%s/part%d.exr", dir, g == 0 ? i : 3 - i);
-            if (!share_read(path, &share[i], &e))
-                fail_msg("%s", e.msg);
+            MUST(share_read(path, &share[i], &e));
         }
         assert_true(merge_shares(share, 3 - g, &whole[g], &e));
         for (int i = 0; i < 3 - g; i++)
@@ -346,9 +329,8 @@ static void rounded_sums_have_other_bits(void **state)
     }
 }
 
-static void refusals(void **state)
+TEST(refusals)
 {
-    (void)state;
     static const struct {
         struct part part[MAX_SHARES];
         int num;
@@ -391,13 +373,4 @@ static void refusals(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parts_make_the_whole),
-        cmocka_unit_test(any_grouping_has_the_same_bits),
-        cmocka_unit_test(rounded_sums_have_other_bits),
-        cmocka_unit_test(refusals),
-    };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
-}
+TEST_GROUP(make_dir, remove_dir)

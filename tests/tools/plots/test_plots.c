@@ -1,17 +1,10 @@
 /* The curves of the page's plots against other routes: the QQ band against sums of binomial probabilities,
  * the power curve against simulated tests; and its CSV files, decoded again. */
 #include "tools/html/csv_link.h"
+#include "tools/html/html.h"
+#include "tools/plots/plot.h"
 #include "tools/plots/plot_power.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* The i-th smallest of n uniform numbers is at most x if at least i of them are: a binomial tail. */
 static double order_cdf(int i, int n, double x)
@@ -23,14 +16,13 @@ static double order_cdf(int i, int n, double x)
     return sum;
 }
 
-static void qq_band_is_binomial(void **state)
+TEST(qq_band_is_binomial)
 {
-    (void)state;
     static const int of[][2] = {{1, 4},   {4, 4},     {1, 64},   {10, 64},
                                 {64, 64}, {200, 400}, {1, 4096}, {3000, 4096}};
     for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
         double low, high;
-        qq_band(of[k][0], of[k][1], &low, &high);
+        plot_qq_band(of[k][0], of[k][1], &low, &high);
         assert_float_equal(order_cdf(of[k][0], of[k][1], low), 0.025, 1e-6);
         assert_float_equal(order_cdf(of[k][0], of[k][1], high), 0.975, 1e-6);
     }
@@ -60,9 +52,8 @@ static json_t *claim_of(double alpha, double margin, double mdb)
 /* A test of level 0.05 x 0.25 / 4 (two-sided) of a mean with that standard error, 40000 times for each bias.
  * Frequencies lie within 4 standard errors, at most 0.01, of the curve with 0.9999 each. Control: the curve
  * of half the bias does not fit. */
-static void power_is_that_of_the_test(void **state)
+TEST(power_is_that_of_the_test)
 {
-    (void)state;
     enum { TRIALS = 40000 };
     json_t *claim = claim_of(0.05, 0.003, 0.008);
     struct power p = power_of(claim);
@@ -109,9 +100,8 @@ static char *saved(const char *link)
     return out;
 }
 
-static void csv_comes_back(void **state)
+TEST(csv_comes_back)
 {
-    (void)state;
     char *link = NULL;
     size_t size;
     FILE *f = open_memstream(&link, &size);
@@ -134,12 +124,57 @@ static void csv_comes_back(void **state)
     free(link);
 }
 
-int main(void)
+TEST(text_is_escaped_and_numbers_are_printed)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(qq_band_is_binomial),
-        cmocka_unit_test(power_is_that_of_the_test),
-        cmocka_unit_test(csv_comes_back),
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    html_print(f, "<b title=\"%s\">%s</b> %d %zu %+.2f%% %lld%s", "\"x'", "<i>&", -3, (size_t)7,
+               1.5, 1LL << 40, json_string_value(NULL));
+    fclose(f);
+    assert_string_equal(text,
+                        "<b title=\"&quot;x&#39;\">&lt;i&gt;&amp;</b> -3 7 +1.50% 1099511627776");
+    free(text);
+}
+
+/* Of a drawing: the places of marks, and the numbers of the axes, by hand. */
+TEST(axes_are_in_proportion)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    assert_non_null(f);
+    struct plot p = {.f = f,
+                     .style = "plot",
+                     .left = 100,
+                     .width = 300,
+                     .height = 200,
+                     .bottom = 40,
+                     .x = {.label = "a <b>", .lo = 1, .hi = 1000, .is_log = true, .unit = " s"},
+                     .y = {.label = "y", .lo = -1, .hi = 1}};
+    plot_open(&p, "what %s is", "\"it\"");
+    plot_point(&p, 0, 10, 0.5, "%s", "10 & half");
+    plot_point(&p, 0, 1e9, -7, "%s", "beyond both ends");
+    plot_close(&p);
+    fclose(f);
+    assert_float_equal(plot_x(&p, 100), 300, 1e-9);
+    assert_float_equal(plot_y(&p, 1), 0, 1e-9);
+    static const char *const there[] = {
+        "aria-label=\"what &quot;it&quot; is\"",
+        ">a &lt;b&gt;</text>",
+        ">1 s</text>",
+        ">1000 s</text>",
+        ">-0.5</text>",
+        "cx=\"200.0\" cy=\"50.0\" r=\"3.2\"><title>10 &amp; half</title>",
+        "cx=\"400.0\" cy=\"200.0\"",
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    for (size_t i = 0; i < sizeof there / sizeof *there; i++)
+        if (strstr(text, there[i]) == NULL)
+            fail_msg("no %s in %s", there[i], text);
+    assert_null(strstr(text, ">2 s</text>")); /* three decades: powers of ten alone */
+    static const double steps[][2] = {{5, 1}, {5.1, 2}, {12, 5}, {0.3, 0.1}, {40, 10}};
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
+        assert_float_equal(plot_step(steps[i][0]), steps[i][1], 1e-9);
+    free(text);
 }

@@ -10,23 +10,14 @@
 #include "tools/plots/plot_interval.h"
 #include "tools/results/results.h"
 #include "tests/tools/images/layer_reader.h"
+#include "tests/support/test.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <libxml/HTMLparser.h>
 #include <libxml/xpath.h>
 #include <nettle/base64.h>
 #include <nettle/sha2.h>
-
-#include <cmocka.h>
 
 struct run {
     char dir[64], results[128], page[128];
@@ -65,8 +56,7 @@ static void run_write_results(const struct run *r)
         json_object_set_new(root, "unfinished", json_integer(r->left));
         json_object_set_new(root, "page_every_s", json_real(2.5));
     }
-    if (!json_write(r->results, root, &e))
-        fail_msg("%s", e.msg);
+    MUST(json_write(r->results, root, &e));
     json_decref(root);
 }
 
@@ -169,8 +159,7 @@ static void run_report(const struct run *r)
 {
     struct err e = {""};
     run_write_results(r);
-    if (!report_write(r->results, r->page, &e))
-        fail_msg("%s", e.msg);
+    MUST(report_write(r->results, r->page, &e));
 }
 
 static void count_error(void *user, const xmlError *error)
@@ -262,9 +251,8 @@ static char *read_text(const char *path)
     return text;
 }
 
-static void numbers_and_text(void **state)
+TEST(numbers_and_text)
 {
-    (void)state;
     assert_string_equal(html_percent_column(0.0123).s, "+1.230");
     assert_string_equal(html_percent_column(-0.25).s, "\u221225.000");
     assert_string_equal(html_percent_column(-0.000001).s, "0.000");
@@ -312,9 +300,8 @@ static void numbers_and_text(void **state)
 }
 
 /* 200 values 1, 2, ..., 200: at least 99 % do not exceed 198; the median is 101 (index 100). */
-static void exposure(void **state)
+TEST(exposure)
 {
-    (void)state;
     double v[200];
     bool capped;
     for (size_t i = 0; i < 200; i++)
@@ -361,9 +348,8 @@ static void lab_of(const uint8_t rgb8[3], double lab[3])
 
 /* Steps of 1/16 are 5.75 units of Lab long (46 / 8) but for rounding to bytes, and L* is the same at
  * -t and +t: neither sign looks stronger. */
-static void diverging_map(void **state)
+TEST(diverging_map)
 {
-    (void)state;
     enum { STEPS = 32 };
     double lab[STEPS + 1][3];
     for (int i = 0; i <= STEPS; i++) {
@@ -392,9 +378,8 @@ static void diverging_map(void **state)
 
 /* 32 steps of equal length in Lab, but for the corners of the path and rounding to bytes, and L* that
  * never falls. */
-static void sequential_map(void **state)
+TEST(sequential_map)
 {
-    (void)state;
     enum { STEPS = 32 };
     double lab[STEPS + 1][3], length[STEPS], mean = 0;
     for (int i = 0; i <= STEPS; i++) {
@@ -421,9 +406,8 @@ static void sequential_map(void **state)
     assert_memory_equal(c, end, 3);
 }
 
-static void p_histogram(void **state)
+TEST(p_histogram)
 {
-    (void)state;
     /* p = 10^-0.01 = 0.977, 10^-1.5 = 0.032, 10^-0.3 = 0.501, 10^-300 and 1: bins 9, 0, 5, 0, 9. */
     json_t *claim = json_pack("{s[f f f f f n]}", "tile_log10_p", -0.01, -1.5, -0.3, -300.0, 0.0);
     int count[20];
@@ -457,9 +441,8 @@ static void p_histogram(void **state)
     json_decref(claim);
 }
 
-static void page_files_are_safe_to_embed(void **state)
+TEST(page_files_are_safe_to_embed)
 {
-    (void)state;
     assert_non_null(strstr(page_css, "prefers-color-scheme: dark"));
     assert_non_null(strstr(page_js, "use strict"));
     assert_null(strstr(page_css, "</"));
@@ -470,9 +453,8 @@ static void page_files_are_safe_to_embed(void **state)
     assert_null(strstr(page_js, "innerHTML"));
 }
 
-static void page_is_whole(void **state)
+TEST(page_is_whole)
 {
-    (void)state;
     struct run r = run_make();
     write_small_files(&r);
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
@@ -551,9 +533,8 @@ static struct layer_numbers page_layer(htmlDocPtr doc, int index, int side)
 
 /* White is 0.25 / 0.8 = 0.3125, since at least 99 % of the reference is 0.25. M2 is 1 and n 64, so a
  * standard error is sqrt(1/(64 x 63)) = 0.01575. */
-static void pictures_have_the_values(void **state)
+TEST(pictures_have_the_values)
 {
-    (void)state;
     struct run r = run_make();
     write_small_files(&r);
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
@@ -596,9 +577,8 @@ static void pictures_have_the_values(void **state)
 }
 
 /* Evidence is folded where there is much of it and it is as expected. */
-static void much_evidence_is_folded(void **state)
+TEST(much_evidence_is_folded)
 {
-    (void)state;
     struct run r = run_make();
     write_small_files(&r);
     for (int i = 0; i < 8; i++)
@@ -627,9 +607,8 @@ static void much_evidence_is_folded(void **state)
 }
 
 /* The policy in the page lets exactly the embedded script run. */
-static void policy_admits_the_script(void **state)
+TEST(policy_admits_the_script)
 {
-    (void)state;
     struct run r = run_make();
     write_small_files(&r);
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
@@ -655,9 +634,8 @@ static void policy_admits_the_script(void **state)
     run_free(&r);
 }
 
-static void names_cannot_inject_markup(void **state)
+TEST(names_cannot_inject_markup)
 {
-    (void)state;
     static const char evil[] = "</title></script><script>alert(1)</script>";
     static const char quote[] = "\"'><img src=x onerror=alert(2)>";
     struct run r = run_make();
@@ -684,9 +662,8 @@ static void names_cannot_inject_markup(void **state)
 }
 
 /* Ten claims on five scenes of 256 x 256 pixels of pure noise, 13 standard errors high. */
-static void page_stays_small(void **state)
+TEST(page_stays_small)
 {
-    (void)state;
     struct run r = run_make();
     for (int scene = 0; scene < 5; scene++)
         for (int k = 0; k < 2; k++) {
@@ -733,9 +710,8 @@ static void expect_failure(const struct run *r, const char *wanted)
         fail_msg("got '%s', wanted '%s'", e.msg, wanted);
 }
 
-static void bad_input_is_named(void **state)
+TEST(bad_input_is_named)
 {
-    (void)state;
     struct err e = {""};
     for (size_t i = 0; i < 2; i++) {
         struct run r = run_make();
@@ -784,9 +760,8 @@ static double lightness(double y)
 
 /* Flat greys, of which FLIP is that of two lightnesses: here a reference of L* 50 (18.42 % of white) and white; for HDR
  * the reference at 0.85 of the tone curve and 1/0.1842 times its light. */
-static void alike(void **state)
+TEST(alike)
 {
-    (void)state;
     enum { SIDE = 12, PIXELS = SIDE * SIDE };
     const double grey = 0.18418651851, white = 3;
     struct err e = {""};
@@ -821,9 +796,8 @@ static void alike(void **state)
 }
 
 /* Identical pictures, and a table that names who disagrees. */
-static void alike_on_the_page(void **state)
+TEST(alike_on_the_page)
 {
-    (void)state;
     struct run r = run_make();
     write_small_files(&r);
     add_claim(&r, "same", "truth", "EQUIVALENT", "EQUIVALENT", small_files);
@@ -841,26 +815,11 @@ static void alike_on_the_page(void **state)
     run_free(&r);
 }
 
-int main(void)
+static int clean_parser(void **state)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(alike),
-        cmocka_unit_test(alike_on_the_page),
-        cmocka_unit_test(numbers_and_text),
-        cmocka_unit_test(exposure),
-        cmocka_unit_test(diverging_map),
-        cmocka_unit_test(sequential_map),
-        cmocka_unit_test(p_histogram),
-        cmocka_unit_test(page_files_are_safe_to_embed),
-        cmocka_unit_test(page_is_whole),
-        cmocka_unit_test(pictures_have_the_values),
-        cmocka_unit_test(much_evidence_is_folded),
-        cmocka_unit_test(policy_admits_the_script),
-        cmocka_unit_test(names_cannot_inject_markup),
-        cmocka_unit_test(page_stays_small),
-        cmocka_unit_test(bad_input_is_named),
-    };
-    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    (void)state;
     xmlCleanupParser();
-    return failed;
+    return 0;
 }
+
+TEST_GROUP(NULL, clean_parser)

@@ -1,14 +1,7 @@
 /* Annotations for GitHub: what is printed for each outcome, by GitHub's rules of escaping (in a message %,
  * CR and LF are %25, %0D, %0A; in a property : and , are %3A, %2C too). */
 #include "tools/results/github_annotations.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 static json_t *judged(const char *scene, const char *expected, const char *verdict)
 {
@@ -41,9 +34,8 @@ static char *printed(json_t *claims)
     return text;
 }
 
-static void each_outcome(void **state)
+TEST(each_outcome)
 {
-    (void)state;
     json_t *claims = json_array();
     json_array_append_new(claims, judged("good", "EQUIVALENT", "EQUIVALENT"));
     json_array_append_new(claims, judged("found", "DIFFERENT", "DIFFERENT"));
@@ -64,9 +56,8 @@ static void each_outcome(void **state)
     free(text);
 }
 
-static void all_is_well(void **state)
+TEST(all_is_well)
 {
-    (void)state;
     json_t *claims = json_array();
     json_array_append_new(claims, judged("good", "EQUIVALENT", "EQUIVALENT"));
     char *text = printed(claims);
@@ -74,9 +65,8 @@ static void all_is_well(void **state)
     free(text);
 }
 
-static void text_cannot_be_a_command(void **state)
+TEST(text_cannot_be_a_command)
 {
-    (void)state;
     json_t *claims = json_array();
     json_array_append_new(claims, not_judged("a,b::c\n::set-env x", "50 %\r\n::error::forged"));
     char *text = printed(claims);
@@ -87,14 +77,4 @@ static void text_cannot_be_a_command(void **state)
         "::notice title=assay::Of 1 claims 0 came out wrong, 0 stayed undecided and 1 could not "
         "be judged.\n");
     free(text);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_outcome),
-        cmocka_unit_test(all_is_well),
-        cmocka_unit_test(text_cannot_be_a_command),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

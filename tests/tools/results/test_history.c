@@ -3,17 +3,7 @@
 #include "tools/results/history.h"
 
 #include "renderer/base/fs.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 struct place {
     char dir[64];
@@ -94,16 +84,14 @@ static void write_run(const struct place *p, const char *name, const char *date,
 static void read_or_fail(const struct place *p, struct history *h)
 {
     struct err e = {""};
-    if (!history_read(p->dir, 1e-3, h, &e))
-        fail_msg("%s", e.msg);
+    MUST(history_read(p->dir, 1e-3, h, &e));
 }
 
 /* Differences 0.001, 0.003 (mean 0.002), then 0.010. A standard error is 0.004 / 3.719016, the normal quantile
  * of 1e-4: 0.00107555. z = 0.008 / (0.00107555 sqrt(1 + 1/2)) = 6.0731. Critical for two series at 1e-3: the
  * quantile of 2.5e-4, 3.480756. The other series: 0.0025 after 0.002, z = 0.0005 / (0.00107555 sqrt 1.5). */
-static void a_move_is_found(void **state)
+TEST(a_move_is_found)
 {
-    (void)state;
     static const double moving[] = {0.010, 0.001, 0.003}, still[] = {0.0025, 0.002, 0.002};
     static const char *const name[] = {"late/results.json", "a/deep/results.json",
                                        "b/results.json"};
@@ -154,9 +142,8 @@ static void a_move_is_found(void **state)
 }
 
 /* What the last run does not have, and one run alone, moved nowhere. */
-static void no_move_without_two_points(void **state)
+TEST(no_move_without_two_points)
 {
-    (void)state;
     struct place p = place_make();
     json_t *first = json_array(), *last = json_array();
     json_array_append_new(first, claim_of("10_gone", 0.5));
@@ -172,9 +159,8 @@ static void no_move_without_two_points(void **state)
     place_free(&p);
 }
 
-static void bad_input_is_named(void **state)
+TEST(bad_input_is_named)
 {
-    (void)state;
     struct place p = place_make();
     struct history h;
     struct err e = {""};
@@ -195,14 +181,4 @@ static void bad_input_is_named(void **state)
     assert_false(history_read(p.dir, 1e-3, &h, &e));
     assert_non_null(strstr(e.msg, "is there twice"));
     place_free(&p);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_move_is_found),
-        cmocka_unit_test(no_move_without_two_points),
-        cmocka_unit_test(bad_input_is_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

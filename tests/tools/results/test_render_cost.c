@@ -1,14 +1,7 @@
 /* Costs by scene, from results written by hand; expected sums are added by hand. */
 #include "tools/results/render_cost.h"
 #include "tools/report/report_cost.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "tests/support/test.h"
 
 /* Two references of one scene share a render of ours; a probe of an engine; a scene that ran out of
  * time; a claim of consistency; a claim of two files, which has no cost. */
@@ -37,9 +30,8 @@ static json_t *results(void)
     return root;
 }
 
-static void test_gather(void **state)
+TEST(test_gather)
 {
-    (void)state;
     json_t *root = results();
     struct scene_cost c[MAX_COSTS];
     assert_int_equal(render_cost_gather(root, c), 2);
@@ -64,9 +56,8 @@ static char *printed(void (*print)(FILE *, const json_t *), const json_t *root)
     return out;
 }
 
-static void test_print(void **state)
+TEST(test_print)
 {
-    (void)state;
     json_t *root = results();
     char *line = printed(render_cost_print, root);
     assert_string_equal(line, "cost: <b> 20 s of 30.5 s (1 undecided), a 10 s (1 undecided) of "
@@ -86,10 +77,4 @@ static void test_print(void **state)
     free(line);
     free(table);
     json_decref(root);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_gather), cmocka_unit_test(test_print)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,22 +1,12 @@
 /* results.json's schema, exit codes, verdict table and JUnit XML. Expected strings are written by
  * hand from the numbers in the claims; the JUnit file is read back by libxml2's own parser. */
-#include "tools/results/results.h"
+#include "tools/results/results_table.h"
 
 #include "renderer/base/fs.h"
 #include "tools/results/claim_result.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "tests/support/test.h"
 
 #include <libxml/parser.h>
-
-#include <cmocka.h>
 
 static const char judged_claim[] =
     "{\"scene\": \"41_cornell\", \"title\": \"Cornell box\", \"detects\": \"colour bleeding\","
@@ -130,17 +120,14 @@ static void expect_claim_rejected(json_t *claim, const char *wanted)
     expect_root_rejected(results_of(1, &claim), wanted);
 }
 
-static void round_trip(void **state)
+TEST(round_trip)
 {
-    (void)state;
     struct place p = temp_place("new/results.json");
     json_t *root = results_of(2, (json_t *[]){parse(judged_claim), parse(error_claim)});
     struct err e = {""};
-    if (!json_write(p.path, root, &e))
-        fail_msg("%s", e.msg);
+    MUST(json_write(p.path, root, &e));
     json_t *back = NULL;
-    if (!results_read(p.path, &back, &e))
-        fail_msg("%s", e.msg);
+    MUST(results_read(p.path, &back, &e));
     assert_true(json_equal(root, back));
 
     FILE *f = fopen(p.path, "rb");
@@ -157,9 +144,8 @@ static void round_trip(void **state)
 /* Every member that the header promises is missed by name when it is absent, and refused when it is
  * of another type. No member promised here is of type object-or-true, so `true` is wrong for all
  * but the two booleans, for which a string is. */
-static void missing_or_mistyped_member(void **state)
+TEST(missing_or_mistyped_member)
 {
-    (void)state;
     static const char *const required[] = {"scene",
                                            "a",
                                            "b",
@@ -219,17 +205,15 @@ static void missing_or_mistyped_member(void **state)
         json_t *root = results_of(1, &claim), *back = NULL;
         struct err e = {""};
         assert_true(json_write(p.path, root, &e));
-        if (!results_read(p.path, &back, &e))
-            fail_msg("%s", e.msg);
+        MUST(results_read(p.path, &back, &e));
         json_decref(back);
         json_decref(root);
         remove_place(&p);
     }
 }
 
-static void nested_members(void **state)
+TEST(nested_members)
 {
-    (void)state;
     static const char *const member[][2] = {{"worst_tile", "x"},
                                             {"worst_tile", "y"},
                                             {"worst_tile", "difference"},
@@ -281,9 +265,8 @@ static void set(json_t *claim, const char *name, const char *json)
     json_object_set_new(claim, name, v);
 }
 
-static void values_out_of_order(void **state)
+TEST(values_out_of_order)
 {
-    (void)state;
     static const char *const bad[][3] = {
         {"ci", "[2, 1]", "'ci' is not an array of two numbers, the lower first"},
         {"ci", "[1]", "'ci' is not an array of two numbers"},
@@ -325,9 +308,8 @@ static void values_out_of_order(void **state)
     expect_claim_rejected(claim, "'cost_s.b' is missing");
 }
 
-static void bad_file(void **state)
+TEST(bad_file)
 {
-    (void)state;
     /* JSON has no NaN and no infinity; a writer that prints them is found out at the line. */
     expect_rejected("{\n \"assay\": 1,\n \"alpha\": NaN\n}", ":3: invalid token near 'NaN'");
     expect_rejected("{\"alpha\": 1e999}", ":1: ");
@@ -360,9 +342,8 @@ static void bad_file(void **state)
     json_decref(root);
 }
 
-static void exit_codes(void **state)
+TEST(exit_codes)
 {
-    (void)state;
     static const struct {
         const char *verdict[3],
             *expected[3]; /* verdict NULL: not judged; expected NULL: no claim */
@@ -444,9 +425,8 @@ static char *printed_table(const json_t *results, bool markdown)
 }
 
 /* Widths by the rule: 10, 10, 7, 26, 7, 8, 12, 10 columns, two spaces between. */
-static void table_for_a_terminal(void **state)
+TEST(table_for_a_terminal)
 {
-    (void)state;
     /* clang-format off */
     static const char wanted[] =
         "scene       tested      against     difference % [interval]    MDB %  margin %  verdict       expected    ok\n"
@@ -463,9 +443,8 @@ static void table_for_a_terminal(void **state)
     json_decref(root);
 }
 
-static void table_in_markdown(void **state)
+TEST(table_in_markdown)
 {
-    (void)state;
     static const char wanted[] =
         "| scene | tested | against | difference % [interval] | MDB % | margin % | verdict | expected | ok "
         "|\n"
@@ -511,9 +490,8 @@ static xmlNode *child(xmlNode *parent, const char *name, size_t index)
     return NULL;
 }
 
-static void junit_reads_back(void **state)
+TEST(junit_reads_back)
 {
-    (void)state;
     static const char nasty[] = "<b> & \"q\" 'a' ]]> \xc3\xbc \xe6\x97\xa5";
     json_t *wrong = claim_with("DIFFERENT", "EQUIVALENT");
     json_object_set_new(wrong, "scene", json_string(nasty));
@@ -525,8 +503,7 @@ static void junit_reads_back(void **state)
                                               claim_with("INCONCLUSIVE", "EQUIVALENT"), error});
     struct place p = temp_place("deep/er/junit.xml");
     struct err e = {""};
-    if (!junit_write(p.path, root, &e))
-        fail_msg("%s", e.msg);
+    MUST(junit_write(p.path, root, &e));
 
     xmlDoc *doc = xmlReadFile(p.path, NULL, XML_PARSE_NONET | XML_PARSE_NOERROR);
     assert_non_null(doc);
@@ -566,9 +543,8 @@ static void junit_reads_back(void **state)
 }
 
 /* A file name in Latin-1, say. */
-static void an_argument_that_is_no_utf8_is_named(void **state)
+TEST(an_argument_that_is_no_utf8_is_named)
 {
-    (void)state;
     struct err e = {""};
     char *argv[] = {"compare",
                     "k\xfc"
@@ -584,21 +560,11 @@ static void an_argument_that_is_no_utf8_is_named(void **state)
     json_decref(root);
 }
 
-int main(void)
+static int clean_parser(void **state)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(round_trip),
-        cmocka_unit_test(missing_or_mistyped_member),
-        cmocka_unit_test(nested_members),
-        cmocka_unit_test(values_out_of_order),
-        cmocka_unit_test(bad_file),
-        cmocka_unit_test(exit_codes),
-        cmocka_unit_test(an_argument_that_is_no_utf8_is_named),
-        cmocka_unit_test(table_for_a_terminal),
-        cmocka_unit_test(table_in_markdown),
-        cmocka_unit_test(junit_reads_back),
-    };
-    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    (void)state;
     xmlCleanupParser();
-    return failed;
+    return 0;
 }
+
+TEST_GROUP(NULL, clean_parser)

@@ -12,13 +12,9 @@
 
 #include "tools/sequential/two_stage.h"
 #include "tools/sequential/alpha_spending.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
 
 enum { SIDE = 8, PIXELS = SIDE * SIDE, BLOCK = 16, POOL = 20000, DECLARED = 64, CLAIMS = 2000 };
 
@@ -139,8 +135,7 @@ static struct tally run(const struct alpha_spending *q, int stages, struct compa
             struct err e;
             if (q->share[c.look] == 0 || size == 0)
                 continue;
-            if (!alpha_spending_judge(q, c.look, stages, &opt, pair_of, &c, &r, &stage, &e))
-                fail_msg("%s", e.msg);
+            MUST(alpha_spending_judge(q, c.look, stages, &opt, pair_of, &c, &r, &stage, &e));
             different = different || r.verdict == VERDICT_DIFFERENT;
             equivalent = equivalent || r.verdict == VERDICT_EQUIVALENT;
             if (!decided)
@@ -177,9 +172,8 @@ static const struct alpha_spending every_look_at_alpha = {{1, 1, 1, 1, 1, 1, 1, 
 static const double alpha = 0.05;
 
 /* By hand from the table in alpha_spending.h. */
-static void test_schedule(void **state)
+TEST(test_schedule)
 {
-    (void)state;
     const struct alpha_spending *all[] = {&alpha_spending_single, &alpha_spending_declared,
                                           &alpha_spending_open};
     const double sum[] = {1, 1, .975};
@@ -202,9 +196,8 @@ static void test_schedule(void **state)
 
 /* H0: equal means. DIFFERENT at any of the looks, had all been taken, at most alpha. (Margins 0, so
  * that nothing is spared.) Negative control: the same looks, each at the whole alpha, break it. */
-static void test_false_different(void **state)
+TEST(test_false_different)
 {
-    (void)state;
     struct compare_options opt = {.alpha = alpha, .tile = SIDE};
     struct tally t = run(&alpha_spending_open, 1, opt, false, 0, CLAIMS, 1, true);
     struct tally naive = run(&every_look_at_alpha, 1, opt, false, 0, CLAIMS, 2, true);
@@ -217,9 +210,8 @@ static void test_false_different(void **state)
 /* H0: the bias lies just outside the margin of the image. EQUIVALENT at any look at most alpha. Standard
  * error of the image at n = 128: 1.1 %, so that the margin of 3 % is reached by intervals from there on.
  * Negative control as above. */
-static void test_false_equivalent(void **state)
+TEST(test_false_equivalent)
 {
-    (void)state;
     struct compare_options opt = {
         .alpha = alpha, .margin_global = .03, .margin_tile = .25, .tile = 4};
     struct tally t = run(&alpha_spending_open, 1, opt, true, .03 * (1 + 1e-6), CLAIMS, 3, true);
@@ -237,9 +229,8 @@ static void test_false_equivalent(void **state)
  * that the declared size passes equal renderers in most cases, as those of the suite are. The sequence
  * decides equal ones with less than the declared samples on average, far off ones at its first look, those
  * near the margin with more samples where the single look stays undecided. */
-static void test_saving(void **state)
+TEST(test_saving)
 {
-    (void)state;
     enum { RUNS = 500 };
     struct compare_options opt = {
         .alpha = 1e-3, .margin_global = .12, .margin_tile = .4, .tile = 4};
@@ -268,9 +259,8 @@ static void test_saving(void **state)
  * controls: stage 1 by itself, at 10 %, breaks 1 %; and so do two stages that share their reference, as
  * a golden would, where that is what the noise is of (16 samples against 512): this is why validate
  * holds such a claim to one stage. */
-static void test_two_stages(void **state)
+TEST(test_two_stages)
 {
-    (void)state;
     const double product = 0.01;
     struct compare_options opt = {.alpha = product, .tile = SIDE}, one = opt;
     one.alpha = two_stage_alpha(product);
@@ -288,11 +278,9 @@ static void test_two_stages(void **state)
         grow(&a, 512);
         grow(&a2, 512);
         grow(&b, 64);
-        if (!two_stage_first(&a.m, &b.m, &opt, &r, &e))
-            fail_msg("%s", e.msg);
+        MUST(two_stage_first(&a.m, &b.m, &opt, &r, &e));
         if (r.verdict == VERDICT_DIFFERENT) {
-            if (!two_stage_confirm(&r, &a2.m, &b.m, &opt, &r2, &e))
-                fail_msg("%s", e.msg);
+            MUST(two_stage_confirm(&r, &a2.m, &b.m, &opt, &r2, &e));
             shared += r2.verdict == VERDICT_DIFFERENT;
             comparison_free(&r2);
         }
@@ -312,9 +300,8 @@ static void test_two_stages(void **state)
 
 /* Both together, at an alpha of which no tail could be measured: a wrong renderer is found, an equal one
  * passes. And a stage that is not fresh is refused. */
-static void test_two_stages_in_sequence(void **state)
+TEST(test_two_stages_in_sequence)
 {
-    (void)state;
     enum { RUNS = 100 };
     struct compare_options opt = {
         .alpha = 1e-9, .margin_global = .12, .margin_tile = .4, .tile = 4};
@@ -342,12 +329,4 @@ static void test_two_stages_in_sequence(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_schedule),         cmocka_unit_test(test_false_different),
-        cmocka_unit_test(test_false_equivalent), cmocka_unit_test(test_saving),
-        cmocka_unit_test(test_two_stages),       cmocka_unit_test(test_two_stages_in_sequence),
-    };
-    return cmocka_run_group_tests(tests, fill_pool, NULL);
-}
+TEST_GROUP(fill_pool, NULL)

@@ -2,13 +2,9 @@
 #include "tests/support/simulate.h"
 
 #include "tools/sequential/two_stage.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
 
 enum { SIDE = 8 };
 
@@ -36,14 +32,12 @@ static enum verdict run(const struct world *w, const struct compare_options *opt
 {
     struct comparison first, second;
     struct err e;
-    if (!two_stage_first(&w->a, &w->b, opt, &first, &e))
-        fail_msg("%s", e.msg);
+    MUST(two_stage_first(&w->a, &w->b, opt, &first, &e));
     enum verdict v = first.verdict;
     *flagged = v == VERDICT_DIFFERENT;
     if (*flagged) {
         const struct moments *a2 = first_only ? &w->a : &w->a2, *b2 = first_only ? &w->b : &w->b2;
-        if (!two_stage_confirm(&first, a2, b2, opt, &second, &e))
-            fail_msg("%s", e.msg);
+        MUST(two_stage_confirm(&first, a2, b2, opt, &second, &e));
         v = second.verdict;
         if (reason != NULL)
             strcpy(reason, second.reason);
@@ -61,9 +55,8 @@ static void paint(struct world *w, int n, double scale, double scale_again, uint
     simulate(&w->b2, LAW_NORMAL, 1, n, false, state);
 }
 
-static void test_confirmed(void **state)
+TEST(test_confirmed)
 {
-    (void)state;
     struct world w = new_world();
     struct compare_options opt = {.alpha = 1e-9, .tile = SIDE};
     uint64_t seed = 1;
@@ -93,9 +86,8 @@ static void test_confirmed(void **state)
 /* n 256: with fewer, the skewness of regions smaller than the image is not known well enough.
  * One quarter in stage 1, another in stage 2: the place that was flagged must be the place. (What has no
  * place, the dense statistic, may confirm that there is something.) */
-static void test_same_place(void **state)
+TEST(test_same_place)
 {
-    (void)state;
     struct world w = new_world();
     struct compare_options opt = {.alpha = 1e-6, .tile = SIDE};
     uint64_t seed = 2;
@@ -120,9 +112,8 @@ static void test_same_place(void **state)
  * chance of 1e-4 at that rate. Negative control: a second stage on the first pair confirms what it
  * saw. It confirms at the level divided by the flagged alone, so nearly always; the share of flagged
  * worlds is what the first stage may have, and must lie beyond the 66 for the control to say anything. */
-static void test_false_alarms(void **state)
+TEST(test_false_alarms)
 {
-    (void)state;
     struct world w = new_world();
     struct compare_options opt = {.alpha = 0.04, .tile = SIDE};
     uint64_t seed = 3;
@@ -143,9 +134,8 @@ static void test_false_alarms(void **state)
     free_world(&w);
 }
 
-static void test_check_fresh(void **state)
+TEST(test_check_fresh)
 {
-    (void)state;
     struct world w = new_world();
     struct err e;
     uint64_t seed = 4;
@@ -161,15 +151,4 @@ static void test_check_fresh(void **state)
     assert_non_null(strstr(e.msg, "4 x 4"));
     moments_free(&small);
     free_world(&w);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_confirmed),
-        cmocka_unit_test(test_same_place),
-        cmocka_unit_test(test_false_alarms),
-        cmocka_unit_test(test_check_fresh),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

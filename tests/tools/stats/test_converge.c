@@ -6,20 +6,10 @@
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
 #include "tools/report/report.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "tests/support/test.h"
 
 #include <libxml/HTMLparser.h>
 #include <libxml/xpath.h>
-
-#include <cmocka.h>
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_fit.h>
@@ -51,12 +41,6 @@ struct engine {
     double exponent; /* variance falls as n^-exponent: 1 for independent samples */
     double scale;    /* of the noise */
 };
-
-static void assert_near(double got, double expected, double tolerance)
-{
-    if (!(fabs(got - expected) <= tolerance))
-        fail_msg("%.15g is not %.15g +- %g", got, expected, tolerance);
-}
 
 static double truth(size_t i)
 {
@@ -101,8 +85,7 @@ static struct converge_reference make_reference(gsl_rng *rng, const struct engin
         m.mean[i] = truth(i);
         m.n[i / 3] = 1;
     }
-    if (!convergence_rate_reference_init(&r, &m, 1, &e))
-        fail_msg("%s", e.msg);
+    MUST(convergence_rate_reference_init(&r, &m, 1, &e));
     free(image);
     moments_free(&m);
     return r;
@@ -115,8 +98,7 @@ static void climb(gsl_rng *rng, const struct engine *g, const struct converge_re
     float *images = malloc((size_t)count * SIZE * sizeof *images);
     for (int i = 0; i < RUNGS; i++) {
         render(rng, g, ladder[i], count, images);
-        if (!convergence_rate_rung(images, count, ladder[i], ref, &rung[i], &e))
-            fail_msg("%s", e.msg);
+        MUST(convergence_rate_rung(images, count, ladder[i], ref, &rung[i], &e));
         rung[i].cpu_s = 1;
     }
     free(images);
@@ -141,9 +123,8 @@ static void assert_rate(const char *what, int wrong, int n, double alpha)
 
 /* Every estimate by its definition in the header, pair by pair, and its jackknife by taking each replicate
  * away in earnest. */
-static void estimates_are_their_definitions(void **state)
+TEST(estimates_are_their_definitions)
 {
-    (void)state;
     enum { COUNT = 5 };
     gsl_rng *rng = new_rng(1);
     const struct engine g = {EXPONENTIAL, 0.1, 1, 1};
@@ -201,9 +182,8 @@ static void estimates_are_their_definitions(void **state)
 }
 
 /* Weighted least squares by GSL, with the weights that the header names. */
-static void slope_is_least_squares(void **state)
+TEST(slope_is_least_squares)
 {
-    (void)state;
     struct rung rung[RUNGS] = {0};
     double x[RUNGS], y[RUNGS], w[RUNGS], mean = 0, c0, c1, cov[3], chi2;
     for (int i = 0; i < RUNGS; i++) {
@@ -233,9 +213,8 @@ static void slope_is_least_squares(void **state)
     assert_near(slope.dof, 15, 0);
 }
 
-static void cost_is_a_line_without_the_start(void **state)
+TEST(cost_is_a_line_without_the_start)
 {
-    (void)state;
     struct rung rung[RUNGS] = {0};
     double x[RUNGS], y[RUNGS], w[RUNGS], c0, c1, cov[3], chi2;
     for (int i = 0; i < RUNGS; i++) {
@@ -259,9 +238,8 @@ static void cost_is_a_line_without_the_start(void **state)
     assert_true(isnan(convergence_rate_log_efficiency(&rung[0], &c).value));
 }
 
-static void a_smaller_reference_is_a_box_average(void **state)
+TEST(a_smaller_reference_is_a_box_average)
 {
-    (void)state;
     struct moments m;
     struct converge_reference r;
     struct err e;
@@ -298,9 +276,8 @@ static void a_smaller_reference_is_a_box_average(void **state)
 /* H0: the interval of the slope misses -1/2 in alpha of all runs, of an unbiased engine of independent
  * samples. 2000 runs a law at 5 % and 0.1 %; a rate of 7.0 % (0.5 %) or more is rejected with 99.99 %,
  * so a true rate of 8 % (0.8 %) is found with more than 90 %. */
-static void slope_interval_covers(void **state)
+TEST(slope_interval_covers)
 {
-    (void)state;
     static const char *const name[] = {"exponential", "90 % black", "shared noise"};
     /* One random number shared by all pixels leaves each replicate one degree of freedom: a limit of the
      * procedure, known and bounded here. The engine that is judged has pixels of their own. */
@@ -329,9 +306,8 @@ static void slope_interval_covers(void **state)
 
 /* Negative controls for the slope, 200 runs each at alpha 1e-3: all must be DIFFERENT. A detection rate
  * below 97.7 % would let one slip with 99 %. */
-static void wrong_slopes_are_found(void **state)
+TEST(wrong_slopes_are_found)
 {
-    (void)state;
     static const struct {
         const char *name;
         struct engine engine;
@@ -359,9 +335,8 @@ static void wrong_slopes_are_found(void **state)
 }
 
 /* A right slope with few, wild replicates is not called right. */
-static void a_vague_slope_is_inconclusive(void **state)
+TEST(a_vague_slope_is_inconclusive)
 {
-    (void)state;
     struct rung rung[RUNGS] = {0};
     for (int i = 0; i < RUNGS; i++) {
         rung[i].spp = ladder[i];
@@ -374,9 +349,8 @@ static void a_vague_slope_is_inconclusive(void **state)
 
 /* Bias just at the margin of 3 %: DIFFERENT and EQUIVALENT are both wrong, each in at most alpha of all
  * runs; 2000 runs at 5 %. No bias: never DIFFERENT, EQUIVALENT in most; 9 %: always DIFFERENT. */
-static void floor_keeps_its_error_rates(void **state)
+TEST(floor_keeps_its_error_rates)
 {
-    (void)state;
     enum { RUNS = 2000 };
     /* So that each law has a variance of 1 a sample. */
     static const double scale[] = {1, 0.2294157, 1.4142136};
@@ -393,8 +367,7 @@ static void floor_keeps_its_error_rates(void **state)
                 struct rung top;
                 struct err e;
                 render(rng, &g, 1024, K, images);
-                if (!convergence_rate_rung(images, K, 1024, &ref, &top, &e))
-                    fail_msg("%s", e.msg);
+                MUST(convergence_rate_rung(images, K, 1024, &ref, &top, &e));
                 v[b] = convergence_rate_floor_verdict(&top, 0.03, 0.05);
                 convergence_rate_reference_free(&ref);
             }
@@ -418,9 +391,8 @@ static void floor_keeps_its_error_rates(void **state)
 
 /* A biased engine has the right slope on a short ladder and only the floor tells. 200 runs, alpha 1e-3,
  * margin 1 %, bias 5 % at 256 samples of relative noise 1/4: all DIFFERENT. */
-static void a_floor_under_a_good_slope_is_found(void **state)
+TEST(a_floor_under_a_good_slope_is_found)
 {
-    (void)state;
     const struct engine g = {EXPONENTIAL, 0.05, 1, 0.5};
     gsl_rng *rng = new_rng(4);
     int found = 0;
@@ -437,9 +409,8 @@ static void a_floor_under_a_good_slope_is_found(void **state)
 
 /* H0: the interval of the variance ratio misses the true one in alpha of all runs. 2000 runs a law, 5 %.
  * The ratio is 1.3^2; 16 and 24 replicates. Control: 1 is outside in nearly all. */
-static void variance_ratio_covers(void **state)
+TEST(variance_ratio_covers)
 {
-    (void)state;
     enum { RUNS = 2000, MORE = 24 };
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
         gsl_rng *rng = new_rng(500 + (unsigned long)law);
@@ -471,9 +442,8 @@ static void variance_ratio_covers(void **state)
     }
 }
 
-static void bad_rungs_are_refused(void **state)
+TEST(bad_rungs_are_refused)
 {
-    (void)state;
     gsl_rng *rng = new_rng(6);
     const struct engine g = {EXPONENTIAL, 0, 1, 1};
     struct converge_reference ref = make_reference(rng, &g, 1, 4);
@@ -532,9 +502,8 @@ static void remember_row(void *ctx, const struct convergence_row *r)
              r->quantity, r->value, r->verdict);
 }
 
-static void results_become_a_matrix(void **state)
+TEST(results_become_a_matrix)
 {
-    (void)state;
     json_t *scene, *root = results_with(&scene);
     char *text;
     size_t size;
@@ -552,9 +521,8 @@ static void results_become_a_matrix(void **state)
     json_decref(root);
 }
 
-static void results_become_rows_and_an_exit_code(void **state)
+TEST(results_become_rows_and_an_exit_code)
 {
-    (void)state;
     json_t *scene, *root = results_with(&scene);
     struct err e;
     char text[2048] = "";
@@ -590,9 +558,8 @@ static double xpath_number(xmlXPathContext *context, const char *expression)
 
 /* The page is read again by libxml2: every rung a dot in both plots, at the place that its numbers ask
  * for; text that is not ours is escaped; a second file can be joined, but only if it has anything. */
-static void the_page_shows_the_rungs(void **state)
+TEST(the_page_shows_the_rungs)
 {
-    (void)state;
     char dir[] = "/tmp/test_converge_XXXXXX", results[64], page[64];
     struct err e = {""};
     assert_non_null(mkdtemp(dir));
@@ -602,8 +569,7 @@ static void the_page_shows_the_rungs(void **state)
     json_t *engines = json_object_get(scene, "engines");
     json_object_set_new(json_array_get(engines, 0), "engine", json_string("<i>ours</i>"));
     assert_true(json_write(results, root, &e));
-    if (!report_write(results, page, &e))
-        fail_msg("%s", e.msg);
+    MUST(report_write(results, page, &e));
     htmlDocPtr doc = htmlReadFile(page, "utf-8", HTML_PARSE_NOERROR | HTML_PARSE_NOWARNING);
     assert_non_null(doc);
     xmlXPathContext *c = xmlXPathNewContext(doc);
@@ -645,9 +611,8 @@ static void the_page_shows_the_rungs(void **state)
 
 /* Everything that the table or the page would read and that is missing or of another kind is a line that
  * names it. */
-static void broken_results_are_refused(void **state)
+TEST(broken_results_are_refused)
 {
-    (void)state;
     static const struct {
         const char *owner, *member, *value, *line;
     } broken[] = {
@@ -680,26 +645,4 @@ static void broken_results_are_refused(void **state)
             fail_msg("'%s' does not say '%s' of 41_cornell", e.msg, broken[i].line);
         json_decref(root);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(estimates_are_their_definitions),
-        cmocka_unit_test(slope_is_least_squares),
-        cmocka_unit_test(cost_is_a_line_without_the_start),
-        cmocka_unit_test(a_smaller_reference_is_a_box_average),
-        cmocka_unit_test(slope_interval_covers),
-        cmocka_unit_test(wrong_slopes_are_found),
-        cmocka_unit_test(a_vague_slope_is_inconclusive),
-        cmocka_unit_test(floor_keeps_its_error_rates),
-        cmocka_unit_test(a_floor_under_a_good_slope_is_found),
-        cmocka_unit_test(variance_ratio_covers),
-        cmocka_unit_test(bad_rungs_are_refused),
-        cmocka_unit_test(results_become_rows_and_an_exit_code),
-        cmocka_unit_test(results_become_a_matrix),
-        cmocka_unit_test(the_page_shows_the_rungs),
-        cmocka_unit_test(broken_results_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,8 @@
 /* tools/stats/distributions.c against closed forms (nu = 1, 2, 4), against GSL's incomplete beta function, and
  * against asymptotic series where nothing else reaches. */
 #include "tools/stats/distributions.h"
+#include "tests/support/test.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
 #include <gsl/gsl_sf_erf.h>
@@ -36,9 +31,8 @@ static double closed_log10_p(double t, int nu)
     return 2 * (log10(4 / s) - log10(s + t)) + log10((2 + u) / 2);
 }
 
-static void test_p_closed_forms(void **state)
+TEST(test_p_closed_forms)
 {
-    (void)state;
     for (int nu = 1; nu <= 4; nu *= 2)
         for (double t = 1e-6; t < 1e120; t *= 1.7)
             assert_close(stats_t_log10_p(t, nu), closed_log10_p(t, nu), 1e-10);
@@ -47,9 +41,8 @@ static void test_p_closed_forms(void **state)
 
 /* GSL's cdf switches to a truncated expansion for nu > 30, so the reference here is its incomplete
  * beta function, which is not. */
-static void test_p_gsl_beta(void **state)
+TEST(test_p_gsl_beta)
 {
-    (void)state;
     const double dof[] = {0.7, 1.5, 3, 7.25, 15, 30.5, 100, 1000, 20000};
     int compared = 0;
     for (size_t i = 0; i < sizeof dof / sizeof *dof; i++)
@@ -70,9 +63,8 @@ static void test_p_gsl_beta(void **state)
 
 /* t much larger than sqrt(nu): P(|T| >= t) = 2 nu^(nu/2) t^-nu / (nu B(nu/2, 1/2)) (1 +
  * O(nu^2/t^2)), the first term of the integral of the density. */
-static void test_p_power_tail(void **state)
+TEST(test_p_power_tail)
 {
-    (void)state;
     for (double nu = 5; nu < 3000; nu *= 3.3) {
         double t = 1e9;
         double want =
@@ -86,9 +78,8 @@ static void test_p_power_tail(void **state)
 /* Normal limit: log erfc from GSL. At nu = 1e11 the two differ by t^4/(4 nu) in ln p (from
  * expanding
  * -(nu+1)/2 ln(1 + t^2/nu)): 2.5e-6 relative to 5000 at t = 100. */
-static void test_p_normal_limit(void **state)
+TEST(test_p_normal_limit)
 {
-    (void)state;
     for (double t = 0.1; t < 100; t *= 1.5) {
         double want = gsl_sf_log_erfc(t / sqrt(2)) / M_LN10;
         assert_close(stats_t_log10_p(t, INFINITY), want, 1e-13);
@@ -100,18 +91,16 @@ static void test_p_normal_limit(void **state)
 
 /* The two methods that meet at nu = 1e6, where the step in nu moves ln p by t^4/(4 nu) 2e-9 only.
  */
-static void test_p_methods_meet(void **state)
+TEST(test_p_methods_meet)
 {
-    (void)state;
     for (double t = 1; t < 1000; t *= 1.5)
         assert_close(stats_t_log10_p(t, 1e6 * (1 + 1e-9)), stats_t_log10_p(t, 1e6 * (1 - 1e-9)),
                      1e-9);
 }
 
 /* p falls strictly, also where two ways of computing it meet. */
-static void test_p_monotone(void **state)
+TEST(test_p_monotone)
 {
-    (void)state;
     const double dof[] = {1, 2.5, 9, 29, 31, 64, 1e3, 1e5, 0.99e6, 1.01e6, 1e8};
     for (size_t i = 0; i < sizeof dof / sizeof *dof; i++) {
         double last = 0;
@@ -124,9 +113,8 @@ static void test_p_monotone(void **state)
 }
 
 /* t(1) = cot(pi q); t(2) = (1-2q) / sqrt(2 q (1-q)); both from inverting the closed forms. */
-static void test_quantile_closed_forms(void **state)
+TEST(test_quantile_closed_forms)
 {
-    (void)state;
     for (double q = 0.49; q > 1e-300; q *= 0.3) {
         double t1 = stats_t_quantile(q, 1), t2 = stats_t_quantile(q, 2);
         assert_true(fabs(t1 * tan(M_PI * q) - 1) < 1e-9);
@@ -136,9 +124,8 @@ static void test_quantile_closed_forms(void **state)
 }
 
 /* The quantile's own tail, by GSL's incomplete beta function, is q again. */
-static void test_quantile_gsl(void **state)
+TEST(test_quantile_gsl)
 {
-    (void)state;
     const double dof[] = {0.8, 3, 7.5, 15, 63, 500, 20000};
     for (size_t i = 0; i < sizeof dof / sizeof *dof; i++)
         for (double q = 0.4; q > 1e-13; q *= 0.13) {
@@ -152,9 +139,8 @@ static void test_quantile_gsl(void **state)
 }
 
 /* Wallace's approximation: its z has the p of t to 3 % in z, and the inverse is one. */
-static void test_normal_equivalent(void **state)
+TEST(test_normal_equivalent)
 {
-    (void)state;
     for (double nu = 3; nu < 1e6; nu *= 3)
         for (double t = 0.5; t < 30; t *= 1.4) {
             double z = stats_z_of_t(t, nu);
@@ -168,9 +154,8 @@ static void test_normal_equivalent(void **state)
  */
 /* Chi-square tails. Even k in closed form: e^-y sum_{i < k/2} y^i/i!, in logarithms, far beyond what a
  * double p can hold; k = 1 is 2 Q(sqrt x) of the normal law; and GSL near the centre of large k. */
-static void test_chi2(void **state)
+TEST(test_chi2)
 {
-    (void)state;
     for (int k = 2; k <= 8; k += 2)
         for (double x = 0.01; x < 1e7; x *= 1.9) {
             double y = x / 2, term = 1, sum = 1;
@@ -190,9 +175,8 @@ static void test_chi2(void **state)
 }
 
 /* Hill's equivalent has the p of t: relative 1e-4 of ln p for nu >= 20, t up to 8. */
-static void test_hill(void **state)
+TEST(test_hill)
 {
-    (void)state;
     for (double nu = 20; nu < 1e7; nu *= 7)
         for (double t = -8; t <= 8; t += 0.5)
             assert_close(stats_t_log10_p(stats_hill_z(t, nu), INFINITY), stats_t_log10_p(t, nu),
@@ -201,32 +185,12 @@ static void test_hill(void **state)
     assert_true(stats_hill_z(3, INFINITY) == 3);
 }
 
-static void test_dof(void **state)
+TEST(test_dof)
 {
-    (void)state;
     assert_close(stats_welch_dof(0.4, 10, 1.8, 5), 4.84 / (0.16 / 9 + 3.24 / 4), 1e-14);
     /* Equal variances and n: 2 (n - 1). One side without noise: n - 1 of the other. */
     assert_close(stats_welch_dof(3, 8, 3, 8), 14, 1e-14);
     assert_close(stats_welch_dof(0, 100, 3, 8), 7, 1e-14);
     assert_true(isinf(stats_welch_dof(0, 3, 0, 3)));
     assert_close(stats_dof(3, 2), 9, 1e-14);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_p_closed_forms),
-        cmocka_unit_test(test_p_gsl_beta),
-        cmocka_unit_test(test_p_power_tail),
-        cmocka_unit_test(test_p_normal_limit),
-        cmocka_unit_test(test_p_monotone),
-        cmocka_unit_test(test_p_methods_meet),
-        cmocka_unit_test(test_quantile_closed_forms),
-        cmocka_unit_test(test_quantile_gsl),
-        cmocka_unit_test(test_normal_equivalent),
-        cmocka_unit_test(test_chi2),
-        cmocka_unit_test(test_hill),
-        cmocka_unit_test(test_dof),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

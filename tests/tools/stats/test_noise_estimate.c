@@ -5,13 +5,9 @@
 #include "tools/compare/compare.h"
 #include "tools/compare/pyramid.h"
 #include "tools/stats/noise_estimate.h"
+#include "tests/support/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
-#include <string.h>
 
 static double normal(uint64_t *state)
 {
@@ -64,9 +60,8 @@ static void assert_between(double got, double lo, double hi)
  * 1.1 % times a bound that is at least the factor, 1 +- 4.3 % (4096 means, 3.78 correlated), times what
  * makes 99.9 % of it: 1 to 1.35. Degrees of freedom: N/6, +- 10 % for what r^4 scatters. The skewness
  * is 0 +- 6.1/256 = 0.024 (test of four of these). */
-static void test_independent(void **state)
+TEST(test_independent)
 {
-    (void)state;
     struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 5;
     struct noise_estimate s;
@@ -88,9 +83,8 @@ static void test_independent(void **state)
 
 /* Shared by 2 x 2: the sum's variance is 4 times that of independent pixels of the same sd (each own
  * number enters four pixels at half its size), up to the rim. What is found must not be less. */
-static void test_shared(void **state)
+TEST(test_shared)
 {
-    (void)state;
     struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 6;
     struct noise_estimate s;
@@ -107,9 +101,8 @@ static void test_shared(void **state)
 }
 
 /* A - B = f(x) + g(y), steps and all: nothing the kernel sees, so no noise. */
-static void test_blind_to_sums(void **state)
+TEST(test_blind_to_sums)
 {
-    (void)state;
     struct moments a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
     struct noise_estimate s;
     struct err e;
@@ -125,9 +118,8 @@ static void test_blind_to_sums(void **state)
     moments_free(&b);
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
-    (void)state;
     struct moments a = new_moments(32, 31, "sample"), b = new_moments(32, 31, "sample");
     struct noise_estimate s;
     struct err e;
@@ -167,8 +159,7 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
         struct err e;
         paint(&a, kind, scale, &seed);
         paint(&b, kind, 1, &seed);
-        if (!noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e))
-            fail_msg("%s", e.msg);
+        MUST(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
         double f = 1.5 * s.factor[0];
         for (int k = 0; decree && k < 3 * 64 * 64; k++) {
             a.m2[k] /= f;
@@ -176,8 +167,7 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
             a.m3[k] /= f * sqrt(f);
             b.m3[k] /= f * sqrt(f);
         }
-        if (!compare_moments(&a, &b, &opt, &c, &e))
-            fail_msg("%s", e.msg);
+        MUST(compare_moments(&a, &b, &opt, &c, &e));
         different += c.verdict == VERDICT_DIFFERENT;
         comparison_free(&c);
     }
@@ -188,9 +178,8 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
 
 /* H0: the same mean. alpha 5 %, 400 pairs a law: more than 36 (9 %) would have a chance of 1e-4 at a
  * true rate of 5 %. Negative control: without the factor for what neighbours share, it is exceeded. */
-static void test_false_alarms(void **state)
+TEST(test_false_alarms)
 {
-    (void)state;
     int most = 36;
     assert_true(gsl_cdf_binomial_Q(36, 0.05, 400) < 1e-3);
     int own = count_different(OWN, 1, 0.05, 400, false, 21);
@@ -205,18 +194,7 @@ static void test_false_alarms(void **state)
 
 /* Power: sd of the relative difference of the image is 0.1 sqrt(2)/64 = 0.22 %; 3 % are found in all of
  * 50 pairs, at alpha 1e-3. */
-static void test_power(void **state)
+TEST(test_power)
 {
-    (void)state;
     assert_int_equal(count_different(OWN, 1.03, 1e-3, 50, false, 31), 50);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_independent),   cmocka_unit_test(test_shared),
-        cmocka_unit_test(test_blind_to_sums), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_false_alarms),  cmocka_unit_test(test_power),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

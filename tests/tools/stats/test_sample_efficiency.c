@@ -5,16 +5,8 @@
 #include "renderer/math/sampler.h"
 #include "tools/stats/sample_efficiency.h"
 #include "tools/sequential/adaptive_stop.h"
+#include "tests/support/test.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
-#define COUNT(a) (sizeof(a) / sizeof *(a))
 
 static double uniform(uint32_t stream, uint32_t i, int k)
 {
@@ -63,9 +55,8 @@ static const struct {
 };
 
 /* The first moment is the irradiance over pi, known otherwise: to 1e-8, at order 48. */
-static void first_moment_is_the_mean(void **state)
+TEST(first_moment_is_the_mean)
 {
-    (void)state;
     for (size_t i = 0; i < COUNT(places); i++) {
         const struct truth_lamp *l = &places[i].lamp;
         double moment[2];
@@ -79,9 +70,8 @@ static void first_moment_is_the_mean(void **state)
 /* H0: simulated samples have the second moment of the form. z of N = 4e5 samples, below 4.4 with
  * probability 1 - 1e-5 for each of the three places. Other estimators of the same mean must be further
  * off at the place where the two techniques are equally good, by more than 10. */
-static void second_moment_is_that_of_samples(void **state)
+TEST(second_moment_is_that_of_samples)
 {
-    (void)state;
     enum { SAMPLES = 400000 };
     for (size_t i = 0; i < COUNT(places); i++)
         for (enum estimator how = POWER; how <= ONE_TECHNIQUE; how++) {
@@ -129,8 +119,7 @@ static struct sample_efficiency judge(int every, double margin)
         m[k] = render(k, 256, every);
     for (size_t i = 0; i < COUNT(variance); i++)
         variance[i] = 1;
-    if (!sample_efficiency_judge(m, RENDERS, 256, variance, margin, 1e-4, &f, &e))
-        fail_msg("%s", e.msg);
+    MUST(sample_efficiency_judge(m, RENDERS, 256, variance, margin, 1e-4, &f, &e));
     for (int k = 0; k < RENDERS; k++)
         moments_free(&m[k]);
     return f;
@@ -138,9 +127,8 @@ static struct sample_efficiency judge(int every, double margin)
 
 /* A sample variance of 64 x 256 exponential ones is known to sqrt(8/16384) = 2.2 % a render, so the
  * interval is about +-0.8 % x t(7, 5e-5) = 6 %. */
-static void wasted_samples_are_found(void **state)
+TEST(wasted_samples_are_found)
 {
-    (void)state;
     struct sample_efficiency f = judge(1, 0.2);
     assert_int_equal(f.verdict, VERDICT_EQUIVALENT);
     assert_true(f.lo < 1 && f.hi > 1);
@@ -200,9 +188,8 @@ static struct adaptive_stop adapt(enum rule rule)
     return r;
 }
 
-static void stop_rules_are_told_apart(void **state)
+TEST(stop_rules_are_told_apart)
 {
-    (void)state;
     struct adaptive_stop r = adapt(AS_ASKED);
     assert_int_equal(r.too_early, 0);
     assert_int_equal(r.too_late, 0);
@@ -211,15 +198,4 @@ static void stop_rules_are_told_apart(void **state)
     assert_true(adapt(WITHOUT_ROOT).too_early > PIXELS / 2);
     assert_true(adapt(NEVER).too_late > PIXELS / 2);
     assert_true(adapt(NO_BATCH).too_early > PIXELS / 2);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(first_moment_is_the_mean),
-        cmocka_unit_test(second_moment_is_that_of_samples),
-        cmocka_unit_test(wasted_samples_are_found),
-        cmocka_unit_test(stop_rules_are_told_apart),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

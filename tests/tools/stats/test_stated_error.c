@@ -2,17 +2,10 @@
  * light, of 16 x 16 pixels, n = 32 a pixel, K = 8 renders. Seeds are fixed; nothing is retried. */
 #include "renderer/math/sampler.h"
 #include "tools/stats/stated_error.h"
-#include "tools/validate/stated_error_claims.h"
+#include "tools/results/stated_error_results.h"
 #include "tools/report/report_stated_error.h"
+#include "tests/support/test.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
 #include <gsl/gsl_cdf.h>
 
 enum { SIDE = 16, PIXELS = SIDE * SIDE, SAMPLES = 32, RENDERS = 8 };
@@ -58,8 +51,7 @@ static struct stated_error judge(enum fault fault, uint64_t trial, double margin
     struct err e;
     for (int k = 0; k < RENDERS; k++)
         m[k] = render(fault, 1000 * trial + (uint64_t)k);
-    if (!stated_error_judge(m, RENDERS, margin, alpha, &c, &e))
-        fail_msg("%s", e.msg);
+    MUST(stated_error_judge(m, RENDERS, margin, alpha, &c, &e));
     for (int k = 0; k < RENDERS; k++)
         moments_free(&m[k]);
     return c;
@@ -69,9 +61,8 @@ static struct stated_error judge(enum fault fault, uint64_t trial, double margin
  * image at the most. n = 200 trials: more than 22 have the probability 1e-4 if the rate is 5 %. The
  * margin of 50 % is far from R = 1, so only the image's test is at work in `wrong`; R itself must
  * lie in its 95 % interval in all but 22 of the trials too. */
-static void independent_samples_pass(void **state)
+TEST(independent_samples_pass)
 {
-    (void)state;
     int wrong = 0, outside = 0;
     double sum = 0;
     for (uint64_t trial = 0; trial < 200; trial++) {
@@ -91,9 +82,8 @@ static void independent_samples_pass(void **state)
 /* R of the faults, from what they do: half the samples are copies: the mean's variance is twice what
  * M2 states, but for the spread of pairs, (n-1)/(n-2) less. Halved M2: 2. Shared numbers: R = 1, and
  * S = the number of pixels. Stratified -ln u: V(mean) << V/n. */
-static void faults_are_found(void **state)
+TEST(faults_are_found)
 {
-    (void)state;
     struct stated_error c = judge(SAMPLES_REPEAT, 301, 0.1, 1e-3);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.pixels_lo < 2 * 31. / 30 && c.pixels_hi > 2 * 31. / 30);
@@ -114,16 +104,14 @@ static void faults_are_found(void **state)
 
 /* The interval of R has a half width of about t(7) x 2.5 % = 13 % at alpha = 1e-3: inside a margin of 25 %,
  * not inside one of 1 %. */
-static void verdicts_follow_the_margin(void **state)
+TEST(verdicts_follow_the_margin)
 {
-    (void)state;
     assert_int_equal(judge(RIGHT, 401, 0.25, 1e-3).verdict, VERDICT_EQUIVALENT);
     assert_int_equal(judge(RIGHT, 402, 0.01, 1e-3).verdict, VERDICT_INCONCLUSIVE);
 }
 
-static void bad_input_is_named(void **state)
+TEST(bad_input_is_named)
 {
-    (void)state;
     struct moments m[4];
     struct stated_error c;
     struct err e;
@@ -152,9 +140,8 @@ static const char record[] =
     " {\"scene\": \"41\", \"engine\": \"pathtracer\", \"passed\": false, \"error\": \"no <file>\"}]";
 
 /* Edits of the record above and a part of the line that must come out; NULL: it is fine. */
-static void records_are_checked(void **state)
+TEST(records_are_checked)
 {
-    (void)state;
     static const char *const cases[][3] = {
         {"why", "because", NULL},
         {"\"pixels\": 0.98", "\"pixels\": \"1\"",
@@ -186,9 +173,8 @@ static void records_are_checked(void **state)
 }
 
 /* What is printed and what is in the page; markup in names stays text. */
-static void records_are_shown(void **state)
+TEST(records_are_shown)
 {
-    (void)state;
     json_t *c = json_loads(record, 0, NULL);
     assert_int_equal(stated_error_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
     assert_int_equal(stated_error_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
@@ -209,14 +195,4 @@ static void records_are_shown(void **state)
     assert_non_null(strstr(text, "no &lt;file&gt;"));
     free(text);
     json_decref(c);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(independent_samples_pass),   cmocka_unit_test(faults_are_found),
-        cmocka_unit_test(verdicts_follow_the_margin), cmocka_unit_test(bad_input_is_named),
-        cmocka_unit_test(records_are_checked),        cmocka_unit_test(records_are_shown),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

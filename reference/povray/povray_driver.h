@@ -1,0 +1,9 @@
+/* Drives POV-Ray: a process for each picture, side by side. */
+#ifndef ASSAY_POVRAY_DRIVER_H
+#define ASSAY_POVRAY_DRIVER_H
+
+#include "reference/replicates/engine_driver.h"
+
+extern const struct engine_driver povray_driver;
+
+#endif

@@ -1,0 +1,39 @@
+/* The engines that this program knows by name, in the order in which lists and pages have them: one table for everybody who
+ * lists them. What writes their scene files and what runs them is bound to it in reference/external/engine_bindings.c. */
+#ifndef ASSAY_ENGINE_TABLE_H
+#define ASSAY_ENGINE_TABLE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* ROW(name, title, ending, subgrid), see struct engine_kind. First those that goldens are made with; the first of them is the
+ * one that costs and convergence are compared with. */
+#define ENGINES_WITH_GOLDENS(ROW)                                                                  \
+    ROW(cycles, "Cycles", ".json", false)                                                          \
+    ROW(povray, "POV-Ray", ".pov", true)
+#define ENGINES(ROW)                                                                               \
+    ENGINES_WITH_GOLDENS(ROW)                                                                      \
+    ROW(mitsuba, "Mitsuba", ".xml", false)                                                         \
+    ROW(pbrt, "pbrt", ".pbrt", false)
+
+/* Rows for lists of words, {"auto", ENGINES(ENGINE_WORD) NULL}, and for sentences, "one of" ENGINES(ENGINE_TEXT). */
+#define ENGINE_WORD(name, title, ending, subgrid) #name,
+#define ENGINE_TEXT(name, title, ending, subgrid) " " #name
+#define ENGINE_ID(name, title, ending, subgrid)   ENGINE_##name,
+enum { ENGINES_WITH_GOLDENS(ENGINE_ID) NUM_ENGINES_WITH_GOLDENS };
+
+struct engine_kind {
+    const char *name;   /* in files, results and on command lines */
+    const char *title;  /* for people */
+    const char *ending; /* of its scene files */
+    bool subgrid; /* the suite says k, for k x k samples a pixel of one replicate, not "spp" */
+};
+
+extern const struct engine_kind engine_table[]; /* ends with a NULL name */
+extern const char *const engine_names[];        /* of those with goldens; ends with NULL */
+
+/* NULL if there is none of that name; engine_with_goldens() also for an engine without. */
+const struct engine_kind *engine_kind_of(const char *name);
+const struct engine_kind *engine_with_goldens(const char *name);
+
+#endif

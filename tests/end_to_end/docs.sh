@@ -1,0 +1,127 @@
+#!/bin/bash
+# tests/end_to_end/docs.sh BUILD: every relative link of every Markdown file of the repository leads to a file that is there, and to a
+# heading that it has; sources that pages name are there, and pages that sources name; the five-minute walk is walked; what programs write has the keys of its manual (tools/docs/formats; what
+# they read: test_formats.c). Prints "ok NAME" or "not ok NAME: why".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/docs.sh BUILD}")
+cd "$(dirname "$0")/../.." || exit 1
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0 what=docs
+. tests/end_to_end/expect.sh
+
+# Headings of a page as the fragments that links name: lower case, blanks as -, no other punctuation.
+fragments() {
+    sed -n 's/^##* //p' "$1" | tr '[:upper:]' '[:lower:]' | sed 's/[^[:alnum:] _-]//g; s/ /-/g'
+}
+# Of files given by name: a line for each link that leads nowhere. Links in code are not links.
+dead_links() {
+    local page link file
+    for page in "$@"; do
+        awk '/^```/ { code = !code } !code && !/^    /' "$page" | sed 's/`[^`]*`//g' | grep -oE '\]\([^) ]+\)' |
+            sed 's/^](//; s/)$//' | grep -vE '^[a-z]+:' | while read -r link; do
+            file=${link%%#*}
+            if [ -z "$file" ]; then file=$page; else file=$(dirname "$page")/$file; fi
+            if [ ! -e "$file" ]; then
+                echo "$page: $link"
+            elif [[ $link == *#* ]] && ! fragments "$file" | grep -qxF -- "${link#*#}"; then
+                echo "$page: $link: no such heading"
+            fi
+        done
+    done
+}
+
+mapfile -t pages < <(git ls-files -co --exclude-standard -- '*.md' | while read -r f; do [ -e "$f" ] && echo "$f"; done)
+tell "links of ${#pages[@]} pages" "$(dead_links "${pages[@]}")"
+
+mkdir "$tmp/docs"
+printf '# One page\n[a](../two.md#a-heading-2) [b](gone.md) [c](../two.md#gone) [d](#one-page) `[e](code.md)`\n' >"$tmp/docs/one.md"
+printf '## A heading, 2\n' >"$tmp/two.md"
+tell "control: two dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed "s,^$tmp/,," |
+    diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\n'))"
+
+# Sources in code of pages, by name or from the top, and pages named in sources: those that are not there. NAME stands for any.
+git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u >"$tmp/names"
+missing_names() {
+    grep -oE '`[A-Za-z0-9_/]+\.(c|h|cc|sh|mjs|js)`' "$@" /dev/null | tr -d '`' | grep -v NAME | while IFS=: read -r page name; do
+        case $name in
+        */*) [ -e "$name" ] || [ -e "$(dirname "$page")/$name" ] || echo "$page: $name" ;;
+        *) grep -qxF "$name" "$tmp/names" || echo "$page: $name" ;;
+        esac
+    done
+}
+tell "sources that pages name" "$(missing_names "${pages[@]}")"
+tell "pages that sources name" "$(git grep -oE '\b(renderer|reference|tools|tests)/[A-Za-z_/-]+\.md\b' -- '*.[ch]' '*.sh' '*.mk' '*.rubric' '*.json' |
+    while IFS=: read -r source page; do [ -e "$page" ] || echo "$source: $page"; done)"
+printf '`docs.sh` and `gone_for_good.c`\n' >"$tmp/three.md"
+tell "control: a name that is not there is seen" "$(missing_names "$tmp/three.md" | diff - <(echo "$tmp/three.md: gone_for_good.c"))"
+
+# From here on a directory with the checkout's names in it, which takes what examples write.
+top=$PWD
+cd "$tmp" || exit 1
+ln -s "$build" build
+ln -s "$top/tools" "$top/reference" "$top/tests" .
+
+# Code in a page: indented lines below a heading; or lines that begin with "$ ".
+code_below() { # PAGE HEADING
+    awk -v head="$2" '/^#/ { on = $0 == head } on && sub(/^    /, "")' "$1"
+}
+walk() {
+    code_below tools/docs/guide-course.md "## A graded submission in five minutes" | grep -v '^make$' >walk.sh
+    bash -e walk.sh >walk.out 2>&1 || head -c 1000 walk.out
+    grep -q '^"ada",10.00,10,' grades/grades.csv && grep -q '^"bob",4.00,10,' grades/grades.csv || cat grades/grades.csv
+}
+
+# Names in the first cells of a page's tables of keys; keys of JSON.
+page_keys() { # PAGE
+    awk -F'|' '/^\|/ { if (!table) in_keys = $2 ~ /^ (key|attribute|channel)/; table = 1; if (in_keys) print $2 } !/^\|/ { table = 0 }' "$1" |
+        grep -o '`[^`]*`' | tr -d '`' | sort -u
+}
+json_keys() { # FILE...
+    cat "$@" | grep -oE '"[a-z0-9_]+" *:' | grep -oE '[a-z0-9_]+' | sort -u
+}
+# A line for each key of the file's list ($1) that the page lacks, and for each of the page that nothing in the programs has.
+differ() { # KEYS PAGE
+    local key
+    page_keys "$2" >keys.page
+    comm -23 "$1" keys.page | sed "s,$, is not in ${2##*/};,"
+    while read -r key; do
+        grep -rqF --include='*.c' --include='*.h' "\"$key" "$top/tools" "$top/reference" "$top/renderer" || echo "$key of ${2##*/} is nowhere;"
+    done < <(comm -13 "$1" keys.page)
+}
+
+formats=tools/docs/formats
+walk >walk.why 2>&1
+if grep -q "no sandbox" walk.out; then
+    echo "skip docs: the five-minute walk ($(head -c 300 walk.out))"
+else
+    tell "the five-minute walk of the guide" "$(cat walk.why)"
+    json_keys grades/*/grade.json grades/*/results.json >keys
+    tell "keys of grades" "$(differ keys $formats/grades.md)"
+fi
+
+scene=reference/scenes/13_square_patch.dae
+for seed in 1 2; do build/pathtracer -q -r 16 16 -s 16 --seed $seed -f $seed.exr $scene >out 2>&1; done
+build/assay compare -q --tile 16 --margin 0.5 --json compare.json 1.exr 2.exr
+build/assay validate -q --only 12_point_plane -o validated >out 2>&1
+build/assay converge -q --shrink 4 -k 4 --ladder 1,4,16 --engine pathtracer --engine pathtracer-sobol -o converged 13_square_patch >out 2>&1
+json_keys compare.json validated/results.json converged/results.json >keys
+tell "keys of results" "$(differ keys $formats/results.md)"
+
+build/assay plan --parts 2 pathtracer -s 4 -r 32 32 -f cells.exr $scene >out 2>&1
+build/assay run-job cells.exr.plan 0 1 >out 2>&1 || cat out
+json_keys cells.exr.plan/plan.jsonl cells.exr.plan/jobs/*/job.json >keys
+tell "keys of plans" "$(differ keys $formats/plan.md)"
+tell "control: a key too few and one too many are seen" "$( (grep -v '^key$' keys; echo no_such_key) | sort >keys.control
+    grep -v '^| `host`' $formats/plan.md | sed 's/^| `cwd`/| `cwd`, `other_such_key`/' >plan.md
+    differ keys.control plan.md | diff - <(printf '%s is not in plan.md;\n' host no_such_key; echo "other_such_key of plan.md is nowhere;"))"
+
+# The example of the EXR is a session: its commands, and names before a colon.
+example() { awk '/^```text/ { on = 1; next } /^```/ { on = 0 } on' $formats/moments-exr.md; }
+example | sed -n 's/^\$ //p' >session.sh
+bash -e session.sh >session.out 2>&1
+names() { grep -oE '^ +[A-Za-z:]+( list: .*|:)' | sort; }
+tell "the example of a moments EXR" "$(example | names | diff - <(grep -v oiio: session.out | names) | head -5)"
+names <session.out | sed -n 's/^ *\(assay:.*\):$/\1/p; s/.*channel list: //p' | tr -d ' ' | tr , '\n' | sort >keys
+tell "attributes and channels of a moments EXR" "$(differ keys $formats/moments-exr.md)"
+[ $failures -eq 0 ]

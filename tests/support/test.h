@@ -1,0 +1,80 @@
+/* Test programs. A file of tests is a list of
+ *     TEST(name)
+ *     {
+ *         ...
+ *     }
+ * and has no main(): that stands in test.c and runs them in the order of the file, by cmocka. */
+#ifndef ASSAY_TESTS_TEST_H
+#define ASSAY_TESTS_TEST_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+void test_add(const char *name, CMUnitTestFunction run, CMFixtureFunction set_up,
+              CMFixtureFunction tear_down);
+void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
+
+#define TEST(name) TEST_WITH(name, NULL, NULL)
+/* What set_up leaves in *state is the test's, and tear_down frees it. */
+#define TEST_WITH(name, set_up, tear_down)                                                         \
+    static void name(void **state);                                                                \
+    static __attribute__((constructor)) void name##_add(void)                                      \
+    {                                                                                              \
+        test_add(#name, name, set_up, tear_down);                                                  \
+    }                                                                                              \
+    static void name(__attribute__((unused)) void **state)
+/* Once before all tests of the file, and once after them. */
+#define TEST_GROUP(set_up, tear_down)                                                              \
+    static __attribute__((constructor)) void group_add(void)                                       \
+    {                                                                                              \
+        test_add_group(set_up, tear_down);                                                         \
+    }
+
+#define COUNT(a) (sizeof(a) / sizeof *(a))
+
+/* "DIR/name" in a directory of this program's own, which is made when it is first asked for and removed with all that is
+ * in it after the tests. One of 16 buffers, which take turns. */
+const char *test_path(const char *name);
+/* The whole file with a 0 behind it; the caller frees. Writes one of those bytes. */
+char *test_read(const char *path);
+void test_write(const char *path, const void *bytes, size_t size);
+
+/* Fails at the first line of the text that is not the one of the file `expected`. Numbers are the same that differ by
+ * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
+void test_same_text(const char *text, const char *expected);
+
+/* In double precision, unlike cmocka's own. */
+#define assert_near(a, b, tolerance)                                                               \
+    do {                                                                                           \
+        double a_ = (double)(a), b_ = (double)(b);                                                 \
+        if (!(fabs(a_ - b_) <= (tolerance)))                                                       \
+            fail_msg("%s is %.15g, expected %.15g", #a, a_, b_);                                   \
+    } while (0)
+
+/* What must not fail for the test to mean anything: else it fails with the line in `e`. */
+#define MUST(call)                                                                                 \
+    do {                                                                                           \
+        if (!(call))                                                                               \
+            fail_msg("%s", e.msg);                                                                 \
+    } while (0)
+
+/* The call must fail, with one line in `e` that holds `why`. */
+#define REFUSES(call, why)                                                                         \
+    do {                                                                                           \
+        const char *why_ = (why);                                                                  \
+        *e.msg = '\0';                                                                             \
+        if (call)                                                                                  \
+            fail_msg("does not fail with '%s'", why_);                                             \
+        if (strstr(e.msg, why_) == NULL || strchr(e.msg, '\n') != NULL)                            \
+            fail_msg("'%s' does not say '%s'", e.msg, why_);                                       \
+    } while (0)
+
+#endif

@@ -1,0 +1,21 @@
+#include "input.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+void input_notes_add(struct notes *notes, const char *format, ...)
+{
+    int most = (int)(sizeof notes->line / sizeof notes->line[0]);
+    if (notes->num == most)
+        return;
+    char *line = notes->line[notes->num];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line, sizeof notes->line[0], format, args);
+    va_end(args);
+    for (int i = 0; i < notes->num; i++)
+        if (strcmp(notes->line[i], line) == 0)
+            return;
+    notes->num++;
+}

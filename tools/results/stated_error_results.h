@@ -1,0 +1,19 @@
+/* "consistency" in results.json (tools/docs/formats/results.md): claims about the error that our renders state
+ * (stated_error.h). pixels and image are 0 where two renders are the same. */
+#ifndef ASSAY_STATED_ERROR_RESULTS_H
+#define ASSAY_STATED_ERROR_RESULTS_H
+
+#include "results.h"
+
+#include <stdio.h>
+
+/* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
+bool stated_error_check(const json_t *consistency, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+enum outcome stated_error_outcome(const json_t *claim);
+
+/* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
+void stated_error_print(FILE *f, const json_t *consistency, bool markdown);
+
+#endif

@@ -1,0 +1,22 @@
+#include "validate_internal.h"
+
+#include "renderer/base/progress.h"
+
+#include <math.h>
+#include <stdio.h>
+
+double validate_time_left(const struct validation *v)
+{
+    return v->deadline - now_seconds();
+}
+
+void validate_log(const struct validation *v, const char *scene, const char *what)
+{
+    if (v->opt->quiet)
+        return;
+    fprintf(stderr, "[%2d/%d", v->done, v->num_tasks);
+    if (isfinite(v->deadline))
+        fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, validate_time_left(v)),
+                v->opt->budget_s);
+    fprintf(stderr, "] %s: %s\n", scene, what);
+}
