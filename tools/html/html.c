@@ -48,12 +48,11 @@ static void print_value(FILE *f, const char *conversion, size_t length, va_list 
         html_text(f, va_arg(*values, const char *));
     else if (strchr("aefg", type) != NULL)
         fprintf(f, format, va_arg(*values, double));
-    else if (size == 'z')
-        fprintf(f, format, va_arg(*values, size_t));
-    else if (size == 'l')
-        fprintf(f, format, va_arg(*values, long long));
     else
-        fprintf(f, format, va_arg(*values, int));
+        fprintf(f, "%lld",
+                size == 'z'   ? (long long)va_arg(*values, size_t)
+                : size == 'l' ? va_arg(*values, long long)
+                              : va_arg(*values, int));
 }
 
 void html_vprint(FILE *f, const char *format, va_list values)

@@ -18,8 +18,8 @@ void html_text(FILE *f, const char *s);
 /* The same as text that may go on in another line behind each underscore. */
 void html_name(FILE *f, const char *s);
 
-/* As fprintf(), but that the text of each %s is escaped (NULL is "", no width or precision). Markup stands in the
- * format. */
+/* As fprintf(), but that the text of each %s is escaped (NULL is ""). Markup stands in the format; only
+ * floating-point numbers may have flags, width or precision. */
 void html_print(FILE *f, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void html_vprint(FILE *f, const char *format, va_list values);
 
