@@ -140,6 +140,14 @@ struct number_text html_duration(double seconds)
     return out;
 }
 
+void html_p_value(FILE *f, double log10_p)
+{
+    if (log10_p > -4)
+        fprintf(f, "%.3g", pow(10, log10_p));
+    else
+        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
+}
+
 void html_base64(FILE *f, const void *bytes, size_t size)
 {
     const uint8_t *p = bytes;

@@ -35,6 +35,9 @@ struct number_text html_number(double v);
 /* "0.5 s", "12 s", "3 min 5 s", "2 h 3 min". */
 struct number_text html_duration(double seconds);
 
+/* 0.0123, or 10 to the power of what is smaller. */
+void html_p_value(FILE *f, double log10_p);
+
 void html_base64(FILE *f, const void *bytes, size_t size);
 
 /* Up to <main>, with the style sheet of all pages and a policy that lets nothing in from elsewhere. `script`: the only
