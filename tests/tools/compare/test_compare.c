@@ -104,7 +104,7 @@ TEST(test_pyramid_brute_force)
     const int sizes[][3] = {{5, 3, 1}, {12, 18, 6},  {16, 16, 4},
                             {1, 1, 1}, {40, 10, 10}, {7, 7, 7}};
     uint64_t seed = 5;
-    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
+    for (size_t s = 0; s < COUNT(sizes); s++) {
         int w = sizes[s][0], h = sizes[s][1], tile = sizes[s][2];
         struct moments a = new_moments(w, h, "sample"), b = new_moments(w, h, "sample");
         simulate(&a, LAW_EXPONENTIAL, 1, 7, false, &seed);
@@ -502,102 +502,73 @@ TEST(test_channels)
     moments_free(&b);
 }
 
-enum fault {
-    FAULT_NONE,
-    FAULT_SIZE,
-    FAULT_NAN,
-    FAULT_NAN_M3,
-    FAULT_INF,
-    FAULT_NEGATIVE,
-    FAULT_M2,
-    FAULT_N,
-    FAULT_N_NONE,
-    FAULT_UNIT,
-    FAULT_STRATIFIED,
-    FAULT_EXACT,
-    FAULT_IDENTICAL,
-    FAULT_BLACK,
-    FAULT_ALPHA,
-    FAULT_ALPHA_NAN,
-    FAULT_MARGIN,
-    FAULT_MARGIN_HALF,
-    FAULT_TILE,
-    FAULT_TILE_ZERO,
-};
-
-static void inject(enum fault fault, struct moments *m, struct compare_options *opt)
+static void expect(const struct moments *b, struct compare_options opt, const char *line)
 {
-    switch (fault) {
-    case FAULT_NONE:
-    case FAULT_SIZE: break;
-    case FAULT_NAN: m->mean[3 * 5 + 1] = NAN; break;
-    case FAULT_NAN_M3: m->m3[3 * 5 + 1] = NAN; break;
-    case FAULT_INF: m->m2[3 * 5 + 1] = INFINITY; break;
-    case FAULT_NEGATIVE: m->mean[3 * 5 + 2] = -0.1; break;
-    case FAULT_M2: m->m2[3 * 5 + 2] = -1; break;
-    case FAULT_N: m->n[5] = 2; break;
-    case FAULT_N_NONE: m->n[5] = 0; break;
-    case FAULT_UNIT: strcpy(m->unit, "frame"); break;
-    case FAULT_STRATIFIED: strcpy(m->unit, "stratified"); break;
-    case FAULT_EXACT: strcpy(m->unit, "exact"); break;
-    case FAULT_IDENTICAL: set_all(m, 8, 1, 0, 0); break;
-    case FAULT_BLACK:
-        set_all(m, 8, 0, 0, 0);
-        m->m2[0] = 1e-30;
-        break;
-    case FAULT_ALPHA: opt->alpha = 0.5; break;
-    case FAULT_ALPHA_NAN: opt->alpha = NAN; break;
-    case FAULT_MARGIN: opt->margin_global = 0.5; break;
-    case FAULT_MARGIN_HALF: opt->margin_global = 0; break;
-    case FAULT_TILE: opt->tile = 3; break;
-    case FAULT_TILE_ZERO: opt->tile = 0; break;
-    }
+    struct moments a = new_moments(4, 4, "sample");
+    struct comparison c;
+    struct err e = {"untouched"};
+    set_all(&a, 64, 1, 0.5, 0);
+    bool judged = compare_moments(&a, b, &opt, &c, &e);
+    assert_true(judged == (line == NULL));
+    assert_string_equal(e.msg, judged ? "untouched" : line);
+    if (judged)
+        comparison_free(&c);
+    moments_free(&a);
 }
 
 /* Each fault on its own, in B: refused with its own line. Control: without it, judged. */
 TEST(test_hygiene)
 {
+    const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0};
+    struct compare_options opt = right;
+    struct moments b = new_moments(4, 4, "replicate"), tall = new_moments(4, 8, "replicate");
     const struct {
-        enum fault fault;
+        double *at, value;
         const char *line;
     } cases[] = {
-        {FAULT_NONE, NULL},
-        {FAULT_SIZE, "A is 4 x 4 pixels, B is 4 x 8"},
-        {FAULT_NAN, "B: pixel 1,1 is not a number"},
-        {FAULT_NAN_M3, "B: pixel 1,1 is not a number"},
-        {FAULT_INF, "B: pixel 1,1 is infinite"},
-        {FAULT_NEGATIVE, "B: pixel 1,1 has negative radiance -0.1"},
-        {FAULT_M2, "B: pixel 1,1 has a negative sum of squares -1"},
-        {FAULT_N, "B: pixel 1,1 has 2 observations, at least 3 are needed"},
-        {FAULT_N_NONE, "B: pixel 1,1 has 0 observations, at least 3 are needed"},
-        {FAULT_UNIT, "B: unknown unit 'frame' of an observation"},
-        {FAULT_STRATIFIED, "B: its samples depend on each other (--sampler sobol), so its variance "
-                           "is unknown: only replicates with seeds of their own may be compared"},
-        {FAULT_EXACT, "B: pixel 0,0 is called exact but has variance"},
-        {FAULT_IDENTICAL, "B: 8 replicates without any variance: was the seed ignored?"},
-        {FAULT_BLACK, "B is black: relative differences have no unit"},
-        {FAULT_ALPHA, "alpha is 0.5, must lie in (0, 0.5)"},
-        {FAULT_ALPHA_NAN, "alpha is nan, must lie in (0, 0.5)"},
-        {FAULT_MARGIN, "margins 0.5 (image) and 0.02 (tile): must be 0 <= image <= tile < 1"},
-        {FAULT_MARGIN_HALF, "margins 0 (image) and 0.02 (tile): both or none must be 0"},
-        {FAULT_TILE, "tile side 3 does not divide the image's 4 x 4 pixels"},
-        {FAULT_TILE_ZERO, "tile side 0 does not divide the image's 4 x 4 pixels"},
+        {&b.mean[16], NAN, "B: pixel 1,1 is not a number"},
+        {&b.m3[16], NAN, "B: pixel 1,1 is not a number"},
+        {&b.m2[16], INFINITY, "B: pixel 1,1 is infinite"},
+        {&b.mean[17], -0.1, "B: pixel 1,1 has negative radiance -0.1"},
+        {&b.m2[17], -1, "B: pixel 1,1 has a negative sum of squares -1"},
+        {&b.n[5], 2, "B: pixel 1,1 has 2 observations, at least 3 are needed"},
+        {&b.n[5], 0, "B: pixel 1,1 has 0 observations, at least 3 are needed"},
+        {&opt.alpha, 0.5, "alpha is 0.5, must lie in (0, 0.5)"},
+        {&opt.alpha, NAN, "alpha is nan, must lie in (0, 0.5)"},
+        {&opt.margin_global, 0.5,
+         "margins 0.5 (image) and 0.02 (tile): must be 0 <= image <= tile < 1"},
+        {&opt.margin_global, 0, "margins 0 (image) and 0.02 (tile): both or none must be 0"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        struct moments a = new_moments(4, 4, "sample");
-        struct moments b = new_moments(4, cases[i].fault == FAULT_SIZE ? 8 : 4, "replicate");
-        struct compare_options opt = {1e-3, 0.01, 0.02, 2, 0};
-        set_all(&a, 64, 1, 0.5, 0);
+    for (size_t i = 0; i < COUNT(cases); i++) {
         set_all(&b, 8, 1, 0.5, 0);
-        inject(cases[i].fault, &b, &opt);
-        struct comparison c;
-        struct err e = {"untouched"};
-        bool judged = compare_moments(&a, &b, &opt, &c, &e);
-        assert_true(judged == (cases[i].line == NULL));
-        assert_string_equal(e.msg, judged ? "untouched" : cases[i].line);
-        if (judged)
-            comparison_free(&c);
-        moments_free(&a);
-        moments_free(&b);
+        opt = right;
+        *cases[i].at = cases[i].value;
+        expect(&b, opt, cases[i].line);
     }
+    set_all(&b, 8, 1, 0.5, 0);
+    expect(&b, right, NULL);
+    opt = right;
+    opt.tile = 3;
+    expect(&b, opt, "tile side 3 does not divide the image's 4 x 4 pixels");
+    opt.tile = 0;
+    expect(&b, opt, "tile side 0 does not divide the image's 4 x 4 pixels");
+    set_all(&tall, 8, 1, 0.5, 0);
+    expect(&tall, right, "A is 4 x 4 pixels, B is 4 x 8");
+    static const char *const units[][2] = {
+        {"frame", "B: unknown unit 'frame' of an observation"},
+        {"stratified", "B: its samples depend on each other (--sampler sobol), so its variance "
+                       "is unknown: only replicates with seeds of their own may be compared"},
+        {"exact", "B: pixel 0,0 is called exact but has variance"}};
+    for (size_t i = 0; i < COUNT(units); i++) {
+        strcpy(b.unit, units[i][0]);
+        expect(&b, right, units[i][1]);
+    }
+    strcpy(b.unit, "replicate");
+    set_all(&b, 8, 1, 0, 0);
+    expect(&b, right, "B: 8 replicates without any variance: was the seed ignored?");
+    set_all(&b, 8, 0, 0, 0);
+    b.m2[0] = 1e-30;
+    expect(&b, right, "B is black: relative differences have no unit");
+    moments_free(&b);
+    moments_free(&tall);
 }

@@ -320,9 +320,8 @@ TEST(test_two_stages_in_sequence)
     struct comparison r;
     struct err e;
     int stage;
-    assert_false(
-        alpha_spending_judge(&alpha_spending_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e));
-    assert_non_null(strstr(e.msg, "fresh seeds"));
+    REFUSES(
+        alpha_spending_judge(&alpha_spending_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e), "fresh seeds");
     for (int k = 0; k < 2; k++) {
         moments_free(&c.a[k].m);
         moments_free(&c.b[k].m);
