@@ -6,6 +6,7 @@
 #include "reference/base/process.h"
 #include "reference/base/image_oiio.h"
 #include "renderer/base/fs.h"
+#include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
@@ -201,16 +202,11 @@ static double at_most(int k, int n, double p)
 
 TEST(test_intervals)
 {
-    double lo, hi;
-    anchors_clopper_pearson(0, 200, &lo, &hi);
-    assert_near(lo, 0, 0);
-    assert_near(hi, 1 - pow(0.025, 1 / 200.0), 1e-12); /* (1-hi)^200 = 0.025 */
-    anchors_clopper_pearson(200, 200, &lo, &hi);
-    assert_near(lo, pow(0.025, 1 / 200.0), 1e-12);
-    assert_near(hi, 1, 0);
-    anchors_clopper_pearson(7, 200, &lo, &hi);
-    assert_near(1 - at_most(6, 200, lo), 0.025, 1e-9);
-    assert_near(at_most(7, 200, hi), 0.025, 1e-9);
+    assert_near(rate_upper(0, 200, 0.025), 1 - pow(0.025, 1 / 200.0), 1e-12); /* (1-hi)^200 */
+    assert_near(rate_lower(200, 200, 0.025), pow(0.025, 1 / 200.0), 1e-12);
+    assert_near(1 - at_most(6, 200, rate_lower(7, 200, 0.025)), 0.025, 1e-9);
+    assert_near(at_most(7, 200, rate_upper(7, 200, 0.025)), 0.025, 1e-9);
+    assert_true(rate_lower(0, 200, 0.025) == 0 && rate_upper(200, 200, 0.025) == 1);
 
     int at, low, high;
     anchors_quantile_ranks(200, 0.95, &at, &low, &high);

@@ -225,7 +225,8 @@ TEST(test_refused)
     paint(&c, NORMAL, 1, &seed);
     REFUSES(permutation_test(&a, &c, &opt, &p, &e), "4 x 4");
     memcpy(b.rgb[1], a.rgb[2], 48 * sizeof **a.rgb);
-    REFUSES(permutation_test(&a, &b, &opt, &p, &e), "2.exr of A and 1.exr of B are the same picture");
+    REFUSES(permutation_test(&a, &b, &opt, &p, &e),
+            "2.exr of A and 1.exr of B are the same picture");
     replicate_dir_free(&a);
     replicate_dir_free(&b);
     replicate_dir_free(&c);
