@@ -12,7 +12,7 @@
 #include "tools/diagnose/diagnose_render.h"
 #include "tools/validate/run_pathtracer.h"
 #include "tests/support/simulate.h"
-#include "tests/support/work.h"
+#include "tests/studies/calibration/work.h"
 
 #include <math.h>
 #include <stdio.h>

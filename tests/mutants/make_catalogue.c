@@ -13,8 +13,8 @@
  * What is there and up to date (the scene's and the patch's hash, the view's settings) is kept. */
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose_render.h"
-#include "tests/support/bug_effect.h"
-#include "tests/support/work.h"
+#include "bug_effect.h"
+#include "tests/studies/calibration/work.h"
 
 #include <math.h>
 #include <stdio.h>

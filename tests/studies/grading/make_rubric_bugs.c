@@ -10,8 +10,8 @@
  * effect within its noise is stored as none. Pictures are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
-#include "tests/support/bug_effect.h"
-#include "tests/support/work.h"
+#include "tests/mutants/bug_effect.h"
+#include "tests/studies/calibration/work.h"
 
 #include <limits.h>
 #include <math.h>
