@@ -200,10 +200,7 @@ TEST(links_lead_nowhere)
         skip();
     char secret[600], script[4096];
     snprintf(secret, sizeof secret, "%s/secret", box.dir.path);
-    FILE *f = fopen(secret, "w");
-    assert_non_null(f);
-    fputs("the golden\n", f);
-    fclose(f);
+    test_write(secret, "the golden\n", 11);
     assert_int_equal(chmod(secret, 0644), 0);
     snprintf(script, sizeof script, "ln -s %s out.png; ln -s /etc/passwd second; true", secret);
     assert_int_equal(run(script).end, SANDBOX_OK);
