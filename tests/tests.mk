@@ -20,7 +20,7 @@ PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagno
 BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
 # What several tests share: a library, of which each takes what it wants.
 SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c, \
-  $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c))
+  $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c tests/mutants/bug_effect.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
 RATES   := $(addprefix test_,calibration compare_rates converge permutation alpha_spending noise_estimate statistics)
 program  = $(addprefix $(1)/tests/,$(basename $(notdir $(2))))

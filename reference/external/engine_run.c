@@ -70,14 +70,14 @@ static bool command_line(const struct engine_job *j, uint32_t seed, const char *
 
 static bool run_process(struct engine_job *j, uint32_t seed, const char *out, struct err *e)
 {
-    char **block[3] = {NULL, NULL, NULL}, log[PATH_SIZE];
+    char **block[3] = {NULL, NULL, NULL};
     const char **argv = NULL;
     struct process_usage usage = {0};
-    snprintf(log, sizeof log, "%s/engine.log", j->dir);
+    const struct path log = fs_path("%s/engine.log", j->dir);
     bool ok = command_line(j, seed, out, block, &argv, e) &&
               process_run(
                   &(struct process){
-                      .argv = argv, .cwd = j->dir, .log = log, .timeout_s = j->opt->timeout_s},
+                      .argv = argv, .cwd = j->dir, .log = log.s, .timeout_s = j->opt->timeout_s},
                   &usage, e);
     j->cpu_s += usage.cpu_s;
     for (int i = 0; i < 3; i++)

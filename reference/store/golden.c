@@ -13,26 +13,16 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-enum { PATH_SIZE = 4096 };
-
-static bool golden_path(char out[PATH_SIZE], const char *golden_dir, const char *scene,
-                        const char *name, const char *suffix, struct err *e)
-{
-    int n = snprintf(out, PATH_SIZE, "%s/%s/%s%s", golden_dir, scene, name, suffix);
-    return (n > 0 && n < PATH_SIZE) || err_set(e, "%.64s...: path too long", golden_dir);
-}
-
 /* Of one engine's reference. next: of an image that the manifest may not describe yet. */
 struct place {
-    char exr[PATH_SIZE], next[PATH_SIZE], manifest[PATH_SIZE];
+    struct path exr, next, manifest;
 };
 
-static bool find_place(struct place *out, const char *golden_dir, const char *scene,
-                       const char *engine, struct err *e)
+static struct place find_place(const char *golden_dir, const char *scene, const char *engine)
 {
-    return golden_path(out->exr, golden_dir, scene, engine, ".exr", e) &&
-           golden_path(out->next, golden_dir, scene, engine, ".exr.next", e) &&
-           golden_path(out->manifest, golden_dir, scene, "manifest", ".json", e);
+    return (struct place){.exr = fs_path("%s/%s/%s.exr", golden_dir, scene, engine),
+                          .next = fs_path("%s/%s/%s.exr.next", golden_dir, scene, engine),
+                          .manifest = fs_path("%s/%s/manifest.json", golden_dir, scene)};
 }
 
 /* The manifest's object; an empty one if there is no file. */
@@ -56,17 +46,17 @@ static json_t *load_manifest(const char *path, struct err *e)
  * the same time. Close the descriptor to let go. */
 static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
 {
-    char dir[PATH_SIZE];
-    if (!golden_path(dir, golden_dir, scene, "", "", e) || !fs_make_dirs(dir, e))
+    const struct path dir = fs_path("%s/%s", golden_dir, scene);
+    if (!fs_make_dirs(dir.s, e))
         return -1;
-    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC), r = -1;
+    int fd = open(dir.s, O_RDONLY | O_DIRECTORY | O_CLOEXEC), r = -1;
     if (fd >= 0)
         do
             r = flock(fd, LOCK_EX);
         while (r != 0 && errno == EINTR);
     if (r == 0)
         return fd;
-    err_set(e, "%s: cannot lock: %s", dir, strerror(errno));
+    err_set(e, "%s: cannot lock: %s", dir.s, strerror(errno));
     if (fd >= 0)
         close(fd);
     return -1;
@@ -111,16 +101,14 @@ static bool settle(const json_t *entry, const char *exr, const char *next, struc
 
 bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
 {
-    struct place at;
-    if (!find_place(&at, golden_dir, scene, engine, e))
-        return false;
-    if (access(at.next, F_OK) != 0)
+    const struct place at = find_place(golden_dir, scene, engine);
+    if (access(at.next.s, F_OK) != 0)
         return true;
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest, e);
-    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr, at.next, e);
+    json_t *all = load_manifest(at.manifest.s, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr.s, at.next.s, e);
     json_decref(all);
     close(lock);
     return ok;
@@ -131,27 +119,26 @@ bool golden_settle(const char *golden_dir, const char *scene, const char *engine
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                   const struct moments *m, json_t *manifest, struct err *e)
 {
-    struct place at;
     char sha256[65];
-    if (!find_place(&at, golden_dir, scene, engine, e))
-        return false;
+    const struct place at = find_place(golden_dir, scene, engine);
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest, e), *entry = json_copy(manifest);
+    json_t *all = load_manifest(at.manifest.s, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
-    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr, at.next, e);
-    bool waits = ok && moments_write(at.next, m, attrs, 2, e);
-    ok = waits && sha256_file(at.next, sha256, e);
+    bool ok = all != NULL && settle(json_object_get(all, engine), at.exr.s, at.next.s, e);
+    bool waits = ok && moments_write(at.next.s, m, attrs, 2, e);
+    ok = waits && sha256_file(at.next.s, sha256, e);
     if (ok) {
         ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
              json_object_set(all, engine, entry) == 0;
-        ok = ok ? json_write(at.manifest, all, e) : err_set(e, "%s: out of memory", at.manifest);
+        ok =
+            ok ? json_write(at.manifest.s, all, e) : err_set(e, "%s: out of memory", at.manifest.s);
     }
     if (waits && !ok)
-        unlink(at.next); /* no manifest names it */
-    if (ok && rename(at.next, at.exr) != 0)
-        ok = err_set(e, "%s: cannot write: %s", at.exr, strerror(errno));
+        unlink(at.next.s); /* no manifest names it */
+    if (ok && rename(at.next.s, at.exr.s) != 0)
+        ok = err_set(e, "%s: cannot write: %s", at.exr.s, strerror(errno));
     json_decref(entry);
     json_decref(all);
     close(lock);
@@ -160,21 +147,19 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
 
 bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
 {
-    struct place at;
-    if (!find_place(&at, golden_dir, scene, engine, e))
-        return false;
-    if (access(at.manifest, F_OK) != 0 && access(at.exr, F_OK) != 0)
+    const struct place at = find_place(golden_dir, scene, engine);
+    if (access(at.manifest.s, F_OK) != 0 && access(at.exr.s, F_OK) != 0)
         return true;
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest, e);
+    json_t *all = load_manifest(at.manifest.s, e);
     bool ok = all != NULL;
     if (ok && json_object_del(all, engine) == 0)
-        ok = json_write(at.manifest, all, e);
+        ok = json_write(at.manifest.s, all, e);
     if (ok &&
-        ((unlink(at.exr) != 0 && errno != ENOENT) || (unlink(at.next) != 0 && errno != ENOENT)))
-        ok = err_set(e, "%s: cannot remove: %s", at.exr, strerror(errno));
+        ((unlink(at.exr.s) != 0 && errno != ENOENT) || (unlink(at.next.s) != 0 && errno != ENOENT)))
+        ok = err_set(e, "%s: cannot remove: %s", at.exr.s, strerror(errno));
     json_decref(all);
     close(lock);
     return ok;
@@ -263,24 +248,22 @@ static bool read_pair(const char *exr, const json_t *entry, struct moments *out,
 void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out)
 {
-    struct place at;
-    char where[PATH_SIZE + 32];
+    const struct place at = find_place(golden_dir, scene->name, ref->engine);
+    char where[PATH_MAX + 32];
     *out = (struct golden){.state = GOLDEN_DAMAGED};
     struct err *e = &out->why;
-    if (!find_place(&at, golden_dir, scene->name, ref->engine, e))
-        return;
-    json_t *all = load_manifest(at.manifest, e);
+    json_t *all = load_manifest(at.manifest.s, e);
     if (all == NULL)
         return;
-    snprintf(where, sizeof where, "%s: %s", at.manifest, ref->engine);
+    snprintf(where, sizeof where, "%s: %s", at.manifest.s, ref->engine);
     json_t *entry = json_object_get(all, ref->engine);
     struct err stale = {0};
     if (!json_is_object(entry)) {
         out->state = GOLDEN_MISSING;
-        err_set(e, "%s: no golden of %s: make it with `make golden`", at.exr, ref->engine);
+        err_set(e, "%s: no golden of %s: make it with `make golden`", at.exr.s, ref->engine);
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
-        if (read_pair(image_of(entry, at.exr, at.next), entry, &out->m, e)) {
+        if (read_pair(image_of(entry, at.exr.s, at.next.s), entry, &out->m, e)) {
             out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
             out->manifest = json_incref(entry);
         }
@@ -336,13 +319,11 @@ static bool is_wanted(const struct suite *suite, const char *scene, const char *
 static bool add_orphans(const char *golden_dir, const struct suite *suite, const char *scene,
                         json_t *found, struct err *e)
 {
-    char dir[PATH_SIZE], path[PATH_SIZE], name[PATH_SIZE + 300];
-    if (!golden_path(dir, golden_dir, scene, "", "", e) ||
-        !golden_path(path, golden_dir, scene, "manifest", ".json", e))
-        return false;
-    DIR *d = opendir(dir);
+    char name[PATH_MAX];
+    const struct path dir = fs_path("%s/%s", golden_dir, scene);
+    DIR *d = opendir(dir.s);
     if (d == NULL)
-        return errno == ENOTDIR || err_set(e, "%s: %s", dir, strerror(errno));
+        return errno == ENOTDIR || err_set(e, "%s: %s", dir.s, strerror(errno));
     struct dirent *entry;
     while ((entry = readdir(d)) != NULL) {
         const char *dot = strrchr(entry->d_name, '.');
@@ -355,7 +336,7 @@ static bool add_orphans(const char *golden_dir, const struct suite *suite, const
         json_object_set_new(found, name, json_true());
     }
     closedir(d);
-    json_t *all = load_manifest(path, e);
+    json_t *all = load_manifest(fs_path("%s/manifest.json", dir.s).s, e);
     const char *engine;
     json_t *value;
     json_object_foreach(all, engine, value)

@@ -12,30 +12,10 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 
-ok() { echo "ok $1"; }
-not_ok() {
-    echo "not ok $1: $2"
-    failures=$((failures + 1))
-}
-
-# expect NAME STATUS PATTERN COMMAND...: exit status, and a pattern in what it printed. A status of 3
-# has to come with exactly one line on stderr.
-expect() {
-    local name=$1 status=$2 pattern=$3
-    shift 3
-    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
-    local got=$?
-    if [ $got -ne "$status" ]; then
-        not_ok "$name" "exit status $got instead of $status: $(head -c 2000 "$tmp/err")"
-    elif ! cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern"; then
-        not_ok "$name" "no '$pattern' in: $(head -c 2000 "$tmp/out" "$tmp/err")"
-    elif [ "$status" -eq 3 ] && [ "$(wc -l <"$tmp/err")" -ne 1 ]; then
-        not_ok "$name" "$(wc -l <"$tmp/err") lines on stderr: $(head -c 2000 "$tmp/err")"
-    else
-        ok "$name"
-    fi
-}
-
+ok() { tell "$1" ""; }
+not_ok() { tell "$1" "${2:-?}"; }
+what=""
+. tests/end_to_end/expect.sh
 # part SCRIPT ARGUMENT...: one that prints such lines too. To have looked at nothing, or not to the end, is a failure.
 part() {
     local wrong status

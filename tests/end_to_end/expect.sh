@@ -1,9 +1,10 @@
-# For `source`, from the root of the checkout: lines "ok $what: NAME" and "not ok $what: NAME: why", the latter counted in $failures. Uses $tmp.
+# For `source`, from the root of the checkout: lines "ok $what: NAME" and "not ok $what: NAME: why", the latter counted in $failures; without
+# $what only the name. Uses $tmp.
 # shellcheck shell=bash disable=SC2154
 
 tell() { # NAME WHY: not ok where WHY says something
-    if [ -z "$2" ]; then echo "ok $what: $1"; else
-        echo "not ok $what: $1: $2"
+    if [ -z "$2" ]; then echo "ok ${what:+$what: }$1"; else
+        echo "not ok ${what:+$what: }$1: $2"
         failures=$((failures + 1))
     fi
 }

@@ -15,12 +15,8 @@ trap 'rm -rf "$tmp"' EXIT
 failures=0
 RANDOM=1 # the moments are the same parts of a run in every run of this script
 
-tell() { # NAME WHY: not ok where WHY says something
-    if [ -z "$2" ]; then echo "ok $1"; else
-        echo "not ok $1: $2"
-        failures=$((failures + 1))
-    fi
-}
+what=""
+. tests/end_to_end/expect.sh
 # As many kills as asked for, of at most five times as many tries and 50: on a busy machine a program may end sooner than when it was timed.
 more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills + 50)) ]; }
 too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }

@@ -8,13 +8,12 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 
+what=grading
+. tests/end_to_end/expect.sh
 check() { # NAME COMMAND...
     local name=$1
     shift
-    if "$@" >"$tmp/out" 2>&1; then echo "ok grading: $name"; else
-        echo "not ok grading: $name: $(head -c 1000 "$tmp/out")"
-        failures=$((failures + 1))
-    fi
+    tell "$name" "$("$@" >"$tmp/out" 2>&1 || { echo failed: && head -c 1000 "$tmp/out"; })"
 }
 student() { # NAME OPTION...: our program with these options besides
     mkdir -p "$tmp/submissions/$1"

@@ -8,17 +8,15 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 
+what=reproduce
+. tests/end_to_end/expect.sh
 expect() { # NAME STATUS PATTERN FILE [OPTION...]
     local name=$1 status=$2 pattern=$3 got
     shift 3
     "$assay" reproduce "$@" >"$tmp/out" 2>&1
     got=$?
-    if [ $got -eq "$status" ] && grep -q -- "$pattern" "$tmp/out"; then echo "ok reproduce: $name"; else
-        echo "not ok reproduce: $name: status $got: $(head -c 1000 "$tmp/out")"
-        failures=$((failures + 1))
-    fi
+    tell "$name" "$({ [ $got -eq "$status" ] && grep -q -- "$pattern" "$tmp/out"; } || echo "status $got: $(head -c 1000 "$tmp/out")")"
 }
-tell() { if [ -z "$2" ]; then echo "ok reproduce: $1"; else echo "not ok reproduce: $1: $2" && failures=$((failures + 1)); fi; }
 render() { # FILE ARGUMENT...
     local out=$1
     shift

@@ -17,6 +17,8 @@ render() { # THREADS ARGUMENT...
     "$pathtracer" -q -r 72 56 -s 6 --keep-state -t "$@" -f "$tmp/$1.exr" >"$tmp/out" 2>&1
 }
 
+what="1, 2, 3, 7 and 16 threads"
+. tests/end_to_end/expect.sh
 same_bits() { # NAME ARGUMENT...
     local name=$1 why="" t
     shift
@@ -26,10 +28,7 @@ same_bits() { # NAME ARGUMENT...
         [ -z "$why" ] && { cmp "$tmp/1.exr.state" "$tmp/$t.exr.state" >"$tmp/out" 2>&1 || why="$t threads: $(cat "$tmp/out")"; }
         [ -n "$why" ] && break
     done
-    if [ -z "$why" ]; then echo "ok 1, 2, 3, 7 and 16 threads: $name"; else
-        echo "not ok 1, 2, 3, 7 and 16 threads: $name: $why"
-        failures=$((failures + 1))
-    fi
+    tell "$name" "$why"
 }
 
 for scene in "$@"; do

@@ -8,18 +8,8 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 
-expect() { # NAME STATUS PATTERN COMMAND...: as in tests/end_to_end/end_to_end.sh
-    local name=$1 status=$2 pattern=$3 got
-    shift 3
-    "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
-    got=$?
-    if [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ $got -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; }; then
-        echo "ok $name"
-    else
-        echo "not ok $name: status $got, no '$pattern' in: $(head -c 1000 "$tmp/out") $(head -c 1000 "$tmp/err")"
-        failures=$((failures + 1))
-    fi
-}
+what=""
+. tests/end_to_end/expect.sh
 sum() { sha256sum "$1" | cut -d ' ' -f 1; }
 
 # assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate that is older than

@@ -7,21 +7,20 @@
  * sqrt(POOL/(POOL - 1)), which the pool's own mean takes from its scatter. Where a view asks for consistency, its
  * renders are drawn from POOL real ones without replacement, and judged; each such draw serves for
  * TRIES / CONSISTENT_DRAWS tries. PART (same, large, small, few, correct) measures only that. */
-#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose.h"
 #include "tools/diagnose/diagnose_render.h"
 #include "tools/validate/run_pathtracer.h"
 #include "tests/support/simulate.h"
+#include "tests/studies/calibration/work.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-enum { POOL = 200, TRIES = 10000, CONSISTENT_DRAWS = 1000, MOST_VIEWS = 64, MOST_THREADS = 64 };
+enum { POOL = 200, TRIES = 10000, CONSISTENT_DRAWS = 1000 };
 static const double alpha = 1e-6;
 
 struct rate_image {
@@ -69,61 +68,34 @@ struct claim_run {
     struct look look;
     char program[4400];
     struct observation *clue;
-    bool ok;
-    struct err e;
 };
 
-struct crew {
+struct looks {
     const struct rate_image *r;
     struct claim_run *task;
-    int num, next;
-    pthread_mutex_t lock;
 };
 
-struct worker {
-    struct crew *crew;
-    pthread_t thread;
-    char work[4400];
-};
-
-static void *work(void *arg)
+/* The directory in which look i is rendered. */
+static void work_dir(const struct rate_image *r, int i, char dir[4400])
 {
-    struct worker *w = arg;
-    for (;;) {
-        pthread_mutex_lock(&w->crew->lock);
-        int i = w->crew->next < w->crew->num ? w->crew->next++ : -1;
-        pthread_mutex_unlock(&w->crew->lock);
-        if (i < 0)
-            return NULL;
-        struct claim_run *t = &w->crew->task[i];
-        t->clue = calloc((size_t)w->crew->r->c.num_views, sizeof *t->clue);
-        t->ok = t->clue != NULL && look_at(w->crew->r, &t->look, w->work, t->clue, &t->e);
-    }
+    snprintf(dir, 4400, "%s/diagnose_rates/%d.%d", r->build, (int)getpid(), i);
+}
+
+static bool look_once(void *arg, int i, struct err *e)
+{
+    const struct looks *l = arg;
+    struct claim_run *t = &l->task[i];
+    char dir[4400];
+    work_dir(l->r, i, dir);
+    t->clue = calloc((size_t)l->r->c.num_views, sizeof *t->clue);
+    return (t->clue != NULL || err_set(e, "out of memory")) && fs_make_dirs(dir, e) &&
+           look_at(l->r, &t->look, dir, t->clue, e);
 }
 
 static bool look_at_all(const struct rate_image *r, struct claim_run *task, int num, struct err *e)
 {
-    static struct worker worker[MOST_THREADS];
-    struct crew crew = {.r = r, .task = task, .num = num};
-    int threads = cli_processors() < MOST_THREADS ? cli_processors() : MOST_THREADS, started = 0;
-    pthread_mutex_init(&crew.lock, NULL);
-    for (int i = 0; i < threads; i++, started++) {
-        worker[i].crew = &crew;
-        snprintf(worker[i].work, sizeof worker[i].work, "%s/diagnose_rates/%d.%d", r->build,
-                 (int)getpid(), i);
-        if (!fs_make_dirs(worker[i].work, e) ||
-            pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
-            break;
-    }
-    for (int i = 0; i < started; i++)
-        pthread_join(worker[i].thread, NULL);
-    pthread_mutex_destroy(&crew.lock);
-    for (int i = 0; i < num; i++)
-        if (!task[i].ok) {
-            *e = task[i].e;
-            return false;
-        }
-    return started > 0 || err_set(e, "no thread could be started");
+    struct looks looks = {r, task};
+    return work_run_all(num, look_once, &looks, e);
 }
 
 static void free_tasks(struct claim_run *task, int num)
@@ -318,11 +290,12 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     if (p->consistent_view < 0)
         return true;
     const struct view *v = &r->c.view[p->consistent_view];
-    char picture[4400], log[4400];
+    char dir[4400], picture[4500], log[4500];
     const struct suite_scene *found;
     const struct suite_variant *variant;
-    snprintf(picture, sizeof picture, "%s/diagnose_rates/%d.0/single.exr", r->build, (int)getpid());
-    snprintf(log, sizeof log, "%s/diagnose_rates/%d.0/single.log", r->build, (int)getpid());
+    work_dir(r, 0, dir);
+    snprintf(picture, sizeof picture, "%s/single.exr", dir);
+    snprintf(log, sizeof log, "%s/single.log", dir);
     if (!catalogue_view_scene(v, &r->suite, &found, &variant, e))
         return false;
     struct suite_scene scene = *found;

@@ -11,13 +11,12 @@
  * LONG_FACTOR times the samples.
  *
  * What is there and up to date (the scene's and the patch's hash, the view's settings) is kept. */
-#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose_render.h"
+#include "bug_effect.h"
+#include "tests/studies/calibration/work.h"
 
-#include <dirent.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,34 +66,6 @@ struct error_modes_base {
     struct diagnose_job job;
     struct signature batch[BATCHES];
 };
-
-static int by_name(const void *a, const void *b)
-{
-    return strcmp(((const struct bug *)a)->name, ((const struct bug *)b)->name);
-}
-
-static bool list_bugs(const char *dir, struct catalogue *c, struct err *e)
-{
-    enum { MOST = 512 };
-    struct dirent **entry;
-    int num = scandir(dir, &entry, NULL, NULL);
-    if (num < 0)
-        return err_set(e, "%s: cannot be read", dir);
-    c->bug = calloc(MOST, sizeof *c->bug);
-    bool ok = c->bug != NULL || err_set(e, "out of memory");
-    for (int i = 0; i < num; i++) {
-        char path[4400];
-        const char *dot = strrchr(entry[i]->d_name, '.');
-        snprintf(path, sizeof path, "%s/%s", dir, entry[i]->d_name);
-        if (ok && dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST)
-            ok = catalogue_bug_of_patch(path, &c->bug[c->num_bugs++], e);
-        free(entry[i]);
-    }
-    free(entry);
-    if (ok)
-        qsort(c->bug, (size_t)c->num_bugs, sizeof *c->bug, by_name);
-    return ok && (c->num_bugs > 0 || err_set(e, "%s: no patch", dir));
-}
 
 static bool set_view(struct maker *m, int i, struct view *v, struct err *e)
 {
@@ -195,45 +166,6 @@ static bool make_correct(struct error_modes_base *base, const char *program, str
     return true;
 }
 
-/* The mean difference and its variance. */
-static void set_effect(const struct error_modes_base *base, const struct signature *bug,
-                       const struct view *v, struct effect *out)
-{
-    int values = 3 * v->correct.columns * v->correct.rows;
-    bool same = same_values(&bug[0], &bug[1]); /* the seed is ignored */
-    struct signature a = signature_average(bug, BATCHES),
-                     c = signature_average(base->batch, BATCHES);
-    double level = 0, chi2 = 0;
-    int noisy = 0;
-    for (int i = 0; i < values; i++) {
-        double shape = a.var[i] + c.var[i], squares = 0;
-        for (int k = 0; k < BATCHES; k++)
-            squares += pow(bug[k].mean[i] - base->batch[k].mean[i] - (a.mean[i] - c.mean[i]), 2);
-        if (shape > 0) {
-            level += squares / (BATCHES - 1) / BATCHES / shape;
-            noisy++;
-        }
-    }
-    level = same ? BATCHES : fmax(noisy > 0 ? level / noisy : 0, 1e-3);
-    for (int i = 0; i < values; i++) {
-        double mean = a.mean[i] - c.mean[i], var = level * (a.var[i] + c.var[i]);
-        double rounding = 1e-6 * (a.mean[i] + c.mean[i]);
-        out->mean[i] = (float)mean;
-        out->var[i] = (float)var;
-        chi2 += mean * mean / (var + rounding * rounding + 1e-300);
-    }
-    out->pixels = chi2 > values + 6 * sqrt(2.0 * 3 * values);
-    if (!out->pixels) {
-        memset(out->mean, 0, sizeof out->mean);
-        memset(out->var, 0, sizeof out->var);
-    }
-    signature_set_spread(&a, &c);
-    for (int f = 0; f < NUM_FACTS; f++) {
-        out->fact[f] = a.fact[f];
-        out->fact_sd[f] = a.fact_sd[f];
-    }
-}
-
 static bool make_effect(const struct maker *m, const struct error_modes_base *base, struct view *v,
                         int b, struct err *e)
 {
@@ -250,7 +182,12 @@ static bool make_effect(const struct maker *m, const struct error_modes_base *ba
     v->effect[b] = calloc(1, sizeof *v->effect[b]);
     if (v->effect[b] == NULL)
         return err_set(e, "out of memory");
-    set_effect(base, bug, v, v->effect[b]);
+    struct signature a = signature_average(bug, BATCHES),
+                     c = signature_average(base->batch, BATCHES);
+    signature_set_spread(&a, &c);
+    /* Where the seed is ignored nothing scatters. */
+    bug_effect(bug, base->batch, BATCHES, same_values(&bug[0], &bug[1]) ? BATCHES : 0, NULL, &a,
+               v->effect[b]);
     return true;
 }
 
@@ -272,74 +209,22 @@ static void take_over(struct maker *m, struct view *v, bool *missing)
     }
 }
 
-/* Bugs of one view, rendered by several threads: each takes the next one that is missing. */
-struct crew {
+/* Bugs of one view that are missing. */
+struct effects {
     const struct maker *m;
     const struct error_modes_base *base;
     struct view *view;
     const bool *missing;
-    pthread_mutex_t lock;
-    int next;
-    bool ok;
-    struct err e;
 };
 
-struct worker {
-    struct crew *crew;
-    pthread_t thread;
-    char work[300];
-};
-
-static int next_bug(struct crew *c)
+static bool make_missing(void *arg, int b, struct err *e)
 {
-    pthread_mutex_lock(&c->lock);
-    while (c->next < c->m->made.num_bugs && !c->missing[c->next])
-        c->next++;
-    int b = c->ok && c->next < c->m->made.num_bugs ? c->next++ : -1;
-    pthread_mutex_unlock(&c->lock);
-    return b;
-}
-
-static void *work(void *arg)
-{
-    struct worker *w = arg;
-    struct error_modes_base base = *w->crew->base;
-    struct err e = {""};
-    base.job.work_dir = w->work;
-    for (int b; (b = next_bug(w->crew)) >= 0;)
-        if (!make_effect(w->crew->m, &base, w->crew->view, b, &e)) {
-            pthread_mutex_lock(&w->crew->lock);
-            w->crew->ok = false;
-            w->crew->e = e;
-            pthread_mutex_unlock(&w->crew->lock);
-        }
-    return NULL;
-}
-
-static bool make_effects(const struct maker *m, const struct error_modes_base *base, struct view *v,
-                         const bool *missing, struct err *e)
-{
-    enum { MOST = 64 };
-    static const struct worker none;
-    struct worker worker[MOST];
-    struct crew crew = {.m = m, .base = base, .view = v, .missing = missing, .ok = true};
-    int num = cli_processors() < MOST ? cli_processors() : MOST, started = 0;
-    pthread_mutex_init(&crew.lock, NULL);
-    for (int i = 0; i < num; i++) {
-        worker[i] = none;
-        worker[i].crew = &crew;
-        snprintf(worker[i].work, sizeof worker[i].work, "%s/%d", m->work, i);
-        if (!fs_make_dirs(worker[i].work, e) ||
-            pthread_create(&worker[i].thread, NULL, work, &worker[i]) != 0)
-            break;
-        started++;
-    }
-    for (int i = 0; i < started; i++)
-        pthread_join(worker[i].thread, NULL);
-    pthread_mutex_destroy(&crew.lock);
-    if (!crew.ok)
-        *e = crew.e;
-    return crew.ok && (started > 0 || err_set(e, "no thread could be started"));
+    const struct effects *x = arg;
+    struct error_modes_base base = *x->base;
+    char dir[300];
+    snprintf(dir, sizeof dir, "%s/%d", x->m->work, b);
+    base.job.work_dir = dir;
+    return !x->missing[b] || (fs_make_dirs(dir, e) && make_effect(x->m, &base, x->view, b, e));
 }
 
 static bool make_view(struct maker *m, int i, struct err *e)
@@ -371,7 +256,8 @@ static bool make_view(struct maker *m, int i, struct err *e)
     if (ok && any)
         ok = make_batches(base, program, e) &&
              (v->correct.columns > 0 || make_correct(base, program, v, e));
-    ok = ok && make_effects(m, base, v, missing, e);
+    struct effects effects = {m, base, v, missing};
+    ok = ok && work_run_all(m->made.num_bugs, make_missing, &effects, e);
     int seen = 0;
     for (int b = 0; ok && b < m->made.num_bugs; b++)
         seen += v->effect[b] != NULL;
@@ -405,7 +291,7 @@ int main(int argc, char **argv)
     m.build = argv[1];
     snprintf(m.work, sizeof m.work, "%s/catalogue", m.build);
     bool ok = suite_load("reference/scenes", &m.suite, &e) && fs_make_dirs(m.work, &e) &&
-              list_bugs(argv[2], &m.made, &e);
+              bug_list(argv[2], &m.made, &e);
     struct err none;
     if (ok && !catalogue_read(argv[3], &m.old, &none))
         printf("a new catalogue: %s\n", none.msg);

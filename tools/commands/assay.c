@@ -23,14 +23,14 @@ static const struct {
     {"grade", command_grade, "grade students' pictures and programs by a rubric"},
     {"report", command_report, "make the HTML page of a results.json"},
     {"golden", command_golden, "render, inspect and approve the stored references"},
-    {"reference", command_reference, "the same as golden render: with Cycles and POV-Ray"},
+    {"reference", command_reference, "the same as golden render: with Cycles, POV-Ray ..."},
     {"merge", command_merge, "add renders of cells or sample ranges of one picture"},
     {"reproduce", command_reproduce, "make a render or results again, and compare bits"},
     {"plan", command_plan, "cut a render, a batch, a validation or references into jobs"},
     {"run-job", command_run_job, "make some of the jobs of a plan"},
     {"gather", command_gather, "put the jobs of a plan together"},
     {"slurm", command_slurm, "all three, the jobs on a Slurm cluster"},
-    {"export", command_export, "write a scene for Cycles, POV-Ray, Mitsuba or pbrt"},
+    {"export", command_export, "write a scene for another renderer"},
 };
 
 static void print_help(void)

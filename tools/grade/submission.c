@@ -43,20 +43,19 @@ static bool stage_file(const char *from, const char *dir, struct err *e)
 
 bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
 {
-    char path[8192];
     if (!fs_make_dirs(dir, e))
         return false;
     chmod(dir, 0755);
     for (int i = 0; i < r->num_pictures; i++) {
         const struct rubric_picture *p = &r->picture[i];
-        snprintf(path, sizeof path, "%s/%s", r->dir, p->scene);
-        if (!stage_file(p->suite != NULL ? p->suite->dae : path, dir, e))
+        if (!stage_file(p->suite != NULL ? p->suite->dae : fs_path("%s/%s", r->dir, p->scene).s,
+                        dir, e))
             return false;
         if (p->suite != NULL && p->suite->environment[0] != '\0' &&
             !stage_file(p->suite->environment, dir, e))
             return false;
-        snprintf(path, sizeof path, "%s/%s", r->dir, p->environment);
-        if (p->environment[0] != '\0' && !stage_file(path, dir, e))
+        if (p->environment[0] != '\0' &&
+            !stage_file(fs_path("%s/%s", r->dir, p->environment).s, dir, e))
             return false;
     }
     return true;
@@ -194,28 +193,26 @@ bool submission_build(const struct rubric *r, const struct sandbox *box, const c
 {
     if (s->kind != SUBMISSION_SOURCE || s->why[0] != '\0')
         return true;
-    char out[MAX_PATH], built[2 * MAX_PATH];
+    const struct path out = fs_path("%s/build", work), built = fs_path("%s/tree.tar", out.s);
     const char *const argv[] = {"sh", "-c", r->build, NULL};
     struct sandbox_job job = {.argv = argv,
                               .tree = s->tree,
                               .keep_tree = true,
-                              .out = out,
+                              .out = out.s,
                               .log = log,
                               .limit = r->limit};
     struct sandbox_result result;
-    snprintf(out, sizeof out, "%s/build", work);
     job.limit.wall_s = job.limit.cpu_s = r->build_s;
     if (!sandbox_run(box, &job, &result, e))
         return false;
-    snprintf(built, sizeof built, "%s/tree.tar", out);
     if (result.end != SANDBOX_OK)
         snprintf(s->why, sizeof s->why, "building it failed: %s", result.why);
-    else if (access(built, R_OK) != 0)
+    else if (access(built.s, R_OK) != 0)
         snprintf(s->why, sizeof s->why, "what building made is larger than %zu MiB",
                  r->limit.disk >> 20);
-    else if (rename(built, s->tree) != 0 || chmod(s->tree, 0644) != 0)
+    else if (rename(built.s, s->tree) != 0 || chmod(s->tree, 0644) != 0)
         return err_set(e, "%s: %s", s->tree, strerror(errno));
-    return fs_remove_tree(out, e);
+    return fs_remove_tree(out.s, e);
 }
 
 bool submission_open(const struct rubric *r, const char *path, const char *work,

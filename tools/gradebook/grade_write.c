@@ -11,8 +11,6 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MAX_PATH = 4400 };
-
 /* To a hundredth of a point: more would be noise. */
 static double rounded(double points)
 {
@@ -287,22 +285,17 @@ static bool write_file(const char *dir, const json_t *grades, const char *name, 
 
 bool grade_write(const char *out, const json_t *grades, struct err *e)
 {
-    char path[MAX_PATH];
     size_t i;
     json_t *g;
     bool ok = true;
     json_array_foreach(grades, i, g)
     {
-        for (int k = 0; ok && files[k] != NULL; k++) {
-            snprintf(path, sizeof path, "%.4000s/%s/%s", out, member_or_empty(g, "id"), files[k]);
-            ok = write_file(out, g, files[k], path, e);
-        }
+        for (int k = 0; ok && files[k] != NULL; k++)
+            ok = write_file(out, g, files[k],
+                            fs_path("%s/%s/%s", out, member_or_empty(g, "id"), files[k]).s, e);
     }
-    snprintf(path, sizeof path, "%.4000s/grades.json", out);
-    ok = ok && json_write(path, grades, e);
-    for (int k = 0; ok && class_files[k] != NULL; k++) {
-        snprintf(path, sizeof path, "%.4000s/%s", out, class_files[k]);
-        ok = write_file(out, grades, class_files[k], path, e);
-    }
+    ok = ok && json_write(fs_path("%s/grades.json", out).s, grades, e);
+    for (int k = 0; ok && class_files[k] != NULL; k++)
+        ok = write_file(out, grades, class_files[k], fs_path("%s/%s", out, class_files[k]).s, e);
     return ok;
 }

@@ -48,12 +48,11 @@ static void print_value(FILE *f, const char *conversion, size_t length, va_list 
         html_text(f, va_arg(*values, const char *));
     else if (strchr("aefg", type) != NULL)
         fprintf(f, format, va_arg(*values, double));
-    else if (size == 'z')
-        fprintf(f, format, va_arg(*values, size_t));
-    else if (size == 'l')
-        fprintf(f, format, va_arg(*values, long long));
     else
-        fprintf(f, format, va_arg(*values, int));
+        fprintf(f, "%lld",
+                size == 'z'   ? (long long)va_arg(*values, size_t)
+                : size == 'l' ? va_arg(*values, long long)
+                              : va_arg(*values, int));
 }
 
 void html_vprint(FILE *f, const char *format, va_list values)
@@ -139,6 +138,14 @@ struct number_text html_duration(double seconds)
     else
         snprintf(out.s, sizeof out.s, "%.0f h %.0f min", floor(minutes / 60), fmod(minutes, 60));
     return out;
+}
+
+void html_p_value(FILE *f, double log10_p)
+{
+    if (log10_p > -4)
+        fprintf(f, "%.3g", pow(10, log10_p));
+    else
+        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
 }
 
 void html_base64(FILE *f, const void *bytes, size_t size)

@@ -18,8 +18,8 @@ void html_text(FILE *f, const char *s);
 /* The same as text that may go on in another line behind each underscore. */
 void html_name(FILE *f, const char *s);
 
-/* As fprintf(), but that the text of each %s is escaped (NULL is "", no width or precision). Markup stands in the
- * format. */
+/* As fprintf(), but that the text of each %s is escaped (NULL is ""). Markup stands in the format; only
+ * floating-point numbers may have flags, width or precision. */
 void html_print(FILE *f, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void html_vprint(FILE *f, const char *format, va_list values);
 
@@ -34,6 +34,9 @@ struct number_text html_percent_plain(double fraction);
 struct number_text html_number(double v);
 /* "0.5 s", "12 s", "3 min 5 s", "2 h 3 min". */
 struct number_text html_duration(double seconds);
+
+/* 0.0123, or 10 to the power of what is smaller. */
+void html_p_value(FILE *f, double log10_p);
 
 void html_base64(FILE *f, const void *bytes, size_t size);
 

@@ -45,10 +45,8 @@ static bool engine_inputs(struct plan *p, const char *engine, const char *share_
     const struct engine_driver *driver = engine_driver_of(engine);
     bool ok = true;
     char path[PLAN_PATH + 64];
-    for (int i = 0; ok && driver->scripts != NULL && driver->scripts[i] != NULL; i++) {
-        snprintf(path, sizeof path, "%.4000s/%s", share_dir, driver->scripts[i]);
-        ok = plan_input(p, path, e);
-    }
+    for (int i = 0; ok && driver->scripts != NULL && driver->scripts[i] != NULL; i++)
+        ok = plan_input(p, fs_path("%s/%s", share_dir, driver->scripts[i]).s, e);
     if (ok && !process_find(driver->program, path, sizeof path))
         return err_set(e, "%s: no such program in PATH", driver->program);
     ok = ok && plan_input(p, path, e);
@@ -60,8 +58,7 @@ static bool engine_inputs(struct plan *p, const char *engine, const char *share_
 bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e)
 {
     char path[PLAN_PATH + 64];
-    snprintf(path, sizeof path, "%.4000s/import_check/blender_import.py", share_dir);
-    bool ok = plan_input(p, path, e);
+    bool ok = plan_input(p, fs_path("%s/import_check/blender_import.py", share_dir).s, e);
     for (int i = 0; ok && i < NUM_ENGINES_WITH_GOLDENS; i++)
         if (i == ENGINE_cycles ||
             process_find(engine_driver_of(engine_names[i])->program, path, sizeof path))

@@ -74,15 +74,13 @@ static bool add_input(json_t *inputs, const char *path, struct err *e)
 
 bool plan_begin(struct plan *p, const char *output, const char *product, int cpus, struct err *e)
 {
-    char dir[PLAN_PATH], full[PATH_MAX];
-    int n = snprintf(dir, sizeof dir, p->dir[0] != '\0' ? "%s" : "%s.plan",
-                     p->dir[0] != '\0' ? p->dir : output);
-    if (n < 0 || (size_t)n >= sizeof dir)
-        return err_set(e, "%.64s...: path too long", output);
-    if (!fs_make_dirs(dir, e))
+    const struct path dir =
+        fs_path(p->dir[0] != '\0' ? "%s" : "%s.plan", p->dir[0] != '\0' ? p->dir : output);
+    char full[PATH_MAX];
+    if (!fs_make_dirs(dir.s, e))
         return false;
-    if (realpath(dir, full) == NULL || strlen(full) >= sizeof p->dir)
-        return err_set(e, "%s: %s", dir, strerror(errno));
+    if (realpath(dir.s, full) == NULL || strlen(full) >= sizeof p->dir)
+        return err_set(e, "%s: %s", dir.s, strerror(errno));
     strcpy(p->dir, full);
     return (json_object_set_new(p->head, "output", json_string(output)) == 0 &&
             json_object_set_new(p->head, "product", json_string(product)) == 0 &&

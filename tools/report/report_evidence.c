@@ -4,7 +4,6 @@
 #include "report_statistics.h"
 #include "tools/results/results.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,46 +17,43 @@ static void fact_close(FILE *f)
     fputs("</dd></div>\n", f);
 }
 
+static __attribute__((format(printf, 3, 4))) void write_fact(FILE *f, const char *label,
+                                                             const char *text, ...)
+{
+    va_list values;
+    va_start(values, text);
+    fact_open(f, label);
+    html_vprint(f, text, values);
+    fact_close(f);
+    va_end(values);
+}
+
 static void write_numbers(FILE *f, const json_t *claim)
 {
     double alpha = member_number(claim, "alpha");
-    fact_open(f, "Difference of the image mean");
-    fprintf(f, "%s, %.6g\u00a0%% interval %s to %s",
-            html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
-            html_percent_prose(member_end(claim, "ci", 0)).s,
-            html_percent_prose(member_end(claim, "ci", 1)).s);
-    fact_close(f);
+    write_fact(f, "Difference of the image mean", "%s, %.6g\u00a0%% interval %s to %s",
+               html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
+               html_percent_prose(member_end(claim, "ci", 0)).s,
+               html_percent_prose(member_end(claim, "ci", 1)).s);
     const json_t *channels = json_object_get(claim, "channel_difference");
-    fact_open(f, "In red, green, blue");
-    fprintf(f, "%s, %s, %s", html_percent_prose(json_number_value(json_array_get(channels, 0))).s,
-            html_percent_prose(json_number_value(json_array_get(channels, 1))).s,
-            html_percent_prose(json_number_value(json_array_get(channels, 2))).s);
-    fact_close(f);
-    fact_open(f, "Margin (counts as equal)");
-    fprintf(f, "±%s for the image, ±%s for a tile",
-            html_percent_plain(member_number(claim, "margin_global")).s,
-            html_percent_plain(member_number(claim, "margin_tile")).s);
-    fact_close(f);
-    fact_open(f, "Smallest bias this run would find");
-    fprintf(f, "%s of the image mean, %s of a tile",
-            html_percent_plain(member_number(claim, "mdb_global")).s,
-            html_percent_plain(member_number(claim, "mdb_tile")).s);
-    fact_close(f);
-    double log10_p = member_number(claim, "log10_p");
+    write_fact(f, "In red, green, blue", "%s, %s, %s",
+               html_percent_prose(json_number_value(json_array_get(channels, 0))).s,
+               html_percent_prose(json_number_value(json_array_get(channels, 1))).s,
+               html_percent_prose(json_number_value(json_array_get(channels, 2))).s);
+    write_fact(f, "Margin (counts as equal)", "±%s for the image, ±%s for a tile",
+               html_percent_plain(member_number(claim, "margin_global")).s,
+               html_percent_plain(member_number(claim, "margin_tile")).s);
+    write_fact(f, "Smallest bias this run would find", "%s of the image mean, %s of a tile",
+               html_percent_plain(member_number(claim, "mdb_global")).s,
+               html_percent_plain(member_number(claim, "mdb_tile")).s);
     fact_open(f, "p of “no difference beyond the margin”");
-    if (log10_p > -4)
-        fprintf(f, "%.3g", pow(10, log10_p));
-    else
-        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
+    html_p_value(f, member_number(claim, "log10_p"));
     fact_close(f);
-    fact_open(f, "Error rate (alpha)");
-    fprintf(f, "%.3g for this claim, divided over %.0f tests", alpha,
-            member_number(claim, "num_tests"));
-    fact_close(f);
-    fact_open(f, "Error of single pixels, noise removed");
-    fprintf(f, "%s of the mean radiance (root mean square)",
-            html_percent_plain(member_number(claim, "rms_bias")).s);
-    fact_close(f);
+    write_fact(f, "Error rate (alpha)", "%.3g for this claim, divided over %.0f tests", alpha,
+               member_number(claim, "num_tests"));
+    write_fact(f, "Error of single pixels, noise removed",
+               "%s of the mean radiance (root mean square)",
+               html_percent_plain(member_number(claim, "rms_bias")).s);
 }
 
 static void write_regions(FILE *f, const json_t *claim)
@@ -65,21 +61,19 @@ static void write_regions(FILE *f, const json_t *claim)
     static const char *const channel[] = {"red", "green", "blue", "luminance"};
     const json_t *tile = json_object_get(claim, "worst_tile");
     const json_t *worst = json_object_get(claim, "worst");
-    fact_open(f, "Tile that reaches furthest out");
-    fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
-            member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
-            member_number(claim, "tile"), html_percent_prose(member_number(tile, "difference")).s,
-            html_percent_prose(member_end(tile, "ci", 0)).s,
-            html_percent_prose(member_end(tile, "ci", 1)).s,
-            html_number(member_number(tile, "t")).s);
-    fact_close(f);
-    fact_open(f, "Smallest p of all regions");
-    fprintf(f, "x %.0f, y %.0f, %.0f × %.0f pixels in %s: %s, t = %s", member_number(worst, "x"),
-            member_number(worst, "y"), member_number(worst, "width"),
-            member_number(worst, "height"), channel[(size_t)member_number(worst, "channel")],
-            html_percent_prose(member_number(worst, "difference")).s,
-            html_number(member_number(worst, "t")).s);
-    fact_close(f);
+    write_fact(
+        f, "Tile that reaches furthest out",
+        "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
+        member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
+        member_number(claim, "tile"), html_percent_prose(member_number(tile, "difference")).s,
+        html_percent_prose(member_end(tile, "ci", 0)).s,
+        html_percent_prose(member_end(tile, "ci", 1)).s, html_number(member_number(tile, "t")).s);
+    write_fact(f, "Smallest p of all regions",
+               "x %.0f, y %.0f, %.0f × %.0f pixels in %s: %s, t = %s", member_number(worst, "x"),
+               member_number(worst, "y"), member_number(worst, "width"),
+               member_number(worst, "height"), channel[(size_t)member_number(worst, "channel")],
+               html_percent_prose(member_number(worst, "difference")).s,
+               html_number(member_number(worst, "t")).s);
     fact_open(f, "Very skewed regions");
     fputs(json_is_true(json_object_get(claim, "skew_limited"))
               ? "some small ones were merged into larger ones, where the t test holds"
@@ -87,9 +81,8 @@ static void write_regions(FILE *f, const json_t *claim)
           f);
     fact_close(f);
     if (member_number(claim, "extra_factor") > 1) {
-        fact_open(f, "Samples that would decide");
-        fprintf(f, "about %s times as many", html_number(member_number(claim, "extra_factor")).s);
-        fact_close(f);
+        write_fact(f, "Samples that would decide", "about %s times as many",
+                   html_number(member_number(claim, "extra_factor")).s);
     }
 }
 

@@ -5,14 +5,6 @@
 
 #include <math.h>
 
-static void write_p(FILE *f, double log10_p)
-{
-    if (log10_p > -4)
-        fprintf(f, "%.3g", pow(10, log10_p));
-    else
-        fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
-}
-
 static void write_row(FILE *f, const json_t *s, double alpha)
 {
     double share = member_number(s, "share"), log10_p = member_number(s, "log10_p");
@@ -30,7 +22,7 @@ static void write_row(FILE *f, const json_t *s, double alpha)
         return;
     }
     fputs("<td class=\"num\">", f);
-    write_p(f, log10_p);
+    html_p_value(f, log10_p);
     fprintf(f, "</td><td>%s</td><td>", rejects ? "<strong>DIFFERENT</strong>" : "nothing");
     if (log10_p < 0) /* else nothing stands out, and its place is none */
         html_text(f, member_text(s, "what"));

@@ -128,9 +128,9 @@ static void file_of(const struct validation *v, const struct side *s, int stage,
              stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n, ending);
 }
 
-static void full_path(const struct validation *v, const char *file, char path[MAX_PATH])
+static struct path full_path(const struct validation *v, const char *file)
 {
-    snprintf(path, MAX_PATH, "%s/%s", v->opt->out_dir, file);
+    return fs_path("%s/%s", v->opt->out_dir, file);
 }
 
 static double program_time(const struct validation *v)
@@ -142,12 +142,12 @@ static double program_time(const struct validation *v)
 static bool render_ours(const struct validation *v, const struct side *s, int stage, int look,
                         int first, struct side_image *out, struct err *e)
 {
-    char file[256], path[MAX_PATH], log[MAX_PATH];
+    char file[256];
     bool keep = first == 0 && v->sequence == &alpha_spending_single;
     file_of(v, s, stage, look, "log", file);
-    full_path(v, file, log);
+    const struct path log = full_path(v, file);
     file_of(v, s, stage, look, keep ? "exr" : "part.exr", file);
-    full_path(v, file, path);
+    const struct path path = full_path(v, file);
     const struct pathtracer_job job = {.program = v->opt->pathtracer,
                                        .scene = s->scene,
                                        .first = first,
@@ -156,15 +156,15 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                                        .options = s->variant != NULL ? s->variant->options : NULL,
                                        .threads = v->opt->threads,
                                        .timeout_s = program_time(v),
-                                       .picture = path,
-                                       .log = log};
-    if (!fs_make_parent_dirs(path, e) ||
+                                       .picture = path.s,
+                                       .log = log.s};
+    if (!fs_make_parent_dirs(path.s, e) ||
         !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))
         return false;
     out->written = keep;
     if (!keep) {
-        unlink(path);
-        unlink(log);
+        unlink(path.s);
+        unlink(log.s);
     }
     return true;
 }
@@ -194,12 +194,12 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
                                       .threads = o->threads,
                                       .timeout_s = program_time(v),
                                       .work_dir = o->out_dir};
-    char path[MAX_PATH], file[256];
+    char file[256];
     file_of(v, s, stage, LOOK_DECLARED, "json", file);
-    full_path(v, file, path);
+    const struct path path = full_path(v, file);
     if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
         return false;
-    return fs_make_parent_dirs(path, e) && json_write(path, out->manifest, e);
+    return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
 }
 
 static bool copy(const struct moments *m, struct moments *out, struct err *e)
@@ -320,11 +320,11 @@ bool side_write(const struct validation *v, struct side *s, int stage, int look,
                 struct err *e)
 {
     struct side_image *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
-    char path[MAX_PATH];
     assert(o->present);
     file_of(v, s, stage, look, "exr", file);
-    full_path(v, file, path);
-    if (!o->written && !(fs_make_parent_dirs(path, e) && moments_write(path, &o->m, NULL, 0, e)))
+    const struct path path = full_path(v, file);
+    if (!o->written &&
+        !(fs_make_parent_dirs(path.s, e) && moments_write(path.s, &o->m, NULL, 0, e)))
         return false;
     o->written = true;
     return true;

@@ -37,8 +37,7 @@ struct moments must_render(struct fixture *f, json_t *manifest)
 {
     struct err e;
     struct moments m;
-    if (!engine_driver_render(&povray_driver, &f->job, &m, manifest, &e))
-        fail_msg("%s", e.msg);
+    MUST(engine_driver_render(&povray_driver, &f->job, &m, manifest, &e));
     return m;
 }
 

@@ -29,15 +29,6 @@ static struct scene ball_of(enum material_kind kind)
     return s;
 }
 
-static struct camera finish(struct scene *s)
-{
-    struct err e;
-    struct camera c = {0};
-    if (!scene_finish(s, "test", &e) || !camera_init(&c, s, 40, 30, &e))
-        fail_msg("%s", e.msg);
-    return c;
-}
-
 /* The text of a pass; the caller frees. */
 static char *text_of(const struct scene *s, const struct camera *c, int depth, int pass)
 {
@@ -63,13 +54,10 @@ static int count(const char *text, const char *what)
 
 static void refused(struct scene *s, int depth, const char *why)
 {
-    struct err e = {"nothing"};
+    struct err e;
     struct povray_passes p;
-    struct camera c = finish(s);
-    assert_false(povray_passes(s, &c, depth, &p, &e));
-    if (strstr(e.msg, why) == NULL)
-        fail_msg("'%s' does not say '%s'", e.msg, why);
-    assert_null(strchr(e.msg, '\n'));
+    struct camera c = build_finish(s, 40, 30);
+    REFUSES(povray_passes(s, &c, depth, &p, &e), why);
     scene_free(s);
 }
 
@@ -77,7 +65,7 @@ static void refused(struct scene *s, int depth, const char *why)
 TEST(test_passes)
 {
     struct scene s = ball_of(MATERIAL_GLASS);
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     struct povray_passes p;
     struct err e;
     assert_true(povray_passes(&s, &c, 1, &p, &e));
@@ -97,7 +85,7 @@ TEST(test_passes)
 TEST(test_glass_text)
 {
     struct scene s = ball_of(MATERIAL_GLASS);
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     char *lit = text_of(&s, &c, 10, 0), *seen = text_of(&s, &c, 10, 1);
     for (int i = 0; i < 2; i++) {
         const char *text = i == 0 ? lit : seen;
@@ -121,13 +109,13 @@ TEST(test_mirror_and_refraction_text)
 {
     struct scene s = ball_of(MATERIAL_MIRROR);
     s.materials[2].reflectance = (rgb){.5f, .25f, 1};
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     char *text = text_of(&s, &c, 10, 0);
     assert_non_null(strstr(text, "finish { diffuse 0 reflection { rgb <0.5,0.25,1> } }"));
     free(text);
     scene_free(&s);
     s = ball_of(MATERIAL_REFRACTION);
-    c = finish(&s);
+    c = build_finish(&s, 40, 30);
     text = text_of(&s, &c, 10, 0);
     assert_non_null(strstr(text, "rgbf <0.5,0.75,1,1> } finish { diffuse 0 }"));
     assert_null(strstr(text, "fresnel"));
@@ -146,7 +134,7 @@ TEST(test_spot_text)
                                    .cos_cutoff = .5f,
                                    .exponent = 7,
                                    .attenuation = {1, 0, 0}});
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     char *text = text_of(&s, &c, 1, 0);
     assert_non_null(
         strstr(text, "spotlight point_at <0,1,1>\n    tightness 7 radius 60 falloff 60 }"));
@@ -178,7 +166,7 @@ TEST(test_sky_text)
 {
     struct err e;
     struct scene s = ball_of(MATERIAL_DIFFUSE);
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     add_sky(&s, image(2, 1));
     char *text = text_of(&s, &c, 3, 1);
     assert_non_null(strstr(text, "[0 rgb S*<1.5,2.5,3.5>] [0.25 rgb S*<0,1,2>] "
@@ -188,7 +176,7 @@ TEST(test_sky_text)
     scene_free(&s);
 
     s = ball_of(MATERIAL_DIFFUSE);
-    c = finish(&s);
+    c = build_finish(&s, 40, 30);
     add_sky(&s, environment_constant((rgb){1, 2, 3}, &e));
     text = text_of(&s, &c, 3, 0);
     assert_null(strstr(text, "background"));
@@ -204,11 +192,11 @@ TEST(test_sky_refused)
     struct err e;
     for (int which = 0; which < 2; which++) {
         struct scene s = ball_of(MATERIAL_DIFFUSE);
-        struct camera c = finish(&s);
+        struct camera c = build_finish(&s, 40, 30);
         struct povray_passes p;
         add_sky(&s, which == 0 ? environment_upper_half(grey(1), &e) : image(255, 2));
-        assert_false(povray_passes(&s, &c, 1, &p, &e));
-        assert_non_null(strstr(e.msg, which == 0 ? "only diffuse surfaces see" : "255 x 2"));
+        REFUSES(povray_passes(&s, &c, 1, &p, &e),
+                which == 0 ? "only diffuse surfaces see" : "255 x 2");
         scene_free(&s);
     }
 }
@@ -266,7 +254,7 @@ TEST(test_glass_meshes)
             refused(&s, 10, "reflects totally");
             continue;
         }
-        struct camera c = finish(&s);
+        struct camera c = build_finish(&s, 40, 30);
         char *text = text_of(&s, &c, 10, 1);
         assert_int_equal(strstr(text, "  no_reflection\n") != NULL, what == 3);
         free(text);
@@ -284,7 +272,7 @@ TEST(test_mixed_lights)
                                    .attenuation = {0, 0, 1}});
     build_sphere(&s, v3(.75f, 1, 0), .125f, 1, build_material(&s, grey(0), grey(2)));
     build_sphere(&s, v3(-.75f, 1, 0), .125f, 1, build_material(&s, grey(.5f), grey(2)));
-    struct camera c = finish(&s);
+    struct camera c = build_finish(&s, 40, 30);
     struct povray_passes p;
     struct err e;
     assert_true(povray_passes(&s, &c, 3, &p, &e));
@@ -317,7 +305,7 @@ TEST(test_lamp_points)
     s.objects[s.num_objects - 1].num_triangles = 2;
     s.tri_object[1] = s.tri_object[0];
     build_camera(&s, v3(0, 1, 9), 60);
-    finish(&s);
+    build_finish(&s, 40, 30);
     for (uint32_t i = 0; i < s.num_lights; i++) {
         struct povray_lamp l;
         assert_true(povray_lamp(&s, &s.lights[i], &l));
@@ -348,7 +336,7 @@ TEST(test_sphere_around_the_eye)
     for (int around = 0; around < 2; around++) {
         struct scene s = ball_of(MATERIAL_DIFFUSE);
         build_sphere(&s, v3(0, 0, 0), around ? 9 : .125f, -1, 0);
-        struct camera c = finish(&s);
+        struct camera c = build_finish(&s, 40, 30);
         char *text = text_of(&s, &c, 1, 0);
         assert_int_equal(count(text, "  inverse\n"), around);
         free(text);

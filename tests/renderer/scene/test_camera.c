@@ -141,6 +141,5 @@ TEST(collada_keeps_the_angle_of_the_file)
     assert_true(fabs((double)c.tan_h - tan(0.5)) < 1e-6 &&
                 fabs((double)c.tan_v - tan(0.5) / 1.5) < 1e-6);
     s.camera.present = false;
-    assert_false(camera_init(&c, &s, 300, 200, &e));
-    assert_non_null(strstr(e.msg, "no camera"));
+    REFUSES(camera_init(&c, &s, 300, 200, &e), "no camera");
 }

@@ -162,23 +162,6 @@ bool anchors_load(const char *path, struct anchor_results *r, struct err *e)
     return ok;
 }
 
-/* x with P(Binomial(n, x) >= k) = 0.025, which is I_x(k, n-k+1). */
-static double lower_bound(int k, int n)
-{
-    double lo = 0, hi = 1;
-    for (int i = 0; i < 60 && k > 0; i++) {
-        double x = (lo + hi) / 2;
-        *(gsl_cdf_beta_P(x, k, n - k + 1) < 0.025 ? &lo : &hi) = x;
-    }
-    return lo;
-}
-
-void anchors_clopper_pearson(int k, int n, double *lo, double *hi)
-{
-    *lo = lower_bound(k, n);
-    *hi = 1 - lower_bound(n - k, n);
-}
-
 /* With K ~ Binomial(n, p) values at or below the quantile: the i-th value (from 0) is at or below it
  * where K >= i + 1. */
 void anchors_quantile_ranks(int n, double p, int *at, int *lo, int *hi)

@@ -78,8 +78,6 @@ bool anchors_save(const char *path, const struct anchor_results *r, struct err *
 bool anchors_load(const char *path, struct anchor_results *r, struct err *e)
     __attribute__((warn_unused_result));
 
-/* 95 % Clopper-Pearson interval of k of n. */
-void anchors_clopper_pearson(int k, int n, double *lo, double *hi);
 /* The order statistics (from 0) of a sample of n that estimate the quantile p and bound it with 95 %:
  * *at = ceil(p n) - 1; P(X(*lo) <= quantile) and P(X(*hi) >= quantile) are each at least 97.5 %. *hi is
  * n if no element is that far up. */

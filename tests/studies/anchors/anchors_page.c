@@ -1,5 +1,7 @@
 #include "anchors.h"
 
+#include "tests/support/rates.h"
+
 #include "renderer/base/fs.h"
 
 #include <math.h>
@@ -94,10 +96,9 @@ static void false_alarm_row(FILE *f, const struct anchor_results *r, enum anchor
     fprintf(f, "| %s%s |", anchor_rule_name[rule], tuned ? " (set)" : "");
     for (int s = 0; s < r->num_scenes; s++) {
         const struct anchor_outcome *o = &r->scene[s].rule[rule];
-        double lo, hi;
-        anchors_clopper_pearson(o->false_alarms, r->settings.num_pairs, &lo, &hi);
-        fprintf(f, " %.3g %% (%.1f to %.1f)", 100.0 * o->false_alarms / r->settings.num_pairs,
-                100 * lo, 100 * hi);
+        double k = o->false_alarms, n = r->settings.num_pairs;
+        fprintf(f, " %.3g %% (%.1f to %.1f)", 100 * k / n, 100 * rate_lower(k, n, 0.025),
+                100 * rate_upper(k, n, 0.025));
         if (tuned)
             fprintf(f, " at %.4g", o->threshold);
         fputs(" |", f);

@@ -4,6 +4,7 @@
  * WORK (900 MB). For `make anchors`. */
 #include "anchors.h"
 
+#include "tests/support/rates.h"
 #include "renderer/base/progress.h"
 #include "renderer/base/version.h"
 #include "tools/compare/compare.h"
@@ -156,12 +157,6 @@ static void tune_one(void *arg, int i, int thread)
         show(scene_shown, "thresholds", (double)(i + 1) / n);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The smallest score that at most the share `tuned` of the null scores exceeds. */
 static void set_thresholds(struct measurement *m, int threads)
 {
@@ -174,7 +169,7 @@ static void set_thresholds(struct measurement *m, int threads)
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         if (m->tune[r] != NULL) {
             int scores = one_sided(r) ? n : n * TUNE_PARTNERS;
-            qsort(m->tune[r], (size_t)scores, sizeof(double), by_value);
+            sort_numbers(m->tune[r], (size_t)scores);
             m->threshold[r] = m->tune[r][scores - 1 - (int)(m->set->tuned * scores)];
             free(m->tune[r]);
             m->tune[r] = NULL;
@@ -324,7 +319,7 @@ static void measure_pairs(struct measurement *m, int threads, struct anchor_scen
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
             for (int i = 0; i < n; i++)
                 sorted[i] = m->smallest[(i * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
-            qsort(sorted, (size_t)n, sizeof *sorted, by_value);
+            sort_numbers(sorted, (size_t)n);
             m->bias[r][k] = sorted[at];
             out->rule[r].bias[k] = (struct anchor_bias){
                 .b = sorted[at], .lo = sorted[lo], .hi = hi < n ? sorted[hi] : INFINITY};

@@ -6,6 +6,7 @@
 #include "reference/base/process.h"
 #include "reference/base/image_oiio.h"
 #include "renderer/base/fs.h"
+#include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
@@ -35,17 +36,15 @@ TEST(test_xyz)
     assert_near(white[2], (1 - xy[3][0] - xy[3][1]) / xy[3][1], 1e-5);
 }
 
+static double z[3 * PIXELS];
+
+/* Black; static. */
 static struct mitsuba_reference black_reference(double var)
 {
-    struct mitsuba_reference r = {.width = SIDE,
-                                  .height = SIDE,
-                                  .mean = calloc(3 * PIXELS, sizeof(double)),
-                                  .var = calloc(3 * PIXELS, sizeof(double))};
-    assert_non_null(r.mean);
-    assert_non_null(r.var);
+    static double mean[3 * PIXELS], variance[3 * PIXELS];
     for (size_t i = 0; i < 3 * PIXELS; i++)
-        r.var[i] = var;
-    return r;
+        variance[i] = var;
+    return (struct mitsuba_reference){.width = SIDE, .height = SIDE, .mean = mean, .var = variance};
 }
 
 /* 64 samples of variance 0, floor 1e-4: z = difference sqrt(64/1e-4) = 800 difference. Blue of 0.0075
@@ -56,8 +55,7 @@ TEST(test_mitsuba_boundary)
 {
     struct mitsuba_reference r = black_reference(0);
     struct moments a = new_moments(SIDE, SIDE, "sample");
-    double *z = calloc(3 * PIXELS, sizeof *z), critical = mitsuba_critical_z(MITSUBA_LEVEL, PIXELS);
-    assert_non_null(z);
+    double critical = mitsuba_critical_z(MITSUBA_LEVEL, PIXELS);
     constant(&a, 0, 64);
     assert_int_equal(mitsuba_allowed(MITSUBA_SHARE, PIXELS), 30);
     for (size_t blue = 0; blue <= 31; blue++) {
@@ -66,9 +64,6 @@ TEST(test_mitsuba_boundary)
         assert_int_equal(mitsuba_score(z, PIXELS, 30) >= critical, blue > 30);
         a.mean[3 * (blue * 97) + 2] = 0.0075;
     }
-    free(z);
-    free(r.mean);
-    free(r.var);
     moments_free(&a);
 }
 
@@ -78,8 +73,6 @@ TEST(test_mitsuba_z)
 {
     struct mitsuba_reference r = black_reference(4);
     struct moments a = new_moments(SIDE, SIDE, "sample");
-    double *z = calloc(3 * PIXELS, sizeof *z);
-    assert_non_null(z);
     constant(&a, 1, 64);
     mitsuba_z(&a, &r, z);
     assert_near(z[1], 4, 1e-4);
@@ -91,9 +84,6 @@ TEST(test_mitsuba_z)
         z[i] = (double)(i * 7919 % (3 * PIXELS));
     for (size_t k = 0; k < 3 * PIXELS; k += 1111)
         assert_near(mitsuba_score(z, PIXELS, k), (double)(3 * PIXELS - 1 - k), 0);
-    free(z);
-    free(r.mean);
-    free(r.var);
     moments_free(&a);
 }
 
@@ -133,10 +123,8 @@ TEST(test_idiff_boundary)
     assert_memory_equal(got, want, 6);
     moments_free(&m);
 
-    uint8_t *a = calloc(3 * PIXELS, 1), *b = calloc(3 * PIXELS, 1);
+    static uint8_t a[3 * PIXELS], b[3 * PIXELS];
     size_t count[256];
-    assert_non_null(a);
-    assert_non_null(b);
     for (size_t p = 0; p < PIXELS; p++)
         b[3 * p + p % 3] = 4;
     for (size_t failing = 0; failing <= 41; failing++) {
@@ -148,8 +136,6 @@ TEST(test_idiff_boundary)
         a[3 * (failing * 50) + 1] = 5; /* two channels, still one pixel */
         b[3 * (failing * 50)] = b[3 * (failing * 50) + 1] = 0;
     }
-    free(a);
-    free(b);
 }
 
 /* What the program says of two PNG files: exit status 2 is a failure, 0 and 1 (a warning) are not. */
@@ -169,14 +155,14 @@ static bool real_idiff(const char *program, const char *a, const char *b)
  * 40 of 4096, and noise: differences of 5 in about 1 - (5/6)^3 = 42 % of the pixels fail, of 3 do not. */
 TEST(test_idiff_program)
 {
-    char program[4096], dir[] = "/tmp/test_anchors_XXXXXX", path[2][64];
+    char program[4096];
+    const char *const path[2] = {test_path("0.png"), test_path("1.png")};
     struct err e = {""};
     if (!process_find("idiff", program, sizeof program)) {
         print_message("SKIPPED: no idiff (package openimageio-tools): its rule is not checked\n");
         skip();
     }
-    assert_non_null(mkdtemp(dir));
-    uint8_t *picture[2] = {calloc(3 * PIXELS, 1), calloc(3 * PIXELS, 1)};
+    static uint8_t picture[2][3 * PIXELS];
     size_t count[256];
     uint64_t seed = 5;
     static const struct {
@@ -185,7 +171,7 @@ TEST(test_idiff_program)
     } cases[] = {{0, 0, 0, false},    {40, 5, 0, false},  {41, 5, 0, true},    {41, 4, 0, false},
                  {40, 250, 0, false}, {41, 250, 0, true}, {4000, 4, 0, false}, {40, 9, 4, false},
                  {41, 9, 4, true},    {0, 0, 6, true}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         for (size_t v = 0; v < 3 * PIXELS; v++) {
             picture[0][v] = (uint8_t)(250 * uniform(&seed)) / 2;
             picture[1][v] = (uint8_t)(picture[0][v] + cases[i].noise * uniform(&seed));
@@ -195,19 +181,14 @@ TEST(test_idiff_program)
             picture[k % 2][at] = 0;
             picture[1 - k % 2][at] = (uint8_t)cases[i].step;
         }
-        for (int k = 0; k < 2; k++) {
-            snprintf(path[k], sizeof path[k], "%s/%d.png", dir, k);
+        for (int k = 0; k < 2; k++)
             MUST(image_write_png(path[k], SIDE, SIDE, picture[k], &e));
-        }
         idiff_histogram(picture[0], picture[1], PIXELS, count);
         bool ours = idiff_differs(count, PIXELS, BLENDER_FAIL, BLENDER_PERCENT);
         if (ours != real_idiff(program, path[0], path[1]))
             fail_msg("picture %zu: ours says %s, idiff the opposite", i, ours ? "fail" : "pass");
         assert_int_equal(ours, cases[i].fails);
     }
-    free(picture[0]);
-    free(picture[1]);
-    assert_true(fs_remove_tree(dir, &e));
 }
 
 /* Sums of binomial probabilities (GSL's), by brute force, against the two searches of anchors.c. */
@@ -221,16 +202,11 @@ static double at_most(int k, int n, double p)
 
 TEST(test_intervals)
 {
-    double lo, hi;
-    anchors_clopper_pearson(0, 200, &lo, &hi);
-    assert_near(lo, 0, 0);
-    assert_near(hi, 1 - pow(0.025, 1 / 200.0), 1e-12); /* (1-hi)^200 = 0.025 */
-    anchors_clopper_pearson(200, 200, &lo, &hi);
-    assert_near(lo, pow(0.025, 1 / 200.0), 1e-12);
-    assert_near(hi, 1, 0);
-    anchors_clopper_pearson(7, 200, &lo, &hi);
-    assert_near(1 - at_most(6, 200, lo), 0.025, 1e-9);
-    assert_near(at_most(7, 200, hi), 0.025, 1e-9);
+    assert_near(rate_upper(0, 200, 0.025), 1 - pow(0.025, 1 / 200.0), 1e-12); /* (1-hi)^200 */
+    assert_near(rate_lower(200, 200, 0.025), pow(0.025, 1 / 200.0), 1e-12);
+    assert_near(1 - at_most(6, 200, rate_lower(7, 200, 0.025)), 0.025, 1e-9);
+    assert_near(at_most(7, 200, rate_upper(7, 200, 0.025)), 0.025, 1e-9);
+    assert_true(rate_lower(0, 200, 0.025) == 0 && rate_upper(200, 200, 0.025) == 1);
 
     int at, low, high;
     anchors_quantile_ranks(200, 0.95, &at, &low, &high);
@@ -335,9 +311,6 @@ TEST(test_real_renders)
     enum { SMALL = 24, N = 4, CELLS = SMALL * SMALL };
     struct anchor_pool p;
     struct err e = {""};
-    char dir[] = "/tmp/test_anchors_XXXXXX", kept[64];
-    assert_non_null(mkdtemp(dir));
-    snprintf(kept, sizeof kept, "%s/kept", dir);
     struct anchor_job job = {.scene = "33_sphere_light",
                              .side = SMALL,
                              .spp = 64,
@@ -345,12 +318,10 @@ TEST(test_real_renders)
                              .reference_spp = 256,
                              .seed = 77,
                              .threads = 2,
-                             .kept = kept};
+                             .kept = test_path("kept")};
     MUST(anchor_render(&job, &p, &e));
     check_kept(&job, &p);
-    assert_true(fs_remove_tree(dir, &e));
-    double difference = 0, var = 0, *z = calloc(3 * CELLS, sizeof *z);
-    assert_non_null(z);
+    double difference = 0, var = 0;
     for (size_t i = 0; i < CELLS; i++) {
         for (int r = 0; r < N; r++) {
             double xyz[3];
@@ -376,22 +347,8 @@ TEST(test_real_renders)
     idiff_quantise(&p.render[1], 1, b);
     idiff_histogram(a, b, CELLS, count);
     assert_true(idiff_differs(count, CELLS, BLENDER_FAIL, BLENDER_PERCENT));
-    free(z);
     moments_free(&wrong);
     anchor_pool_free(&p);
-}
-
-static char *contents(const char *path)
-{
-    FILE *f = fopen(path, "rb");
-    if (f == NULL)
-        fail_msg("%s is missing: make anchors", path);
-    static const size_t most = 1 << 20;
-    char *text = calloc(most, 1);
-    assert_non_null(text);
-    assert_true(fread(text, 1, most - 1, f) > 0);
-    fclose(f);
-    return text;
 }
 
 /* The page in the repository is what its record gives, byte for byte; the record was made with the
@@ -401,7 +358,6 @@ TEST(test_page)
 {
     struct anchor_results *r = calloc(1, sizeof *r);
     struct err e = {""};
-    char dir[] = "/tmp/test_anchors_XXXXXX";
     assert_non_null(r);
     MUST(anchors_load("tests/studies/anchors/results.json", r, &e));
     const struct anchor_settings *got = &r->settings, *want = &anchor_settings;
@@ -425,21 +381,20 @@ TEST(test_page)
                              anchor_rule_id[k], anchor_error_id[i], b->found);
             }
     }
-    assert_non_null(mkdtemp(dir));
-    MUST(anchors_write_page(dir, r, &e));
+    assert_true(fs_make_dirs(test_path("page"), &e));
+    MUST(anchors_write_page(test_path("page"), r, &e));
     static const char *const files[] = {"README.md", "global.svg", "bounced.svg", "region.svg"};
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+    for (size_t i = 0; i < COUNT(files); i++) {
         char made[128], kept[128];
-        snprintf(made, sizeof made, "%s/%s", dir, files[i]);
+        snprintf(made, sizeof made, "page/%s", files[i]);
         snprintf(kept, sizeof kept, "tests/studies/anchors/%s", files[i]);
-        char *a = contents(made), *b = contents(kept);
+        char *a = test_read(test_path(made)), *b = test_read(kept);
         if (strcmp(a, b) != 0)
             fail_msg("%s is not what results.json gives: make_anchors --page tests/studies/anchors",
                      kept);
         free(a);
         free(b);
     }
-    assert_true(fs_remove_tree(dir, &e));
     free(r);
 }
 
@@ -448,21 +403,14 @@ TEST(test_damaged_record)
 {
     struct anchor_results *r = calloc(1, sizeof *r);
     struct err e = {""};
-    char dir[] = "/tmp/test_anchors_XXXXXX", path[64];
+    const char *path = test_path("results.json");
     assert_non_null(r);
-    assert_non_null(mkdtemp(dir));
-    snprintf(path, sizeof path, "%s/results.json", dir);
     static const char *const bad[] = {"", "{", "{\"settings\": {}}", "[]"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        FILE *f = fopen(path, "w");
-        assert_non_null(f);
-        fputs(bad[i], f);
-        fclose(f);
-        e.msg[0] = '\0';
-        assert_false(anchors_load(path, r, &e));
-        assert_non_null(strstr(e.msg, path));
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        test_write(path, bad[i], strlen(bad[i]));
+        REFUSES(anchors_load(path, r, &e), path);
     }
-    assert_true(fs_remove_tree(dir, &e));
+    assert_int_equal(unlink(path), 0);
     assert_false(anchors_load(path, r, &e));
     free(r);
 }

@@ -1,5 +1,7 @@
 #include "bench_timing.h"
 
+#include "tests/support/rates.h"
+
 #include <stdlib.h>
 #include <time.h>
 
@@ -18,14 +20,8 @@ void *bench_allocate(size_t size)
     return p;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 double bench_median(double *x, int n)
 {
-    qsort(x, (size_t)n, sizeof *x, compare_doubles);
+    sort_numbers(x, (size_t)n);
     return n % 2 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
 }

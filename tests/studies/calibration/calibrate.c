@@ -13,63 +13,28 @@ static size_t part(double share, double num)
     return n < 50 ? 50 : (size_t)n;
 }
 
-static void add_synthetic(struct settings *s, enum law law, int n_a, int n_b)
-{
-    assert(s->num_synthetic < MAX_SYNTHETIC);
-    uint64_t seed = 1000 + (uint64_t)s->num_synthetic;
-    s->synthetic[s->num_synthetic++] = (struct synthetic_cell){law, n_a, n_b, seed};
-}
+/* Appends a cell to one of the lists; its seed is the list's first one and its place. */
+#define ADD(s, list, first_seed, ...)                                                              \
+    do {                                                                                           \
+        assert((size_t)(s)->num_##list < sizeof(s)->list / sizeof *(s)->list);                     \
+        (s)->list[(s)->num_##list] = (__typeof__(*(s)->list)){__VA_ARGS__};                        \
+        (s)->list[(s)->num_##list].seed = (first_seed) + (uint64_t)(s)->num_##list;                \
+        (s)->num_##list++;                                                                         \
+    } while (0)
+#define ADD_SYNTHETIC(s, law, n_a, n_b) ADD(s, synthetic, 1000, law, n_a, n_b, 0)
+#define ADD_RENDER(s, ...)              ADD(s, render, 3000, __VA_ARGS__, 0)
+#define ADD_POWER(s, ...)               ADD(s, power, 4000, __VA_ARGS__)
+#define NORMAL_16                       .law = LAW_NORMAL, .n = 16, .side = 32
+#define EXPONENTIAL_64                  .law = LAW_EXPONENTIAL, .n = 64, .side = 32
+#define ADD_COVER(s, ...)               ADD(s, cover, 5000, __VA_ARGS__, 0)
+#define ADD_MARGIN(s, ...)              ADD(s, margin, 6000, __VA_ARGS__, 0)
+#define ADD_STAGES(s, ...)              ADD(s, stages, 7000, __VA_ARGS__, 0)
+#define ADD_PERMUTATION(s, law)         ADD(s, permutation, 8000, law, 0)
 
 static void add_tail(struct settings *s, enum law law, int n_a, int n_b, size_t regions)
 {
-    assert(s->num_tail < MAX_TAIL);
-    s->tail_regions[s->num_tail] = regions;
-    uint64_t seed = 2000 + (uint64_t)s->num_tail;
-    s->tail[s->num_tail++] = (struct synthetic_cell){law, n_a, n_b, seed};
-}
-
-static void add_render(struct settings *s, const char *scene, int side, int spp, int replicates)
-{
-    assert(s->num_render < MAX_RENDER);
-    uint64_t seed = 3000 + (uint64_t)s->num_render;
-    s->render[s->num_render++] = (struct render_cell){scene, side, spp, replicates, seed};
-}
-
-static void add_power(struct settings *s, struct power_cell cell)
-{
-    assert(s->num_power < MAX_POWER);
-    cell.seed = 4000 + (uint64_t)s->num_power;
-    s->power[s->num_power++] = cell;
-}
-
-static void add_cover(struct settings *s, enum law law, int n_a, int n_b, double alpha)
-{
-    assert(s->num_cover < MAX_COVER);
-    uint64_t seed = 5000 + (uint64_t)s->num_cover;
-    s->cover[s->num_cover++] = (struct cover_cell){law, n_a, n_b, alpha, seed};
-}
-
-static void add_margin(struct settings *s, enum law law, int n, double alpha, double margin_global,
-                       double margin_tile)
-{
-    assert(s->num_margin < MAX_MARGIN);
-    uint64_t seed = 6000 + (uint64_t)s->num_margin;
-    s->margin[s->num_margin++] =
-        (struct margin_cell){law, n, alpha, margin_global, margin_tile, seed};
-}
-
-static void add_stages(struct settings *s, enum law law, int n, double alpha)
-{
-    assert(s->num_stages < MAX_STAGES);
-    uint64_t seed = 7000 + (uint64_t)s->num_stages;
-    s->stages[s->num_stages++] = (struct stages_cell){law, n, alpha, seed};
-}
-
-static void add_permutation(struct settings *s, enum law law)
-{
-    assert(s->num_permutation < MAX_PERMUTATION);
-    uint64_t seed = 8000 + (uint64_t)s->num_permutation;
-    s->permutation[s->num_permutation++] = (struct permutation_cell){law, seed};
+    ADD(s, tail, 2000, law, n_a, n_b, 0);
+    s->tail_regions[s->num_tail - 1] = regions;
 }
 
 struct settings settings_published(double share)
@@ -91,66 +56,42 @@ struct settings settings_published(double share)
     for (int i = 0; i < NUM_LAWS; i++) {
         static const int n[][2] = {{16, 16}, {64, 64}, {1024, 1024}, {64, 1024}, {1024, 0}};
         for (size_t k = 0; k < sizeof n / sizeof *n; k++)
-            add_synthetic(&s, laws[i], n[k][0], n[k][1]);
+            ADD_SYNTHETIC(&s, laws[i], n[k][0], n[k][1]);
         add_tail(&s, laws[i], 64, 64, part(share, 5e6));
     }
     add_tail(&s, LAW_NORMAL, 16, 16, part(share, 5e6));
     add_tail(&s, LAW_EXPONENTIAL, 64, 1024, part(share, 1e5));
     add_tail(&s, LAW_EXPONENTIAL, 1024, 0, part(share, 1e5));
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
-        add_render(&s, scenes[i], 16, 64, 0);
-        add_render(&s, scenes[i], 32, 16, 0);
-        add_render(&s, scenes[i], 16, 32, 8);
+        ADD_RENDER(&s, scenes[i], 16, 64, 0);
+        ADD_RENDER(&s, scenes[i], 32, 16, 0);
+        ADD_RENDER(&s, scenes[i], 16, 32, 8);
     }
-    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels",
-                                      .law = LAW_NORMAL,
-                                      .n = 16,
-                                      .side = 32,
-                                      .is_grey = true});
-    add_power(&s, (struct power_cell){.name = "normal, 16; one tile of 16 x 16",
-                                      .law = LAW_NORMAL,
-                                      .n = 16,
-                                      .side = 32,
-                                      .is_grey = true,
-                                      .one_tile = true});
-    add_power(&s, (struct power_cell){.name = "exponential, 64; all pixels",
-                                      .law = LAW_EXPONENTIAL,
-                                      .n = 64,
-                                      .side = 32,
-                                      .is_grey = true});
-    add_power(&s, (struct power_cell){.name = "exponential, 64; one tile of 16 x 16",
-                                      .law = LAW_EXPONENTIAL,
-                                      .n = 64,
-                                      .side = 32,
-                                      .is_grey = true,
-                                      .one_tile = true});
-    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels, margins 1 % and 4 %",
-                                      .law = LAW_NORMAL,
-                                      .n = 16,
-                                      .side = 32,
-                                      .is_grey = true,
-                                      .margin_global = 0.01,
-                                      .margin_tile = 0.04});
-    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels, channels independent",
-                                      .law = LAW_NORMAL,
-                                      .n = 16,
-                                      .side = 32});
+    ADD_POWER(&s, .name = "normal, 16; all pixels", NORMAL_16, .is_grey = true);
+    ADD_POWER(&s, .name = "normal, 16; one tile of 16 x 16", NORMAL_16, .is_grey = true,
+              .one_tile = true);
+    ADD_POWER(&s, .name = "exponential, 64; all pixels", EXPONENTIAL_64, .is_grey = true);
+    ADD_POWER(&s, .name = "exponential, 64; one tile of 16 x 16", EXPONENTIAL_64, .is_grey = true,
+              .one_tile = true);
+    ADD_POWER(&s, .name = "normal, 16; all pixels, margins 1 % and 4 %", NORMAL_16, .is_grey = true,
+              .margin_global = 0.01, .margin_tile = 0.04);
+    ADD_POWER(&s, .name = "normal, 16; all pixels, channels independent", NORMAL_16);
     for (size_t i = 0; i < 3; i++) {
-        add_cover(&s, LAW_NORMAL, 16, 16, interval_alpha[i]);
-        add_cover(&s, LAW_EXPONENTIAL, 64, 64, interval_alpha[i]);
-        add_cover(&s, LAW_BLACK, 64, 64, interval_alpha[i]);
-        add_cover(&s, LAW_LOGNORMAL, 64, 1024, interval_alpha[i]);
-        add_cover(&s, LAW_EXPONENTIAL, 1024, 0, interval_alpha[i]);
-        add_margin(&s, LAW_NORMAL, 16, margin_alpha[i], 0.03, 0.08);
-        add_margin(&s, LAW_EXPONENTIAL, 64, margin_alpha[i], 0.05, 0.15);
+        ADD_COVER(&s, LAW_NORMAL, 16, 16, interval_alpha[i]);
+        ADD_COVER(&s, LAW_EXPONENTIAL, 64, 64, interval_alpha[i]);
+        ADD_COVER(&s, LAW_BLACK, 64, 64, interval_alpha[i]);
+        ADD_COVER(&s, LAW_LOGNORMAL, 64, 1024, interval_alpha[i]);
+        ADD_COVER(&s, LAW_EXPONENTIAL, 1024, 0, interval_alpha[i]);
+        ADD_MARGIN(&s, LAW_NORMAL, 16, margin_alpha[i], 0.03, 0.08);
+        ADD_MARGIN(&s, LAW_EXPONENTIAL, 64, margin_alpha[i], 0.05, 0.15);
     }
-    add_stages(&s, LAW_NORMAL, 16, 0.01);
-    add_stages(&s, LAW_EXPONENTIAL, 64, 0.01);
-    add_stages(&s, LAW_NORMAL, 16, 0.001);
-    add_stages(&s, LAW_EXPONENTIAL, 64, 0.001);
-    add_permutation(&s, LAW_NORMAL);
-    add_permutation(&s, LAW_BLACK);
-    add_permutation(&s, LAW_PARETO);
+    ADD_STAGES(&s, LAW_NORMAL, 16, 0.01);
+    ADD_STAGES(&s, LAW_EXPONENTIAL, 64, 0.01);
+    ADD_STAGES(&s, LAW_NORMAL, 16, 0.001);
+    ADD_STAGES(&s, LAW_EXPONENTIAL, 64, 0.001);
+    ADD_PERMUTATION(&s, LAW_NORMAL);
+    ADD_PERMUTATION(&s, LAW_BLACK);
+    ADD_PERMUTATION(&s, LAW_PARETO);
     return s;
 }
 
@@ -164,20 +105,16 @@ struct settings settings_short(void)
         .cover_pairs = 400,
         .margin_pairs = 300,
     };
-    add_synthetic(&s, LAW_NORMAL, 16, 16);
-    add_synthetic(&s, LAW_EXPONENTIAL, 64, 64);
-    add_synthetic(&s, LAW_BLACK, 64, 0);
-    add_synthetic(&s, LAW_PARETO, 64, 0);
+    ADD_SYNTHETIC(&s, LAW_NORMAL, 16, 16);
+    ADD_SYNTHETIC(&s, LAW_EXPONENTIAL, 64, 64);
+    ADD_SYNTHETIC(&s, LAW_BLACK, 64, 0);
+    ADD_SYNTHETIC(&s, LAW_PARETO, 64, 0);
     add_tail(&s, LAW_EXPONENTIAL, 64, 64, 20000);
-    add_render(&s, "41_cornell", 16, 16, 0);
-    add_power(&s, (struct power_cell){.name = "normal, 16; all pixels",
-                                      .law = LAW_NORMAL,
-                                      .n = 16,
-                                      .side = 16,
-                                      .is_grey = true,
-                                      .is_short = true});
-    add_cover(&s, LAW_NORMAL, 16, 16, 0.005);
-    add_margin(&s, LAW_NORMAL, 16, 0.01, 0.03, 0.08);
+    ADD_RENDER(&s, "41_cornell", 16, 16, 0);
+    ADD_POWER(&s, .name = "normal, 16; all pixels", .law = LAW_NORMAL, .n = 16, .side = 16,
+              .is_grey = true, .is_short = true);
+    ADD_COVER(&s, LAW_NORMAL, 16, 16, 0.005);
+    ADD_MARGIN(&s, LAW_NORMAL, 16, 0.01, 0.03, 0.08);
     return s;
 }
 

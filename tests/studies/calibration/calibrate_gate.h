@@ -4,7 +4,7 @@
 #define ASSAY_CALIBRATE_GATE_H
 
 #include "calibrate_check.h"
-#include "calibrate_work.h"
+#include "work.h"
 #include "tests/support/synthetic_images.h"
 
 #include <stddef.h>

@@ -5,7 +5,7 @@
 
 #include "calibrate_check.h"
 #include "calibrate_tester.h"
-#include "calibrate_work.h"
+#include "work.h"
 #include "tests/support/synthetic_images.h"
 
 #include <stddef.h>

@@ -4,7 +4,7 @@
 #define ASSAY_CALIBRATE_RENDER_H
 
 #include "calibrate_null.h"
-#include "calibrate_work.h"
+#include "work.h"
 
 struct render_cell {
     const char *scene; /* of the suite */

@@ -4,7 +4,7 @@
 #define ASSAY_CALIBRATE_SYNTHETIC_H
 
 #include "calibrate_null.h"
-#include "calibrate_work.h"
+#include "work.h"
 #include "tests/support/synthetic_images.h"
 
 struct synthetic_cell {

@@ -8,19 +8,18 @@
  * independent pictures times the level at which the batches scatter, and what one picture with the bug has more noise than
  * one without. A bug that changes no pixel of a picture of one sample has no effect on it, nor on it with deviations; an
  * effect within its noise is stored as none. Pictures are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
-#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
+#include "tests/mutants/bug_effect.h"
+#include "tests/studies/calibration/work.h"
 
-#include <dirent.h>
 #include <limits.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { BATCHES = 2, SEED = 40260, MOST_BUGS = 512, LEAST_SPP = 4 };
+enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 4 };
 
 struct maker {
     char build[PATH_MAX];
@@ -31,34 +30,7 @@ struct maker {
     int picture[RUBRIC_SETS * RUBRIC_PICTURES], set[RUBRIC_SETS * RUBRIC_PICTURES]; /* of a view */
     struct signature (*batch)[BATCHES]; /* of a view: the correct renderer's */
     struct moments *one; /* likewise, one sample a pixel; of views without deviations */
-    pthread_mutex_t lock;
-    int next;
-    bool ok;
-    struct err e;
 };
-
-static int by_name(const void *a, const void *b)
-{
-    return strcmp(((const struct bug *)a)->name, ((const struct bug *)b)->name);
-}
-
-static bool list_bugs(const char *dir, struct catalogue *c, struct err *e)
-{
-    DIR *d = opendir(dir);
-    bool ok = d != NULL || err_set(e, "%s: cannot be read", dir);
-    c->bug = calloc(MOST_BUGS, sizeof *c->bug);
-    for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
-        char path[4400];
-        const char *dot = strrchr(entry->d_name, '.');
-        snprintf(path, sizeof path, "%s/%s", dir, entry->d_name);
-        if (dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST_BUGS)
-            ok = catalogue_bug_of_patch(path, &c->bug[c->num_bugs++], e);
-    }
-    if (d != NULL)
-        closedir(d);
-    qsort(c->bug, (size_t)c->num_bugs, sizeof *c->bug, by_name);
-    return ok && (c->num_bugs > 0 || err_set(e, "%s: no patch", dir));
-}
 
 /* Where a program's pictures are kept; hash tells its versions apart. */
 static bool open_cache(const struct maker *m, const char *name, const char *hash,
@@ -116,39 +88,12 @@ static double of_one(const struct rubric *r, int picture, const struct signature
 static void set_effect(const struct maker *m, int view, const struct signature *bug,
                        struct effect *out)
 {
-    const struct signature *correct = m->batch[view];
-    int values = 3 * bug->columns * bug->rows, noisy = 0;
-    double level = 0, chi2 = 0;
-    struct signature a = signature_average(bug, BATCHES), c = signature_average(correct, BATCHES);
-    for (int i = 0; i < values; i++) {
-        double shape = a.var[i] + c.var[i], squares = 0;
-        for (int k = 0; k < BATCHES; k++)
-            squares += pow(bug[k].mean[i] - correct[k].mean[i] - (a.mean[i] - c.mean[i]), 2);
-        if (shape > 0) {
-            level += squares / (BATCHES - 1) / BATCHES / shape;
-            noisy++;
-        }
-    }
-    level = fmax(noisy > 0 ? level / noisy : 0, 1e-3);
-    *out = (struct effect){0};
-    for (int i = 0; i < values; i++) {
-        double mean = a.mean[i] - c.mean[i], var = level * (a.var[i] + c.var[i]);
-        double rounding = 1e-6 * (a.mean[i] + c.mean[i]);
-        double more = of_one(m->rubric, m->picture[view], &bug[0], i) -
-                      of_one(m->rubric, m->picture[view], &correct[0], i);
-        chi2 += mean * mean / (var + rounding * rounding + 1e-300);
-        out->mean[i] = (float)mean;
-        out->var[i] = (float)(var + fmax(0, more));
-    }
-    out->pixels = chi2 > values + 6 * sqrt(2.0 * 3 * values);
-    if (!out->pixels) {
-        memset(out->mean, 0, sizeof out->mean);
-        memset(out->var, 0, sizeof out->var);
-    }
-    for (int f = 0; f < NUM_FACTS; f++) {
-        out->fact[f] = a.fact[f];
-        out->fact_sd[f] = a.fact_sd[f];
-    }
+    const struct signature *correct = m->batch[view], a = signature_average(bug, BATCHES);
+    double more[SIGNATURE_VALUES] = {0};
+    for (int i = 0; i < 3 * a.columns * a.rows; i++)
+        more[i] = fmax(0, of_one(m->rubric, m->picture[view], &bug[0], i) -
+                              of_one(m->rubric, m->picture[view], &correct[0], i));
+    bug_effect(bug, correct, BATCHES, 0, more, &a, out);
 }
 
 static bool is_needed(const struct effect *e, const struct signature *correct)
@@ -187,43 +132,24 @@ static bool make_view(struct maker *m, int view, int b, const struct answer_opti
     return true;
 }
 
-static bool make_bug(struct maker *m, int b, struct err *e)
+static bool make_bug(void *ctx, int b, struct err *e)
 {
+    struct maker *m = ctx;
     char cache[PATH_MAX], program[PATH_MAX];
     struct answer_options bug;
     const struct bug *what = &m->made.bug[b];
+    int seen = 0;
     snprintf(program, sizeof program, "%.3900s/mutants/%s/pathtracer", m->build, what->name);
     if (!open_cache(m, what->name, what->patch_sha256, program, cache, &bug, e))
         return false;
-    for (int v = 0; v < m->made.num_views; v++)
+    for (int v = 0; v < m->made.num_views; v++) {
         if (!make_view(m, v, b, &bug, e))
             return err_prefix(e, "%s", what->name);
-    return true;
-}
-
-static void *work(void *ctx)
-{
-    struct maker *m = ctx;
-    for (;;) {
-        struct err e = {""};
-        pthread_mutex_lock(&m->lock);
-        int b = m->ok ? m->next++ : m->made.num_bugs;
-        pthread_mutex_unlock(&m->lock);
-        if (b >= m->made.num_bugs)
-            return NULL;
-        bool ok = make_bug(m, b, &e);
-        int seen = 0;
-        for (int v = 0; v < m->made.num_views; v++)
-            seen += m->made.view[v].effect[b] != NULL;
-        pthread_mutex_lock(&m->lock);
-        if (!ok) {
-            m->ok = false;
-            m->e = e;
-        }
-        printf("%-36s changes %2d of %d views\n", m->made.bug[b].name, seen, m->made.num_views);
-        fflush(stdout);
-        pthread_mutex_unlock(&m->lock);
+        seen += m->made.view[v].effect[b] != NULL;
     }
+    printf("%-36s changes %2d of %d views\n", what->name, seen, m->made.num_views);
+    fflush(stdout);
+    return true;
 }
 
 /* What is right: the reference; of adaptive sampling, whose mean it is not, the batches. */
@@ -281,31 +207,22 @@ static bool add_views(struct maker *m, const struct answer_options *ours, struct
 
 static bool make(struct maker *m, const char *patches, struct err *e)
 {
-    enum { MOST = 64 };
-    pthread_t thread[MOST];
     char cache[PATH_MAX], ours[PATH_MAX], out[2 * PATH_MAX];
     struct answer_options opt;
-    int started = 0, workers = cli_processors() < MOST ? cli_processors() : MOST;
     snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
-    if (!list_bugs(patches, &m->made, e) ||
+    if (!bug_list(patches, &m->made, e) ||
         !open_cache(m, "correct", "references", ours, cache, &opt, e) ||
         !answer_key_make(m->rubric, &opt, m->answers, e) || !add_views(m, &opt, e))
         return false;
-    while (started < workers && pthread_create(&thread[started], NULL, work, m) == 0)
-        started++;
-    for (int i = 0; i < started; i++)
-        pthread_join(thread[i], NULL);
-    *e = m->e;
     snprintf(out, sizeof out, "%s/%s", m->rubric->dir, m->rubric->bugs);
-    return m->ok && (started > 0 || err_set(e, "no thread could be started")) &&
-           catalogue_write(out, &m->made, e);
+    return work_run_all(m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
 }
 
 int main(int argc, char **argv)
 {
     struct err e = {""};
     struct rubric_mistakes mistakes = {0};
-    static struct maker m = {.lock = PTHREAD_MUTEX_INITIALIZER, .ok = true};
+    static struct maker m;
     if (argc != 4) {
         fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC\n");
         return 3;

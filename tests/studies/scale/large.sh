@@ -9,12 +9,8 @@ tmp=$(mktemp -d "${TMPDIR:-/tmp}/assay-large.XXXXXX")
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 TIMEFORMAT='%U + %S CPU s, %R s'
-tell() { # NAME WHY
-    if [ -z "$2" ]; then echo "ok large: $1"; else
-        echo "not ok large: $1: $2"
-        failures=$((failures + 1))
-    fi
-}
+what=large
+. tests/end_to_end/expect.sh
 limited() { (ulimit -v $((2 << 20)) && "$@"); }
 render=(-q -r "$side" "$side" -s 1)
 limited "$assay" plan --plan "$tmp/plan" --parts 64 pathtracer "${render[@]}" -f "$tmp/x.exr" -f "$tmp/x.png" "$scene" >"$tmp/out" 2>&1 || tell "plan" "$(tail -n 1 "$tmp/out")"

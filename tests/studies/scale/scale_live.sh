@@ -12,12 +12,8 @@ failures=0
 for program in blender povray; do
     command -v $program >/dev/null || { echo "skip live jobs: no $program in PATH: NOT TESTED" && exit 0; }
 done
-tell() { # NAME WHY: not ok where WHY says something
-    if [ -z "$2" ]; then echo "ok live jobs: $1 ($SECONDS s)"; else
-        echo "not ok live jobs: $1: $2"
-        failures=$((failures + 1))
-    fi
-}
+what="live jobs"
+. tests/end_to_end/expect.sh
 run_all() { "$assay" run-job "$1" $(seq $(($(grep -c '^{"job"' "$1/plan.jsonl") - 1)) -1 0); } # the last first
 no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a|b)": [0-9.e-]+//; /"(command|date)":/d' "$1"; }
 

@@ -25,12 +25,8 @@ cleanup() {
 trap cleanup EXIT
 trap 'exit 1' INT TERM
 
-tell() { # NAME WHY: not ok where WHY says something
-    if [ -z "$2" ]; then echo "ok slurm: $1 ($SECONDS s)"; else
-        echo "not ok slurm: $1: $2"
-        failures=$((failures + 1))
-    fi
-}
+what=slurm
+. tests/end_to_end/expect.sh
 # until SECONDS COMMAND...: as soon as it succeeds
 until_so() {
     local end=$((SECONDS + $1))

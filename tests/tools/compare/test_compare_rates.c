@@ -10,20 +10,10 @@
 #include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 
-#include "tools/compare/compare.h"
 #include "tools/stats/distributions.h"
-#include "tests/support/test.h"
+#include "compare_must.h"
 
 #include <gsl/gsl_cdf.h>
-
-static struct comparison compare(const struct moments *a, const struct moments *b,
-                                 struct compare_options opt)
-{
-    struct comparison c;
-    struct err e;
-    MUST(compare_moments(a, b, &opt, &c, &e));
-    return c;
-}
 
 static double uniform_p(double *x, size_t n)
 {
@@ -61,7 +51,7 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
             simulate(&b, k->law, 1, k->n_b, k->grey, &seed);
         else
             constant(&b, 1, 1);
-        struct comparison c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
+        COMPARISON c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
         bool naive = false;
         for (int t = 0; t < tiles; t++) {
             naive = naive || fabs(c.tile_t[t]) > level;
@@ -73,7 +63,6 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
         r.naive += naive;
         r.different += c.verdict == VERDICT_DIFFERENT;
         r.judged += c.num_tests > 0;
-        comparison_free(&c);
     }
     moments_free(&a);
     moments_free(&b);
@@ -141,16 +130,15 @@ TEST(test_p_uniform)
 TEST(test_power)
 {
     enum { CLAIMS = 1000 };
-    struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
+    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
     struct compare_options opt = {alpha, 0, 0, 4, 0};
     uint64_t seed = 77;
     double mdb = 0;
     for (int i = 0; i < 20; i++) {
         simulate(&a, LAW_NORMAL, 1, 16, true, &seed);
         simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
-        struct comparison c = compare(&a, &b, opt);
+        COMPARISON c = compare(&a, &b, opt);
         mdb += c.mdb_global / 20;
-        comparison_free(&c);
     }
     int image[2] = {0}, verdict[2] = {0};
     for (int half = 0; half < 2; half++)
@@ -159,11 +147,10 @@ TEST(test_power)
             simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
             for (size_t p = 0; p < 3 * 256; p++)
                 a.mean[p] += half ? mdb / 2 : mdb;
-            struct comparison c = compare(&a, &b, opt);
+            COMPARISON c = compare(&a, &b, opt);
             const struct statistic *s = &c.statistic[STATISTIC_IMAGE];
             image[half] += c.global[3].log10_p <= log10(opt.alpha * s->share / s->num_tests);
             verdict[half] += c.verdict == VERDICT_DIFFERENT;
-            comparison_free(&c);
         }
     print_message(
         "bias of the MDB (%.2f %%): image's test finds %.1f %%, the claim %.1f %%; of half "
@@ -173,8 +160,6 @@ TEST(test_power)
     assert_true(lower_bound(image[0], CLAIMS) <= 0.95 && upper_bound(image[0], CLAIMS) >= 0.95);
     assert_true(upper_bound(verdict[0], CLAIMS) >= 0.95);
     assert_true(upper_bound(image[1], CLAIMS) < 0.95);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* The same for a tile: a bias of its printed MDB in one tile of 16 is found by the pyramid in 95 % or a little
@@ -184,7 +169,7 @@ TEST(test_power)
 TEST(test_tile_power)
 {
     enum { CLAIMS = 1000, N = 128 };
-    struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {.alpha = alpha, .tile = 4};
     uint64_t seed = 78;
     double mdb = 0;
@@ -196,7 +181,7 @@ TEST(test_tile_power)
             for (int p = 0; half >= 0 && p < 256; p++)
                 for (int c = 0; p % 16 < 4 && p / 16 < 4 && c < 3; c++)
                     a.mean[3 * p + c] += half ? mdb / 2 : mdb;
-            struct comparison c = compare(&a, &b, opt);
+            COMPARISON c = compare(&a, &b, opt);
             const struct statistic *s = &c.statistic[STATISTIC_PYRAMID];
             /* Luminance of grey is one of its channels: the tile's t of any is the same. */
             double log10_p = stats_t_log10_p(c.tile_t[0], 16 * 2 * (N - 1));
@@ -204,15 +189,12 @@ TEST(test_tile_power)
                 mdb += c.mdb_tile / 20;
             else
                 found[half] += log10_p <= log10(opt.alpha * s->share / s->num_tests);
-            comparison_free(&c);
         }
     print_message("bias of a tile's MDB (%.2f %%) found in %.1f %%, half of it in %.1f %%\n",
                   100 * mdb, 100.0 * found[0] / CLAIMS, 100.0 * found[1] / CLAIMS);
     assert_true(upper_bound(found[0], CLAIMS) >= 0.95);
     assert_true(lower_bound(found[0], CLAIMS) <= 0.965);
     assert_true(upper_bound(found[1], CLAIMS) < 0.95);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Rate of each verdict when the means of A are those of B times 1 + bias, in one tile or
@@ -233,12 +215,11 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
             if (!one_tile || (p % 16 < opt.tile && p / 16 < opt.tile))
                 for (int c = 0; c < 3; c++)
                     a.mean[3 * p + c] += bias;
-        struct comparison c = compare(&a, &b, opt);
+        COMPARISON c = compare(&a, &b, opt);
         r.equivalent += c.verdict == VERDICT_EQUIVALENT;
         r.different += c.verdict == VERDICT_DIFFERENT;
         r.inside +=
             c.global[3].ci_lo >= -opt.margin_global && c.global[3].ci_hi <= opt.margin_global;
-        comparison_free(&c);
     }
     moments_free(&a);
     moments_free(&b);

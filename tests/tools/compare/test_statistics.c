@@ -8,25 +8,15 @@
 #include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 
-#include "tools/compare/compare.h"
 #include "tools/compare/error_modes.h"
 #include "tools/stats/distributions.h"
-#include "tests/support/test.h"
+#include "compare_must.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
 #include <sys/resource.h>
 
 static const double pi = 3.14159265358979323846;
-
-static struct comparison compare(const struct moments *a, const struct moments *b,
-                                 struct compare_options opt)
-{
-    struct comparison c;
-    struct err e;
-    MUST(compare_moments(a, b, &opt, &c, &e));
-    return c;
-}
 
 /* Coloured waves around 0.6 (times contrast), a bright disc of up to 1.2, nothing symmetric: averaged over
  * the pixel whose upper left corner is at x, y of a picture of side x side pixels. */
@@ -89,16 +79,16 @@ TEST(test_sizes)
     };
     static double truth[3 * SIDE * SIDE];
     fill_scene(truth, SIDE, 0.7);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         const struct size_case *k = &cases[i];
-        struct moments a = new_moments(SIDE, SIDE, "sample");
-        struct moments b = new_moments(SIDE, SIDE, k->n_b > 0 ? "sample" : "exact");
+        MOMENTS a = new_moments(SIDE, SIDE, "sample");
+        MOMENTS b = new_moments(SIDE, SIDE, k->n_b > 0 ? "sample" : "exact");
         int wrong[NUM_STATISTICS] = {0}, tested[NUM_STATISTICS] = {0}, known = 0, missed = 0;
         uint64_t seed = 4000 + i;
         for (int claim = 0; claim < CLAIMS; claim++) {
             render(&a, k->law, truth, k->n_a, k->grey, &seed);
             render(&b, k->law, truth, k->n_b, k->grey, &seed);
-            struct comparison c = compare(
+            COMPARISON c = compare(
                 &a, &b,
                 (struct compare_options){.alpha = 0.01, .tile = 4, .margin_variance = 1e-9});
             for (int s = 0; s < NUM_STATISTICS; s++) {
@@ -107,7 +97,6 @@ TEST(test_sizes)
             }
             known += c.variance.valid;
             missed += c.variance.valid && !(c.variance.lo <= 1 && c.variance.hi >= 1);
-            comparison_free(&c);
         }
         print_message("%-28s", k->name);
         for (int s = 0; s < NUM_STATISTICS; s++) {
@@ -118,8 +107,6 @@ TEST(test_sizes)
         print_message("; ratio misses %.2f %% of %d\n", 100.0 * missed / (known ? known : 1),
                       known);
         assert_true(lower_bound(missed, known) <= 0.02);
-        moments_free(&a);
-        moments_free(&b);
     }
 }
 
@@ -141,7 +128,7 @@ static double noncentral_q(double x, double k, double lambda)
 TEST(test_dense_power)
 {
     enum { SIDE = 8, N = 1024, CLAIMS = 400 };
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     const double size = 1.06, se = 0.3 * sqrt(2.0 / N);
     uint64_t seed = 51, coin = 7;
     int found[2] = {0}, pyramid = 0;
@@ -180,8 +167,6 @@ TEST(test_dense_power)
     assert_true(upper_bound(found[1], CLAIMS) >= expected);
     assert_true(lower_bound(found[0], CLAIMS) <= 0.01);
     assert_true(4 * pyramid < found[1]);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* With margins every pixel may be off by them: at 5 % in each, up or down at random, H0 holds for pixels and
@@ -190,7 +175,7 @@ TEST(test_dense_power)
 TEST(test_dense_margin)
 {
     enum { SIDE = 16, N = 256, CLAIMS = 500 };
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 61, coin = 7;
     int found[2] = {0};
     double sign[SIDE * SIDE];
@@ -203,19 +188,16 @@ TEST(test_dense_margin)
             a.mean[p] += 0.05 * sign[p / 3];
         for (int narrow = 0; narrow < 2; narrow++) {
             double margin = narrow ? 0.01 : 0.05;
-            struct comparison c = compare(
+            COMPARISON c = compare(
                 &a, &b,
                 (struct compare_options){
                     .alpha = 0.01, .tile = 4, .margin_global = margin, .margin_tile = margin});
             const struct statistic *s = &c.statistic[STATISTIC_CHI_SQUARE];
             found[narrow] += s->num_tests > 0 && s->log10_p <= -2;
-            comparison_free(&c);
         }
     }
     assert_true(lower_bound(found[0], CLAIMS) <= 0.01);
     assert_int_equal(found[1], CLAIMS);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* What each bug does to the picture of fill_scene(). */
@@ -247,23 +229,15 @@ static double bugged(const double *truth, int side, int bug, int x, int y, int c
 TEST(test_names)
 {
     enum { SIDE = 32, N = 64, CLAIMS = 5 };
-    static const char *const name[15] = {"scale",
-                                         "offset",
-                                         "gamma",
-                                         "shift by x",
-                                         "shift by y",
-                                         "left and right exchanged",
-                                         "top and bottom exchanged",
-                                         "turned by 180 degrees",
-                                         "rows and columns exchanged",
-                                         "red and blue exchanged",
-                                         "red and green exchanged",
-                                         "green and blue exchanged",
-                                         "clamped at 1",
-                                         "none",
-                                         "hole"};
+    /* clang-format off */
+    static const char *const name[15] = {
+        "scale", "offset", "gamma", "shift by x", "shift by y", "left and right exchanged",
+        "top and bottom exchanged", "turned by 180 degrees", "rows and columns exchanged",
+        "red and blue exchanged", "red and green exchanged", "green and blue exchanged",
+        "clamped at 1", "none", "hole"};
+    /* clang-format on */
     static double truth[3 * SIDE * SIDE], wrong[3 * SIDE * SIDE];
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 71;
     fill_scene(truth, SIDE, 1);
     for (int bug = 0; bug < 15; bug++) {
@@ -291,8 +265,6 @@ TEST(test_names)
             comparison_free(&c);
         }
     }
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Columns 1 + 0.8 sin(k x), k = 2 pi/16, moved by s = 0.5 pixels; the mean of both sides has the slope
@@ -309,7 +281,7 @@ TEST(test_amounts)
     const double expected[3] = {2 * tan(k * s / 2) / sin(k), 3, 3};
     static const char *const name[3] = {"shift by x", "scale", "offset"};
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 81;
     for (int kind = 0; kind < 3; kind++) {
         for (int i = 0; i < 3 * SIDE * SIDE; i++) {
@@ -347,8 +319,6 @@ TEST(test_amounts)
         assert_true(upper_bound(inside, named) >= 0.98);
         assert_true(lower_bound(inside, named) <= 0.999);
     }
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Power: the shift statistic's T is normal with mean sqrt(sum D^2/v) up to the noise in the direction. The
@@ -361,7 +331,7 @@ TEST(test_directed_power)
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
     const double k = 2 * pi / SIDE, s = 0.1;
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 91;
     int found[2] = {0};
     double share = 0, t2 = 0;
@@ -396,8 +366,6 @@ TEST(test_directed_power)
     assert_true(lower_bound(found[1], CLAIMS) <= hi);
     assert_true(upper_bound(found[1], CLAIMS) >= lo);
     assert_true(lower_bound(found[0], CLAIMS) <= 0.01);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* A bias of the margin in every pixel, upward: inside the margins, and the direction "scale" is just that.
@@ -406,7 +374,7 @@ TEST(test_directed_margin)
 {
     enum { SIDE = 16, N = 64, CLAIMS = 500 };
     static double truth[3 * SIDE * SIDE], wrong[3 * SIDE * SIDE];
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {
         .alpha = 0.01, .tile = 4, .margin_global = 0.05, .margin_tile = 0.05};
     uint64_t seed = 101;
@@ -418,15 +386,12 @@ TEST(test_directed_margin)
                 wrong[p] = (twice ? 1.1 : 1.05) * truth[p];
             render(&a, LAW_NORMAL, wrong, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
-            struct comparison c = compare(&a, &b, opt);
+            COMPARISON c = compare(&a, &b, opt);
             found[twice] += c.statistic[STATISTIC_MATCHED_FILTER].log10_p <= -2;
-            comparison_free(&c);
         }
     print_message("scale at the margin: found %d of %d, at twice %d\n", found[0], CLAIMS, found[1]);
     assert_true(lower_bound(found[0], CLAIMS) <= 0.01);
     assert_int_equal(found[1], CLAIMS);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Variance doubled by halving what an observation is: B's observations are means of 2 of A's. As "sample" on
@@ -437,7 +402,7 @@ TEST(test_directed_margin)
 TEST(test_variance_ratio)
 {
     enum { SIDE = 32, N = 16, CLAIMS = 1000 };
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     static double truth[3 * SIDE * SIDE];
     uint64_t seed = 111;
     int known = 0, missed = 0, edge = 0, found = 0, level = 0, tested = 0;
@@ -500,8 +465,6 @@ TEST(test_variance_ratio)
     assert_true(tested >
                 CLAIMS / 2); /* the skewness of 1024 pixels is not always known well enough */
     assert_int_equal(found, tested);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* The same seeds on both sides are refused, as a whole and in three quarters of the pixels. Controls: other
@@ -511,7 +474,7 @@ TEST(test_variance_ratio)
 TEST(test_shared_seeds)
 {
     enum { SIDE = 8, N = 16 };
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-3, .tile = 4};
     struct comparison c;
     struct err e;
@@ -549,8 +512,6 @@ TEST(test_shared_seeds)
     c = compare(&a, &b, opt);
     assert_int_equal(c.verdict, VERDICT_EQUIVALENT);
     comparison_free(&c);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* alpha = 1e-9: a bias of the printed MDB is found by the image's test in 95 % of 500 claims, as at 1e-2,
@@ -560,7 +521,7 @@ TEST(test_shared_seeds)
 TEST(test_small_alpha)
 {
     enum { SIDE = 16, N = 121, CLAIMS = 500 };
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-9, .tile = 4};
     uint64_t seed = 131;
     simulate(&a, LAW_NORMAL, 1, N, true, &seed);
@@ -596,8 +557,6 @@ TEST(test_small_alpha)
     assert_near(c.statistic[STATISTIC_IMAGE].log10_p / tail, 1, 0.03);
     assert_true(c.statistic[STATISTIC_CHI_SQUARE].log10_p < -1000);
     comparison_free(&c);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* 512 x 512, 8 replicates a side: below 0.5 s and 200 MiB on an idle core. The bounds here are for a busy
@@ -609,7 +568,7 @@ TEST(test_cost)
 #else
     const double seconds = 2, mib = 200;
 #endif
-    struct moments a = new_moments(512, 512, "replicate"), b = new_moments(512, 512, "replicate");
+    MOMENTS a = new_moments(512, 512, "replicate"), b = new_moments(512, 512, "replicate");
     uint64_t seed = 141;
     simulate(&a, LAW_EXPONENTIAL, 1, 8, true, &seed);
     simulate(&b, LAW_EXPONENTIAL, 1, 8, true, &seed);
@@ -617,13 +576,11 @@ TEST(test_cost)
     getrusage(RUSAGE_SELF, &before);
     struct comparison c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 16});
     getrusage(RUSAGE_SELF, &after);
+    comparison_free(&c);
     double cpu = (double)(after.ru_utime.tv_sec - before.ru_utime.tv_sec) +
                  1e-6 * (double)(after.ru_utime.tv_usec - before.ru_utime.tv_usec);
     double more = (double)(after.ru_maxrss - before.ru_maxrss) / 1024;
     print_message("512 x 512: %.2f s of CPU, %.0f MiB more\n", cpu, more);
     assert_true(cpu < seconds);
     assert_true(more < mib);
-    comparison_free(&c);
-    moments_free(&a);
-    moments_free(&b);
 }

@@ -15,7 +15,6 @@ enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, SPP = 256, REFERENCE = 
 
 static gsl_rng *rng;
 static struct moments reference;
-static char dir[64];
 
 static bool is_lamp(size_t p)
 {
@@ -54,18 +53,26 @@ static double with_bug(const struct bug *b, size_t p, size_t c)
     return b->white ? 9 : v;
 }
 
-/* A render of spp samples as a file. The lamp has no noise. */
-static void write_picture(const char *name, const struct bug *b, double spp, char path[128])
+static struct submitted_image submit(const uint8_t *rgb8)
+{
+    struct submitted_image s;
+    struct err e;
+    const char *path = test_path("submitted.png");
+    MUST(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
+    MUST(submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
+    return s;
+}
+
+/* A render of spp samples, written to a file and read back. The lamp has no noise. */
+static struct submitted_image submit_render(const struct bug *b, double spp)
 {
     static uint8_t rgb8[3 * PIXELS];
-    struct err e;
     for (size_t p = 0; p < PIXELS; p++) {
         double g = gsl_ran_gamma(rng, spp * b->noise, 1 / (spp * b->noise));
         for (size_t c = 0; c < 3; c++)
             rgb8[3 * p + c] = tone_map(TONE_CGL, with_bug(b, p, c) * (is_lamp(p) ? 1 : g));
     }
-    snprintf(path, 128, "%s/%s.png", dir, name);
-    MUST(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
+    return submit(rgb8);
 }
 
 /* M2 and M3 of an exponential law of the mean that was found: n mean^2, 2 n mean^3. */
@@ -89,27 +96,16 @@ static int set_up(void **state)
     (void)state;
     rng = gsl_rng_alloc(gsl_rng_mt19937);
     gsl_rng_set(rng, 20240607);
-    strcpy(dir, "/tmp/assay_grading_XXXXXX");
     make_reference(&reference);
-    return mkdtemp(dir) == NULL;
+    return 0;
 }
 
 static int tear_down(void **state)
 {
-    char command[128];
     (void)state;
     gsl_rng_free(rng);
     moments_free(&reference);
-    snprintf(command, sizeof command, "rm -rf %s", dir);
-    return system(command);
-}
-
-static struct submitted_image read_back(const char *path)
-{
-    struct submitted_image s;
-    struct err e;
-    MUST(submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
-    return s;
+    return 0;
 }
 
 static struct rubric *a_rubric(enum check_kind kind, int pictures)
@@ -135,32 +131,40 @@ static struct rubric *a_rubric(enum check_kind kind, int pictures)
     return r;
 }
 
-/* One check on pictures with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
-static struct result check(enum check_kind kind, int num, const struct bug *const *bug,
-                           const double *spp, const int *asked, double alpha)
+/* The rubric's one check on these pictures, which it frees, as it does the rubric. */
+static struct result run_check(struct rubric *r, const struct submitted_image *pictures,
+                               double alpha)
 {
-    struct rubric *r = a_rubric(kind, num);
     struct submitted_images *h = calloc(1, sizeof *h);
     struct answer_key *a = calloc(1, sizeof *a);
     struct result out;
     struct err e;
     assert_true(h != NULL && a != NULL);
-    for (int i = 0; i < num; i++) {
-        char path[128], name[16];
-        snprintf(name, sizeof name, "p%d", i);
-        write_picture(name, bug[i], spp[i], path);
-        h->picture[i] = read_back(path);
+    for (int i = 0; i < r->num_pictures; i++) {
+        h->picture[i] = pictures[i];
         a->of[0][i].m = a->of[0][i].noise = reference;
-        if (asked != NULL)
-            r->picture[i].spp = asked[i];
     }
     MUST(grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e));
-    for (int i = 0; i < num; i++)
+    for (int i = 0; i < r->num_pictures; i++)
         submitted_image_free(&h->picture[i]);
     free(r);
     free(h);
     free(a);
     return out;
+}
+
+/* One check on pictures with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
+static struct result check(enum check_kind kind, int num, const struct bug *const *bug,
+                           const double *spp, const int *asked, double alpha)
+{
+    struct rubric *r = a_rubric(kind, num);
+    struct submitted_image picture[RUBRIC_PICTURES];
+    for (int i = 0; i < num; i++) {
+        picture[i] = submit_render(bug[i], spp[i]);
+        if (asked != NULL)
+            r->picture[i].spp = asked[i];
+    }
+    return run_check(r, picture, alpha);
 }
 
 static struct result equal(const struct bug *bug, double spp, double alpha)
@@ -179,7 +183,7 @@ TEST(points_follow_the_interval)
         {-0.05, -0.04, 0.5}, {-0.9, -0.8, 0}, {-0.06, 0.06, 1},   {-0.09, 0.09, 0.5},
         {-0.12, 0.12, 0},    {-5, 5, 0},      {0.05, 0.05, 0.25},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         const struct interval v = {(cases[i].lo + cases[i].hi) / 2, cases[i].lo, cases[i].hi, 0.01};
         assert_true(fabs(score_share(&m, &v) - cases[i].share) < 1e-9);
     }
@@ -309,7 +313,7 @@ TEST(bugs_cost_points)
         {"shifted by 8", {.scale = 1, .square = 1, .noise = 1, .shift = 8}, 0},
         {"4 % too bright", {.scale = 1.04, .square = 1, .noise = 1}, 0.9},
     };
-    for (size_t i = 0; i < sizeof bugs / sizeof *bugs; i++) {
+    for (size_t i = 0; i < COUNT(bugs); i++) {
         struct result r = equal(&bugs[i].bug, SPP, 1e-5);
         if (r.share > bugs[i].most)
             fail_msg("%s: %g of the points are left: %s", bugs[i].name, r.share, r.seen);
@@ -321,26 +325,13 @@ TEST(bugs_cost_points)
 TEST(a_copy_of_the_reference_is_seen)
 {
     static uint8_t rgb8[3 * PIXELS];
-    char path[128];
-    struct err e;
-    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
-    struct submitted_images *h = calloc(1, sizeof *h);
-    struct answer_key *a = calloc(1, sizeof *a);
-    struct result out;
     for (size_t i = 0; i < 3 * PIXELS; i++)
         rgb8[i] = tone_map(TONE_CGL, reference.mean[i]);
-    snprintf(path, sizeof path, "%s/copy.png", dir);
-    assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
-    h->picture[0] = read_back(path);
-    a->of[0][0].m = a->of[0][0].noise = reference;
-    assert_true(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+    struct submitted_image copy = submit(rgb8);
+    struct result out = run_check(a_rubric(CHECK_EQUAL, 1), &copy, 1e-5);
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
     result_free(&out);
-    submitted_image_free(&h->picture[0]);
-    free(r);
-    free(h);
-    free(a);
 }
 
 /* What is accepted: everything 1.2 times as bright. A program that does that loses nothing, one that has a dark square besides
@@ -369,14 +360,12 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
         m->m2[i] = 1.2 * 1.2 * reference.m2[i];
         m->m3[i] = 1.2 * 1.2 * 1.2 * reference.m3[i];
     }
-    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+    for (size_t k = 0; k < COUNT(cases); k++) {
         struct submitted_images *h = calloc(1, sizeof *h);
         struct result out;
-        char path[128];
         int set = -1;
         assert_non_null(h);
-        write_picture("accepted", &cases[k].bug, SPP, path);
-        h->picture[0] = read_back(path);
+        h->picture[0] = submit_render(&cases[k].bug, SPP);
         MUST(grade_all_checks(r, a, h, 1e-5, &out, &set, &e));
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
@@ -402,26 +391,14 @@ TEST(a_watermark_is_masked)
                  {{0, 1, 48, 5}, {.scale = 1, .square = 1, .noise = 1, .mark = true}, false},
                  {{0, 0, 48, 5}, {.scale = 1, .square = 0.5, .noise = 1, .mark = true}, false}};
     for (int kind = 0; kind < 2; kind++)
-        for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        for (size_t k = 0; k < COUNT(cases); k++) {
             struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
-            struct submitted_images *h = calloc(1, sizeof *h);
-            struct answer_key *a = calloc(1, sizeof *a);
-            struct result out;
-            struct err e;
-            char path[128];
-            assert_true(h != NULL && a != NULL);
             memcpy(r->mask, cases[k].mask, sizeof r->mask);
-            write_picture("mark", &cases[k].bug, SPP, path);
-            h->picture[0] = read_back(path);
-            a->of[0][0].m = a->of[0][0].noise = reference;
-            assert_true(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+            struct submitted_image mark = submit_render(&cases[k].bug, SPP);
+            struct result out = run_check(r, &mark, 1e-5);
             if ((out.share == 1) != cases[k].all)
                 fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
             result_free(&out);
-            submitted_image_free(&h->picture[0]);
-            free(r);
-            free(h);
-            free(a);
         }
 }
 
@@ -491,11 +468,10 @@ TEST(pixels_are_exact_or_not)
 TEST(rates_are_whole_batches_or_not)
 {
     static uint8_t rgb8[3 * PIXELS];
-    char path[128];
+    const char *path = test_path("rate.png");
     struct rate_image r;
     struct err e;
     static double ours[PIXELS];
-    snprintf(path, sizeof path, "%s/rate.png", dir);
     for (size_t p = 0; p < PIXELS; p++) {
         const uint8_t quarter[3] = {0, 127, 127}, all[3] = {255, 0, 0}, odd[3] = {0, 60, 195};
         ours[p] = p < 1024 ? 16 : 64;
@@ -535,11 +511,10 @@ TEST(bad_pictures_get_a_line)
                  {"pfm", "PF\n100000 100000\n-1.0\n", 22},
                  {"nan", "PF\n64 48\n-1.0\n", 14},
                  {"svg", "<svg></svg>", 11}};
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
-        char path[128];
+    for (size_t i = 0; i < COUNT(files); i++) {
+        const char *path = test_path(files[i].name);
         struct submitted_image s;
         struct err e = {""};
-        snprintf(path, sizeof path, "%s/%s", dir, files[i].name);
         FILE *f = fopen(path, "wb");
         assert_non_null(f);
         fwrite(files[i].bytes, 1, files[i].size, f);
@@ -551,11 +526,10 @@ TEST(bad_pictures_get_a_line)
         if (strcmp(files[i].name, "bomb") == 0)
             assert_non_null(strstr(e.msg, "65536 x 65536"));
     }
-    struct submitted_image s;
+    struct submitted_image s = submit_render(&none, SPP);
     struct err e;
-    char path[128];
-    write_picture("right", &none, SPP, path);
-    assert_false(submitted_image_read(path, "cgl", WIDTH, WIDTH, &s, &e));
+    submitted_image_free(&s);
+    assert_false(submitted_image_read(test_path("submitted.png"), "cgl", WIDTH, WIDTH, &s, &e));
     assert_string_equal(e.msg, "the picture is 64 x 48 pixels, not 64 x 64");
 }
 

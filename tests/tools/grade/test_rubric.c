@@ -28,14 +28,9 @@ static int unload(void **state)
 
 static void read_text(const char *text)
 {
-    char path[] = "/tmp/assay_rubric_XXXXXX";
-    int fd = mkstemp(path);
     struct err e;
-    assert_true(fd >= 0);
-    assert_int_equal(write(fd, text, strlen(text)), (ssize_t)strlen(text));
-    close(fd);
-    MUST(rubric_read(path, &suite, rubric, &mistakes, &e));
-    unlink(path);
+    test_write(test_path("rubric"), text, strlen(text));
+    MUST(rubric_read(test_path("rubric"), &suite, rubric, &mistakes, &e));
 }
 
 static const char head[] = "rubric A course\n"           /* 1 */
@@ -118,8 +113,8 @@ TEST(the_shipped_ones_are_right)
     assert_string_equal(rubric->set[0].name, "");
     assert_string_equal(rubric->set[5].name, "light_pdf, camera_crop");
     assert_string_equal(rubric->set[5].words, "--starter light-pdf --frame crop");
-    assert_false(rubric_read("/nowhere.rubric", &suite, rubric, &mistakes, &e));
-    assert_non_null(strstr(e.msg, "/nowhere.rubric: cannot read"));
+    REFUSES(rubric_read("/nowhere.rubric", &suite, rubric, &mistakes, &e),
+            "/nowhere.rubric: cannot read");
 }
 
 TEST(each_mistake_is_named_with_its_line)
@@ -173,7 +168,7 @@ TEST(each_mistake_is_named_with_its_line)
         {11, 9, " tile 0.1 0.2\n visibility never", "'never'"},
         {11, 12, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2", "already in line 9"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         read_text(with(cases[i].at, cases[i].other));
         bool found = false;
         for (int k = 0; k < mistakes.num; k++)

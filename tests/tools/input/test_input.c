@@ -9,15 +9,6 @@
 #include "tools/input/input.h"
 #include "tests/support/test.h"
 
-static char folder[64];
-static char path_text[4][128];
-
-static const char *file(int slot, const char *name)
-{
-    snprintf(path_text[slot], sizeof path_text[slot], "%s/%s", folder, name);
-    return path_text[slot];
-}
-
 static void write_floats(const char *path, int width, int height, int channels,
                          const char *const *names, const float *v)
 {
@@ -39,16 +30,12 @@ static struct input read_side(const char *path, struct input_options opt, struct
     return in;
 }
 
-/* The line says `part` and is one line. */
 static void assert_refused(const char *path, struct input_options opt, const char *part)
 {
     struct input in;
     struct notes notes = {0};
-    struct err e = {0};
-    if (input_read(path, 'a', &opt, &in, &notes, &e))
-        fail_msg("%s was read, want: %s", path, part);
-    if (strstr(e.msg, part) == NULL || strchr(e.msg, '\n') != NULL)
-        fail_msg("'%s' does not say '%s'", e.msg, part);
+    struct err e;
+    REFUSES(input_read(path, 'a', &opt, &in, &notes, &e), part);
 }
 
 static bool has_note(const struct notes *notes, const char *part)
@@ -66,13 +53,13 @@ TEST(test_directory)
     struct err e;
     struct notes notes = {0};
     static const float v[3][6] = {{1, 5, 0, 7, 7, 7}, {2, 5, 0, 7, 7, 7}, {6, 5, 3, 7, 7, 7}};
-    assert_true(fs_make_dirs(file(0, "runs"), &e));
-    write_floats(file(1, "runs/s1.exr"), 2, 1, 3, rgb_names, v[0]);
-    odd_pfm(file(1, "runs/s2.pfm"), 2, 1, v[1]);
-    odd_file(file(1, "runs/.hidden"), "not looked at");
-    assert_refused(file(0, "runs"), (struct input_options){0}, "at least 3");
-    write_floats(file(1, "runs/s3.exr"), 2, 1, 3, rgb_names, v[2]);
-    struct input in = read_side(file(0, "runs"), (struct input_options){0}, &notes);
+    assert_true(fs_make_dirs(test_path("runs"), &e));
+    write_floats(test_path("runs/s1.exr"), 2, 1, 3, rgb_names, v[0]);
+    odd_pfm(test_path("runs/s2.pfm"), 2, 1, v[1]);
+    odd_file(test_path("runs/.hidden"), "not looked at");
+    assert_refused(test_path("runs"), (struct input_options){0}, "at least 3");
+    write_floats(test_path("runs/s3.exr"), 2, 1, 3, rgb_names, v[2]);
+    struct input in = read_side(test_path("runs"), (struct input_options){0}, &notes);
     assert_int_equal(in.kind, INPUT_REPLICATES);
     assert_string_equal(in.m.unit, "replicate");
     assert_true(has_note(&notes, "3 replicates"));
@@ -85,19 +72,20 @@ TEST(test_directory)
     assert_near(in.m.n[0], 3, 0);
     input_free(&in);
 
-    write_floats(file(1, "runs/s4.exr"), 2, 1, 3, rgb_names, v[0]);
-    assert_refused(file(0, "runs"), (struct input_options){0},
+    write_floats(test_path("runs/s4.exr"), 2, 1, 3, rgb_names, v[0]);
+    assert_refused(test_path("runs"), (struct input_options){0},
                    "s1.exr and s4.exr are the same picture: the seed was ignored");
-    write_floats(file(1, "runs/s4.exr"), 1, 2, 3, rgb_names, v[0]);
-    assert_refused(file(0, "runs"), (struct input_options){0}, "is 1 x 2 pixels, s1.exr is 2 x 1");
-    odd_exr(file(1, "runs/s4.exr"), 2, 1, "BGR", true, 2, v[0]);
-    assert_refused(file(0, "runs"), (struct input_options){0}, "32-bit floats");
-    odd_png(file(1, "runs/s4.exr"), 2, 1, 3, 8, (uint16_t[6]){1, 2, 3, 4, 5, 6});
-    assert_refused(file(0, "runs"), (struct input_options){0}, "32-bit floats");
-    odd_file(file(1, "runs/s4.exr"), "no picture");
-    assert_refused(file(0, "runs"), (struct input_options){0}, "s4.exr: cannot read");
-    assert_int_equal(unlink(file(1, "runs/s4.exr")), 0);
-    assert_refused(file(0, "runs"), (struct input_options){.spp = 4}, "--spp-a");
+    write_floats(test_path("runs/s4.exr"), 1, 2, 3, rgb_names, v[0]);
+    assert_refused(test_path("runs"), (struct input_options){0},
+                   "is 1 x 2 pixels, s1.exr is 2 x 1");
+    odd_exr(test_path("runs/s4.exr"), 2, 1, "BGR", true, 2, v[0]);
+    assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
+    odd_png(test_path("runs/s4.exr"), 2, 1, 3, 8, (uint16_t[6]){1, 2, 3, 4, 5, 6});
+    assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
+    odd_file(test_path("runs/s4.exr"), "no picture");
+    assert_refused(test_path("runs"), (struct input_options){0}, "s4.exr: cannot read");
+    assert_int_equal(unlink(test_path("runs/s4.exr")), 0);
+    assert_refused(test_path("runs"), (struct input_options){.spp = 4}, "--spp-a");
 }
 
 /* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.
@@ -110,8 +98,9 @@ TEST(test_mitsuba_integrator)
     static const float v[9] = {1, 1, 1, 2, 1, 3, 5, 1, 13};
     struct notes notes = {0};
     struct err e;
-    write_floats(file(0, "moment.exr"), 1, 1, 9, names, v);
-    struct input in = read_side(file(0, "moment.exr"), (struct input_options){.spp = 100}, &notes);
+    write_floats(test_path("moment.exr"), 1, 1, 9, names, v);
+    struct input in =
+        read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
     assert_int_equal(in.kind, INPUT_VARIANCE);
     assert_true(in.is_xyz && has_note(&notes, "log-normal") && has_note(&notes, "box filter"));
     static const double mean[3] = {2, 1, 3}, m2[3] = {100, 0, 400};
@@ -135,25 +124,25 @@ TEST(test_mitsuba_integrator)
     assert_near(b.m.m3[0], pow(0.412453, 3) * 8, 1e-12);
     input_free(&b);
     /* Two of a kind: opposite signs. */
-    b = read_side(file(0, "moment.exr"), (struct input_options){.spp = 100}, &notes);
+    b = read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
     assert_true(input_pair(&in, &b, &notes, &e));
     assert_near(in.m.m3[0], 100 * 13.0 / 8, 1e-3);
     assert_near(b.m.m3[0], -100 * 13.0 / 8, 1e-3);
     input_free(&in);
     input_free(&b);
 
-    assert_refused(file(0, "moment.exr"), (struct input_options){0}, "--spp-a");
+    assert_refused(test_path("moment.exr"), (struct input_options){0}, "--spp-a");
     static const char *const two[6] = {"a.X", "m2_a.X", "b.X", "m2_b.X", "R", "G"};
-    write_floats(file(1, "two.exr"), 1, 1, 6, two, v);
-    assert_refused(file(1, "two.exr"), (struct input_options){.spp = 9}, "several integrators");
-    write_floats(file(1, "less.exr"), 1, 1, 8, names, v);
-    assert_refused(file(1, "less.exr"), (struct input_options){.spp = 9}, "not m2_path.Z");
+    write_floats(test_path("two.exr"), 1, 1, 6, two, v);
+    assert_refused(test_path("two.exr"), (struct input_options){.spp = 9}, "several integrators");
+    write_floats(test_path("less.exr"), 1, 1, 8, names, v);
+    assert_refused(test_path("less.exr"), (struct input_options){.spp = 9}, "not m2_path.Z");
     static const float negative[9] = {1, 1, 1, 2, 1, 3, 3, 1, 13};
-    write_floats(file(1, "neg.exr"), 1, 1, 9, names, negative);
-    assert_refused(file(1, "neg.exr"), (struct input_options){.spp = 9}, "negative variance");
+    write_floats(test_path("neg.exr"), 1, 1, 9, names, negative);
+    assert_refused(test_path("neg.exr"), (struct input_options){.spp = 9}, "negative variance");
     static const char *const pbrt[4] = {"R", "G", "B", "Variance.R"};
-    write_floats(file(1, "pbrt.exr"), 1, 1, 4, pbrt, v);
-    assert_refused(file(1, "pbrt.exr"), (struct input_options){.spp = 9}, "pbrt");
+    write_floats(test_path("pbrt.exr"), 1, 1, 4, pbrt, v);
+    assert_refused(test_path("pbrt.exr"), (struct input_options){.spp = 9}, "pbrt");
 }
 
 /* Exponential samples (skewness 2; the bound for sd = mean is 4), mean `scale` against 1, M3 forgotten. */
@@ -199,9 +188,9 @@ TEST(test_mitsuba_reference)
 {
     static const float red[3] = {1, 0, 0};
     struct notes notes = {0};
-    write_floats(file(0, "ref.exr"), 1, 1, 3, rgb_names, red);
-    write_floats(file(1, "ref_var.exr"), 1, 1, 3, rgb_names, red);
-    struct input in = read_side(file(0, "ref.exr"), (struct input_options){.spp = 50}, &notes);
+    write_floats(test_path("ref.exr"), 1, 1, 3, rgb_names, red);
+    write_floats(test_path("ref_var.exr"), 1, 1, 3, rgb_names, red);
+    struct input in = read_side(test_path("ref.exr"), (struct input_options){.spp = 50}, &notes);
     static const double xyz[3] = {0.412453, 0.212671, 0.019334};
     assert_int_equal(in.kind, INPUT_VARIANCE);
     assert_true(has_note(&notes, "ref_var.exr"));
@@ -210,10 +199,10 @@ TEST(test_mitsuba_reference)
         assert_near(in.m.m2[c], 50 * xyz[c], 1e-4);
     }
     input_free(&in);
-    assert_refused(file(0, "ref.exr"), (struct input_options){0}, "--spp-a");
-    write_floats(file(1, "ref_var.exr"), 1, 2, 3, rgb_names, (float[6]){1, 0, 0, 1, 0, 0});
-    assert_refused(file(0, "ref.exr"), (struct input_options){.spp = 9}, "is 1 x 2 pixels");
-    assert_int_equal(unlink(file(1, "ref_var.exr")), 0);
+    assert_refused(test_path("ref.exr"), (struct input_options){0}, "--spp-a");
+    write_floats(test_path("ref_var.exr"), 1, 2, 3, rgb_names, (float[6]){1, 0, 0, 1, 0, 0});
+    assert_refused(test_path("ref.exr"), (struct input_options){.spp = 9}, "is 1 x 2 pixels");
+    assert_int_equal(unlink(test_path("ref_var.exr")), 0);
 }
 
 /* Codes and what they stand for, by the curves' definitions. sRGB: code 255 x 0.5 = 127.5 is 0.214041
@@ -239,7 +228,7 @@ TEST(test_curves)
     assert_near(lo, pow(0.2, 2.2) / sqrt(2), 1e-15);
     assert_near(hi, pow(52.0 / 255, 2.2) / sqrt(2), 1e-15);
     static const char *const bad[] = {"", "rec709", "gamma", "gamma=", "gamma=0", "gamma=x"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+    for (size_t i = 0; i < COUNT(bad); i++)
         assert_false(tone_curve_parse(bad[i], &c, &e));
 }
 
@@ -248,8 +237,8 @@ TEST(test_codes)
 {
     struct notes notes = {0};
     struct input_options opt = {.curve = "linear"};
-    odd_png(file(0, "deep.png"), 2, 1, 3, 16, (uint16_t[6]){1000, 1, 65534, 0, 5, 5});
-    struct input in = read_side(file(0, "deep.png"), opt, &notes);
+    odd_png(test_path("deep.png"), 2, 1, 3, 16, (uint16_t[6]){1000, 1, 65534, 0, 5, 5});
+    struct input in = read_side(test_path("deep.png"), opt, &notes);
     double step = 1 / 65535.0;
     assert_int_equal(in.kind, INPUT_PICTURE);
     assert_near(in.m.mean[0], 1000 * step, 1e-9);
@@ -257,19 +246,19 @@ TEST(test_codes)
     assert_near(in.rounding[0], step * step / 12, 1e-18);
     assert_true(!in.censored[0] && in.censored[1]);
     input_free(&in);
-    odd_png(file(0, "grey.png"), 3, 1, 1, 8, (uint16_t[3]){51, 255, 254});
-    in = read_side(file(0, "grey.png"), opt, &notes);
+    odd_png(test_path("grey.png"), 3, 1, 1, 8, (uint16_t[3]){51, 255, 254});
+    in = read_side(test_path("grey.png"), opt, &notes);
     for (int c = 0; c < 3; c++)
         assert_near(in.m.mean[c], 0.2, 1e-12);
     assert_true(!in.censored[0] && in.censored[1] && !in.censored[2]);
     assert_true(has_note(&notes, "half a code"));
     input_free(&in);
-    assert_refused(file(0, "grey.png"), (struct input_options){0}, "--curve");
-    assert_refused(file(0, "grey.png"), (struct input_options){.curve = "film"}, "none of");
-    odd_png(file(0, "clear.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 128});
-    assert_refused(file(0, "clear.png"), opt, "not opaque");
-    odd_png(file(0, "opaque.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 255});
-    in = read_side(file(0, "opaque.png"), opt, &notes);
+    assert_refused(test_path("grey.png"), (struct input_options){0}, "--curve");
+    assert_refused(test_path("grey.png"), (struct input_options){.curve = "film"}, "none of");
+    odd_png(test_path("clear.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 128});
+    assert_refused(test_path("clear.png"), opt, "not opaque");
+    odd_png(test_path("opaque.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 255});
+    in = read_side(test_path("opaque.png"), opt, &notes);
     input_free(&in);
 }
 
@@ -278,16 +267,16 @@ TEST(test_codes)
 TEST(test_rounded_floats)
 {
     struct notes notes = {0};
-    odd_exr(file(0, "half.exr"), 1, 1, "BGR", true, 1, (float[3]){0, 2.5, 1.5});
-    struct input in = read_side(file(0, "half.exr"), (struct input_options){0}, &notes);
+    odd_exr(test_path("half.exr"), 1, 1, "BGR", true, 1, (float[3]){0, 2.5, 1.5});
+    struct input in = read_side(test_path("half.exr"), (struct input_options){0}, &notes);
     assert_near(in.m.mean[0], 1.5, 0);
     assert_near(in.m.mean[1], 2.5, 0);
     assert_near(in.m.tolerance[0], 1.5 / 2048, 1e-15);
     assert_near(in.rounding[0], pow(1.5 / 1024, 2) / 12, 1e-15);
     assert_true(has_note(&notes, "half floats") && in.censored == NULL);
     input_free(&in);
-    odd_hdr(file(0, "one.hdr"), 1, 1, (const uint8_t[1][4]){{128, 64, 0, 129}});
-    in = read_side(file(0, "one.hdr"), (struct input_options){0}, &notes);
+    odd_hdr(test_path("one.hdr"), 1, 1, (const uint8_t[1][4]){{128, 64, 0, 129}});
+    in = read_side(test_path("one.hdr"), (struct input_options){0}, &notes);
     assert_near(in.m.mean[0], 1, 1e-6);
     assert_near(in.m.mean[1], 0.5, 1e-6);
     for (int c = 0; c < 3; c++)
@@ -295,8 +284,8 @@ TEST(test_rounded_floats)
     assert_true(has_note(&notes, "RGBE"));
     input_free(&in);
     /* PFM is stored from the bottom up. */
-    odd_pfm(file(0, "two.pfm"), 1, 2, (float[6]){1, 2, 3, 4, 5, 6});
-    in = read_side(file(0, "two.pfm"), (struct input_options){0}, &notes);
+    odd_pfm(test_path("two.pfm"), 1, 2, (float[6]){1, 2, 3, 4, 5, 6});
+    in = read_side(test_path("two.pfm"), (struct input_options){0}, &notes);
     assert_near(in.m.mean[0], 1, 0);
     assert_near(in.m.mean[5], 6, 0);
     assert_null(in.m.tolerance);
@@ -306,26 +295,31 @@ TEST(test_rounded_floats)
 TEST(test_hygiene)
 {
     struct input_options none = {0};
-    float v[4] = {1, 1, 1, 1};
-    odd_exr(file(0, "crop.exr"), 1, 1, "BGR", false, 2, v);
-    assert_refused(file(0, "crop.exr"), none, "data and display windows");
-    odd_exr(file(0, "alpha.exr"), 1, 1, "ABGR", false, 1, (float[4]){.5f, 1, 1, 1});
-    assert_refused(file(0, "alpha.exr"), none, "not opaque (alpha 0.5)");
-    odd_exr(file(0, "nan.exr"), 1, 1, "BGR", false, 1, (float[3]){1, NAN, 1});
-    assert_refused(file(0, "nan.exr"), none, "pixel 0,0 is not a number");
-    odd_exr(file(0, "inf.exr"), 1, 1, "BGR", false, 1, (float[3]){1, 1, INFINITY});
-    assert_refused(file(0, "inf.exr"), none, "infinite");
-    odd_exr(file(0, "xyz.exr"), 1, 1, "XYZ", false, 1, v);
-    assert_refused(file(0, "xyz.exr"), none, "no channels R, G, B");
-    odd_exr(file(0, "ok.exr"), 1, 1, "ABGR", false, 1, v);
-    assert_refused(file(0, "ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
+    static const struct {
+        const char *names;
+        int shown;
+        float v[4];
+        const char *line;
+    } cases[] = {
+        {"BGR", 2, {1, 1, 1}, "data and display windows"},
+        {"ABGR", 1, {.5f, 1, 1, 1}, "not opaque (alpha 0.5)"},
+        {"BGR", 1, {1, NAN, 1}, "pixel 0,0 is not a number"},
+        {"BGR", 1, {1, 1, INFINITY}, "infinite"},
+        {"XYZ", 1, {1, 1, 1}, "no channels R, G, B"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        odd_exr(test_path("odd.exr"), 1, 1, cases[i].names, false, cases[i].shown, cases[i].v);
+        assert_refused(test_path("odd.exr"), none, cases[i].line);
+    }
+    odd_exr(test_path("ok.exr"), 1, 1, "ABGR", false, 1, (float[4]){1, 1, 1, 1});
+    assert_refused(test_path("ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
     struct notes notes = {0};
-    struct input in = read_side(file(0, "ok.exr"), none, &notes);
+    struct input in = read_side(test_path("ok.exr"), none, &notes);
     input_free(&in);
-    odd_file(file(0, "words.exr"), "no picture");
-    assert_refused(file(0, "words.exr"), none, "cannot read");
-    assert_refused(file(0, "gone.exr"), none, "gone.exr: cannot read");
-    assert_refused(file(0, "gone.exr"), none, "No such file");
+    odd_file(test_path("words.exr"), "no picture");
+    assert_refused(test_path("words.exr"), none, "cannot read");
+    assert_refused(test_path("gone.exr"), none, "gone.exr: cannot read");
+    assert_refused(test_path("gone.exr"), none, "No such file");
 }
 
 /* 64 x 64 linear codes: A and B noise of a few codes about 100, but a square of 12 x 12 that A has at 255
@@ -368,7 +362,7 @@ TEST(test_censored)
     struct notes notes = {0};
     fill_codes(a, 64, &seed);
     fill_codes(b, 64, &seed);
-    const char *pa = file(0, "a.png"), *pb = file(1, "b.png");
+    const char *pa = test_path("a.png"), *pb = test_path("b.png");
     odd_png(pa, 64, 64, 3, 8, a);
     odd_png(pb, 64, 64, 3, 8, b);
     assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_EQUIVALENT);
@@ -409,15 +403,15 @@ TEST(test_rounding_is_no_difference)
             a[i] = (uint16_t)(100 + (uniform(&seed) < 1.0 / 16));
             b[i] = (uint16_t)(100 + step + (uniform(&seed) < 1.0 / 16));
         }
-        odd_png(file(0, "a.png"), 64, 64, 3, 8, a);
-        odd_png(file(1, "b.png"), 64, 64, 3, 8, b);
+        odd_png(test_path("a.png"), 64, 64, 3, 8, a);
+        odd_png(test_path("b.png"), 64, 64, 3, 8, b);
         struct input in[2];
         struct notes notes = {0};
         struct err e;
         struct comparison c;
         struct compare_options opt = {.alpha = 1e-3, .tile = 16};
         for (int i = 0; i < 2; i++)
-            in[i] = read_side(file(i, i ? "b.png" : "a.png"),
+            in[i] = read_side(test_path(i ? "b.png" : "a.png"),
                               (struct input_options){.curve = "linear"}, &notes);
         assert_true(input_pair(&in[0], &in[1], &notes, &e));
         MUST(compare_moments(&in[0].m, &in[1].m, &opt, &c, &e));
@@ -427,19 +421,3 @@ TEST(test_rounding_is_no_difference)
         input_free(&in[1]);
     }
 }
-
-static int set_up(void **state)
-{
-    (void)state;
-    strcpy(folder, "/tmp/assay_test_input.XXXXXX");
-    return mkdtemp(folder) == NULL;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    struct err e;
-    return !fs_remove_tree(folder, &e);
-}
-
-TEST_GROUP(set_up, tear_down)

@@ -5,18 +5,12 @@
 #include "tests/support/test.h"
 
 enum { WIDTH = 4, HEIGHT = 2, MAX_SHARES = 4 };
-static char dir[] = "/tmp/assay_merge_XXXXXX";
 
-static int make_dir(void **state)
+static const char *part_path(int k)
 {
-    (void)state;
-    return mkdtemp(dir) == NULL;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
+    char name[16];
+    snprintf(name, sizeof name, "part%d.exr", k);
+    return test_path(name);
 }
 
 /* Sample k of channel c at column x, row y of the full picture: skewed, with an offset. */
@@ -32,6 +26,16 @@ struct part {
     const char *seed, *adaptive;
     bool layers;
 };
+
+#define ALL .x = 0, 0, WIDTH, HEIGHT
+
+static int num_parts(const struct part part[MAX_SHARES])
+{
+    int n = 0;
+    while (n < MAX_SHARES && part[n].w > 0)
+        n++;
+    return n;
+}
 
 static void add_samples(struct moments *m, size_t pixel, int x, int row, uint32_t first,
                         uint32_t last)
@@ -92,14 +96,11 @@ static void write_part(const char *path, const struct part *p)
 static bool merge(const struct part *part, int num, struct share *whole, struct err *e)
 {
     struct share share[MAX_SHARES];
-    char path[MAX_SHARES][64];
     bool ok = true;
     int n = 0;
     for (; ok && n < num; n++) {
-        snprintf(path[n], sizeof path[n], "%s/part%d.exr", dir, n);
-        write_part(path[n], &part[n]);
-        ok = share_read(path[n], &share[n], e);
-        unlink(path[n]);
+        write_part(part_path(n), &part[n]);
+        ok = share_read(part_path(n), &share[n], e);
         n -= !ok;
     }
     ok = ok && merge_shares(share, num, whole, e);
@@ -150,57 +151,35 @@ TEST(parts_make_the_whole)
 {
     static const struct {
         struct part part[MAX_SHARES];
-        int num;
         uint32_t first, last;
         bool layers;
     } cases[] = {
-        {{{.x = 0, 0, 4, 2, 7, 40, .layers = true}, {.x = 0, 0, 4, 2, 0, 7, .layers = true}},
-         2,
-         0,
-         40,
-         true},
-        {{{.x = 0, 0, 4, 2, 5, 6},
-          {.x = 0, 0, 4, 2, 3, 5, .layers = true},
-          {.x = 0, 0, 4, 2, 6, 90}},
-         3,
-         3,
-         90,
-         false},
-        {{{.x = 0, 0, 1, 2, 2, 9, .layers = true},
-          {.x = 1, 0, 3, 1, 2, 9, .layers = true},
-          {.x = 1, 1, 3, 1, 2, 9, .layers = true}},
-         3,
+        {{{.layers = true, ALL, 7, 40}, {.layers = true, ALL, 0, 7}}, 0, 40, true},
+        {{{ALL, 5, 6}, {.layers = true, ALL, 3, 5}, {ALL, 6, 90}}, 3, 90, false},
+        {{{.layers = true, .x = 0, 0, 1, 2, 2, 9},
+          {.layers = true, .x = 1, 0, 3, 1, 2, 9},
+          {.layers = true, .x = 1, 1, 3, 1, 2, 9}},
          2,
          9,
          true},
-        {{{.x = 0, 1, 4, 1, 0, 9}, {.x = 0, 0, 4, 1, 4, 9}, {.x = 0, 0, 4, 1, 0, 4}},
-         3,
-         0,
-         9,
-         false},
+        {{{.x = 0, 1, 4, 1, 0, 9}, {.x = 0, 0, 4, 1, 4, 9}, {.x = 0, 0, 4, 1, 0, 4}}, 0, 9, false},
         /* An interrupted share may have no sample yet. */
-        {{{.x = 0, 0, 4, 2, 0, 9, .layers = true}, {.x = 0, 0, 4, 2, 9, 9, .layers = true}},
-         2,
-         0,
-         9,
-         true},
+        {{{.layers = true, ALL, 0, 9}, {.layers = true, ALL, 9, 9}}, 0, 9, true},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         struct share whole = {0}, again = {0};
         struct err e = {0};
-        char path[64];
-        if (!merge(cases[i].part, cases[i].num, &whole, &e))
+        const char *path = test_path("whole.exr");
+        if (!merge(cases[i].part, num_parts(cases[i].part), &whole, &e))
             fail_msg("case %zu: %s", i, e.msg);
         check_whole(&whole, cases[i].first, cases[i].last, cases[i].layers);
         /* What is written can be merged again. */
-        snprintf(path, sizeof path, "%s/whole.exr", dir);
         assert_true(share_write(path, &whole, "test", &e));
         if (!share_read(path, &again, &e))
             fail_msg("case %zu: %s", i, e.msg);
         assert_true(again.num_ranges == 1 && again.range[0][1] == cases[i].last);
         share_free(&whole);
         share_free(&again);
-        unlink(path);
     }
 }
 
@@ -216,16 +195,11 @@ static void read_floats(const char *path, struct image *im)
 static void merge_files(const char *of, int to)
 {
     struct share share[MAX_SHARES] = {0}, whole = {0};
-    char path[MAX_SHARES][64], out[64];
     struct err e = {0};
     int num = (int)strlen(of);
-    for (int i = 0; i < num; i++) {
-        snprintf(path[i], sizeof path[i], "%s/part%c.exr", dir, of[i]);
-        MUST(share_read(path[i], &share[i], &e));
-    }
-    snprintf(out, sizeof out, "%s/part%d.exr", dir, to);
-    if (!merge_shares(share, num, &whole, &e) || !share_write(out, &whole, "test", &e))
-        fail_msg("%s of %s", e.msg, of);
+    for (int i = 0; i < num; i++)
+        MUST(share_read(part_path(of[i] - '0'), &share[i], &e));
+    MUST(merge_shares(share, num, &whole, &e) && share_write(part_path(to), &whole, "test", &e));
     for (int i = 0; i < num; i++)
         share_free(&share[i]);
     share_free(&whole);
@@ -236,10 +210,10 @@ static void merge_files(const char *of, int to)
  * the same ranges, and of two cells cut at other samples. */
 TEST(any_grouping_has_the_same_bits)
 {
-    static const struct part cases[][MAX_SHARES] = {{{.x = 0, 0, 4, 2, 0, 7, .layers = true},
-                                                     {.x = 0, 0, 4, 2, 7, 40, .layers = true},
-                                                     {.x = 0, 0, 4, 2, 40, 41, .layers = true},
-                                                     {.x = 0, 0, 4, 2, 41, 97, .layers = true}},
+    static const struct part cases[][MAX_SHARES] = {{{.layers = true, ALL, 0, 7},
+                                                     {.layers = true, ALL, 7, 40},
+                                                     {.layers = true, ALL, 40, 41},
+                                                     {.layers = true, ALL, 41, 97}},
                                                     {{.x = 0, 0, 1, 2, 0, 7},
                                                      {.x = 1, 0, 3, 2, 0, 7, .layers = true},
                                                      {.x = 0, 0, 1, 2, 7, 33},
@@ -252,22 +226,18 @@ TEST(any_grouping_has_the_same_bits)
         {"3210"}, {"01", "24", "35"}, {"31", "20", "54"}, {"23", "14", "50"}};
     /* Of the third case only cells that have been made whole can be put beside each other. */
     static const char *const by_cell[][4] = {{"3210"}, {"02", "31", "45"}, {"13", "240"}};
-    char path[64];
-    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
+    for (size_t c = 0; c < COUNT(cases); c++) {
         size_t num = c == 0 ? 4 : 3;
         struct image first = {0};
-        for (int k = 0; k < MAX_SHARES; k++) {
-            snprintf(path, sizeof path, "%s/part%d.exr", dir, k);
-            write_part(path, &cases[c][k]);
-        }
+        for (int k = 0; k < MAX_SHARES; k++)
+            write_part(part_path(k), &cases[c][k]);
         for (size_t g = 0; g < num; g++) {
             int last = MAX_SHARES - 1;
             const char *const *steps = c == 0 ? grouping[g] : by_cell[g];
             for (int i = 0; i < 4 && steps[i] != NULL; i++)
                 merge_files(steps[i], ++last);
             struct image im;
-            snprintf(path, sizeof path, "%s/part%d.exr", dir, last);
-            read_floats(path, &im);
+            read_floats(part_path(last), &im);
             size_t bytes = (size_t)im.width * (size_t)im.height * (size_t)im.channels * 4;
             if (g == 0)
                 first = im;
@@ -275,16 +245,8 @@ TEST(any_grouping_has_the_same_bits)
                 fail_msg("case %zu, grouping %zu: other bits", c, g);
             if (g > 0)
                 image_free(&im);
-            for (int k = MAX_SHARES; k <= last; k++) {
-                snprintf(path, sizeof path, "%s/part%d.exr", dir, k);
-                unlink(path);
-            }
         }
         image_free(&first);
-        for (int k = 0; k < MAX_SHARES; k++) {
-            snprintf(path, sizeof path, "%s/part%d.exr", dir, k);
-            unlink(path);
-        }
     }
 }
 
@@ -293,28 +255,23 @@ TEST(rounded_sums_have_other_bits)
 {
     struct share whole[2] = {{0}, {0}}, share[MAX_SHARES] = {0};
     struct err e;
-    char path[64];
-    for (int k = 0; k < 3; k++) {
-        snprintf(path, sizeof path, "%s/part%d.exr", dir, k);
-        write_part(path, &(struct part){
-                             .x = 0, 0, 4, 2, (uint32_t)(k * k), (uint32_t)((k + 1) * (k + 1))});
-    }
+    for (int k = 0; k < 3; k++)
+        write_part(
+            part_path(k),
+            &(struct part){.x = 0, 0, 4, 2, (uint32_t)(k * k), (uint32_t)((k + 1) * (k + 1))});
     for (int g = 0; g < 2; g++) {
         if (g == 1) {
             merge_files("01", 3);
             struct image im;
-            snprintf(path, sizeof path, "%s/part3.exr", dir);
-            read_floats(path, &im);
+            read_floats(part_path(3), &im);
             for (int i = 0; i < im.num_attrs; i++)
                 if (strcmp(im.attr[2 * i], "assay:parts") == 0)
                     im.attr[2 * i][0] = 'x';
-            MUST(image_write_exr(path, &im, &e));
+            MUST(image_write_exr(part_path(3), &im, &e));
             image_free(&im);
         }
-        for (int i = 0; i < 3 - g; i++) {
-            snprintf(path, sizeof path, "%s/part%d.exr", dir, g == 0 ? i : 3 - i);
-            MUST(share_read(path, &share[i], &e));
-        }
+        for (int i = 0; i < 3 - g; i++)
+            MUST(share_read(part_path(g == 0 ? i : 3 - i), &share[i], &e));
         assert_true(merge_shares(share, 3 - g, &whole[g], &e));
         for (int i = 0; i < 3 - g; i++)
             share_free(&share[i]);
@@ -323,54 +280,31 @@ TEST(rounded_sums_have_other_bits)
     assert_memory_not_equal(whole[0].m.m3, whole[1].m.m3, values * sizeof(double));
     share_free(&whole[0]);
     share_free(&whole[1]);
-    for (int k = 0; k < 4; k++) {
-        snprintf(path, sizeof path, "%s/part%d.exr", dir, k);
-        unlink(path);
-    }
 }
 
 TEST(refusals)
 {
     static const struct {
-        struct part part[MAX_SHARES];
-        int num;
         const char *why;
+        struct part part[MAX_SHARES];
     } cases[] = {
-        {{{.x = 0, 0, 4, 2, 0, 7}, {.x = 0, 0, 4, 2, 6, 9}}, 2, "both have samples 6:7"},
-        {{{.x = 0, 0, 4, 2, 0, 2, .samples = "0:1,5:6"}, {.x = 0, 0, 4, 2, 3, 9}},
-         2,
-         "samples 5:6"},
-        {{{.x = 0, 0, 4, 2, 0, 7}, {.x = 0, 0, 4, 2, 7, 9, .seed = "2"}},
-         2,
-         "different seed: '1' and '2'"},
-        {{{.x = 0, 0, 4, 2, 0, 7}, {.x = 0, 0, 4, 2, 7, 9, .adaptive = "rule 2 1"}},
-         2,
-         "different adaptive"},
-        {{{.x = 0, 0, 4, 2, 0, 7, .adaptive = "rule 2 1"},
-          {.x = 0, 0, 4, 2, 7, 9, .adaptive = "rule 2 1"}},
-         2,
-         "do not add up"},
-        {{{.x = 0, 0, 3, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 7}}, 2, "overlap without"},
-        {{{.x = 0, 0, 1, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 7}}, 2, "open"},
-        {{{.x = 0, 0, 2, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 8}}, 2, "same samples in all"},
-        {{{.x = 0, 0, 4, 2, 0, 7, .samples = "7:0"}, {.x = 0, 0, 4, 2, 7, 9}},
-         2,
-         "not sample ranges"},
-        {{{.x = 0, 0, 4, 2, 0, 7, .samples = "0:7x"}, {.x = 0, 0, 4, 2, 7, 9}},
-         2,
-         "not sample ranges"},
-        {{{.x = 0, 0, 4, 2, 0, 7, .samples = ":"}, {.x = 0, 0, 4, 2, 7, 9}},
-         2,
-         "not sample ranges"},
-        {{{.x = 1, 0, 4, 2, 0, 7}, {.x = 0, 0, 4, 2, 7, 9}}, 2, "which part of which picture"},
+        {"both have samples 6:7", {{ALL, 0, 7}, {ALL, 6, 9}}},
+        {"samples 5:6", {{ALL, 0, 2, "0:1,5:6"}, {ALL, 3, 9}}},
+        {"different seed: '1' and '2'", {{ALL, 0, 7}, {ALL, 7, 9, .seed = "2"}}},
+        {"different adaptive", {{ALL, 0, 7}, {ALL, 7, 9, .adaptive = "rule 2 1"}}},
+        {"do not add up",
+         {{ALL, 0, 7, .adaptive = "rule 2 1"}, {ALL, 7, 9, .adaptive = "rule 2 1"}}},
+        {"overlap without", {{.x = 0, 0, 3, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 7}}},
+        {"open", {{.x = 0, 0, 1, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 7}}},
+        {"same samples in all", {{.x = 0, 0, 2, 2, 0, 7}, {.x = 2, 0, 2, 2, 0, 8}}},
+        {"not sample ranges", {{ALL, 0, 7, "7:0"}, {ALL, 7, 9}}},
+        {"not sample ranges", {{ALL, 0, 7, "0:7x"}, {ALL, 7, 9}}},
+        {"not sample ranges", {{ALL, 0, 7, ":"}, {ALL, 7, 9}}},
+        {"which part of which picture", {{.x = 1, 0, 4, 2, 0, 7}, {ALL, 7, 9}}},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         struct share whole = {0};
         struct err e = {0};
-        assert_false(merge(cases[i].part, cases[i].num, &whole, &e));
-        if (strstr(e.msg, cases[i].why) == NULL)
-            fail_msg("case %zu: '%s' lacks '%s'", i, e.msg, cases[i].why);
+        REFUSES(merge(cases[i].part, num_parts(cases[i].part), &whole, &e), cases[i].why);
     }
 }
-
-TEST_GROUP(make_dir, remove_dir)

@@ -5,27 +5,10 @@
 
 /* Two references of one scene share a render of ours; a probe of an engine; a scene that ran out of
  * time; a claim of consistency; a claim of two files, which has no cost. */
-static const char text[] =
-    "{\"claims\": ["
-    "{\"scene\": \"a\", \"a\": \"pathtracer\", \"b\": \"truth\", \"expected\": \"EQUIVALENT\","
-    " \"verdict\": \"EQUIVALENT\", \"passed\": true, \"cost_s\": {\"a\": 1.5, \"b\": 0},"
-    " \"looks\": [{\"n_a\": 16}, {\"n_a\": 64}]},"
-    "{\"scene\": \"a\", \"a\": \"pathtracer\", \"b\": \"cycles\", \"expected\": \"EQUIVALENT\","
-    " \"verdict\": \"INCONCLUSIVE\", \"passed\": false, \"cost_s\": {\"a\": 4, \"b\": 2},"
-    " \"looks\": [{\"n_a\": 16}, {\"n_a\": 64}, {\"n_a\": 256}]},"
-    "{\"scene\": \"a\", \"a\": \"cycles\", \"b\": \"truth\", \"expected\": \"EQUIVALENT\","
-    " \"verdict\": \"EQUIVALENT\", \"passed\": true, \"cost_s\": {\"a\": 3, \"b\": 0},"
-    " \"looks\": [{\"n_a\": 512}]},"
-    "{\"scene\": \"<b>\", \"a\": \"pathtracer\", \"b\": \"cycles\", \"expected\": \"EQUIVALENT\","
-    " \"verdict\": \"INCONCLUSIVE\", \"passed\": false, \"error\": \"budget spent\","
-    " \"cost_s\": {\"a\": 0, \"b\": 0}, \"looks\": []},"
-    "{\"scene\": \"files\", \"a\": \"x\", \"b\": \"y\", \"expected\": \"EQUIVALENT\","
-    " \"verdict\": \"EQUIVALENT\", \"passed\": true}],"
-    " \"consistency\": [{\"scene\": \"<b>\", \"seconds\": 20}]}";
 
 static json_t *results(void)
 {
-    json_t *root = json_loads(text, 0, NULL);
+    json_t *root = json_load_file("tests/tools/results/costs.json", 0, NULL);
     assert_non_null(root);
     return root;
 }

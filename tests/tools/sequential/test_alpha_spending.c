@@ -8,30 +8,14 @@
  * samples of mean 1 and standard deviation 0.7. A and B draw from one pool, so H0 holds exactly for what
  * is drawn, and 2000 claims of 512 samples a pixel cost seconds. Declared: 64 samples, so the looks are at
  * 16, 32, 64, 128, 256 and 512. */
+#include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 
 #include "tools/sequential/two_stage.h"
 #include "tools/sequential/alpha_spending.h"
 #include "tests/support/test.h"
 
-#include <gsl/gsl_cdf.h>
-
 enum { SIDE = 8, PIXELS = SIDE * SIDE, BLOCK = 16, POOL = 20000, DECLARED = 64, CLAIMS = 2000 };
-
-static double lower_bound(int k, int n)
-{
-    double lo = 0, hi = 1;
-    for (int i = 0; i < 60 && k > 0; i++) {
-        double x = (lo + hi) / 2;
-        *(gsl_cdf_beta_P(x, k, n - k + 1) < 0.001 ? &lo : &hi) = x;
-    }
-    return lo;
-}
-
-static double upper_bound(int k, int n)
-{
-    return 1 - lower_bound(n - k, n);
-}
 
 static struct block {
     double mean, m2, m3;
@@ -320,9 +304,9 @@ TEST(test_two_stages_in_sequence)
     struct comparison r;
     struct err e;
     int stage;
-    assert_false(
-        alpha_spending_judge(&alpha_spending_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e));
-    assert_non_null(strstr(e.msg, "fresh seeds"));
+    REFUSES(
+        alpha_spending_judge(&alpha_spending_single, c.look, 2, &opt, pair_of, &c, &r, &stage, &e),
+        "fresh seeds");
     for (int k = 0; k < 2; k++) {
         moments_free(&c.a[k].m);
         moments_free(&c.b[k].m);

@@ -1,7 +1,6 @@
 /* Statistics of convergence: formulas against brute force, error rates on synthetic engines whose bias,
  * slope and variance are known, and negative controls that must be flagged. Seeds and counts were fixed
  * beforehand; nothing is drawn again. */
-#include "renderer/base/fs.h"
 #include "tools/stats/convergence_rate.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
@@ -261,15 +260,12 @@ TEST(a_smaller_reference_is_a_box_average)
     assert_near(r.mean[4], 1, 1e-12);
     assert_near(r.var[4], var / (mean * mean), 1e-12);
     convergence_rate_reference_free(&r);
-    assert_false(convergence_rate_reference_init(&r, &m, 3, &e));
-    assert_non_null(strstr(e.msg, "3 times smaller"));
+    REFUSES(convergence_rate_reference_init(&r, &m, 3, &e), "3 times smaller");
     strcpy(m.unit, "stratified");
-    assert_false(convergence_rate_reference_init(&r, &m, 1, &e));
-    assert_non_null(strstr(e.msg, "its own noise"));
+    REFUSES(convergence_rate_reference_init(&r, &m, 1, &e), "its own noise");
     strcpy(m.unit, "exact");
     memset(m.mean, 0, 24 * sizeof *m.mean);
-    assert_false(convergence_rate_reference_init(&r, &m, 1, &e));
-    assert_non_null(strstr(e.msg, "black"));
+    REFUSES(convergence_rate_reference_init(&r, &m, 1, &e), "black");
     moments_free(&m);
 }
 
@@ -318,7 +314,7 @@ TEST(wrong_slopes_are_found)
         {"a bias of 15 % bends the slope", {EXPONENTIAL, 0.15, 1, 1}},
     };
     gsl_rng *rng = new_rng(2);
-    for (size_t c = 0; c < sizeof control / sizeof *control; c++) {
+    for (size_t c = 0; c < COUNT(control); c++) {
         int found = 0;
         for (int run = 0; run < 200; run++) {
             struct converge_reference ref = make_reference(rng, &control[c].engine, 1024, 16);
@@ -452,43 +448,20 @@ TEST(bad_rungs_are_refused)
     struct err e;
     render(rng, &g, 16, 4, images);
     memcpy(images + 3 * SIZE, images + SIZE, SIZE * sizeof *images);
-    assert_false(convergence_rate_rung(images, 4, 16, &ref, &r, &e));
-    assert_non_null(strstr(e.msg, "replicates 1 and 3 are the same"));
+    REFUSES(convergence_rate_rung(images, 4, 16, &ref, &r, &e), "replicates 1 and 3 are the same");
     /* 4 observations of 1 sample cannot tell the error of 4096. */
     render(rng, &g, 4096, 4, images);
     memset(ref.mean, 0, SIZE * sizeof *ref.mean);
     for (size_t i = 0; i < SIZE; i++)
         ref.mean[i] = truth(i) / ref.unit[i];
-    assert_false(convergence_rate_rung(images, 4, 4096, &ref, &r, &e));
-    assert_non_null(strstr(e.msg, "reference is noisier"));
+    REFUSES(convergence_rate_rung(images, 4, 4096, &ref, &r, &e), "reference is noisier");
     convergence_rate_reference_free(&ref);
     gsl_rng_free(rng);
 }
 
-static const char scene_json[] =
-    "{\"scene\": \"41_cornell\", \"width\": 64, \"height\": 64, \"depth\": 5, \"replicates\": 16,"
-    " \"reference\": \"golden of cycles\", \"reference_noise\": 0.001, \"alpha\": 1e-3,"
-    " \"margin\": 0.01, \"slope_margin\": 0.1, \"ratios\": ["
-    "  {\"a\": \"pathtracer\", \"b\": \"cycles\", \"rungs\": ["
-    "   {\"spp\": 1, \"variance\": 1.5, \"variance_ci\": [1, 2], \"efficiency\": null,"
-    "    \"efficiency_ci\": null},"
-    "   {\"spp\": 4, \"variance\": 2.5, \"variance_ci\": [2, 3], \"efficiency\": 0.5,"
-    "    \"efficiency_ci\": [0.4, 0.6]}]}],"
-    " \"engines\": [{\"engine\": \"pathtracer\", \"independent\": true, \"judged\": true,"
-    "  \"slope\": -0.5, \"slope_ci\": [-0.51, -0.49], \"slope_verdict\": \"EQUIVALENT\","
-    "  \"floor_ci\": [0, 0.004], \"floor_verdict\": \"EQUIVALENT\", \"start_s\": 0.2,"
-    "  \"cpu_s_per_spp\": 0.01, \"verdict\": \"EQUIVALENT\", \"passed\": true, \"reason\": \"r\","
-    "  \"rungs\": [{\"spp\": 1, \"rmse\": 1, \"rmse_ci\": [0.9, 1.1], \"variance\": 1,"
-    "   \"variance_ci\": [0.8, 1.2], \"bias\": -0.01, \"cpu_s\": 0.3, \"efficiency\": 100,"
-    "   \"efficiency_ci\": null}, {\"spp\": 4, \"rmse\": 0.5, \"rmse_ci\": [0.45, 0.55],"
-    "   \"variance\": 0.25, \"variance_ci\": [0.2, 0.3], \"bias\": 0.01, \"cpu_s\": 0.4,"
-    "   \"efficiency\": 100, \"efficiency_ci\": [90, 110]}]},"
-    "  {\"engine\": \"cycles\", \"independent\": false, \"judged\": false, \"passed\": false,"
-    "   \"error\": \"cycles: not installed\"}]}";
-
 static json_t *results_with(json_t **scene)
 {
-    *scene = json_loads(scene_json, 0, NULL);
+    *scene = json_load_file("tests/tools/stats/convergence.json", 0, NULL);
     assert_non_null(*scene);
     return json_pack("{s:i, s:s, s:s, s:s, s:f, s:[], s:[o]}", "assay", 1, "command",
                      "assay converge", "version", "0.1", "date", "2026-01-02T03:04:05Z", "alpha",
@@ -560,11 +533,8 @@ static double xpath_number(xmlXPathContext *context, const char *expression)
  * for; text that is not ours is escaped; a second file can be joined, but only if it has anything. */
 TEST(the_page_shows_the_rungs)
 {
-    char dir[] = "/tmp/test_converge_XXXXXX", results[64], page[64];
+    const char *results = test_path("results.json"), *page = test_path("index.html");
     struct err e = {""};
-    assert_non_null(mkdtemp(dir));
-    snprintf(results, sizeof results, "%s/results.json", dir);
-    snprintf(page, sizeof page, "%s/index.html", dir);
     json_t *scene, *root = results_with(&scene);
     json_t *engines = json_object_get(scene, "engines");
     json_object_set_new(json_array_get(engines, 0), "engine", json_string("<i>ours</i>"));
@@ -573,14 +543,20 @@ TEST(the_page_shows_the_rungs)
     htmlDocPtr doc = htmlReadFile(page, "utf-8", HTML_PARSE_NOERROR | HTML_PARSE_NOWARNING);
     assert_non_null(doc);
     xmlXPathContext *c = xmlXPathNewContext(doc);
-    assert_near(xpath_number(c, "count(//h1)"), 1, 0);
-    assert_near(xpath_number(c, "count(//h1[contains(., '1 of 2 engines could not be judged')])"),
-                1, 0);
-    assert_near(xpath_number(c, "count(//*[local-name()='i'])"), 0, 0);
-    assert_near(xpath_number(c, "count(//*[@class='plot'])"), 2, 0);
-    assert_near(xpath_number(c, "count(//*[@class='dot'][*])"), 4,
-                0);                                                 /* with a <title>: the rungs */
-    assert_near(xpath_number(c, "count(//*[@class='dot'])"), 6, 0); /* and one in each legend */
+    static const struct {
+        const char *what;
+        int number;
+    } counts[] = {{"h1", 1},
+                  {"h1[contains(., '1 of 2 engines could not be judged')]", 1},
+                  {"*[local-name()='i']", 0},
+                  {"*[@class='plot']", 2},
+                  {"*[@class='dot'][*]", 4}, /* with a <title>: the rungs */
+                  {"*[@class='dot']", 6}};   /* and one in each legend */
+    for (size_t i = 0; i < COUNT(counts); i++) {
+        char xpath[96];
+        snprintf(xpath, sizeof xpath, "count(//%s)", counts[i].what);
+        assert_near(xpath_number(c, xpath), counts[i].number, 0);
+    }
     /* RMSE falls to a half where samples grow fourfold: on the line of slope -1/2, which begins in the
      * first dot and ends at the right edge. */
     double x0 = xpath_number(c, "(//*[@class='dot'][*])[1]/@cx");
@@ -600,12 +576,10 @@ TEST(the_page_shows_the_rungs)
     xmlXPathFreeContext(c);
     xmlFreeDoc(doc);
 
-    assert_false(report_write_with(results, results, page, &e));
-    assert_non_null(strstr(e.msg, "has a 'convergence' too"));
+    REFUSES(report_write_with(results, results, page, &e), "has a 'convergence' too");
     json_object_del(root, "convergence");
     assert_true(json_write(results, root, &e));
     assert_false(report_write(results, page, &e)); /* neither claims nor convergence */
-    assert_true(fs_remove_tree(dir, &e));
     json_decref(root);
 }
 
@@ -628,7 +602,7 @@ TEST(broken_results_are_refused)
         {"rung", "spp", "null", "'spp' is not a positive number"},
         {"ratio", "variance", "-1", "'variance' is not a positive number"},
     };
-    for (size_t i = 0; i < sizeof broken / sizeof *broken; i++) {
+    for (size_t i = 0; i < COUNT(broken); i++) {
         json_t *scene, *root = results_with(&scene);
         struct err e = {""};
         json_t *engine = json_array_get(json_object_get(scene, "engines"), 0);
@@ -640,9 +614,9 @@ TEST(broken_results_are_refused)
                             : json_array_get(json_object_get(ratio, "rungs"), 0);
         json_object_set_new(owner, broken[i].member,
                             json_loads(broken[i].value, JSON_DECODE_ANY, NULL));
-        assert_false(convergence_results_check(json_object_get(root, "convergence"), "x.json", &e));
-        if (strstr(e.msg, broken[i].line) == NULL || strstr(e.msg, "41_cornell") == NULL)
-            fail_msg("'%s' does not say '%s' of 41_cornell", e.msg, broken[i].line);
+        REFUSES(convergence_results_check(json_object_get(root, "convergence"), "x.json", &e),
+                broken[i].line);
+        assert_non_null(strstr(e.msg, "41_cornell"));
         json_decref(root);
     }
 }

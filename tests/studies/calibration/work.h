@@ -1,6 +1,6 @@
 /* Jobs shared out among threads, with one line that says how far they are. */
-#ifndef ASSAY_CALIBRATE_WORK_H
-#define ASSAY_CALIBRATE_WORK_H
+#ifndef ASSAY_TESTS_WORK_H
+#define ASSAY_TESTS_WORK_H
 
 #include "renderer/base/progress.h"
 #include "renderer/base/err.h"
@@ -16,6 +16,9 @@ typedef bool work_job(void *arg, int job, struct err *e);
 
 /* Runs jobs 0 .. num-1, each about `cost` CPU milliseconds; false with the first error. */
 bool work_run(struct work *w, int num, double cost, work_job *job, void *arg, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same on all processors, and silent. */
+bool work_run_all(int num, work_job *job, void *arg, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -1,4 +1,6 @@
-#include "calibrate_work.h"
+#include "work.h"
+
+#include "renderer/base/cli.h"
 
 #include <assert.h>
 #include <pthread.h>
@@ -53,4 +55,11 @@ bool work_run(struct work *w, int num, double cost, work_job *job, void *arg, st
     if (s.failed)
         return err_set(e, "%s", s.err.msg);
     return true;
+}
+
+bool work_run_all(int num, work_job *job, void *arg, struct err *e)
+{
+    struct work w = {.threads = cli_processors() < MAX_THREADS ? cli_processors() : MAX_THREADS};
+    progress_start(&w.progress, "", NULL, true);
+    return work_run(&w, num, 0, job, arg, e);
 }
