@@ -201,13 +201,13 @@ static void put_part(const struct povray_writer *w, const struct shape *s)
         put_lamp(w, s, m->radiance);
         return;
     }
-    if (povray_is_glass(m) && !bsdf_is_black(m)) {
+    if (povray_is_glass(m) && !material_is_black(m)) {
         put_glass_body(w, s, m);
         return;
     }
     struct look look = {.albedo = m->reflectance, .flags = ""};
     if (m->kind != MATERIAL_DIFFUSE)
-        look = (struct look){.specular = bsdf_is_black(m) ? NULL : m, .flags = ""};
+        look = (struct look){.specular = material_is_black(m) ? NULL : m, .flags = ""};
     bool glows = w->pass->glow && !rgb_is_zero(m->radiance);
     if (glows)
         look.radiance = m->radiance;

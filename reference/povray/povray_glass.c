@@ -20,7 +20,7 @@ bool povray_is_glass(const struct material *m)
 static bool refracts_only(const struct scene *s, const struct object *o)
 {
     const struct material *m = &s->materials[o->material];
-    return m->kind == MATERIAL_REFRACTION && !bsdf_is_black(m);
+    return m->kind == MATERIAL_REFRACTION && !material_is_black(m);
 }
 
 bool povray_hides_total_reflection(const struct scene *s)
@@ -171,7 +171,7 @@ static bool shows_reflection(const struct scene *s)
     bool shows = s->environment != NULL;
     for (uint32_t i = 0; i < s->num_objects; i++) {
         const struct material *m = &s->materials[s->objects[i].material];
-        shows |= (m->kind == MATERIAL_MIRROR || m->kind == MATERIAL_GLASS) && !bsdf_is_black(m);
+        shows |= (m->kind == MATERIAL_MIRROR || m->kind == MATERIAL_GLASS) && !material_is_black(m);
     }
     return shows;
 }
@@ -182,7 +182,7 @@ bool povray_check_glass(const struct scene *s, const struct camera *c, double ex
     for (uint32_t k = 0; k < s->num_objects; k++) {
         const struct object *o = &s->objects[k];
         const struct material *m = &s->materials[o->material];
-        if (!povray_is_glass(m) || bsdf_is_black(m))
+        if (!povray_is_glass(m) || material_is_black(m))
             continue;
         if (!check_material(m, e))
             return false;

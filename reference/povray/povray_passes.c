@@ -26,7 +26,7 @@ static vec3 face_normal(const vec3 *p)
 
 static bool reflects(const struct material *m)
 {
-    return !bsdf_is_black(m);
+    return !material_is_black(m);
 }
 
 /* A plane does not see itself: there is no indirect light to wait for. */

@@ -305,3 +305,15 @@ bool scene_read_environment(struct scene *s, const char *path, struct err *e)
     environment_free(env);
     return err_prefix(e, "%s", path);
 }
+
+bool material_is_black(const struct material *m)
+{
+    switch (m->kind) {
+    case MATERIAL_DIFFUSE:
+    case MATERIAL_MIRROR: return rgb_is_zero(m->reflectance);
+    case MATERIAL_REFRACTION: return rgb_is_zero(m->transmittance);
+    case MATERIAL_GLASS: return rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance);
+    case MATERIAL_MICROFACET: return !m->conductor && rgb_is_zero(m->reflectance);
+    }
+    return true;
+}

@@ -145,6 +145,8 @@ struct scene {
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
 void scene_free(struct scene *s);
+/* Nothing scatters at all. */
+bool material_is_black(const struct material *m);
 
 /* Completes a scene whose triangles, spheres, materials, objects, camera, delta lights and
  * environment (with its light) are in place: drops nothing, appends one area light for the

@@ -47,15 +47,3 @@ bool bsdf_is_delta(const struct material *m)
 {
     return !(1 << m->kind & MATERIAL_SCATTERS);
 }
-
-bool bsdf_is_black(const struct material *m)
-{
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MIRROR: return rgb_is_zero(m->reflectance);
-    case MATERIAL_REFRACTION: return rgb_is_zero(m->transmittance);
-    case MATERIAL_GLASS: return rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance);
-    case MATERIAL_MICROFACET: return !m->conductor && rgb_is_zero(m->reflectance);
-    }
-    return true;
-}

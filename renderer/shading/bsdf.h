@@ -29,7 +29,5 @@ struct bsdf_sample bsdf_sample_direction(const struct material *m, bool front, v
 
 /* No direction has f > 0: light sampling is in vain. */
 bool bsdf_is_delta(const struct material *m);
-/* Nothing scatters at all. */
-bool bsdf_is_black(const struct material *m);
 
 #endif

@@ -63,7 +63,7 @@ void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
     set_rgb(r + MATERIAL_K, m->k);
     r[MATERIAL_IOR] = m->ior;
     r[MATERIAL_ALPHA] = m->alpha;
-    set_int(r + MATERIAL_BITS, 1 << m->kind | (bsdf_is_black(m) ? MATERIAL_IS_BLACK : 0) |
+    set_int(r + MATERIAL_BITS, 1 << m->kind | (material_is_black(m) ? MATERIAL_IS_BLACK : 0) |
                                    (m->schlick ? MATERIAL_IS_SCHLICK : 0) |
                                    (m->separable ? MATERIAL_IS_SEPARABLE : 0) |
                                    (m->conductor ? MATERIAL_IS_CONDUCTOR : 0));
@@ -93,7 +93,7 @@ struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
     for (uint32_t i = 0; i < s->num_materials; i++) {
         scene_simd_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
         l->only_diffuse = l->only_diffuse && (s->materials[i].kind == MATERIAL_DIFFUSE ||
-                                              bsdf_is_black(&s->materials[i]));
+                                              material_is_black(&s->materials[i]));
     }
     return l;
 }
