@@ -57,7 +57,7 @@ faults() {
     grep '\.c$' <<<"$ours" | symbols "$1" | sort -u >"$tmp/symbols"
     links <"$tmp/symbols" >"$tmp/links"
     against_order 'needs a symbol of' <"$tmp/links"
-    tsort "$tmp/links" 2>&1 >/dev/null | sed 's/^tsort: -: .*/a circle:/; s/^tsort: /  /' || :
+    tsort <"$tmp/links" 2>&1 >/dev/null | sed 's/^tsort: -: .*/a circle:/; s/^tsort: /  /' || :
     sed 's,/[^/]*$,,' <<<"$all" | uniq -c | awk '$1 > 25 { print $2 " has " $1 " C files" }'
     sed 's,.*/,,' <<<"$all" | sort | uniq -d | sed 's/$/ is the name of two files/'
     strangers <"$tmp/symbols" >"$tmp/strangers"
