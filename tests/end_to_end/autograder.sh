@@ -20,7 +20,7 @@ rubric Quick
 curve srgb
 command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}
 total 8
-picture point
+image point
   scene 12_point_plane
   size 64 64
   spp 16

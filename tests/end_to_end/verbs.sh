@@ -76,14 +76,14 @@ limit memory 1024
 limit disk 64
 total 10
 accept light_pdf --starter light-pdf
-picture adaptive
+image adaptive
   scene 13_square_patch
   size 64 64
   spp 256
   bounces 1
   options --direct light -a 32 0.1
   reference ours 64
-picture area
+image area
   scene 13_square_patch
   size 64 64
   spp 64

@@ -43,7 +43,13 @@ static void take_text(struct statement *s, const char *what, char *out, size_t s
     s->rest += strlen(s->rest);
 }
 
-/* A name of letters, digits, _ and -. */
+/* Of letters, digits, _ and -. */
+static bool is_name(const char *word)
+{
+    size_t n = strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
+    return n > 0 && word[n] == '\0' && word[0] != '-';
+}
+
 static bool take_name(struct statement *s, const char *what, char *out, size_t size)
 {
     char *word = take_word(s);
@@ -51,9 +57,7 @@ static bool take_name(struct statement *s, const char *what, char *out, size_t s
         rubric_mistake(s->m, s->line, "'%s' needs a name", what);
         return false;
     }
-    if (word[strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")] !=
-            '\0' ||
-        word[0] == '-' || strlen(word) >= size) {
+    if (!is_name(word) || strlen(word) >= size) {
         rubric_mistake(s->m, s->line, "'%s' is no name: letters, digits, _ and -, at most %zu",
                        word, size - 1);
         return false;
@@ -143,7 +147,7 @@ static void read_picture(struct statement *s)
     struct rubric_picture *p = &r->picture[r->num_pictures];
     *p = (struct rubric_picture){.line = s->line, .lights = 1, .bounces = -1};
     s->picture = p;
-    if (!take_name(s, "picture", p->name, sizeof p->name))
+    if (!take_name(s, "image", p->name, sizeof p->name))
         return;
     for (int i = 0; i < r->num_pictures; i++)
         if (strcmp(r->picture[i].name, p->name) == 0)
@@ -335,8 +339,11 @@ static void read_statement(struct statement *s)
         read_mask(s);
     else if (strcmp(word, "accept") == 0 && s->picture == NULL && s->check == NULL)
         read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
-    else if (strcmp(word, "picture") == 0)
+    else if (strcmp(word, "picture") == 0) {
+        r->old_word_line = r->old_word_line > 0 ? r->old_word_line : s->line;
         read_picture(s);
+    } else if (strcmp(word, "image") == 0 && (s->check == NULL || is_name(s->rest)))
+        read_picture(s); /* a check's margin of that name is two numbers, which are no name */
     else if (strcmp(word, "part") == 0)
         read_part(s);
     else if (strcmp(word, "check") == 0)

@@ -99,6 +99,7 @@ struct rubric {
     struct rubric_picture picture[RUBRIC_PICTURES];
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_pictures, num_checks;
+    int old_word_line; /* the first that says "picture" for "image"; 0: none does */
 };
 
 struct rubric_mistakes {

@@ -14,6 +14,9 @@
 static bool print_mistakes(const struct rubric *r, const struct rubric_mistakes *m, struct err *e)
 {
     int kept = (int)(sizeof m->at / sizeof *m->at);
+    if (r->old_word_line > 0)
+        fprintf(stderr, "%s:%d: 'picture' is called 'image' now; this version still reads it\n",
+                r->path, r->old_word_line);
     for (int i = 0; i < m->num && i < kept; i++)
         printf("%s:%d: %s\n", r->path, m->at[i].line, m->at[i].text);
     if (m->num == 1)

@@ -78,7 +78,7 @@ pictures() { # NAME SEED OWN: OWN 1: as the assignment asks, 0: as the reference
     mkdir -p "$subs/$1"
     awk -v own="$3" '
         function out() { if (name != "") print name "|" scene "|" size "|" (own ? spp : ref) "|" lights "|" bounces "|" (own ? "--direct light " options : refopts) (env == "" ? "" : " -e tools/rubrics/" env) }
-        $1 == "picture" { out(); name = $2; lights = 1; options = refopts = env = "" }
+        $1 == "image" { out(); name = $2; lights = 1; options = refopts = env = "" }
         $1 == "part" { out(); exit }
         $1 == "scene" { scene = $2 } $1 == "spp" { spp = $2 } $1 == "lights" { lights = $2 } $1 == "bounces" { bounces = $2 }
         $1 == "size" { size = $2 " " $3 } $1 == "environment" { env = $2 }

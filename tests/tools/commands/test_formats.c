@@ -373,7 +373,7 @@ static bool rubric_says(const char *text, const char *words)
 /* In the whole, in a picture or in a check. */
 static bool knows_statement(const char *word)
 {
-    static const char *const above[] = {"rubric A", "picture p", "part 1 x\ncheck c 1 equal"};
+    static const char *const above[] = {"rubric A", "image p", "part 1 x\ncheck c 1 equal"};
     bool known = false;
     for (size_t i = 0; i < sizeof above / sizeof *above; i++) {
         char text[256], no_statement[96];

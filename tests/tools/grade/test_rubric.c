@@ -34,7 +34,7 @@ static void read_text(const char *text)
 }
 
 static const char head[] = "rubric A course\n"           /* 1 */
-                           "picture p\n"                 /* 2 */
+                           "image p\n"                   /* 2 */
                            " scene 12_point_plane\n"     /* 3 */
                            " size 64 64\n"               /* 4 */
                            " spp 16\n"                   /* 5 */
@@ -94,6 +94,25 @@ TEST(a_right_one_is_read)
     assert_true(rubric_points(rubric) == 4);
 }
 
+TEST(images_by_their_old_word)
+{
+    read_text(with(2, "picture p"));
+    assert_int_equal(mistakes.num, 0);
+    assert_int_equal(rubric->old_word_line, 2);
+    assert_string_equal(rubric->picture[0].name, "p");
+    read_text(with(0, ""));
+    assert_int_equal(rubric->old_word_line, 0);
+}
+
+/* Below a check the same word is a margin, of two numbers. */
+TEST(images_below_a_check)
+{
+    read_text(with(11, " tile 0.03 0.1\nimage 2nd\n scene 12_point_plane"));
+    assert_int_equal(rubric->num_pictures, 2);
+    assert_string_equal(rubric->picture[1].name, "2nd");
+    assert_true(rubric->check[0].image.full == 0.01);
+}
+
 TEST(the_shipped_ones_are_right)
 {
     static const char *const paths[] = {"tools/rubrics/cs184.rubric",
@@ -144,7 +163,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
         {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},
         {7, 8, " reference truth\n accept x nowhere.exr", "no file"},
-        {2, 2, "picture p/q", "no name"},
+        {2, 2, "image p/q", "no name"},
         {3, 3, " scene 99_nothing", "no scene"},
         {3, 3, " scene nowhere.dae", "no file"},
         {4, 4, " size 64", "needs a whole number"},
@@ -161,6 +180,7 @@ TEST(each_mistake_is_named_with_its_line)
         {9, 9, "check c 0 equal p", "worth nothing"},
         {9, 9, "check c 4 equal p p", "takes 1"},
         {10, 10, " image 0.05 0.01", "must be less"},
+        {10, 10, " image 0.01", "'image' needs a number"},
         {10, 10, " image 0.01 0.05 0.1", "too much"},
         {10, 9, "", "needs 'image'"},
         {10, 10, " imagine 0.01 0.05", "'imagine'"},
@@ -212,9 +232,8 @@ TEST(rubbish_is_survived)
     }
     size_t n = 0;
     for (int i = 0; i < 400; i++)
-        n += (size_t)sprintf(text + n,
-                             "picture p%d\npart %d x\ncheck c%d 1 equal p%d\naccept a b.exr\n", i,
-                             i, i, i);
+        n += (size_t)sprintf(
+            text + n, "image p%d\npart %d x\ncheck c%d 1 equal p%d\naccept a b.exr\n", i, i, i, i);
     read_text(text);
     assert_true(mistakes.num > 64);
     memset(text, 'x', 100000);
