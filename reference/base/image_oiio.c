@@ -22,7 +22,7 @@ bool image_oiio_file(struct path *path, struct err *e)
             return true;
     }
     *path = fs_beside_program(places[0]);
-    return err_set(e, "cannot load what reads pictures: %s is not there", path->s);
+    return err_set(e, "cannot load what reads images: %s is not there", path->s);
 }
 
 /* Loaded for good at the first call; it is found again at the others. */
@@ -34,7 +34,7 @@ static const struct oiio_table *load(struct err *e)
     void *module = dlopen(path.s, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
     const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
     if (table == NULL)
-        err_set(e, "cannot load what reads pictures: %s", dlerror());
+        err_set(e, "cannot load what reads images: %s", dlerror());
     return table;
 }
 
@@ -104,8 +104,8 @@ static bool check_size(const char *path, const struct image_info *i, int depth, 
 }
 
 /* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
-static struct oiio_picture *open_picture(const char *path, const struct oiio_table **with,
-                                         struct image_info *out, struct err *e)
+static struct oiio_image *open_image(const char *path, const struct oiio_table **with,
+                                     struct image_info *out, struct err *e)
 {
     double size = 0, bytes = 0;
     int depth = 0;
@@ -114,7 +114,7 @@ static struct oiio_picture *open_picture(const char *path, const struct oiio_tab
     *with = format != NULL ? load(e) : NULL;
     if (*with == NULL)
         return NULL;
-    struct oiio_picture *p = (*with)->open(path, format, why, sizeof why);
+    struct oiio_image *p = (*with)->open(path, format, why, sizeof why);
     if (p == NULL || !(*with)->head(p, out, &depth, &bytes, why, sizeof why))
         err_set(e, "%s: %s", path, why);
     else if (check_size(path, out, depth, bytes, size, e))
@@ -125,7 +125,7 @@ static struct oiio_picture *open_picture(const char *path, const struct oiio_tab
 }
 
 /* The shape with its names, and room for the pixels. */
-static bool alloc_like(const struct oiio_table *oiio, const struct oiio_picture *p,
+static bool alloc_like(const struct oiio_table *oiio, const struct oiio_image *p,
                        const struct image_info *info, struct image *im, struct err *e)
 {
     const char *names[IMAGE_MAX_CHANNELS];
@@ -142,7 +142,7 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     struct err inner;
     char why[800];
     const char *name, *value;
-    struct oiio_picture *p = open_picture(path, &oiio, &info, e);
+    struct oiio_image *p = open_image(path, &oiio, &info, e);
     if (p == NULL)
         return false;
     bool ok = alloc_like(oiio, p, &info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
@@ -163,7 +163,7 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
 {
     const struct oiio_table *oiio;
-    struct oiio_picture *p = open_picture(path, &oiio, out, e);
+    struct oiio_image *p = open_image(path, &oiio, out, e);
     if (p == NULL)
         return false;
     out->parts = oiio->parts(p);

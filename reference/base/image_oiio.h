@@ -1,5 +1,5 @@
-/* Pictures from elsewhere, by OpenImageIO. That library brings 230 others along and takes a fifth of a second to load, so it is in a
- * file of its own, oiio.so, which is loaded when the first picture is read; without it every call fails with a line. */
+/* Images from elsewhere, by OpenImageIO. That library brings 230 others along and takes a fifth of a second to load, so it is in a
+ * file of its own, oiio.so, which is loaded when the first image is read; without it every call fails with a line. */
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
@@ -24,9 +24,9 @@ struct image_info {
     enum image_type type; /* the smallest of its channels */
     int bytes;            /* of one value of that channel */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
-    int parts;            /* pictures in one file (EXR parts), 1 .. */
+    int parts;            /* images in one file (EXR parts), 1 .. */
     int width, height, channels;
-    bool is_cropped; /* the file holds another rectangle than the picture shown */
+    bool is_cropped; /* the file holds another rectangle than the image shown */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
     __attribute__((warn_unused_result));

@@ -12,7 +12,7 @@ extern "C" {
 #include <utility>
 #include <vector>
 
-struct oiio_picture {
+struct oiio_image {
     std::unique_ptr<OIIO::ImageInput> in;
     std::vector<std::pair<std::string, std::string>> texts;
 };
@@ -50,11 +50,11 @@ enum image_type type_of(OIIO::TypeDesc type)
                                             : IMAGE_OTHER;
 }
 
-struct oiio_picture *open_picture(const char *path, const char *format, char *why, size_t size)
+struct oiio_image *open_image(const char *path, const char *format, char *why, size_t size)
 {
-    std::unique_ptr<oiio_picture> p;
+    std::unique_ptr<oiio_image> p;
     bool ok = guarded(why, size, [&]() -> std::string {
-        p = std::make_unique<oiio_picture>();
+        p = std::make_unique<oiio_image>();
         OIIO::ImageSpec spec;
         p->in = OIIO::ImageInput::create(format);
         if (!p->in || !p->in->open(path, spec))
@@ -67,12 +67,12 @@ struct oiio_picture *open_picture(const char *path, const char *format, char *wh
     return ok ? p.release() : nullptr;
 }
 
-void close_picture(struct oiio_picture *p)
+void close_image(struct oiio_image *p)
 {
     delete p;
 }
 
-bool head_of(struct oiio_picture *p, struct image_info *out, int *depth, double *bytes, char *why,
+bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *bytes, char *why,
              size_t size)
 {
     *out = {};
@@ -101,13 +101,13 @@ bool head_of(struct oiio_picture *p, struct image_info *out, int *depth, double 
     });
 }
 
-const char *channel_of(const struct oiio_picture *p, int c)
+const char *channel_of(const struct oiio_image *p, int c)
 {
     const auto &names = p->in->spec().channelnames;
     return size_t(c) < names.size() ? names[size_t(c)].c_str() : "";
 }
 
-bool read_picture(struct oiio_picture *p, float *data, char *why, size_t size)
+bool read_image(struct oiio_image *p, float *data, char *why, size_t size)
 {
     return guarded(why, size, [&]() -> std::string {
         if (!p->in->read_image(0, 0, 0, p->in->spec().nchannels, OIIO::TypeDesc::FLOAT, data))
@@ -116,7 +116,7 @@ bool read_picture(struct oiio_picture *p, float *data, char *why, size_t size)
     });
 }
 
-bool text_of(const struct oiio_picture *p, int k, const char **name, const char **value)
+bool text_of(const struct oiio_image *p, int k, const char **name, const char **value)
 {
     if (size_t(k) >= p->texts.size())
         return false;
@@ -125,11 +125,11 @@ bool text_of(const struct oiio_picture *p, int k, const char **name, const char 
     return true;
 }
 
-int parts_of(struct oiio_picture *p)
+int parts_of(struct oiio_image *p)
 {
     int parts = 1;
     char why[8];
-    // What cannot be sought is no further picture.
+    // What cannot be sought is no further image.
     guarded(why, sizeof why, [&]() -> std::string {
         while (p->in->seek_subimage(parts, 0))
             parts++;
@@ -142,10 +142,10 @@ int parts_of(struct oiio_picture *p)
 
 extern "C" const struct oiio_table assay_oiio;
 const struct oiio_table assay_oiio = {"OpenImageIO " OIIO_VERSION_STRING,
-                                      open_picture,
-                                      close_picture,
+                                      open_image,
+                                      close_image,
                                       head_of,
                                       channel_of,
-                                      read_picture,
+                                      read_image,
                                       text_of,
                                       parts_of};

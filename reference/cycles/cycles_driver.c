@@ -63,9 +63,8 @@ static bool read_report(const char *log, json_t **report, struct err *e)
 }
 
 /* All replicates into *out. */
-static bool fold_replicates(const struct reference_job *job,
-                            const struct replicate_images *pictures, struct moments *out,
-                            json_t *manifest, struct err *e)
+static bool fold_replicates(const struct reference_job *job, const struct replicate_images *images,
+                            struct moments *out, json_t *manifest, struct err *e)
 {
     int width = job->suite->width, height = job->suite->height;
     int count = job->ref->replicates;
@@ -79,7 +78,7 @@ static bool fold_replicates(const struct reference_job *job,
     m.spp = job->ref->spp;
     for (int k = 0; ok && k < count; k++) {
         char path[REPLICATE_IMAGE_PATH];
-        pictures->path_of(pictures->ctx, k, path);
+        images->path_of(images->ctx, k, path);
         float *px = replicate_images_read(path, width, height, false, e);
         ok = px != NULL;
         if (!ok)
@@ -111,11 +110,11 @@ static bool fold_replicates(const struct reference_job *job,
     return ok;
 }
 
-static bool fold(const struct reference_job *job, const struct replicate_images *pictures,
+static bool fold(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
     static const char *const told[] = {"version", "settings", "binary_sha256", "command"};
-    if (!fold_replicates(job, pictures, out, manifest, e))
+    if (!fold_replicates(job, images, out, manifest, e))
         return false;
     bool ok = true;
     for (size_t i = 0; ok && i < sizeof told / sizeof *told; i++)
@@ -135,7 +134,7 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     return true;
 }
 
-/* Picture first + i is replicate_<i>.exr, as cycles.py names it. */
+/* Image first + i is replicate_<i>.exr, as cycles.py names it. */
 static bool render(const struct reference_job *job, int first, int last, json_t *said,
                    struct err *e)
 {

@@ -1,5 +1,5 @@
 /* The scene as a neutral dump that cycles.py builds in Blender: world space, linear Rec. 709, our
- * units, nothing left to interpret. Why each of its numbers gives the same picture in Cycles, and
+ * units, nothing left to interpret. Why each of its numbers gives the same image in Cycles, and
  * the probe that shows it, is in README.md.
  *
  * JSON, in one object:

@@ -110,8 +110,8 @@ static bool read_command(const struct json_node *n, const struct engine *en, str
         return err_set(e, "%s: 'command' has no {%s}", n->file, scene ? "out" : "scene");
     if (en->output == OUTPUT_MEAN && !seed)
         return err_set(e,
-                       "%s: 'command' has no {seed}, so no two pictures would be independent; a "
-                       "picture without noise has \"output\": \"exact\"",
+                       "%s: 'command' has no {seed}, so no two images would be independent; an "
+                       "image without noise has \"output\": \"exact\"",
                        n->file);
     if (en->output == OUTPUT_EXACT && seed)
         return err_set(e, "%s: 'command' has a {seed}, but 'output' is 'exact'", n->file);

@@ -48,8 +48,8 @@ bool engine_expresses(const struct engine *en, const struct suite_scene *scene, 
 /* Renders. *out (unit "replicate", "exact" or "sample") and *manifest (a new reference) belong to the
  * caller; the manifest's members are those of reference_render.h, with "description_sha256" and "files" (the
  * hash of each file of {here} that the command names). "mean": K runs with seeds of their own, folded.
- * Fails, with the program's own last lines, when it is not there, dies, hangs or writes no picture, a
- * picture of another size, without R, G and B, with pixels that are not finite, or the same picture
+ * Fails, with the program's own last lines, when it is not there, dies, hangs or writes no image, an
+ * image of another size, without R, G and B, with pixels that are not finite, or the same image
  * for two seeds (unless no pixel of it has any noise: then it is "exact"). What it left is then kept,
  * and the line names the directory. */
 bool engine_render(const struct engine *en, const struct suite_scene *scene,

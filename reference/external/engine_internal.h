@@ -14,7 +14,7 @@ struct engine_job {
     const char *dir; /* absolute */
     char scene[PATH_SIZE], program[4096];
     int spp, replicates;
-    bool half; /* some picture had fewer than 32 bits */
+    bool half; /* some image had fewer than 32 bits */
     double cpu_s;
 };
 

@@ -1,4 +1,4 @@
-/* Runs an engine as its description says: the scene file, the processes, the pictures. */
+/* Runs an engine as its description says: the scene file, the processes, the images. */
 #define _GNU_SOURCE
 #include "engine_internal.h"
 
@@ -86,9 +86,9 @@ static bool run_process(struct engine_job *j, uint32_t seed, const char *out, st
     return ok;
 }
 
-/* RGB of a picture, packed; the caller frees. Values may be negative: a renderer of spectra has
+/* RGB of an image, packed; the caller frees. Values may be negative: a renderer of spectra has
  * colours outside the gamut, and only their mean has to make sense. */
-static float *read_picture(struct engine_job *j, const char *path, struct err *e)
+static float *read_image(struct engine_job *j, const char *path, struct err *e)
 {
     struct image im = {0};
     bool half;
@@ -137,16 +137,16 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     for (int k = 0; ok && k < j->replicates; k++) {
         const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
         float *px = run_process(j, replicate_seed(j->opt->seed, k), path.s, e)
-                        ? read_picture(j, path.s, e)
+                        ? read_image(j, path.s, e)
                         : NULL;
         ok = px != NULL;
         if (!ok)
             break;
         replicate_repeats_add(&repeats, px, pixels);
         if (j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
-            ok = err_set(
-                e, "replicate %d is the same picture as an earlier one: the seed has no effect",
-                repeats.same);
+            ok = err_set(e,
+                         "replicate %d is the same image as an earlier one: the seed has no effect",
+                         repeats.same);
         moments_add_image(m, px);
         free(px);
         unlink(path.s);

@@ -28,8 +28,8 @@ static void filename(struct writer *w, const char *ending)
     mitsuba_text(w->xml, "string", "filename", fs_path("%s_%s", w->base, ending).s);
 }
 
-static bool write_picture(const struct writer *w, const char *ending, const struct image *im,
-                          struct err *e)
+static bool write_image(const struct writer *w, const char *ending, const struct image *im,
+                        struct err *e)
 {
     return image_write_exr(fs_path("%s_%s", w->stem, ending).s, im, e);
 }
@@ -67,7 +67,7 @@ static void put_camera(struct writer *w)
     mitsuba_end(w->xml);
 }
 
-/* An index of refraction: rgb values outside a lamp may not be above 1, a picture's may. */
+/* An index of refraction: rgb values outside a lamp may not be above 1, an image's may. */
 static bool put_index(struct writer *w, const char *name, uint32_t material, rgb value,
                       struct err *e)
 {
@@ -82,7 +82,7 @@ static bool put_index(struct writer *w, const char *name, uint32_t material, rgb
         return false;
     for (size_t i = 0; i < 4; i++)
         memcpy(im.data + 3 * i, &(float[3]){value.r, value.g, value.b}, 3 * sizeof *im.data);
-    bool ok = write_picture(w, ending, &im, e);
+    bool ok = write_image(w, ending, &im, e);
     image_free(&im);
     mitsuba_begin(w->xml, "texture", "bitmap", "name", name);
     filename(w, ending);
@@ -236,9 +236,9 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
     return true;
 }
 
-/* Mitsuba's picture: columns in the other direction around, rows at theta = pi r/(H-1). With two rows
+/* Mitsuba's image: columns in the other direction around, rows at theta = pi r/(H-1). With two rows
  * for each of ours every kink of our interpolation falls on a row or column, and the two agree. */
-static bool put_sky_picture(struct writer *w, int width, int height, struct err *e)
+static bool put_sky_image(struct writer *w, int width, int height, struct err *e)
 {
     struct image im;
     if (!image_alloc(&im, width, 2 * height + 1, 3, RGB_NAMES, e))
@@ -255,7 +255,7 @@ static bool put_sky_picture(struct writer *w, int width, int height, struct err 
             memcpy(im.data + 3 * ((size_t)y * (size_t)width + (size_t)x),
                    &(float[3]){l.r, l.g, l.b}, 3 * sizeof *im.data);
         }
-    bool ok = write_picture(w, "environment.exr", &im, e);
+    bool ok = write_image(w, "environment.exr", &im, e);
     image_free(&im);
     mitsuba_begin(w->xml, "emitter", "envmap", NULL, NULL);
     filename(w, "environment.exr");
@@ -270,7 +270,7 @@ static bool put_sky(struct writer *w, struct err *e)
     if (environment_is_hidden(w->s->environment))
         return err_set(e, "Mitsuba has no ambient light that only rough surfaces receive");
     if (sky.kind == ENVIRONMENT_IMAGE)
-        return put_sky_picture(w, (int)sky.width, (int)sky.height, e);
+        return put_sky_image(w, (int)sky.width, (int)sky.height, e);
     mitsuba_begin(w->xml, "emitter", "constant", NULL, NULL);
     mitsuba_rgb(w->xml, "radiance", sky.radiance);
     mitsuba_end(w->xml);

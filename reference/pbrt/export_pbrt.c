@@ -173,7 +173,7 @@ static bool put_sky(const struct writer *w, struct err *e)
     if (environment_is_hidden(w->s->environment))
         return err_set(e, "pbrt has no ambient light that only rough surfaces receive");
     if (sky.kind == ENVIRONMENT_IMAGE)
-        return err_set(e, "pbrt has no environment picture in latitude and longitude");
+        return err_set(e, "pbrt has no environment image in latitude and longitude");
     fputs("LightSource \"infinite\"", w->f);
     put_rgb(w, "L", sky.radiance);
     fputc('\n', w->f);

@@ -7,11 +7,11 @@
 
 #include <stdio.h>
 
-/* Writes the file; samples, seed and the picture's name come from pbrt's command line. Fails with one
+/* Writes the file; samples, seed and the image's name come from pbrt's command line. Fails with one
  * line on what pbrt cannot express: mirrors that reflect less than all, metals without an index of
  * refraction that reflect less than all, Beckmann's distribution, separable shadowing, tinted glass,
  * a boundary that only refracts, Schlick's approximation, a falloff that is not the inverse square,
- * spot lights that are brighter in the middle, environment pictures, the ambient light of the
+ * spot lights that are brighter in the middle, environment images, the ambient light of the
  * assignment, and what features_check_exportable() refuses. f stays open. */
 bool export_pbrt(const struct scene *s, const struct camera *c, int depth, FILE *f, struct err *e)
     __attribute__((warn_unused_result));

@@ -1,4 +1,4 @@
-/* The scene as POV-Ray 3.7 scene description language, written so that POV-Ray's picture is the
+/* The scene as POV-Ray 3.7 scene description language, written so that POV-Ray's image is the
  * same radiance as ours. Which setting stands for what, and the measurement behind each, is in
  * README.md. What POV-Ray cannot express is an error with one line, never left out. */
 #ifndef ASSAY_EXPORT_POVRAY_H
@@ -17,21 +17,21 @@ enum povray_rule {
     POVRAY_JITTER /* rectangles: one random point in each cell, a function of lamp_seed (sampler.h) */
 };
 
-/* What differs between two pictures of one scene. */
+/* What differs between two images of one scene. */
 struct povray_variant {
     /* The whole scene and camera, turned about the origin: v' = rotation v. Row-major, orthonormal,
-     * determinant +1. The picture stays; POV-Ray's directions relative to the scene do not. */
+     * determinant +1. The image stays; POV-Ray's directions relative to the scene do not. */
     double rotation[3][3];
     int pass;       /* of the plan */
     int lamp_cells; /* a lamp is lamp_cells x lamp_cells spotlights */
     enum povray_rule rule;
     double lamp_shift[3]; /* in [0,1); of POVRAY_GAUSS for lamps that are no rectangles */
     uint64_t lamp_seed;   /* of POVRAY_JITTER */
-    /* Moves the window right and up; 1 is the width, the height of the whole picture. */
+    /* Moves the window right and up; 1 is the width, the height of the whole image. */
     double shift_x, shift_y;
     bool indirect; /* false: no light from diffuse surface to diffuse surface */
-    /* Mirrors and glass are followed as far as the pass with indirect light follows them, so that a
-     * picture without it can be subtracted. */
+    /* Mirrors and glass are followed as far as the pass with indirect light follows them, so that an
+     * image without it can be subtracted. */
     bool indirect_levels;
     /* Probability in [0,1) that a reflecting point absorbs all light; the others reflect
      * 1/(1-roulette) times as much. Keeps the depths of a path apart where no path could end

@@ -1,4 +1,4 @@
-/* Drives POV-Ray: the pictures of a povray_replicates, rendered side by side. */
+/* Drives POV-Ray: the images of a povray_replicates, rendered side by side. */
 #include "povray_driver.h"
 
 #include "povray_replicates.h"
@@ -18,14 +18,14 @@ struct crew {
     const struct povray_replicates *set;
     const struct reference_job *job; /* of the set */
     const char *program;
-    int first, last; /* of the pictures that are wanted */
+    int first, last; /* of the images that are wanted */
     pthread_mutex_t lock;
     int next;
     bool failed;
     struct err why; /* of the first failure */
 };
 
-/* A picture with radiosity must say in its log that no sample was kept; a cache would be a bias that
+/* An image with radiosity must say in its log that no sample was kept; a cache would be a bias that
  * nobody sees. */
 static bool check_log(const char *path, struct err *e)
 {
@@ -43,9 +43,9 @@ static bool check_log(const char *path, struct err *e)
     return kept == 0 || err_set(e, "%s: POV-Ray kept %ld radiosity samples for re-use", path, kept);
 }
 
-/* out += sign x the box-averaged picture / scale. */
-static bool add_picture(const struct crew *w, const struct povray_image *p, const char *path,
-                        float sign, float *out, struct err *e)
+/* out += sign x the box-averaged image / scale. */
+static bool add_image(const struct crew *w, const struct povray_image *p, const char *path,
+                      float sign, float *out, struct err *e)
 {
     int width = w->job->suite->width, height = w->job->suite->height, k = p->grid;
     struct image im = {0};
@@ -77,10 +77,10 @@ static bool add_picture(const struct crew *w, const struct povray_image *p, cons
     return ok;
 }
 
-enum { MAX_STARTS = 10 /* of one picture */ };
+enum { MAX_STARTS = 10 /* of one image */ };
 
 /* On a busy machine POV-Ray gives up before it has begun, when its own threads start too slowly. That
- * says nothing about the picture, so it is asked again. */
+ * says nothing about the image, so it is asked again. */
 static bool run_engine(const struct process *run, struct err *e)
 {
     for (int attempt = 1;; attempt++) {
@@ -116,7 +116,7 @@ static bool render_one(struct crew *w, const struct povray_image *p, float sign,
         .argv = argv, .cwd = dir.s, .log = log.s, .timeout_s = w->job->opt->timeout_s};
     bool radiosity = p->variant.indirect && w->set->plan.pass[p->variant.pass].recursion > 0;
     return run_engine(&run, e) && (!radiosity || check_log(log.s, e)) &&
-           add_picture(w, p, exr.s, sign, out, e) && fs_remove_tree(dir.s, e);
+           add_image(w, p, exr.s, sign, out, e) && fs_remove_tree(dir.s, e);
 }
 
 /* Adds its passes up, box-averaged to the job's size, into a file. */
@@ -124,7 +124,7 @@ static bool run_task(struct crew *w, int t, struct err *e)
 {
     char path[REPLICATE_IMAGE_PATH];
     float *out = calloc(w->set->size, sizeof *out);
-    bool ok = out != NULL || err_set(e, "a picture: out of memory");
+    bool ok = out != NULL || err_set(e, "an image: out of memory");
     for (int pass = 0; ok && pass < w->set->plan.num_passes; pass++) {
         if (t < POVRAY_WINDOWS) {
             struct povray_image fine = povray_replicates_window(w->set, t, pass);
@@ -236,7 +236,7 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     return true;
 }
 
-/* One picture of each of the three kinds in each pass; the others differ from them by the seed. */
+/* One image of each of the three kinds in each pass; the others differ from them by the seed. */
 static bool write_key(const struct reference_job *job, const char *path, struct err *e)
 {
     const struct suite_scene *s = job->suite;

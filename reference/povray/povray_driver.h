@@ -1,4 +1,4 @@
-/* Drives POV-Ray: a process for each picture, side by side. */
+/* Drives POV-Ray: a process for each image, side by side. */
 #ifndef ASSAY_POVRAY_DRIVER_H
 #define ASSAY_POVRAY_DRIVER_H
 

@@ -1,18 +1,18 @@
 /* What a scene asks of POV-Ray, and whether POV-Ray can do it at all.
  *
- * Light gets into the picture in two ways:
+ * Light gets into the image in two ways:
  * - from light sources: point, spot and directional lights, and lamps (povray_lamp.h), each of which
  *   becomes a quadrature of spotlights;
  * - from what glows: any other emitter, the environment, and lamps where a mirror or glass shows
  *   them. Rays from diffuse surfaces find it (POV-Ray's radiosity).
  * A path of k bounces has k surfaces where a light source ends it and k + 1 where a glow does, so the
- * two want different limits: they are two passes, whose pictures are added. */
+ * two want different limits: they are two passes, whose images are added. */
 #ifndef ASSAY_POVRAY_PASSES_H
 #define ASSAY_POVRAY_PASSES_H
 
 #include "renderer/scene/camera.h"
 
-/* One POV-Ray picture. */
+/* One POV-Ray image. */
 struct povray_pass {
     bool sources;  /* light sources shine */
     bool glow;     /* emitters and the environment are seen */
@@ -39,7 +39,7 @@ struct povray_passes {
     int num_lamps;
 };
 
-/* Looks the scene over for pictures with paths of 0 .. depth bounces. Fails if POV-Ray cannot
+/* Looks the scene over for images with paths of 0 .. depth bounces. Fails if POV-Ray cannot
  * express it: lens, clipping planes that cut geometry, microfacets, point and spot lights whose
  * falloff is neither constant nor purely quadratic, the assignment's hidden ambient light,
  * environment images of more than POVRAY_MOST_TEXELS rows or columns, an emitter that reflects no
@@ -49,7 +49,7 @@ struct povray_passes {
 bool povray_passes(const struct scene *s, const struct camera *c, int depth,
                    struct povray_passes *out, struct err *e) __attribute__((warn_unused_result));
 
-/* Some pass has indirect light that is not constant: the pictures have noise. */
+/* Some pass has indirect light that is not constant: the images have noise. */
 bool povray_passes_are_noisy(const struct povray_passes *p);
 
 enum {

@@ -1,16 +1,16 @@
-/* The pictures that POV-Ray is asked for: what a replicate is made of.
+/* The images that POV-Ray is asked for: what a replicate is made of.
  *
  *     total_i = fine + (indirect_i - direct_i)
  *
  * where each of the three is the sum over the plan's passes.
- * fine, the same for all replicates, is the mean of POVRAY_WINDOWS pictures without noise: shifted
+ * fine, the same for all replicates, is the mean of POVRAY_WINDOWS images without noise: shifted
  * sub-pixel grids, a fine quadrature of the lamps, no radiosity unless the scene is a constant
  * furnace. indirect_i and direct_i differ in nothing but radiosity, so their difference is the
  * indirect light; a glowing lamp in view is the same in both and drops out. POV-Ray has no seed: a
  * replicate is made independent by a rotation of the whole scene, a block size (+BS), lamp points
  * and a shift inside the sub-pixel of its own.
  *
- * Each picture has a scale of its own within one octave. Half floats round by up to 2^-11 of a
+ * Each image has a scale of its own within one octave. Half floats round by up to 2^-11 of a
  * value; at another scale to another side, so the rounding averages out as well. */
 #ifndef ASSAY_POVRAY_REPLICATE_PARTS_H
 #define ASSAY_POVRAY_REPLICATE_PARTS_H
@@ -24,7 +24,7 @@ enum {
                                  fewer, at random points that each window has of its own */
     POVRAY_JITTER_CELLS = 3   /* the same in a replicate, at most; one random point in each cell */
 };
-/* Probability of the roulette in a replicate's two pictures. */
+/* Probability of the roulette in a replicate's two images. */
 #define POVRAY_ROULETTE 0.1
 /* An emitter of radiance plan->radiance comes out as this .. twice this, far from half's 6e-5 and
  * 65504. */
@@ -38,11 +38,11 @@ struct povray_image {
 };
 
 /* Both are of pass `pass` of the plan.
- * Window j, 0 <= j < POVRAY_WINDOWS, of a picture of width x height. The shifts are a Hammersley set
+ * Window j, 0 <= j < POVRAY_WINDOWS, of an image of width x height. The shifts are a Hammersley set
  * over one sub-pixel. */
 struct povray_image povray_window(const struct povray_passes *plan, int width, int height, int j,
                                   int pass);
-/* One of the two pictures of replicate i, of which everything random follows from seed. */
+/* One of the two images of replicate i, of which everything random follows from seed. */
 struct povray_image povray_replicate(const struct povray_passes *plan, int width, int height,
                                      int grid, int i, uint32_t seed, int pass, bool indirect);
 

@@ -1,4 +1,4 @@
-/* What a reference by POV-Ray is of, and how its pictures become one. */
+/* What a reference by POV-Ray is of, and how its images become one. */
 #include "povray_replicates.h"
 
 #include "reference/replicates/independence.h"
@@ -103,12 +103,12 @@ static bool describe(const struct povray_replicates *s, const json_t *said, json
 }
 
 /* The mean of the windows. */
-static bool mean_window(const struct povray_replicates *s, const struct replicate_images *pictures,
+static bool mean_window(const struct povray_replicates *s, const struct replicate_images *images,
                         double *fine, struct err *e)
 {
     for (int t = 0; t < POVRAY_WINDOWS; t++) {
         char path[REPLICATE_IMAGE_PATH];
-        pictures->path_of(pictures->ctx, t, path);
+        images->path_of(images->ctx, t, path);
         float *px =
             replicate_images_read(path, s->job->suite->width, s->job->suite->height, true, e);
         if (px == NULL)
@@ -121,13 +121,12 @@ static bool mean_window(const struct povray_replicates *s, const struct replicat
 }
 
 /* fine + the difference of replicate k, into the moments. */
-static bool add_replicate(const struct povray_replicates *s,
-                          const struct replicate_images *pictures, int k, const double *fine,
-                          struct replicate_repeats *repeats, struct replicates *all,
-                          struct moments *m, struct err *e)
+static bool add_replicate(const struct povray_replicates *s, const struct replicate_images *images,
+                          int k, const double *fine, struct replicate_repeats *repeats,
+                          struct replicates *all, struct moments *m, struct err *e)
 {
     char path[REPLICATE_IMAGE_PATH];
-    pictures->path_of(pictures->ctx, POVRAY_WINDOWS + k, path);
+    images->path_of(images->ctx, POVRAY_WINDOWS + k, path);
     float *px = replicate_images_read(path, m->width, m->height, true, e);
     if (px == NULL)
         return false;
@@ -147,9 +146,8 @@ static bool add_replicate(const struct povray_replicates *s,
 }
 
 /* fine + each replicate's difference; fine alone if there are none. */
-static bool fold_pictures(const struct povray_replicates *s,
-                          const struct replicate_images *pictures, struct moments *out,
-                          json_t *manifest, struct err *e)
+static bool fold_images(const struct povray_replicates *s, const struct replicate_images *images,
+                        struct moments *out, json_t *manifest, struct err *e)
 {
     const struct suite_scene *suite = s->job->suite;
     int replicates = s->replicates;
@@ -157,15 +155,15 @@ static bool fold_pictures(const struct povray_replicates *s,
     struct replicates all = {0};
     struct replicate_repeats repeats = {0};
     double *fine = calloc(s->size, sizeof *fine);
-    bool ok = fine != NULL || err_set(e, "POV-Ray pictures: out of memory");
+    bool ok = fine != NULL || err_set(e, "POV-Ray images: out of memory");
     ok = ok && moments_alloc(&m, suite->width, suite->height, e) &&
          (replicates == 0 || (replicates_alloc(&all, m.width, m.height, replicates, e) &&
                               replicate_repeats_alloc(&repeats, replicates, e))) &&
-         mean_window(s, pictures, fine, e);
+         mean_window(s, images, fine, e);
     strcpy(m.unit, replicates == 0 ? "exact" : "replicate");
     m.spp = replicates == 0 ? 0 : s->job->ref->subgrid * s->job->ref->subgrid;
     for (int k = 0; ok && k < replicates; k++)
-        ok = add_replicate(s, pictures, k, fine, &repeats, &all, &m, e);
+        ok = add_replicate(s, images, k, fine, &repeats, &all, &m, e);
     ok = ok &&
          (replicates == 0 || independence_check(&all, manifest, e) || err_prefix(e, "POV-Ray"));
     for (size_t i = 0; ok && replicates == 0 && i < s->size; i++) {
@@ -182,10 +180,10 @@ static bool fold_pictures(const struct povray_replicates *s,
     return ok;
 }
 
-bool povray_fold(const struct reference_job *job, const struct replicate_images *pictures,
+bool povray_fold(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
     struct povray_replicates s;
     return povray_replicates(job, &s, e) && describe(&s, said, manifest, e) &&
-           fold_pictures(&s, pictures, out, manifest, e);
+           fold_images(&s, images, out, manifest, e);
 }

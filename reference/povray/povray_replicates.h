@@ -1,4 +1,4 @@
-/* All pictures of one reference by POV-Ray. Picture t of replicate_images.h is window t for t < POVRAY_WINDOWS, and for the rest what a
+/* All images of one reference by POV-Ray. Image t of replicate_images.h is window t for t < POVRAY_WINDOWS, and for the rest what a
  * replicate adds: all passes of a window, or those of a replicate's pair (povray_replicate_parts.h), added. */
 #ifndef ASSAY_POVRAY_REPLICATES_H
 #define ASSAY_POVRAY_REPLICATES_H
@@ -9,8 +9,8 @@
 struct povray_replicates {
     const struct reference_job *job;
     struct povray_passes plan;
-    int replicates; /* 0 where the picture has no noise */
-    size_t size;    /* floats in a picture */
+    int replicates; /* 0 where the image has no noise */
+    size_t size;    /* floats in an image */
 };
 
 /* Fails where povray_passes() does. */
@@ -27,7 +27,7 @@ void povray_command_line(const struct povray_replicates *s, const char *program,
                          const char *argv[POVRAY_ARGS]);
 
 /* As struct engine_driver has it. */
-bool povray_fold(const struct reference_job *job, const struct replicate_images *pictures,
+bool povray_fold(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
     __attribute__((warn_unused_result));
 

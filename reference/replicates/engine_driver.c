@@ -77,11 +77,11 @@ bool engine_driver_render(const struct engine_driver *driver, const struct refer
                           struct moments *out, json_t *manifest, struct err *e)
 {
     const struct here here = {driver, job->dir};
-    const struct replicate_images pictures = {path_here, &here};
+    const struct replicate_images images = {path_here, &here};
     int num;
     json_t *said = json_object();
     bool ok = driver->count(job, &num, e) && driver->render(job, 0, num, said, e) &&
-              driver->fold(job, &pictures, said, out, manifest, e);
+              driver->fold(job, &images, said, out, manifest, e);
     json_decref(said);
     return ok;
 }

@@ -34,25 +34,25 @@ struct reference_job {
 /* Seed of replicate k >= 0: 31 bits, well spread, never 0, and another one for each k. */
 uint32_t replicate_seed(uint32_t seed, int k);
 
-/* An engine. Rendering and folding share nothing but pictures and what was said, so that they can be done on different
+/* An engine. Rendering and folding share nothing but images and what was said, so that they can be done on different
  * machines. Each fails with one line if the engine cannot express the scene at all. */
 struct engine_driver {
     const char *program;        /* looked up in PATH */
     const char *const *scripts; /* what it runs of share_dir, NULL at the end; or NULL */
-    const char *prefix;         /* of a picture's file, replicate_images_path() */
-    bool below_zero;            /* pictures are differences */
-    /* How many pictures the fold takes. */
+    const char *prefix;         /* of an image's file, replicate_images_path() */
+    bool below_zero;            /* images are differences */
+    /* How many images the fold takes. */
     bool (*count)(const struct reference_job *job, int *num, struct err *e);
-    /* Pictures first .. last-1 into files of job->dir that are numbered from 0. Adds to `said` what the manifest needs and only
+    /* Images first .. last-1 into files of job->dir that are numbered from 0. Adds to `said` what the manifest needs and only
      * the engine knows: "version", "binary_sha256" and more. */
     bool (*render)(const struct reference_job *job, int first, int last, json_t *said,
                    struct err *e);
-    /* All pictures, in their order, into *out (unit "replicate", or "exact" where the engine's answer has no noise); adds to the
+    /* All images, in their order, into *out (unit "replicate", or "exact" where the engine's answer has no noise); adds to the
      * manifest "version", "binary_sha256", "command", "settings" (object), "seeds" (array), and "independence".
      * Calls opt->on_replicate. */
-    bool (*fold)(const struct reference_job *job, const struct replicate_images *pictures,
+    bool (*fold)(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
-    /* A file that says all that decides the pictures, beside the program, the scripts and what the suite asks for. */
+    /* A file that says all that decides the images, beside the program, the scripts and what the suite asks for. */
     bool (*write_key)(const struct reference_job *job, const char *path, struct err *e);
 };
 

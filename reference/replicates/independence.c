@@ -101,7 +101,7 @@ static void add_block(struct sums *s, const double *e, size_t n)
     s->blocks++;
 }
 
-/* All blocks of the picture that have a noisy pixel; e holds a block. */
+/* All blocks of the image that have a noisy pixel; e holds a block. */
 static void add_blocks(struct sums *s, const struct replicates *r, int side, double *e)
 {
     for (int y0 = 0; y0 < r->height; y0 += side)

@@ -35,7 +35,7 @@
 enum { MOST_REPLICATES = 1024, NUM_SQUARES = 4 };
 struct replicates {
     int width, height, num, capacity;
-    float *luminance; /* num pictures of width*height */
+    float *luminance; /* num images of width*height */
 };
 
 bool replicates_alloc(struct replicates *r, int width, int height, int count, struct err *e)

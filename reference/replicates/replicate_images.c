@@ -76,7 +76,7 @@ bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct e
 {
     *r = (struct replicate_repeats){.capacity = capacity, .same = -1, .without_noise = true};
     r->digest = malloc((size_t)capacity * sizeof *r->digest);
-    return r->digest != NULL || err_set(e, "hashes of pictures: out of memory");
+    return r->digest != NULL || err_set(e, "hashes of images: out of memory");
 }
 
 static bool is_constant(const float *pixels_rgb, size_t pixels)

@@ -1,6 +1,6 @@
-/* The pictures that a reference of an engine is folded from: files of float32 R, G and B. Those of Cycles are its
+/* The images that a reference of an engine is folded from: files of float32 R, G and B. Those of Cycles are its
  * replicates; those of POV-Ray the windows and then, unless the scene has no noise, what each replicate adds to
- * them (povray_replicate_parts.h). A picture depends on its number and the seed of all, not on which others are made. */
+ * them (povray_replicate_parts.h). An image depends on its number and the seed of all, not on which others are made. */
 #ifndef ASSAY_REPLICATE_IMAGES_H
 #define ASSAY_REPLICATE_IMAGES_H
 
@@ -28,8 +28,8 @@ float *replicate_images_read(const char *path, int width, int height, bool below
 bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,
                             struct err *e) __attribute__((warn_unused_result));
 
-/* Pictures that repeat betray a seed without effect, and would make a standard error that is too small. The exception is
- * light without noise: every pixel has random numbers of its own, so if all pixels of all pictures agree to the bit, no
+/* Images that repeat betray a seed without effect, and would make a standard error that is too small. The exception is
+ * light without noise: every pixel has random numbers of its own, so if all pixels of all images agree to the bit, no
  * random number matters, and the answer is exact. */
 struct replicate_repeats {
     int num, capacity;
@@ -39,7 +39,7 @@ struct replicate_repeats {
 };
 bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
     __attribute__((warn_unused_result));
-/* Takes the next picture; the number of the first that was the same, its own if there is none. */
+/* Takes the next image; the number of the first that was the same, its own if there is none. */
 int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels);
 void replicate_repeats_free(struct replicate_repeats *r);
 

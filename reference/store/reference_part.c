@@ -93,7 +93,7 @@ bool reference_render_part(const struct suite_scene *scene, const struct suite_r
     struct range r = {.first = first, .last = last, .dir = dir, .said = json_object()};
     bool ok = part_path(dir, path, e) && count(scene, ref, opt, &num, e);
     if (ok && (first < 0 || last > num || first >= last))
-        ok = err_set(e, "no pictures %d:%d among its %d", first, last, num);
+        ok = err_set(e, "no images %d:%d among its %d", first, last, num);
     ok = ok && reference_in_directory(scene, ref, opt, render_range, &r, e);
     if (ok) {
         timing_stop(&t);
@@ -107,7 +107,7 @@ bool reference_render_part(const struct suite_scene *scene, const struct suite_r
     return ok || err_prefix(e, "%s, %s", scene->name, ref->engine);
 }
 
-/* Which directory each picture is in. */
+/* Which directory each image is in. */
 struct gathered {
     const char **dir;
     int num;
@@ -121,7 +121,7 @@ static void path_of(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH])
     replicate_images_path(g->dir[k], PREFIX, k, path);
 }
 
-/* The next part, whose pictures have to follow those that are there: *next. */
+/* The next part, whose images have to follow those that are there: *next. */
 static bool add_part(struct gathered *g, const json_t *identity, const char *dir, int *next,
                      struct err *e)
 {
@@ -139,7 +139,7 @@ static bool add_part(struct gathered *g, const json_t *identity, const char *dir
     if (ok &&
         (!json_is_integer(first) || json_integer_value(first) != *next || !json_is_integer(last) ||
          json_integer_value(last) <= *next || json_integer_value(last) > g->num))
-        ok = err_set(e, "%s: has pictures %lld:%lld, those from %d on are wanted, of %d", path,
+        ok = err_set(e, "%s: has images %lld:%lld, those from %d on are wanted, of %d", path,
                      (long long)json_integer_value(first), (long long)json_integer_value(last),
                      *next, g->num);
     if (ok && !json_is_string(json_object_get(said, "version")))
@@ -160,9 +160,9 @@ static bool add_part(struct gathered *g, const json_t *identity, const char *dir
     return ok;
 }
 
-static bool find_pictures(const struct suite_scene *scene, const struct suite_reference *ref,
-                          const struct reference_options *opt, const char *const *dir, int num,
-                          struct gathered *g, struct err *e)
+static bool find_images(const struct suite_scene *scene, const struct suite_reference *ref,
+                        const struct reference_options *opt, const char *const *dir, int num,
+                        struct gathered *g, struct err *e)
 {
     int next = 0;
     if (!count(scene, ref, opt, &g->num, e))
@@ -173,7 +173,7 @@ static bool find_pictures(const struct suite_scene *scene, const struct suite_re
     for (int i = 0; ok && i < num; i++)
         ok = add_part(g, identity, dir[i], &next, e);
     if (ok && next < g->num)
-        ok = err_set(e, "pictures %d:%d are missing", next, g->num);
+        ok = err_set(e, "images %d:%d are missing", next, g->num);
     json_decref(identity);
     return ok;
 }
@@ -184,12 +184,12 @@ static bool fold(const struct suite_scene *scene, const struct suite_reference *
 {
     struct scene s = {0};
     struct camera camera;
-    const struct replicate_images pictures = {path_of, g};
+    const struct replicate_images images = {path_of, g};
     const struct reference_job job = {
         .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
     if (!suite_open(scene, &s, &camera, e))
         return false;
-    bool ok = engine_driver_of(ref->engine)->fold(&job, &pictures, g->said, out, manifest, e);
+    bool ok = engine_driver_of(ref->engine)->fold(&job, &images, g->said, out, manifest, e);
     scene_free(&s);
     return ok;
 }
@@ -201,8 +201,7 @@ bool reference_fold_parts(const struct suite_scene *scene, const struct suite_re
     struct timing t = timing_start();
     struct gathered g = {.num = 0};
     json_t *m = json_object();
-    bool ok =
-        find_pictures(scene, ref, opt, dir, num, &g, e) && fold(scene, ref, opt, &g, out, m, e);
+    bool ok = find_images(scene, ref, opt, dir, num, &g, e) && fold(scene, ref, opt, &g, out, m, e);
     if (ok) {
         timing_stop(&t);
         t.cpu_s += g.cpu_s;

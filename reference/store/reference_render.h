@@ -17,22 +17,22 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
                       const struct reference_options *opt, struct moments *out, json_t **manifest,
                       struct err *e) __attribute__((warn_unused_result));
 
-/* The same in parts, which may be made anywhere and in any order: ranges of the pictures that an engine's reference is folded
+/* The same in parts, which may be made anywhere and in any order: ranges of the images that an engine's reference is folded
  * from (replicate_images.h). Not of "truth". */
 
-/* How many pictures that are. */
+/* How many images that are. */
 bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
                      const struct reference_options *opt, int *num, struct err *e)
     __attribute__((warn_unused_result));
-/* Pictures first .. last-1 into dir, which exists: picture_NNNN.exr (float32, to the bit what the fold takes), each looked at,
+/* Images first .. last-1 into dir, which exists: picture_NNNN.exr (float32, to the bit what the fold takes), each looked at,
  * and, in the end, part.json: "of" (scene, its hash, engine, settings, seed), "first", "last", "said" (what only the
  * engine knows: version, hash of its binary ...), "cpu_s", "wall_s". */
 bool reference_render_part(const struct suite_scene *scene, const struct suite_reference *ref,
                            const struct reference_options *opt, int first, int last,
                            const char *dir, struct err *e) __attribute__((warn_unused_result));
 /* What reference_render() returns: the same moments to the bit, the same manifest but for "date", "cpu_s" and "wall_s": this
- * function's and those of all parts added. dir: num directories of such parts, in the order of their pictures. Fails
- * also if these are not all pictures of this reference, each once, or not all made by the same version of the engine. */
+ * function's and those of all parts added. dir: num directories of such parts, in the order of their images. Fails
+ * also if these are not all images of this reference, each once, or not all made by the same version of the engine. */
 bool reference_fold_parts(const struct suite_scene *scene, const struct suite_reference *ref,
                           const struct reference_options *opt, const char *const *dir, int num,
                           struct moments *out, json_t **manifest, struct err *e)

@@ -29,7 +29,7 @@ enum feature {
 
 extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
 
-/* Bit 1 << enum feature of all that picture needs. */
+/* Bit 1 << enum feature of all that image needs. */
 unsigned features_of_scene(const struct scene *s, const struct camera *c);
 
 /* True if a triangle's shading normals are its geometric normal, but for the rounding of text. */

@@ -21,12 +21,12 @@ struct suite_reference {
     double margin_tile;   /* the same for one tile */
     int replicates;       /* engines: images with a seed of their own */
     int spp;              /* samples per pixel of one replicate, or */
-    int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) picture */
+    int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) image */
     char kind[32];        /* truth: which closed form (truth.h) */
     json_t *values;       /* truth: its numbers; borrowed from the suite */
 };
 
-/* Another way of ours to the same picture: further options of pathtracer. */
+/* Another way of ours to the same image: further options of pathtracer. */
 struct suite_variant {
     char name[64]; /* "pathtracer-hemisphere" */
     int spp;

@@ -4,7 +4,7 @@
  * ggx_sphere   view (truth_pixel_mean.h), centre, radius, sky [radiance from everywhere], alpha, eta, k
  * beckmann_sphere   the same
  *
- * A sphere that fills the picture, with facets distributed by GGX or Beckmann, correlated Smith
+ * A sphere that fills the image, with facets distributed by GGX or Beckmann, correlated Smith
  * shadowing and the reflectance of a conductor of index eta + i k; facets scatter once. */
 #ifndef ASSAY_TRUTH_GGX_H
 #define ASSAY_TRUTH_GGX_H

@@ -52,12 +52,12 @@ static bool read_panel(json_t *value, const struct suite_scene *s, struct panel 
     if (!(fabs(hypot(p->normal[0], p->normal[1]) - 1) < 1e-9))
         return err_set(e, "a panel's normal is not of unit length");
     if (fabs(p->normal[0]) < min_slope || fabs(p->normal[1]) < min_slope)
-        return err_set(e, "a panel's edge is parallel to the picture's sides");
+        return err_set(e, "a panel's edge is parallel to the image's sides");
     return truth_check_triple("radiance", p->radiance, HUGE_VAL, e);
 }
 
 /* Share of rays of the pixel whose lower corner in x and y, at distance 1, is (x, y). A ray from the
- * lens point r l through the picture's point s meets the panel's plane at distance D in
+ * lens point r l through the image's point s meets the panel's plane at distance D in
  * D s + r (1 - D/F) l. */
 static double panel_share(const struct panel *p, const struct suite_scene *s, double x, double y,
                           double dx, double dy)

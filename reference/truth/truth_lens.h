@@ -4,10 +4,10 @@
  * lens_steps   background [W sr^-1 m^-2], panels (1 to 8 of {radiance, distance, normal [x, y],
  *              offset}), footprint {x: [left, right], y: [top, bottom]}
  *
- * The camera is at the origin and looks along -Z, picture up being +Y. A panel covers the half plane
+ * The camera is at the origin and looks along -Z, image up being +Y. A panel covers the half plane
  * z = -distance, normal . (x, y) > offset; `normal` is of unit length. Behind all panels is the
- * background. All surfaces emit and reflect nothing, so every depth gives the same picture.
- * footprint is what the picture shows at distance 1. The lens is that of the scene: lens_radius and
+ * background. All surfaces emit and reflect nothing, so every depth gives the same image.
+ * footprint is what the image shows at distance 1. The lens is that of the scene: lens_radius and
  * focal_distance. Panels may not cover each other in any pixel, not even partly, and no edge may be
  * in focus or parallel to the pixels' rows or columns. */
 #ifndef ASSAY_TRUTH_LENS_H

@@ -144,7 +144,7 @@ static bool fill_mirror_box(const struct suite_scene *scene, json_t *values, str
     if (!box_values(values, &b, e))
         return false;
     if (out->width != out->height)
-        return err_set(e, "the picture is %d x %d, not square", out->width, out->height);
+        return err_set(e, "the image is %d x %d, not square", out->width, out->height);
     int size = out->width, num_x, num_y;
     double pixel = 2 * b.tan_half / size;
     double *x = breaks(&b, scene->depth, 0, size, &num_x);
@@ -216,7 +216,7 @@ static bool fill_slab(const struct suite_scene *scene, json_t *values, struct mo
         double d[3];
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
         if (!(d[2] < 0))
-            return err_set(e, "a corner of the picture does not look at the slab");
+            return err_set(e, "a corner of the image does not look at the slab");
     }
     return truth_view_render(&view, slab_radiance, &s, out, e);
 }

@@ -9,9 +9,9 @@
  * glass_sphere  view, ior, centre, radius, room {x, y, z: [lo, hi]}, walls {left, right, bottom, top,
  *               far, near: radiance of the walls at x lo, x hi, y lo, y hi, z lo, z hi}
  *
- * mirror_box: the camera at `eye` looks along -Z, picture up being +Y; tan_half is the tangent of half
+ * mirror_box: the camera at `eye` looks along -Z, image up being +Y; tan_half is the tangent of half
  * its angle. All walls are mirrors but three of the four panels into which `split` divides the end:
- * these glow and reflect nothing. The picture is constant on rectangles whose sides are parallel to the
+ * these glow and reflect nothing. The image is constant on rectangles whose sides are parallel to the
  * pixels' sides, and is integrated exactly.
  * glass_slab: a slab parallel to the plane z = 0 with clear sides far away; what is on the side of +Z,
  * where the eye is, has the radiance `front`, what is on the other side `behind`.

@@ -209,7 +209,7 @@ static bool read_sphere(json_t *values, struct plane *p, struct err *e)
 }
 
 /* The source itself is out of sight and the plane does not see itself, so that every depth from 1 on
- * gives the same picture. */
+ * gives the same image. */
 static bool fill_plane(struct plane *p, bool (*read)(json_t *, struct plane *, struct err *),
                        const struct suite_scene *scene, json_t *values, struct moments *out,
                        struct err *e)

@@ -9,7 +9,7 @@
  * sphere_over_plane      radiance [W sr^-1 m^-2], albedo, centre [x, height, z], radius, footprint
  *
  * The plane is y = 0. footprint {x: [left, right], z: [top, bottom]} is the part of it that the
- * whole picture covers: column 0 begins at x = left, row 0 (the top row) at z = top. The box-filtered
+ * whole image covers: column 0 begins at x = left, row 0 (the top row) at z = top. The box-filtered
  * value of a pixel is the Gauss-Legendre quadrature (GSL) of the closed form over it. */
 #ifndef ASSAY_TRUTH_ONE_LAMP_H
 #define ASSAY_TRUTH_ONE_LAMP_H

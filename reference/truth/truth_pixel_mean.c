@@ -65,7 +65,7 @@ bool truth_view_filled(const struct truth_view *view, const double centre[3], do
         double d[3], cos_i, normal[3];
         truth_view_direction(view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
         if (!truth_sphere_hit(view->eye, d, centre, radius, &cos_i, normal))
-            return err_set(e, "the sphere does not fill the picture");
+            return err_set(e, "the sphere does not fill the image");
         *min_cos = fmin(*min_cos, cos_i);
     }
     return true;
@@ -237,7 +237,7 @@ bool truth_view_render(const struct truth_view *view, truth_shade *shade, const 
                        struct moments *out, struct err *e)
 {
     if (out->width != out->height)
-        return err_set(e, "the picture is %d x %d, not square", out->width, out->height);
+        return err_set(e, "the image is %d x %d, not square", out->width, out->height);
     struct image_file p = {.view = view,
                            .shade = shade,
                            .form = form,

@@ -7,8 +7,8 @@
 
 #include <jansson.h>
 
-/* right, up and forward are unit and orthogonal. The point (u, v) of the picture, both -1 at the left
- * and the top edge of a square picture and +1 at the right and the bottom, is seen in the direction
+/* right, up and forward are unit and orthogonal. The point (u, v) of the image, both -1 at the left
+ * and the top edge of a square image and +1 at the right and the bottom, is seen in the direction
  * forward + tan_half (u right - v up). */
 struct truth_view {
     double eye[3], right[3], up[3], forward[3], tan_half;
@@ -27,18 +27,18 @@ void truth_view_direction(const struct truth_view *view, double u, double v, dou
 bool truth_sphere_hit(const double o[3], const double d[3], const double centre[3], double radius,
                       double *cos_i, double normal[3]);
 
-/* The smallest cosine of incidence on a sphere that fills the whole picture. Fails if it does not. */
+/* The smallest cosine of incidence on a sphere that fills the whole image. Fails if it does not. */
 bool truth_view_filled(const struct truth_view *view, const double centre[3], double radius,
                        double *min_cos, struct err *e) __attribute__((warn_unused_result));
 
 /* Radiance that arrives at the eye from the unit direction d. The result tells the smooth pieces of the
- * picture apart: within one of them light is smooth in the direction, up to a square root at the edge. */
+ * image apart: within one of them light is smooth in the direction, up to a square root at the edge. */
 typedef int truth_shade(const void *form, const double eye[3], const double d[3], double light[3]);
 
-/* Means over the pixels of a square picture. A pixel of one piece: Gauss-Legendre rules with 8 x 8 and
+/* Means over the pixels of a square image. A pixel of one piece: Gauss-Legendre rules with 8 x 8 and
  * 16 x 16 points that agree to 1e-10 of the value. Any other: scan lines, cut where the piece changes
  * (found by bisection), each part and the lines themselves bisected until Gauss-Legendre rules agree to
- * 1e-6 of the value. Fails where they never do, and on pictures that are not square. */
+ * 1e-6 of the value. Fails where they never do, and on images that are not square. */
 bool truth_view_render(const struct truth_view *view, truth_shade *shade, const void *form,
                        struct moments *out, struct err *e) __attribute__((warn_unused_result));
 

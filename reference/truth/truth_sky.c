@@ -65,7 +65,7 @@ static bool fill_floor(const struct suite_scene *scene, json_t *values, struct m
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
         floor_point(view.eye, d, &x, &z);
         if (!(view.eye[1] > 0 && d[1] < 0 && x > s.wall_x && view.eye[0] > s.wall_x))
-            return err_set(e, "a corner of the picture does not look down past the wall");
+            return err_set(e, "a corner of the image does not look down past the wall");
     }
     return truth_view_render(&view, floor_radiance, &s, out, e);
 }

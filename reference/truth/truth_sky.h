@@ -8,7 +8,7 @@
  * sky_and_wall: the floor is y = 0 for all x below floor_edge, beyond is the sky. A black wall stands on
  * the floor in the plane wall.x, left of all that is seen. Depth 1 or more.
  * sky_gradient: from the direction w comes the radiance mean + x w_x + y w_y + z w_z, per channel; a
- * sphere that fills the picture reflects it. Depth 1 or more. */
+ * sphere that fills the image reflects it. Depth 1 or more. */
 #ifndef ASSAY_TRUTH_SKY_H
 #define ASSAY_TRUTH_SKY_H
 

@@ -52,7 +52,7 @@ static bool fill_window(const struct suite_scene *scene, json_t *values, struct 
         double d[3];
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
         if (!(d[1] > 0))
-            return err_set(e, "a corner of the picture does not look up");
+            return err_set(e, "a corner of the image does not look up");
     }
     return truth_view_render(&view, window_radiance, &w, out, e);
 }

@@ -5,8 +5,8 @@
  *                  any length], apex [x, y, z], ridges [a point on each: right, bottom, left, top],
  *                  centre [share of width, share of height]
  *
- * The pyramid is seen from above. In the picture its ridges are the lines from `centre`, the image of
- * the apex, straight to the right, down, to the left and up; it is convex and fills the picture. Only
+ * The pyramid is seen from above. In the render its ridges are the lines from `centre`, the image of
+ * the apex, straight to the right, down, to the left and up; it is convex and fills the image. Only
  * the geometry of the .dae makes it so: nothing here can check it. */
 #ifndef ASSAY_TRUTH_SUN_H
 #define ASSAY_TRUTH_SUN_H

@@ -208,7 +208,7 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
 }
 
 /* Libraries that hold nothing are common in exported files; otherwise the file means to do
- * something that would be missing from the picture. */
+ * something that would be missing from the image. */
 static bool check_libraries(struct loader *ld, const xmlNode *root)
 {
     for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {

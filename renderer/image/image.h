@@ -1,4 +1,4 @@
-/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Pictures of other kinds,
+/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Images of other kinds,
  * which only the harness reads: image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
 #ifndef ASSAY_IMAGE_H
 #define ASSAY_IMAGE_H
@@ -53,7 +53,7 @@ bool image_read_exr(const char *path, struct image *out, bool *half, struct err 
 /* Its header alone: data stays NULL. */
 bool image_read_exr_head(const char *path, struct image *out, struct err *e)
     __attribute__((warn_unused_result));
-/* Reads a Radiance picture (RGBE, rows from the top) as R G B. */
+/* Reads a Radiance image (RGBE, rows from the top) as R G B. */
 bool image_read_hdr(const char *path, struct image *out, struct err *e)
     __attribute__((warn_unused_result));
 
@@ -62,7 +62,7 @@ bool image_read_hdr(const char *path, struct image *out, struct err *e)
 bool image_write_exr(const char *path, const struct image *im, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The same for a picture that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
+/* The same for an image that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
  * the rest last, and the file appears when it is closed. */
 enum { IMAGE_BAND = 16 };
 struct image_writer;

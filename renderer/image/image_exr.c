@@ -97,7 +97,7 @@ static bool failed(const char *path, const char *what, const struct stream *s, e
                    s->why[0] != '\0' ? s->why : exr_get_default_error_message(code));
 }
 
-/* Where the pixels of each channel of a chunk go in the interleaved picture: the first is number
+/* Where the pixels of each channel of a chunk go in the interleaved image: the first is number
  * `at`. */
 static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im, size_t at)
 {

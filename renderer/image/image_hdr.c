@@ -1,4 +1,4 @@
-/* Radiance pictures, RGBE. Our own: the libraries that read nothing else take a file that is cut short
+/* Radiance images, RGBE. Our own: the libraries that read nothing else take a file that is cut short
  * for black pixels. Format: G. Ward, Real pixels, in Graphics Gems II, 1991. */
 #include "image.h"
 
@@ -74,7 +74,7 @@ bool image_read_hdr(const char *path, struct image *out, struct err *e)
     bool ok = fstat(fileno(f), &st) == 0 && read_header(f, &width, &height) && width > 0 &&
               height > 0 && width <= IMAGE_MAX_SIDE && height <= IMAGE_MAX_SIDE;
     if (!ok)
-        err_set(e, "%s: cannot read: not a Radiance picture (RGBE, rows from the top)", path);
+        err_set(e, "%s: cannot read: not a Radiance image (RGBE, rows from the top)", path);
     else if (4.0 * width * height > IMAGE_MAX_EXPANSION * (double)st.st_size)
         ok = err_set(e, "%s: an image of %d x %d cannot be in %lld bytes", path, width, height,
                      (long long)st.st_size);

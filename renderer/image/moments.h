@@ -39,7 +39,7 @@ void moments_add_image(struct moments *m, const float *pixels_rgb);
  * (as it does on different units or spp). */
 bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
     __attribute__((warn_unused_result));
-/* Pixels first .. first+num-1 in the order of their rows, as a picture one pixel high for moments_merge(). Owns nothing. */
+/* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for moments_merge(). Owns nothing. */
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* Groups of `k` samples are not kept apart, so the variance of the pixel's mean is M2/(n(n-1));
  * NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
@@ -53,7 +53,7 @@ bool moments_write(const char *path, const struct moments *m, const struct image
 bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
                           const struct image_attr *attrs, int num_attrs, struct err *e)
     __attribute__((warn_unused_result));
-/* The same for a picture that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
+/* The same for an image that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
  * multiple of that at a time and the rest last. */
 struct moments_writer;
 /* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */

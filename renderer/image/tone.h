@@ -1,4 +1,4 @@
-/* Linear radiance -> 8 bits for a picture file. */
+/* Linear radiance -> 8 bits for an image file. */
 #ifndef ASSAY_TONE_H
 #define ASSAY_TONE_H
 

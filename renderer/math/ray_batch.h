@@ -34,7 +34,7 @@ struct hits {
     uint32_t prim[BATCH_ROOM];
 };
 
-/* What camera rays met, for the layers beside the picture (aov.h). */
+/* What camera rays met, for the layers beside the image (aov.h). */
 struct first_hits {
     float depth[BATCH_ROOM];     /* from the plane through the eye, along the viewing axis */
     struct vec3s normal;         /* shading normal as the scene has it, world space */

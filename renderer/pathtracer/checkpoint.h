@@ -1,5 +1,5 @@
-/* A film kept for going on with it: PICTURE.state beside the picture. All sums in double to the last
- * bit, which the float32 of the picture do not have; whose render it is; and a SHA-256 of the lot.
+/* A film kept for going on with it: IMAGE.state beside the image. All sums in double to the last
+ * bit, which the float32 of the image do not have; whose render it is; and a SHA-256 of the lot.
  * Valid on the kind of machine and the version of the program that wrote it. */
 #ifndef ASSAY_CHECKPOINT_H
 #define ASSAY_CHECKPOINT_H
@@ -18,7 +18,7 @@ bool checkpoint_write(const char *path, const struct render_id *id, const struct
 bool checkpoint_read(const char *path, const struct render_id *id, struct film *f, struct err *e)
     __attribute__((warn_unused_result));
 
-/* A state read by rows, for putting together a picture that is larger than memory. */
+/* A state read by rows, for putting together an image that is larger than memory. */
 struct checkpoint {
     FILE *f; /* NULL: closed */
     char path[4096];

@@ -1,4 +1,4 @@
-/* How hard the acceleration structure works, as a picture. */
+/* How hard the acceleration structure works, as an image. */
 #ifndef ASSAY_HEATMAP_H
 #define ASSAY_HEATMAP_H
 
@@ -6,7 +6,7 @@
 #include "renderer/scene/camera.h"
 #include "renderer/image/image.h"
 
-/* Counts the nodes that the ray through the centre of each pixel of the cell (x, y of the full picture,
+/* Counts the nodes that the ray through the centre of each pixel of the cell (x, y of the full image,
  * origin at the top left) visits until its nearest hit is known, and writes them as a PNG: dark is 0,
  * light is *most, the largest count. Rays leave the middle of the lens. */
 bool heatmap_write(const char *path, const struct bvh *bvh, const struct camera *c, int x, int y,

@@ -148,11 +148,11 @@ static const struct cli_option options[] = {
      "stop when the root mean square standard error of a pixel is\n"
      "P % of the mean luminance (off; -s is then unlimited)",
      TO(max_error), 0, 100, .unit = percent},
-    {0, "write-every", "T", "write pictures and state meanwhile, every 60, 60s, 5m, 1h (off)",
+    {0, "write-every", "T", "write images and state meanwhile, every 60, 60s, 5m, 1h (off)",
      TO(write_every), 0, 1e9, .unit = cli_time_units},
     {0, "resume", "FILE", "go on with the render that left FILE.state; same options", TO(resume)},
     {0, "keep-state", "",
-     "leave the state beside the first picture even when done,\n"
+     "leave the state beside the first image even when done,\n"
      "to add samples later",
      TO(keep_state)},
     {'e', "environment", "FILE", "environment map in latitude and longitude, .exr or .hdr",
@@ -165,7 +165,7 @@ static const struct cli_option options[] = {
      "the same bits (off)",
      TO(slurm), 1, 1000000},
     {'f', "out", "FILE",
-     "picture; may be given again. .exr: float32 with moments,\n"
+     "image; may be given again. .exr: float32 with moments,\n"
      ".png: 8 bits by the dialect's tone curve",
      .read = read_output},
     {0, "aov", "", "add to .exr: variance, stderr, depth, normal, albedo, object id", TO(aov)},
@@ -185,7 +185,7 @@ static const struct cli_option options[] = {
      .names = bvh_kind_names},
     {0, "isa", "NAME",
      "vector instructions: auto, sse4.2, avx2, avx512, or scalar\n"
-     "paths; all give the same picture (auto; scalar with another\n"
+     "paths; all give the same image (auto; scalar with another\n"
      "--accel than wide)",
      TO(isa), .names = isa_names},
     {0, "dialect", "NAME",
@@ -225,7 +225,7 @@ static bool complete(struct options *s, struct err *e)
         s->cell[3] = s->height;
     }
     if (s->cell[0] + s->cell[2] > s->width || s->cell[1] + s->cell[3] > s->height)
-        return err_set(e, "--cell: %d %d %d %d reaches out of the %d x %d picture", s->cell[0],
+        return err_set(e, "--cell: %d %d %d %d reaches out of the %d x %d image", s->cell[0],
                        s->cell[1], s->cell[2], s->cell[3], s->width, s->height);
     if ((s->adaptive_batch > 0 || s->pilot_tolerance >= 0 || s->max_error > 0) &&
         s->sampler != SAMPLER_INDEPENDENT)

@@ -14,12 +14,12 @@ struct options {
     const char *output[MAX_OUTPUTS]; /* each ends in .exr or .png */
     int num_outputs;
     const char *heatmap; /* PNG file; NULL: none */
-    const char *resume;  /* the picture to go on with; NULL: from the start */
+    const char *resume;  /* the image to go on with; NULL: from the start */
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
     int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
     unsigned starter; /* 1 << enum cs184_deviation (cs184_deviations.h) */
-    int spp;          /* of the whole picture, the most if adaptive */
+    int spp;          /* of the whole image, the most if adaptive */
     int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
     int accumulate; /* 0: only light that bounced exactly max_bounces times, which first_bounce then says */

@@ -187,8 +187,8 @@ void output_abandon(struct output_writer *w)
     free(w);
 }
 
-bool output_pictures(const struct output *o, const struct film *f, const struct render_stats *stats,
-                     struct err *e)
+bool output_images(const struct output *o, const struct film *f, const struct render_stats *stats,
+                   struct err *e)
 {
     struct output_writer *w = output_open(o, f->m.width, f->m.height, f->num_samples, stats, e);
     if (w == NULL)
@@ -199,13 +199,13 @@ bool output_pictures(const struct output *o, const struct film *f, const struct 
     return false;
 }
 
-bool output_state_path(const struct output *o, const char *picture, char path[CHECKPOINT_PATH],
+bool output_state_path(const struct output *o, const char *image, char path[CHECKPOINT_PATH],
                        struct err *e)
 {
-    if (picture == NULL)
-        picture = o->opt->output[0];
-    int n = snprintf(path, CHECKPOINT_PATH, "%s.state", picture);
-    return (n > 0 && n < CHECKPOINT_PATH) || err_set(e, "%.64s...: path too long", picture);
+    if (image == NULL)
+        image = o->opt->output[0];
+    int n = snprintf(path, CHECKPOINT_PATH, "%s.state", image);
+    return (n > 0 && n < CHECKPOINT_PATH) || err_set(e, "%.64s...: path too long", image);
 }
 
 void output_print_summary(const struct output *o, const struct film *f,

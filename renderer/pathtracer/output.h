@@ -1,4 +1,4 @@
-/* What a render leaves: pictures, its state, a summary. */
+/* What a render leaves: images, its state, a summary. */
 #ifndef ASSAY_OUTPUT_H
 #define ASSAY_OUTPUT_H
 
@@ -15,13 +15,13 @@ struct output {
     char **argv;
 };
 
-/* All pictures of the options, each by rename, and beside each PNG of an adaptive render its sampling
+/* All images of the options, each by rename, and beside each PNG of an adaptive render its sampling
  * rates (X.png -> X_rate.png). stats may be NULL while rendering goes on. */
-bool output_pictures(const struct output *o, const struct film *f, const struct render_stats *stats,
-                     struct err *e) __attribute__((warn_unused_result));
+bool output_images(const struct output *o, const struct film *f, const struct render_stats *stats,
+                   struct err *e) __attribute__((warn_unused_result));
 
 /* The same for a film that is never in memory as a whole: its rows come from the top as films of whole rows, IMAGE_BAND
- * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the pictures of the whole film. */
+ * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the images of the whole film. */
 struct output_writer;
 /* num_samples: film.num_samples of the whole. NULL with a line on failure. */
 struct output_writer *output_open(const struct output *o, int width, int height,
@@ -29,13 +29,13 @@ struct output_writer *output_open(const struct output *o, int width, int height,
                                   struct err *e) __attribute__((warn_unused_result));
 bool output_rows(struct output_writer *w, const struct film *band, struct err *e)
     __attribute__((warn_unused_result));
-/* Both free the writer; the pictures appear with close. */
+/* Both free the writer; the images appear with close. */
 bool output_close(struct output_writer *w, struct err *e) __attribute__((warn_unused_result));
 void output_abandon(struct output_writer *w);
 
-/* PICTURE.state beside the first picture, or beside `picture` if that is not NULL. */
+/* IMAGE.state beside the first image, or beside `image` if that is not NULL. */
 enum { CHECKPOINT_PATH = 4096 };
-bool output_state_path(const struct output *o, const char *picture, char path[CHECKPOINT_PATH],
+bool output_state_path(const struct output *o, const char *image, char path[CHECKPOINT_PATH],
                        struct err *e) __attribute__((warn_unused_result));
 
 /* The assignment's colours of a sampling rate n/most: blue (0) through green (1/2) to red (1). */

@@ -1,4 +1,4 @@
-/* pathtracer: options -> scene -> render -> pictures. */
+/* pathtracer: options -> scene -> render -> images. */
 #include "renderer/collada/collada.h"
 #include "renderer/base/fs.h"
 #include "heatmap.h"
@@ -55,7 +55,7 @@ static bool signal_came(void *arg)
 static bool write_meanwhile(void *arg, const struct film *f, struct err *e)
 {
     const struct session *s = arg;
-    return output_pictures(&s->out, f, NULL, e) && checkpoint_write(s->state_path, s->out.id, f, e);
+    return output_images(&s->out, f, NULL, e) && checkpoint_write(s->state_path, s->out.id, f, e);
 }
 
 static bool setup_camera(const struct options *o, const struct scene *scene, struct camera *c,
@@ -144,12 +144,12 @@ static bool start_film(const struct session *s, const struct options *o, struct 
     return true;
 }
 
-/* Pictures, and the state if it can be of use; a state that this render has outlived goes. */
+/* Images, and the state if it can be of use; a state that this render has outlived goes. */
 static bool finish(struct session *s, const struct film *f, const struct render_stats *stats,
                    struct err *e)
 {
     const struct options *o = s->out.opt;
-    if (!output_pictures(&s->out, f, stats, e))
+    if (!output_images(&s->out, f, stats, e))
         return false;
     if (stats->end == RENDER_ASKED || o->keep_state)
         return checkpoint_write(s->state_path, s->out.id, f, e);

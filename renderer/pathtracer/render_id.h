@@ -1,5 +1,5 @@
-/* Which render a picture or a state belongs to: what has to be the same for its samples to be samples
- * of the same picture. Goes into the metadata of pictures and the head of state files. */
+/* Which render an image or a state belongs to: what has to be the same for its samples to be samples
+ * of the same image. Goes into the metadata of images and the head of state files. */
 #ifndef ASSAY_RENDER_ID_H
 #define ASSAY_RENDER_ID_H
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The assignment fits its angle of view to a picture of this shape, then crops or extends it. */
+/* The assignment fits its angle of view to an image of this shape, then crops or extends it. */
 enum { CGL_WIDTH = 800, CGL_HEIGHT = 600 };
 
 static void place_cgl(struct camera *c, const struct scene *s)

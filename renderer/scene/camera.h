@@ -4,18 +4,18 @@
 
 #include "scene.h"
 
-/* The camera of one picture. Row 0 is the top row. Image-plane point (sx, sy), both in [-1,1] with
+/* The camera of one image. Row 0 is the top row. Image-plane point (sx, sy), both in [-1,1] with
  * sy up, lies in direction sx*tan_h*right + sy*tan_v*up - backward. */
 struct camera {
     vec3 eye, right, up, backward; /* unit, orthogonal */
     float tan_h, tan_v;            /* tangents of the half angles of view */
     float near, far;               /* measured along the ray, as the assignment does */
-    int width, height;             /* of the full picture, pixels */
+    int width, height;             /* of the full image, pixels */
     float lens_radius;             /* 0: pinhole */
     float focal_distance;          /* of the plane in focus, along the axis */
 };
 
-/* Frames the scene for a width x height picture by the scene's dialect: COLLADA keeps the file's
+/* Frames the scene for a width x height image by the scene's dialect: COLLADA keeps the file's
  * pose and horizontal angle (or, if it has only a vertical one, that) with square pixels; CGL
  * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle
  * at 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
@@ -27,7 +27,7 @@ bool camera_init(struct camera *c, const struct scene *s, int width, int height,
 void camera_show_whole(struct camera *c);
 
 /* Replaces pose and angles by those of a camera file of the assignment (its key D writes them).
- * The picture's size stays. */
+ * The image's size stays. */
 bool camera_read_file(struct camera *c, const char *path, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -93,7 +93,7 @@ struct light {
     float area;     /* triangles, sphere: total, one side */
 };
 
-/* One named node instance of the file; the unit of object-id pictures and of the exporters. */
+/* One named node instance of the file; the unit of object-id images and of the exporters. */
 struct object {
     char name[64];
     uint32_t first_triangle, num_triangles;
@@ -101,7 +101,7 @@ struct object {
     uint32_t material;
 };
 
-/* The camera as the file has it, after transforms; camera_init() makes the picture's camera of it.
+/* The camera as the file has it, after transforms; camera_init() makes the image's camera of it.
  * c2w columns: right, up, backward (it looks along -Z), unit length; eye is its position. Angles
  * are full angles in radians; 0 where the file is silent. In the CGL dialect all fields are filled
  * even if not present (by the assignment's defaults), backward is the assignment's direction from

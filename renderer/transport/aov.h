@@ -1,4 +1,4 @@
-/* What the camera rays of a batch meet first, for the layers beside the picture. */
+/* What the camera rays of a batch meet first, for the layers beside the image. */
 #ifndef ASSAY_AOV_H
 #define ASSAY_AOV_H
 

@@ -27,7 +27,7 @@ bool film_alloc(struct film *f, int width, int height, bool first_hits, struct e
         f->first = huge_calloc(pixels, sizeof *f->first);
     if (f->s1 == NULL || f->s2 == NULL || (first_hits && f->first == NULL)) {
         film_free(f);
-        return err_set(e, "out of memory for a picture of %d x %d pixels", width, height);
+        return err_set(e, "out of memory for an image of %d x %d pixels", width, height);
     }
     return true;
 }

@@ -43,7 +43,7 @@ bool film_merge(struct film *dst, const struct film *src, size_t first, int num,
     __attribute__((warn_unused_result));
 
 /* Root mean square over the pixels of the standard error of luminance, over the mean luminance of the
- * picture. INFINITY while a pixel has fewer than two samples or the picture is black. */
+ * image. INFINITY while a pixel has fewer than two samples or the image is black. */
 double film_relative_error(const struct film *f);
 
 /* The layers beside the moments, as an image to write with them: variance.R G B (of one sample),

@@ -76,7 +76,7 @@ struct integrator {
 };
 
 /* The working memory of one thread. In: lanes 0 .. num_lanes-1 of pixel (number in the full
- * picture, row 0 at the top) and sample. Out: radiance and, if asked for, first. */
+ * image, row 0 at the top) and sample. Out: radiance and, if asked for, first. */
 struct batch {
     uint32_t pixel[BATCH_ROOM], sample[BATCH_ROOM];
     struct rgbs radiance;

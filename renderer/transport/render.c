@@ -24,7 +24,7 @@ struct job {
     struct film *film;
     uint32_t last; /* the pass ends before this many samples per pixel */
     int tiles_x, num_tiles;
-    int stretch; /* tiles of one of as many stretches of the picture as there are threads */
+    int stretch; /* tiles of one of as many stretches of the image as there are threads */
     atomic_int next_ticket;
     atomic_bool out_of_memory;
     atomic_ullong samples_done;

@@ -1,4 +1,4 @@
-/* A picture: passes over all of it, each a few samples for every pixel, tile by tile from a queue by
+/* An image: passes over all of it, each a few samples for every pixel, tile by tile from a queue by
  * threads, into a film. */
 #ifndef ASSAY_RENDER_H
 #define ASSAY_RENDER_H
@@ -10,7 +10,7 @@
 
 struct render_options {
     struct integrator_options integrator;
-    int x, y, width, height; /* the cell of the full picture to render; origin at the top left */
+    int x, y, width, height; /* the cell of the full image to render; origin at the top left */
     uint32_t first_sample;   /* sample numbers first_sample .. first_sample + num_samples - 1 */
     uint32_t num_samples;    /* per pixel (the most, if adaptive) */
     int threads;

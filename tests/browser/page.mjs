@@ -1,4 +1,4 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS GOING|--values-only: the page of one scene of four pictures, in Debian's chromium, and
+// node page.mjs MODULES PAGE RESULTS SHOTS GOING|--values-only: the page of one scene of four images, in Debian's chromium, and
 // GOING, one of a run that has not ended.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
@@ -12,8 +12,8 @@ const results = JSON.parse(readFileSync(resultsPath, "utf8"));
 const directory = dirname(resultsPath) + "/", claims = results.claims.filter((c) => c.files);
 const fileOf = {};
 for (const c of claims) Object.assign(fileOf, { [c.a]: c.files.a, [c.b]: c.files.b });
-const pictures = Object.fromEntries(Object.entries(fileOf).map(([name, f]) => [name, readExr(directory + f)]));
-const size = pictures[claims[0].a];
+const images = Object.fromEntries(Object.entries(fileOf).map(([name, f]) => [name, readExr(directory + f)]));
+const size = images[claims[0].a];
 
 function check(name, good, why = "") {
   console.log(good ? "ok page: " + name : "not ok page: " + name + ": " + why);
@@ -36,7 +36,7 @@ async function open(path, width, height, options = {}) {
 const frames = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 const page = await open(pagePath, 1280, 900);
-check("its pictures are all there", await page.evaluate("scenes.length === 1 && scenes[0].ready"));
+check("its images are all there", await page.evaluate("scenes.length === 1 && scenes[0].ready"));
 const names = await page.evaluate("scenes[0].shots.map((s) => s.name)");
 check("keys 1 to 4 are ours, Cycles, POV-Ray, truth", names.slice(0, 4).join() === "pathtracer,cycles,povray,truth", names.join());
 
@@ -60,14 +60,14 @@ for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 
   await frames(page);
   const table = await rows();
   for (const row of table.filter((r) => r.length === 5)) {
-    const p = pixelOf(pictures[row[0]], x, y), exact = results.claims.some((c) => c.b === row[0] && c.unit_b === "exact");
+    const p = pixelOf(images[row[0]], x, y), exact = results.claims.some((c) => c.b === row[0] && c.unit_b === "exact");
     for (let k = 0; k < 3; k++)
       if (!agrees(row[k + 1], p.value[k], exact ? 0 : p.error[k])) wrong.push(row[0] + " " + x + "," + y + ": " + row[k + 1] + " is " + p.value[k] + " ± " + p.error[k]);
     if (row[4] !== "exact" && number(row[4]) !== p.n) wrong.push(row[0] + ": n " + row[4] + " is " + p.n);
   }
   table.filter((r) => r.length === 3).forEach((row, i) => {
     const [d] = row[1].split("\u00b1").map(number), z = zMaps[i].at("z", x, y), relative = relativeMaps[i].at("rel", x, y);
-    const a = pixelOf(pictures[claims[i].a], x, y), b = pixelOf(pictures[claims[i].b], x, y);
+    const a = pixelOf(images[claims[i].a], x, y), b = pixelOf(images[claims[i].b], x, y);
     const unit = (grey(a.value) - grey(b.value)) / relative, noise = Math.hypot(grey(a.error), grey(b.error)) / unit;
     // Both sides are off by 1/16 of their error or 2^-20 of themselves.
     const off = 0.2 * noise + 2 * 2 ** -20 * grey(b.value) / unit + 5e-4 * Math.abs(relative);
@@ -82,7 +82,7 @@ if (process.argv.includes("--values-only")) {
   process.exit();
 }
 
-// What is painted: the buffer that the stage shows (its second picture, if over), pixel by pixel.
+// What is painted: the buffer that the stage shows (its second image, if over), pixel by pixel.
 const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
   const pane = scenes[0].stagePane, source = pane.source();
   return [...pane.buffer(o ? source.over : source).getContext("2d").getImageData(px, py, 1, 1).data.slice(0, 3)];
@@ -90,7 +90,7 @@ const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
 async function paintsRadiance(name, over, gain, points) {
   const bad = [], white = +(await page.getAttribute("section.scene", "data-white"));
   for (const [x, y] of points) {
-    const p = pixelOf(pictures[name], x, y), c = await painted(over, x, y);
+    const p = pixelOf(images[name], x, y), c = await painted(over, x, y);
     for (let k = 0; k < 3; k++) {
       const lowest = srgb((p.value[k] - p.error[k] / 8) * gain / white) - 1, highest = srgb((p.value[k] + p.error[k] / 8) * gain / white) + 1;
       if (c[k] < lowest || c[k] > highest) bad.push(x + "," + y + ": " + c[k] + " not " + lowest + ".." + highest);
@@ -112,15 +112,15 @@ for (let i = 0; i < 4; i++) await page.keyboard.press("[");
 await page.getByLabel("Curve").selectOption({ label: "linear" });
 await frames(page);
 const white = +(await page.getAttribute("section.scene", "data-white"));
-const linear = await painted(0, 31, 31), wanted = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * v / white));
+const linear = await painted(0, 31, 31), wanted = pixelOf(images[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * v / white));
 check("the linear curve is linear", linear.every((v, k) => Math.abs(v - wanted[k]) <= 1), linear + " not " + wanted);
 await page.getByLabel("Curve").selectOption({ label: "gamma 2.2" });
 await frames(page);
-const gamma = await painted(0, 31, 31), bent = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (v / white) ** (1 / 2.2)));
+const gamma = await painted(0, 31, 31), bent = pixelOf(images[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (v / white) ** (1 / 2.2)));
 check("gamma 2.2 is that", gamma.every((v, k) => Math.abs(v - bent[k]) <= 1), gamma + " not " + bent);
 await page.getByLabel("Curve").selectOption({ label: "log, 4 decades" });
 await frames(page);
-const logarithmic = await painted(0, 31, 31), decades = pixelOf(pictures[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (1 + Math.log10(v / white) / 4)));
+const logarithmic = await painted(0, 31, 31), decades = pixelOf(images[names[3]], 31, 31).value.map((v) => Math.min(255, 255 * (1 + Math.log10(v / white) / 4)));
 check("the logarithmic curve is that", logarithmic.every((v, k) => Math.abs(v - decades[k]) <= 1), logarithmic + " not " + decades);
 await page.getByLabel("Curve").selectOption({ label: "sRGB" });
 await page.getByLabel("Exposure").fill("-2");
@@ -128,11 +128,11 @@ await frames(page);
 check("the slider exposes too", (await paintsRadiance(names[3], 0, 0.25, points)).length === 0);
 await page.getByLabel("Exposure").fill("0");
 
-// Wipe: the shown picture left of the line, another one right of it; the line follows a drag.
+// Wipe: the shown image left of the line, another one right of it; the line follows a drag.
 await page.keyboard.press("1");
 await page.keyboard.press("w");
 await frames(page);
-check("wipe shows two pictures", (await paintsRadiance(names[0], 0, 1, points)).length === 0 && (await paintsRadiance(names[1], 1, 1, points)).length === 0);
+check("wipe shows two images", (await paintsRadiance(names[0], 0, 1, points)).length === 0 && (await paintsRadiance(names[1], 1, 1, points)).length === 0);
 await page.locator(".stage .frame").scrollIntoViewIfNeeded();
 let box = await page.locator(".stage .frame").boundingBox();
 await page.mouse.move(box.x + box.width / 2, box.y + 40);
@@ -140,8 +140,8 @@ await page.mouse.down();
 await page.mouse.move(box.x + box.width / 4, box.y + 60, { steps: 3 });
 await page.mouse.up();
 check("the wipe is dragged", Math.abs(await page.evaluate("scenes[0].wipe") - 0.25) < 0.01);
-await page.getByLabel("Picture that is wiped in").selectOption({ label: names[3] });
-check("the wiped picture is chosen", await page.evaluate("scenes[0].shots[scenes[0].against].name") === names[3]);
+await page.getByLabel("Image that is wiped in").selectOption({ label: names[3] });
+check("the wiped image is chosen", await page.evaluate("scenes[0].shots[scenes[0].against].name") === names[3]);
 await page.keyboard.press("w");
 
 // Maps, each with its sentence, legend and colours.
@@ -169,12 +169,12 @@ for (let y = 0; y < size.height; y += 7)
   }
 check("the t map is red above and blue below", red.length === 0, red.join("; "));
 
-await page.getByLabel("Pictures of the map").selectOption({ index: 1 });
+await page.getByLabel("Images of the map").selectOption({ index: 1 });
 await frames(page);
 check("the pair of a map is chosen", (await page.textContent(".stage figcaption")).startsWith("t map, " + claims[1].a + " against " + claims[1].b));
-await page.getByLabel("Pictures of the map").selectOption({ index: 0 });
+await page.getByLabel("Images of the map").selectOption({ index: 0 });
 
-// Zoom to single pixels and pan, linked between all frames; then the whole picture.
+// Zoom to single pixels and pan, linked between all frames; then the whole image.
 await page.keyboard.press("0");
 for (let i = 0; i < 8; i++) await page.keyboard.press("+");
 check("zoom ends at 4 pixels", await page.evaluate("scenes[0].width / scenes[0].view.zoom") === 4);
@@ -191,7 +191,7 @@ const middles = await page.evaluate(`[...document.querySelectorAll(".side .frame
   [...c.getContext("2d").getImageData(c.width / 8, c.height / 8, 1, 1).data.slice(0, 3)])`);
 const corner = await page.evaluate("[Math.floor(scenes[0].view.x + 0.5), Math.floor(scenes[0].view.y + 0.5)]");
 check("all frames show the same pixels", middles.length === names.length && middles.every((c, i) =>
-  srgb(pixelOf(pictures[names[i]], ...corner).value[1] / white) - c[1] <= 2 && c[1] - srgb(pixelOf(pictures[names[i]], ...corner).value[1] / white) <= 2), JSON.stringify(middles));
+  srgb(pixelOf(images[names[i]], ...corner).value[1] / white) - c[1] <= 2 && c[1] - srgb(pixelOf(images[names[i]], ...corner).value[1] / white) <= 2), JSON.stringify(middles));
 await page.keyboard.press("f");
 await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
 await page.mouse.dblclick(box.x + box.width / 2, box.y + box.height / 2);
@@ -207,7 +207,7 @@ await page.keyboard.press("Shift+ArrowDown");
 const after = await page.evaluate("({...scenes[0].pixel})");
 check("arrow keys move the pixel", after.x === at.x && after.y === Math.min(at.y + 8, size.height - 1));
 
-// A frame smaller than the picture: each of its pixels shows the mean radiance of what it covers, here 40 of 64.
+// A frame smaller than the image: each of its pixels shows the mean radiance of what it covers, here 40 of 64.
 const SMALL = 40;
 await page.evaluate((width) => {
   scenes[0].show(4, null);
@@ -221,7 +221,7 @@ const covered = (x, y, k) => {
   for (let j = 0; j < size.height; j++)
     for (let i = 0; i < size.width; i++) {
       const weight = share(i, size.width, x) * share(j, size.height, y);
-      if (weight > 0) sum += weight * pixelOf(pictures[names[3]], i, j).value[k];
+      if (weight > 0) sum += weight * pixelOf(images[names[3]], i, j).value[k];
     }
   return sum;
 };
@@ -230,7 +230,7 @@ const reduced = await page.evaluate(() => {
   return { size: [c.width, c.height], at: [[5, 7], [19, 30], [31, 12], [36, 38]].map((p) => [p, [...c.getContext("2d").getImageData(...p, 1, 1).data]]) };
 });
 const far = reduced.at.filter(([[x, y], rgb]) => [0, 1, 2].some((k) => Math.abs(rgb[k] - srgb(covered(x, y, k) / white)) > 1));
-check("a picture larger than its frame is averaged", reduced.size.join() === SMALL + "," + SMALL && far.length === 0, JSON.stringify(reduced));
+check("an image larger than its frame is averaged", reduced.size.join() === SMALL + "," + SMALL && far.length === 0, JSON.stringify(reduced));
 await page.evaluate(`scenes[0].stagePane.frame.style.cssText = "aspect-ratio: 1"; scenes[0].show(0, null)`);
 
 // Tiles: sorted by p, one press marks and reads.
@@ -266,7 +266,7 @@ await find.fill("");
 check("all rows are back", await rowsShown() === total);
 await page.evaluate("scenes[0].show(1, null)");
 await find.press("2");
-check("what is typed there shows no picture", await page.evaluate("scenes[0].shown") === 1);
+check("what is typed there shows no image", await page.evaluate("scenes[0].shown") === 1);
 await find.fill("");
 await page.evaluate("scenes[0].show(0, null)");
 const column = async (name, n, read, order) => {
@@ -317,7 +317,7 @@ const blank = () => paper.evaluate(() => [...document.querySelectorAll(".side ca
 const unseen = await blank();
 await paper.evaluate(`window.dispatchEvent(new Event("beforeprint"))`);
 const printed = await blank();
-check("pictures out of sight are drawn for paper, and only then", unseen > 0 && printed === 0, unseen + " and " + printed + " are blank");
+check("images out of sight are drawn for paper, and only then", unseen > 0 && printed === 0, unseen + " and " + printed + " are blank");
 await paper.context().close();
 // The page of a run that goes on gives way to the next one where it was scrolled to, up to the last one, which stays.
 const reloads = /<meta http-equiv="refresh" content="1">/, goes = readFileSync(goingPath, "utf8");
@@ -337,7 +337,7 @@ const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true 
 check("it prints", pdf.length > 20000, pdf.length + " bytes");
 const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>
   e.offsetParent !== null && !e.closest("[hidden]") && !(e.getAttribute("aria-label") || e.textContent.trim() || e.labels && e.labels.length)).length`);
-check("every picture and control has a name", unnamed === 0, unnamed + " have none");
+check("every image and control has a name", unnamed === 0, unnamed + " have none");
 check("no console message", complaints.length === 0, complaints.join("; "));
 check("nothing is loaded from outside", requests.every((u) => u.startsWith("data:text/csv") || u.startsWith("file://") && u.endsWith(".html") || u.startsWith("blob:")), requests.join(" "));
 await browser.close();

@@ -26,7 +26,7 @@ const decoded = await page.evaluate(async () => {
   await loadAll();
   return performance.now();
 });
-console.log("all pictures decoded after %d ms; CPU %d ms", Math.round(decoded), Math.round(await cpu() - idle));
+console.log("all images decoded after %d ms; CPU %d ms", Math.round(decoded), Math.round(await cpu() - idle));
 await page.evaluate(() => scenes[0].box.scrollIntoView());
 
 // Frames: the time from one to the next while something changes in each; draws: the script's own part of it.
@@ -52,7 +52,7 @@ async function frames(name, step) {
   console.log("%s: median frame %s ms, 9 of 10 below %s ms; drawing %s and %s ms; CPU of the page's process %s ms a frame", name,
     at(gaps, 0.5), at(gaps, 0.9), at(draws, 0.5), at(draws, 0.9), ((await cpu() - begun) / 94).toFixed(1));
 }
-await frames("switch pictures", "scenes[0].show(1 + i % scenes[0].shots.length, null)");
+await frames("switch images", "scenes[0].show(1 + i % scenes[0].shots.length, null)");
 await frames("switch maps", "scenes[0].show(1, ['difference', 't', 'flip'][i % 3])");
 await frames("zoom", "scenes[0].show(1, null); scenes[0].zoom(1 + 30 * Math.abs(Math.sin(i / 20)))");
 await frames("pan", "scenes[0].zoom(4); scenes[0].pan(20 * Math.cos(i / 9), 20 * Math.sin(i / 9))");

@@ -87,7 +87,7 @@ if tests/mutants/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "
 fi
 rm -f "$tmp/mutants.out"
 
-# Pictures.
+# Images.
 expect "render" 0 "mean radiance" \
     "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
 expect "environment map" 0 "mean radiance" \
@@ -99,8 +99,8 @@ if cmp -s "$tmp/a1.png" "$tmp/a2.png"; then ok "1 and 2 threads, same bytes"; el
 fi
 "$pathtracer" $small -t 2 --seed 2 -f "$tmp/a3.png" $scene >/dev/null
 if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
-    not_ok "another seed, another picture" "PNG files are the same"
-else ok "another seed, another picture"; fi
+    not_ok "another seed, another image" "PNG files are the same"
+else ok "another seed, another image"; fi
 
 # What tests/support/asan_options.c turns off is on without it: else a search for leaks now and then dies of where a variable happens to lie.
 sky=reference/scenes/46_sky.exr
@@ -138,7 +138,7 @@ interrupt() {
         timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
-    expect "$1: the picture has moments, and is not judged by itself" 3 "the same observations" \
+    expect "$1: the image has moments, and is not judged by itself" 3 "the same observations" \
         "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long.exr" "$tmp/long.exr"
     $pathtracer -q -r 48 32 $scene -s $((done + 2)) --keep-state --resume "$tmp/long.exr" \
         -f "$tmp/long.exr" >/dev/null
@@ -157,7 +157,7 @@ $pathtracer -q -r 32 32 -s 1000000 --write-every 0.2 $scene -f "$tmp/long2.exr" 
 for i in $(seq 100); do [ -s "$tmp/long2.exr.state" ] && break; sleep 0.1; done
 kill -9 $!
 wait $! 2>/dev/null
-expect "--write-every: the picture of a killed render has moments" 3 "the same observations" \
+expect "--write-every: the image of a killed render has moments" 3 "the same observations" \
     "$san_assay" compare --margin 0.9 --margin-tile 0.9 "$tmp/long2.exr" "$tmp/long2.exr"
 if [ -s "$tmp/long2.exr.state" ]; then ok "--write-every: its state"; else
     not_ok "--write-every: its state" "none"
@@ -167,9 +167,9 @@ expect "--samples: not a range" 3 "not a range" "$san_pathtracer" --samples 5 $s
 expect "--samples: empty" 3 "no sample" "$san_pathtracer" --samples 5:5 $scene -f "$tmp/x.exr"
 expect "two adaptive modes" 3 "exclude" \
     "$san_pathtracer" -a 32 0.1 --adaptive-unbiased 0.1 $scene -f "$tmp/x.exr"
-expect "adaptive pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 -a 16 0.2 $scene \
+expect "adaptive images" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 -a 16 0.2 $scene \
     -f "$tmp/rule.exr" -f "$tmp/rule.png" --heatmap "$tmp/heat.png"
-expect "a pilot's pictures" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 --pilot 16 \
+expect "a pilot's images" 0 "mean radiance" "$san_pathtracer" -q -r 16 16 -s 64 --pilot 16 \
     --adaptive-unbiased 0.2 $scene -f "$tmp/pilot.png"
 for file in rule_rate.png heat.png pilot_rate.png; do
     if [ -s "$tmp/$file" ]; then ok "there is $file"; else not_ok "there is $file" "no"; fi
@@ -198,7 +198,7 @@ if command -v oiiotool >/dev/null; then
     expect "layers" 0 "albedo.R.*depth.Z.*id.object.*normal.X.*stderr.R.*variance.B" \
         oiiotool --info -v "$tmp/whole.exr"
 else
-    ok "oiiotool is not here: bits of merged pictures are not compared"
+    ok "oiiotool is not here: bits of merged images are not compared"
 fi
 expect "merge: the same samples twice" 3 "both have samples" \
     "$san_assay" merge "$tmp/x.exr" "$tmp/s0.exr" "$tmp/s1.exr" "$tmp/whole.exr"
@@ -231,7 +231,7 @@ expect "compare: samples that are not independent" 3 "only replicates" \
     "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
-# compare: inputs from elsewhere. Replicates are any float pictures, so moments images do.
+# compare: inputs from elsewhere. Replicates are any float images, so moments images do.
 for option in --alpha --margin --margin-tile --margin-variance --again --exchangeable --curve --spp-a --spp-b; do
     expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
 done
@@ -260,7 +260,7 @@ expect "compare: results have the notes" 0 "judged by permutation" grep '"notes"
 expect "report of directories" 0 "index.html" "$san_assay" report "$tmp/perm/results.json"
 cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy.exr"
 cp "$tmp/runs_a/1.exr" "$tmp/runs_a2/copy2.exr"
-expect "compare: a seed that was ignored" 3 "copy.exr and copy2.exr are the same picture" \
+expect "compare: a seed that was ignored" 3 "copy.exr and copy2.exr are the same image" \
     "$san_assay" compare "$tmp/runs_a2" "$tmp/runs_b"
 expect "compare: exchangeable files" 3 "one.exr: cannot read" \
     "$san_assay" compare --exchangeable "$tmp/one.exr" "$tmp/two.exr"
@@ -288,7 +288,7 @@ expect "report --github: with another" 3 "no other" "$san_assay" report --github
 expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
 expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
-expect "compare: the same PNG" 3 "the same picture" \
+expect "compare: the same PNG" 3 "the same image" \
     "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
 expect "compare: a curve for nothing" 3 "neither" \
     "$san_assay" compare --curve srgb "$tmp/one.exr" "$tmp/two.exr"
@@ -365,7 +365,7 @@ if xmllint --noout "$tmp/c.xml" && grep -q 'thinlens' "$tmp/c.xml" && [ -s "$tmp
     ok "the Mitsuba scene is XML, with its files"
 else not_ok "the Mitsuba scene is XML, with its files" "$(ls "$tmp"/c[._]*)"; fi
 expect "export to pbrt" 0 "c.pbrt" "$san_assay" export -o "$tmp/c.pbrt" -b 0.1 -d 2 $scene
-expect "export: what pbrt has not" 3 "no environment picture" \
+expect "export: what pbrt has not" 3 "no environment image" \
     "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene
 if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
     ok "a refused export leaves no file"
@@ -536,18 +536,18 @@ expect "diagnose: left out of the catalogue" 1 "none of the" "$assay" diagnose -
     --pathtracer "$plain/mutants/point_light_linear/pathtracer" --without point_light_linear
 expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only 12_point_plane \
     --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
-expect "diagnose: the pictures of a validation" 1 "tests/mutants/point_light_linear.patch" \
+expect "diagnose: the images of a validation" 1 "tests/mutants/point_light_linear.patch" \
     "$assay" diagnose "$tmp/wrong_suite/results.json"
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" >"$tmp/out" && $plane -r 40 40 -f "$tmp/odd.exr" >"$tmp/out"
-expect "diagnose: one picture, larger than the catalogue's" 0 "nothing wrong found" \
+expect "diagnose: one image, larger than the catalogue's" 0 "nothing wrong found" \
     "$san_assay" diagnose --scene 12_point_plane "$tmp/plane.exr"
 expect "diagnose: a size that is no multiple" 3 "40 x 40 pixels: the width has to be" \
     "$san_assay" diagnose --scene 12_point_plane "$tmp/odd.exr"
 expect "diagnose: another shape" 3 "width by height is not" \
     "$san_assay" diagnose --scene 39_three_lamps-four_light_samples "$tmp/plane.exr"
 expect "diagnose: unknown view" 3 "has no '99_none'" "$san_assay" diagnose --scene 99_none "$tmp/plane.exr"
-expect "diagnose: no picture" 3 "needs the picture" "$san_assay" diagnose --scene 12_point_plane
+expect "diagnose: no image" 3 "needs the image" "$san_assay" diagnose --scene 12_point_plane
 expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --without x
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
@@ -567,31 +567,31 @@ expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay"
 expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
 cp tests/end_to_end/quick.rubric "$tmp/quick.rubric"
-mkdir -p "$tmp/subs" "$tmp/subs/pictures" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
+mkdir -p "$tmp/subs" "$tmp/subs/images" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
 sub() { # NAME: a shell script from stdin
     { echo '#!/bin/sh' && cat; } >"$tmp/subs/$1" && chmod +x "$tmp/subs/$1"
 }
 cp "$pathtracer" "$tmp/subs/right"
-"$pathtracer" -q -s 16 -m 1 -r 64 64 --seed 9 -f "$tmp/subs/pictures/point.png" reference/scenes/12_point_plane.dae >/dev/null
+"$pathtracer" -q -s 16 -m 1 -r 64 64 --seed 9 -f "$tmp/subs/images/point.png" reference/scenes/12_point_plane.dae >/dev/null
 cp "$pathtracer" "$tmp/subs/source/pathtracer"
-ln -s "$tmp/subs/pictures/point.png" "$tmp/subs/linked/point.png"
+ln -s "$tmp/subs/images/point.png" "$tmp/subs/linked/point.png"
 cp "$pathtracer" "$tmp/subs/other_scene.bin"
 sub crash <<<'kill -SEGV $$'
 sub hang <<<'trap "" TERM; while :; do sleep 1; done'
 sub fork_bomb <<<'b() { b | b & }; b; wait; sleep 100'
 sub huge_file <<<'exec head -c 100G /dev/zero >out.png'
-sub link_out <<<"ln -s $tmp/subs/pictures/point.png out.png"
-sub reads_golden <<<"cp $PWD/golden/12_point_plane/* $tmp/subs/pictures/point.png out.png"
+sub link_out <<<"ln -s $tmp/subs/images/point.png out.png"
+sub reads_golden <<<"cp $PWD/golden/12_point_plane/* $tmp/subs/images/point.png out.png"
 sub made_up <<<'echo "{\"score\": 100}" >results.json; echo "{\"points\": 100}" >grade.json; echo "0 ended" >.report'
 sub noise <<<'head -c 12288 /dev/urandom >out.png'
-sub text <<<'echo "I am a picture" >out.png'
+sub text <<<'echo "I am an image" >out.png'
 sub nothing <<<'exit 0'
 { printf '\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0\x08\2\0\0\0\xe3\xe6\xa7\xb4\0\0\0\x10IDAT' && head -c 100 /dev/zero; } >"$tmp/subs/bomb.png"
 mkdir -p "$tmp/subs/bomb" && mv "$tmp/subs/bomb.png" "$tmp/subs/bomb/point.png" && rm "$tmp/subs/other_scene.bin"
 if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tmp/out" 2>&1; then
     expect "grade: a batch" 0 "right  *8.00 of 8" "$assay" grade -j2 -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
-    for good in right pictures source; do
+    for good in right images source; do
         [ "$(points $good)" = 8.00 ] && ok "grade: $good has all points" || not_ok "grade: $good has all points" "$(points $good)"
     done
     for bad in crash hang fork_bomb huge_file link_out linked reads_golden made_up noise text nothing bomb empty; do
@@ -642,7 +642,7 @@ expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/no
 # The same bits on any number of threads.
 part tests/end_to_end/threads.sh "$pathtracer"
 
-# Pictures made again from what they say of themselves.
+# Images made again from what they say of themselves.
 part tests/end_to_end/reproduce.sh "$build"
 
 # What a file or a command line may ask for.
@@ -669,10 +669,10 @@ fi
 cd "$tmp" || exit 1
 expect "the installed programs work" 0 "EQUIVALENT" \
     "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace
-expect "installed, it reads pictures from elsewhere" 1 "^DIFFERENT" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+expect "installed, it reads images from elsewhere" 1 "^DIFFERENT" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
 mv "$tmp/usr/lib/assay/oiio.so" "$tmp/oiio.so"
-expect "without OpenImageIO: a line" 3 "cannot load what reads pictures: .*oiio.so is not there" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+expect "without OpenImageIO: a line" 3 "cannot load what reads images: .*oiio.so is not there" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
 echo garbage >"$tmp/usr/lib/assay/oiio.so"
-expect "with a damaged one: a line" 3 "cannot load what reads pictures: .*oiio.so" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
+expect "with a damaged one: a line" 3 "cannot load what reads images: .*oiio.so" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
 
 [ $failures -eq 0 ]

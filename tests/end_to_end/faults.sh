@@ -62,7 +62,7 @@ kill_renders() {
         fi
         k=$((k + 1))
         [ -e "$tmp/why" ] && why="$(cat "$tmp/why")"
-        [ -e "$dir/x.exr" ] && ! is_whole "$dir/x.exr" && why="kill $k left a picture that cannot be read"
+        [ -e "$dir/x.exr" ] && ! is_whole "$dir/x.exr" && why="kill $k left an image that cannot be read"
         if [ -e "$dir/x.exr.state" ]; then
             # The number of samples stands behind the nine lines of the head.
             n=$(tail -c +$(($(head -n 9 "$dir/x.exr.state" | wc -c) + 1)) "$dir/x.exr.state" | od -An -tu4 -N4 | tr -d ' ')
@@ -73,7 +73,7 @@ kill_renders() {
     [ -e "$dir/x.exr.state" ] && resume="--resume $dir/x.exr" || resume=""
     [ -z "$why" ] && "${render[@]}" --keep-state $resume -f "$dir/x.exr" "$scene" >/dev/null 2>"$tmp/err"
     [ -z "$why" ] && ! cmp "$dir/whole.exr.state" "$dir/x.exr.state" >/dev/null && why="other bits at the end: $(cat "$tmp/err")"
-    tell "kill -9, $hits moments of a render ($k tries): whole pictures, no written sample lost (at most $lost ms of work), the same bits" "${why:-$(too_few $k)}"
+    tell "kill -9, $hits moments of a render ($k tries): whole images, no written sample lost (at most $lost ms of work), the same bits" "${why:-$(too_few $k)}"
 }
 
 # New references that differ in the last bits from those stored.
@@ -239,9 +239,9 @@ disk() {
     mkdir -p "$dir"
     "$pathtracer" -q -r 64 64 -s 4 -f "$dir/x.exr" -f "$dir/x.png" "$scene" >/dev/null
     render_shares
-    refused "disk full: a picture; the one before stays" "x.exr: cannot write: File too large" "$dir" \
+    refused "disk full: an image; the one before stays" "x.exr: cannot write: File too large" "$dir" \
         "$tmp/limited" 16 "$pathtracer" -q -r 64 64 -s 8 -f "$dir/x.exr" "$scene"
-    refused "disk full: a PNG picture" "x.png: cannot write" "$dir" \
+    refused "disk full: a PNG image" "x.png: cannot write" "$dir" \
         "$tmp/limited" 4 "$pathtracer" -q -r 64 64 -s 8 -f "$dir/x.png" "$scene"
     refused "disk full: the state of a render" "state: cannot write: File too large" "$dir" \
         "$tmp/limited" 200 "$pathtracer" -q -r 64 64 -s 8 --keep-state -f "$tmp/y.png" "$scene"
@@ -270,7 +270,7 @@ disk() {
     done
     if bwrap --ro-bind / / --dev /dev true 2>/dev/null; then
         local ro=(env LLVM_PROFILE_FILE=/dev/null bwrap --ro-bind / / --dev /dev)
-        refused "read-only directory: a picture" "n.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$pathtracer" -q -r 8 8 -f "$dir/n.exr" "$scene"
+        refused "read-only directory: an image" "n.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$pathtracer" -q -r 8 8 -f "$dir/n.exr" "$scene"
         refused "read-only directory: merge" "m.exr: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" merge "$dir/m.exr" "$tmp/share0.exr" "$tmp/share1.exr"
         refused "read-only directory: a validation" "Read-only" "$dir" "${ro[@]}" "$assay" validate -q --only 12_point_plane --out "$dir/v"
         refused "read-only directory: export" "s.pov: cannot write: Read-only" "$dir" "${ro[@]}" "$assay" export -o "$dir/s.pov" "$scene"
@@ -283,10 +283,10 @@ disk() {
     else
         echo "ok bubblewrap is not here: no read-only directory"
     fi
-    # A reader that goes away: the picture is whole, whether the signal ends the program or is ignored.
+    # A reader that goes away: the image is whole, whether the signal ends the program or is ignored.
     "$pathtracer" -q -r 16 16 -s 4 -f "$tmp/p1.exr" "$scene" 2>/dev/null | true
     (trap '' PIPE; "$pathtracer" -q -r 16 16 -s 4 -f "$tmp/p2.exr" "$scene" 2>"$tmp/err"; echo $? >"$tmp/status") | true
-    if is_whole "$tmp/p1.exr" && is_whole "$tmp/p2.exr"; then tell "closed pipe: whole pictures" ""; else tell "closed pipe: whole pictures" "no"; fi
+    if is_whole "$tmp/p1.exr" && is_whole "$tmp/p2.exr"; then tell "closed pipe: whole images" ""; else tell "closed pipe: whole images" "no"; fi
 }
 
 # Whole commands while memory runs out.

@@ -39,7 +39,7 @@ for option in "--margin nan" "--margin-tile inf" "--margin -1" "--alpha nan" "--
     refused "assay compare $option" "is not a " "$assay" compare $option "$tmp/out.a" "$tmp/out.b"
 done
 
-# Pictures of 10^6 x 10^6 pixels in a few bytes.
+# Images of 10^6 x 10^6 pixels in a few bytes.
 printf 'PF\n1000000 1000000\n-1.0\n' >"$tmp/big.pfm"
 printf '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n\0\0\0\0' >"$tmp/big.hdr"
 ihdr='IHDR\x00\x0f\x42\x40\x00\x0f\x42\x40\x08\x02\x00\x00\x00'
@@ -70,7 +70,7 @@ refused "a number beyond all in a scene's json" "12_point_plane.json" "$assay" v
 head -c 3000000 /dev/zero | tr '\0' 'a' >"$tmp/long.rubric"
 refused "a rubric of 3 MB" "more than 1 MiB" "$assay" grade --check-rubric "$tmp/long.rubric"
 sed 's/64 64/1000000 1000000/' tests/end_to_end/quick.rubric >"$tmp/big.rubric"
-refused "a rubric's picture of 10^6 x 10^6" "'1000000' is not a whole number from 16 to 4096" "$assay" grade --check-rubric "$tmp/big.rubric"
+refused "a rubric's image of 10^6 x 10^6" "'1000000' is not a whole number from 16 to 4096" "$assay" grade --check-rubric "$tmp/big.rubric"
 printf '50 35 1.5 0.1 100\n0.1 nan 4.2 0 0.8 0\n90 0 4.2 0.01 100\n1 0 0 0 1 0 0 0 1\n480 360 570\n4.7 0.05\n' >"$tmp/nan.info"
 render "a camera at no place" "nan.info" -c "$tmp/nan.info"
 sed 's,<vcount>[^<]*<,<vcount>1000000000<,' tests/bad/00_valid.dae >"$tmp/corners.dae"

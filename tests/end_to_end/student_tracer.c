@@ -6,7 +6,7 @@
  * Diffuse surfaces, triangles and spheres, area, point and directional lights and a constant sky;
  * anything else in the file is an error. Lamps of triangles are sampled by area, one at each vertex;
  * all else that glows is found by the path. Every ray looks at every triangle. GAIN (1) multiplies the
- * picture: a renderer that is wrong by so much. */
+ * image: a renderer that is wrong by so much. */
 #include <libxml/parser.h>
 #include <libxml/tree.h>
 #include <math.h>

@@ -42,7 +42,7 @@ same_bits "a pilot" --adaptive-unbiased 0.3 --pilot 4 "$first"
 same_bits "layers" --aov "$first"
 same_bits "one path at a time" --isa scalar "$first"
 same_bits "roulette, several light samples" --roulette on -l 3 "$first"
-# The comparison can fail: one bit of the seed is another picture.
+# The comparison can fail: one bit of the seed is another image.
 render 1 --seed 8 "$first" && cp "$tmp/1.exr.state" "$tmp/other" && render 1 --seed 9 "$first"
 # The seed stands in the head; the last 32 bytes are a hash, the 1000 before them are sums.
 if cmp -s <(tail -c 1032 "$tmp/other" | head -c 1000) <(tail -c 1032 "$tmp/1.exr.state" | head -c 1000); then

@@ -13,7 +13,7 @@ what=""
 sum() { sha256sum "$1" | cut -d ' ' -f 1; }
 
 # assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate that is older than
-# what is stored goes. In Blender's place our own program writes a picture for each seed.
+# what is stored goes. In Blender's place our own program writes an image for each seed.
 mkdir "$tmp/suite" "$tmp/work" "$tmp/bin"
 cp reference/scenes/13_square_patch.dae "$tmp/suite"
 sed 's/"width": 64, "height": 64/"width": 16, "height": 16/; s/"tile": 16/"tile": 8/; s/"replicates": [0-9]*, "spp": [0-9]*/"replicates": 3, "spp": 4/' \
@@ -124,7 +124,7 @@ if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer"
     right "grade: what cannot be built has none" test "$(points broken)" = 0.00
     expect "grade: why it cannot be built" 0 "building it failed: .*no compiler" cat "$tmp/grades/broken/results.json"
     expect "grade: why batches are wrong" 0 "pixels stand for no multiple of 32" cat "$tmp/grades/batches/results.json"
-    expect "grade: no rate picture" 0 "there is no rate picture" cat "$tmp/grades/no_rates/results.json"
+    expect "grade: no rate image" 0 "there is no rate image" cat "$tmp/grades/no_rates/results.json"
     expect "grade: the deviation is named" 0 "light_pdf" cat "$tmp/grades/starter/results.json"
 else
     echo "skip grade: $(tail -n 1 "$tmp/out")"

@@ -1,4 +1,4 @@
-/* Pictures from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies by our reader. */
+/* Images from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies by our reader. */
 #include "reference/base/image_oiio.h"
 #include "fuzz.h"
 

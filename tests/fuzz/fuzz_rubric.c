@@ -21,21 +21,19 @@ static void check_mistakes(const struct rubric_mistakes *m)
 static void check_rubric(const struct rubric *r)
 {
     fuzz_require(r->num_checks > 0 && r->num_checks <= RUBRIC_CHECKS, "no check, or too many");
-    fuzz_require(r->num_pictures >= 0 && r->num_pictures <= RUBRIC_PICTURES, "pictures");
+    fuzz_require(r->num_images >= 0 && r->num_images <= RUBRIC_IMAGES, "pictures");
     double points = rubric_points(r);
     fuzz_require(isfinite(points) && points > 0, "points that are no number");
     for (int i = 0; i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         fuzz_require(c->part >= 0 && c->part < r->num_parts, "a check of no part");
-        fuzz_require(c->num_pictures > 0 && c->num_pictures <= CHECK_PICTURES,
-                     "a check of no picture");
-        for (int k = 0; k < c->num_pictures; k++)
-            fuzz_require(c->picture[k] >= 0 && c->picture[k] < r->num_pictures,
-                         "a check of a picture that is not there");
+        fuzz_require(c->num_images > 0 && c->num_images <= CHECK_IMAGES, "a check of no image");
+        for (int k = 0; k < c->num_images; k++)
+            fuzz_require(c->images[k] >= 0 && c->images[k] < r->num_images,
+                         "a check of an image that is not there");
     }
-    for (int i = 0; i < r->num_pictures; i++)
-        fuzz_require(r->picture[i].width > 0 && r->picture[i].height > 0,
-                     "a picture without pixels");
+    for (int i = 0; i < r->num_images; i++)
+        fuzz_require(r->image[i].width > 0 && r->image[i].height > 0, "an image without pixels");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

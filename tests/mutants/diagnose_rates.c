@@ -290,11 +290,11 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     if (p->consistent_view < 0)
         return true;
     const struct view *v = &r->c.view[p->consistent_view];
-    char dir[4400], picture[4500], log[4500];
+    char dir[4400], image[4500], log[4500];
     const struct suite_scene *found;
     const struct suite_variant *variant;
     work_dir(r, 0, dir);
-    snprintf(picture, sizeof picture, "%s/single.exr", dir);
+    snprintf(image, sizeof image, "%s/single.exr", dir);
     snprintf(log, sizeof log, "%s/single.log", dir);
     if (!catalogue_view_scene(v, &r->suite, &found, &variant, e))
         return false;
@@ -308,7 +308,7 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
                                            .seed = 900000 + (uint64_t)k,
                                            .threads = 1,
                                            .timeout_s = 600,
-                                           .picture = picture,
+                                           .image = image,
                                            .log = log};
         double cpu_s;
         if (!run_pathtracer(&job, &p->single[k], &cpu_s, NULL, e))

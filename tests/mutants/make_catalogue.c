@@ -116,7 +116,7 @@ static bool same_values(const struct signature *a, const struct signature *b)
            memcmp(a->var, b->var, sizeof a->var) == 0 && a->n == b->n;
 }
 
-/* `times` pictures of as many samples as a batch, with this average. */
+/* `times` images of as many samples as a batch, with this average. */
 static int repeat(const struct signature *s, int times, struct signature *all)
 {
     for (int i = 0; i < times; i++) {
@@ -156,7 +156,7 @@ static bool make_correct(struct error_modes_base *base, const char *program, str
         num += repeat(&s, times, &all[num]);
     }
     v->correct = signature_average(all, num);
-    /* The facts have the values that a correct renderer should have, not those of these few pictures; how
+    /* The facts have the values that a correct renderer should have, not those of these few images; how
      * many samples an adaptive render takes is measured. */
     struct signature batches = signature_average(base->batch, BATCHES);
     for (int f = 0; f < NUM_FACTS; f++)

@@ -1,4 +1,4 @@
-/* What the tests of closed forms share: adaptive quadrature by GSL, one tolerance, pictures. */
+/* What the tests of closed forms share: adaptive quadrature by GSL, one tolerance, images. */
 #ifndef ASSAY_TESTS_QUADRATURE_H
 #define ASSAY_TESTS_QUADRATURE_H
 

@@ -1,4 +1,4 @@
-/* Pictures of built scenes against closed forms. H0 of every z-test: the mean of the picture's
+/* Images of built scenes against closed forms. H0 of every z-test: the mean of the image's
  * samples is the expected value. Two-sided at alpha = 1e-6 (|z| < 4.89), one seed, fixed n, no
  * retry. */
 #ifndef ASSAY_RENDER_CHECK_H
@@ -33,7 +33,7 @@ bool check_agrees(const struct moments *m, int channel, double expected);
 void check_mean(const struct moments *m, int channel, double expected, const char *what);
 /* Standard error of that mean. */
 double check_std_error(const struct moments *m, int channel);
-/* Difference of the means of two independent pictures, in units of its standard error. */
+/* Difference of the means of two independent images, in units of its standard error. */
 double check_z(const struct moments *a, const struct moments *b, int channel);
 
 #endif

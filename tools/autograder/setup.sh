@@ -8,5 +8,5 @@ if [ -z "${AUTOGRADER_NO_APT:-}" ]; then
 fi
 # The commit is part of the names under which the references lie in the zip.
 make -C "$root/source/assay" BUILD="$root/source/build" COMMIT="$(cat "$root/source/commit")" all
-# Nobody but root may see what the right pictures look like.
+# Nobody but root may see what the right images look like.
 chmod -R go-rwx "$root/source"

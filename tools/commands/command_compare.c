@@ -18,7 +18,7 @@ static const char usage[] =
     "  a moments EXR (of pathtracer or assay)\n"
     "  a directory of at least 3 replicates: float EXR or PFM, each with a seed of its own\n"
     "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (--spp-a, --spp-b)\n"
-    "  a picture without moments: EXR, HDR, PFM; its noise is then told by its neighbours\n"
+    "  an image without moments: EXR, HDR, PFM; its noise is then told by its neighbours\n"
     "  a PNG of 8 or 16 bits (--curve)\n"
     "What had to be assumed is printed with the verdict. Procedure: tools/docs/background/verdict.md.\n";
 
@@ -77,7 +77,7 @@ static const struct cli_option options[] = {
     {0, "expect", "VERDICT", "what exit code 0 stands for (EQUIVALENT)", TO(expect),
      .names = verdict_names},
     {0, "json", "FILE", "write the claim as results.json", TO(json)},
-    {'r', "report", "FILE", "write the claim as one HTML page with its pictures", TO(report)},
+    {'r', "report", "FILE", "write the claim as one HTML page with its images", TO(report)},
     {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
     {'h', "help", "", "print this", TO(help), .usage = usage},
     {.args = "two images", CLI_TO_LIST(struct settings, job.path, num_paths)}};

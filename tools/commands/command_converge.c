@@ -57,13 +57,13 @@ static const struct cli_option options[] = {
      "samples per pixel of the rungs, ascending; povray needs squares\n"
      "(1,4,16,64,256)",
      .read = read_ladder},
-    {'k', "replicates", "K", "pictures per rung, each with its own seed (16)", TO(replicates), 4,
+    {'k', "replicates", "K", "images per rung, each with its own seed (16)", TO(replicates), 4,
      CONVERGE_MAX_REPLICATES},
     {0, "depth-spp", "N",
-     "samples per pixel of the depth ladder, pathtracer's picture at every greatest\n"
+     "samples per pixel of the depth ladder, pathtracer's image at every greatest\n"
      "depth up to the scene's; 0: none (64)",
      TO(depth_spp), 0, 1 << 20},
-    {0, "shrink", "N", "pictures N times smaller on both sides (1)", TO(shrink), 1, 1024},
+    {0, "shrink", "N", "images N times smaller on both sides (1)", TO(shrink), 1, 1024},
     {0, "reference", "NAME",
      "what errors are measured against: truth (closed form), an engine's golden,\n"
      "own (a long run of pathtracer), or auto: the first there is",

@@ -26,7 +26,7 @@ struct settings {
 static const struct cli_option options[] = {
     {0, "pathtracer", "PROGRAM", "the renderer to look at (the one beside this program)",
      TO(pathtracer)},
-    {0, "scene", "VIEW", "what the picture shows: one of the views below", TO(view)},
+    {0, "scene", "VIEW", "what the image shows: one of the views below", TO(view)},
     {0, "json", "FILE", "write the diagnosis as JSON too", TO(json)},
     {0, "alpha", "A", "chance of accusing a correct renderer (1e-6)", TO(diagnose.alpha), 1e-12,
      0.1},
@@ -44,7 +44,7 @@ static const struct cli_option options[] = {
 static bool check(const struct settings *s, struct err *e)
 {
     if (s->view != NULL && s->input == NULL)
-        return err_set(e, "--scene needs the picture that shows it (see --help)");
+        return err_set(e, "--scene needs the image that shows it (see --help)");
     return s->pathtracer == NULL || s->input == NULL ||
            err_set(e, "either a program or a file is looked at, not both");
 }
@@ -53,12 +53,12 @@ static void print_help(const struct catalogue *c)
 {
     cli_print_help(
         "usage: assay diagnose [options]                       render the views and look at them\n"
-        "       assay diagnose [options] results.json          the pictures of a validation\n"
+        "       assay diagnose [options] results.json          the images of a validation\n"
         "       assay diagnose [options] --scene VIEW X.exr    one moments image\n\n"
-        "Names the known bug that explains how pictures differ from the correct ones.\n",
+        "Names the known bug that explains how images differ from the correct ones.\n",
         options);
     puts(
-        "\nviews, the size of their renders, and what the width of any other picture of the same shape "
+        "\nviews, the size of their renders, and what the width of any other image of the same shape "
         "has\nto be a multiple of:");
     for (int i = 0; i < c->num_views; i++)
         printf("  %-36s %d x %d, %d spp, %d\n", c->view[i].name, c->view[i].width,

@@ -29,7 +29,7 @@ static const struct cli_option options[] = {
      TO(wish.parts), 1, 1000000},
     {0, "ranges", "R",
      "each cell into R sample ranges, a job each; at most one for each\n"
-     "sample. Their sums are added up, so that the picture is that of\n"
+     "sample. Their sums are added up, so that the image is that of\n"
      "one render to rounding, not to the bit; the same bits for the\n"
      "same R whatever the cells and the order; not with --adaptive and\n"
      "--keep-state (1)",

@@ -30,9 +30,9 @@ static bool read_word(void *settings, const char *const v[4], struct err *e)
 static const struct cli_option options[] = {
     {'h', "help", "", "print this", CLI_TO(struct settings, help),
      .usage = "usage: assay merge OUT.exr SHARE.exr SHARE.exr ...\n\n"
-              "Adds pictures that pathtracer rendered of one scene with --samples A:B or -p:\n"
+              "Adds images that pathtracer rendered of one scene with --samples A:B or -p:\n"
               "samples of the same cell, cells of the same samples. Refuses what overlaps and\n"
-              "what is not of the same picture.\n"},
+              "what is not of the same image.\n"},
     {.read = read_word}};
 
 int command_merge(int argc, char **argv, struct err *e)

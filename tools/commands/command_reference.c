@@ -44,7 +44,7 @@ static bool choose(void *ctx, const struct suite_scene *scene, const struct suit
     return true;
 }
 
-static bool make_pictures(const struct reference_command *c, struct err *e)
+static bool make_images(const struct reference_command *c, struct err *e)
 {
     struct chosen one = {NULL, NULL};
     return reference_options_each(c, choose, &one, e) && fs_make_dirs(c->out, e) &&
@@ -61,7 +61,7 @@ int command_reference(int argc, char **argv, struct err *e)
         argv[0] = name;
         code = slurm_command(NULL, argc, argv, NULL, e);
         argv[0] = word;
-    } else if (ok && (c.help || (c.last > 0 ? make_pictures(&c, e)
+    } else if (ok && (c.help || (c.last > 0 ? make_images(&c, e)
                                             : reference_options_each(&c, make_one, &c, e)))) {
         code = 0;
     }

@@ -1,4 +1,4 @@
-/* What a known kind of error would add to each pixel, as a picture: the directions of matched_filter.c.
+/* What a known kind of error would add to each pixel, as an image: the directions of matched_filter.c.
  *
  * A direction is computed from the two sides themselves. To keep the level of the test, nothing that is
  * seen in pixel p may enter the direction or its weight in p: neighbours stand for it. */

@@ -48,7 +48,7 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
 }
 
 /* Its variance is the other side's too, and its n no count (moments.h). */
-static bool is_picture(const struct moments *m)
+static bool is_image(const struct moments *m)
 {
     return strcmp(m->unit, "picture") == 0;
 }
@@ -61,7 +61,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
     if (strcmp(m->unit, "stratified") == 0)
         return err_set(e, "its samples depend on each other (--sampler sobol), so its variance is "
                           "unknown: only replicates with seeds of their own may be compared");
-    if (!exact && !replicates && !is_picture(m) && strcmp(m->unit, "sample") != 0)
+    if (!exact && !replicates && !is_image(m) && strcmp(m->unit, "sample") != 0)
         return err_set(e, "unknown unit '%s' of an observation", m->unit);
     bool varies = false;
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -85,7 +85,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 /* The same seeds on both sides: no difference could show, and none would be there to find. */
 static bool check_shared(const struct moments *a, const struct moments *b, struct err *e)
 {
-    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_picture(a))
+    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_image(a))
         return true;
     size_t pixels = (size_t)a->width * (size_t)a->height, shared = variance_ratio_shared(a, b);
     if (shared > 0)
@@ -102,7 +102,7 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
 {
     static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};
     bool pixels = j->width * j->height > 1, noise_a = strcmp(a->unit, "exact") != 0;
-    bool noise_b = strcmp(b->unit, "exact") != 0, known = !is_picture(a) && !is_picture(b);
+    bool noise_b = strcmp(b->unit, "exact") != 0, known = !is_image(a) && !is_image(b);
     bool applies[NUM_STATISTICS] = {
         [STATISTIC_IMAGE] = true,
         [STATISTIC_PYRAMID] = pixels,

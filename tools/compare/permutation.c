@@ -150,7 +150,7 @@ static bool check(const struct replicate_dir *a, const struct replicate_dir *b, 
         for (int j = 0; j < b->num; j++)
             if (memcmp(a->rgb[i], b->rgb[j], bytes) == 0)
                 return err_set(e,
-                               "%s of A and %s of B are the same picture: exchangeable replicates "
+                               "%s of A and %s of B are the same image: exchangeable replicates "
                                "need seeds of their own",
                                a->name[i], b->name[j]);
     return true;
@@ -242,7 +242,7 @@ bool permutation_test(const struct replicate_dir *a, const struct replicate_dir 
     for (size_t r = 0; ok && r < t.num; r++)
         out->num_regions += t.spread[r] > 0;
     if (ok && !(t.spread[image] > 0))
-        ok = err_set(e, "the pictures of A and B do not vary: were the seeds ignored?");
+        ok = err_set(e, "the images of A and B do not vary: were the seeds ignored?");
     if (ok && !(t.mean[1][image] > 0))
         ok = err_set(e, "B is black: relative differences have no unit");
     if (ok) {

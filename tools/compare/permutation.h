@@ -1,9 +1,9 @@
-/* An exact test of "A and B come from the same law" from replicates: if they do, which pictures are
+/* An exact test of "A and B come from the same law" from replicates: if they do, which images are
  * called A is arbitrary, and every other way to call them is as likely [Pitman37]. Nothing is assumed
- * of noise, its tails, or what pixels and channels share: a relabelling moves whole pictures.
+ * of noise, its tails, or what pixels and channels share: a relabelling moves whole images.
  *
  * Statistic: the largest |t| (two samples, pooled variance) over the squares of sides min_side, 2
- * min_side, .. up to the picture, in R, G, B and luminance [Westfall93]. A region's total sum of
+ * min_side, .. up to the image, in R, G, B and luminance [Westfall93]. A region's total sum of
  * squares is the same for every labelling, so t grows with |sum over A of z|, z being the region's
  * means, centred and over the root of that sum; the largest of that is what is compared.
  *
@@ -36,7 +36,7 @@ struct permutation {
     double mdb;        /* relative, luminance of the image: found with about 95 % */
 };
 
-/* Fails with a line if sizes differ, a picture is in both, none varies, or B is black. */
+/* Fails with a line if sizes differ, an image is in both, none varies, or B is black. */
 bool permutation_test(const struct replicate_dir *a, const struct replicate_dir *b,
                       const struct permutation_options *opt, struct permutation *out, struct err *e)
     __attribute__((warn_unused_result));

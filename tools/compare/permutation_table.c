@@ -65,7 +65,7 @@ static bool table_alloc(struct permutation_table *t, size_t num, struct err *e)
     t->rect = malloc(num * sizeof *t->rect);
     t->channel = malloc(num * sizeof *t->channel);
     return (t->z && t->mean[0] && t->mean[1] && t->spread && t->rect && t->channel) ||
-           err_set(e, "out of memory for %zu regions of %zu pictures", num, rows);
+           err_set(e, "out of memory for %zu regions of %zu images", num, rows);
 }
 
 static void standardise(struct permutation_table *t, size_t r)
@@ -81,7 +81,7 @@ static void standardise(struct permutation_table *t, size_t r)
     for (int k = 0; k < rows; k++)
         squares += pow(t->z[(size_t)k * t->num + r] - centre, 2);
     double spread = sqrt(squares);
-    /* Sums of floats differ in the last place even where all pictures are alike. */
+    /* Sums of floats differ in the last place even where all images are alike. */
     t->spread[r] = spread > 1e-12 * largest * rows ? spread : 0;
     for (int k = 0; k < rows; k++) {
         double *z = &t->z[(size_t)k * t->num + r];

@@ -1,11 +1,11 @@
-/* The regions of all pictures of two sides, made comparable: what permutation.c adds up. */
+/* The regions of all images of two sides, made comparable: what permutation.c adds up. */
 #ifndef ASSAY_PERMUTATION_TABLE_H
 #define ASSAY_PERMUTATION_TABLE_H
 
 #include "pyramid.h"
 #include "tools/images/replicate_dir.h"
 
-/* Means of all regions in all pictures. */
+/* Means of all regions in all images. */
 struct permutation_table {
     int num_a, num_b;
     size_t num;      /* regions of all channels */

@@ -140,7 +140,7 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
     add_level(out, tile);
     while (out->level[out->num_levels - 1].side < longest)
         add_level(out, 2 * out->level[out->num_levels - 1].side);
-    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): a picture has a pixel. */
+    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has a pixel. */
     out->cells = calloc(pyramid_regions(out), sizeof *out->cells);
     if (out->cells == NULL)
         return err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);

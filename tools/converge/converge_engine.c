@@ -41,7 +41,7 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                         .options = options,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .picture = path.s,
+                                        .image = path.s,
                                         .log = log.s};
     bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
     unlink(path.s);

@@ -1,4 +1,4 @@
-/* Renders the pictures that `assay converge` judges: K replicates of one engine at one number of
+/* Renders the images that `assay converge` judges: K replicates of one engine at one number of
  * samples, as plain images. */
 #ifndef ASSAY_CONVERGE_ENGINE_H
 #define ASSAY_CONVERGE_ENGINE_H
@@ -20,7 +20,7 @@ extern const char *const converge_engine_names[]; /* end with NULL */
 enum { CONVERGE_MAX_REPLICATES = 4096, CONVERGE_MAX_RUNGS = 16 };
 
 struct converge_job {
-    const struct suite_scene *scene; /* width and height are those of the pictures to render */
+    const struct suite_scene *scene; /* width and height are those of the images to render */
     const char *pathtracer;          /* the program */
     const char *dir;                 /* exists; for temporary files */
     const char *share_dir;           /* where cycles.py is */
@@ -30,13 +30,13 @@ struct converge_job {
     int replicates;
 };
 
-/* Told of every picture of our own; the other engines give theirs all at once. */
+/* Told of every image of our own; the other engines give theirs all at once. */
 struct converge_progress {
     struct progress *progress;
-    double before, each, total; /* work done before this rung, of one picture, in all */
+    double before, each, total; /* work done before this rung, of one image, in all */
 };
 
-/* Fills images (replicates x width x height x 3 floats, one replicate after the other) with pictures
+/* Fills images (replicates x width x height x 3 floats, one replicate after the other) with images
  * whose seeds are a function of (seed, engine, rung, replicate) and differ from one another. *cpu_s is
  * the CPU time of one replicate, its share of the engine's start included. *version (NULL where the
  * engine does not say) is a new string, free() it. Fails where an engine cannot express the scene, where

@@ -103,7 +103,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
     struct progress progress;
     snprintf(what, sizeof what, "%s, %s", job->scene->name, converge_engine_names[engine]);
     progress_start(&progress, what, NULL, o->quiet);
-    /* A picture costs its samples and a start, of which this is a guess good enough for a bar. */
+    /* An image costs its samples and a start, of which this is a guess good enough for a bar. */
     const double start = o->ladder[o->num_rungs - 1] / 4.0;
     double done = 0, total = 0;
     for (int i = 0; i < o->num_rungs; i++)

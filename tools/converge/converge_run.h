@@ -26,7 +26,7 @@ struct converge_options {
     int num_rungs;                  /* at least 3 */
     int replicates;                 /* at least 4 */
     int depth_spp; /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
-    int shrink;    /* pictures are so many times smaller on both sides */
+    int shrink;    /* images are so many times smaller on both sides */
     enum converge_against against;
     uint32_t seed;
     double alpha;        /* of all judgements of the run together */

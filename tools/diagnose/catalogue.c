@@ -183,7 +183,7 @@ static void put(struct image *im, int *next, const char *stem, const double *x, 
     }
 }
 
-static bool write_picture(const char *path, const struct view *v, int num_bugs, struct err *e)
+static bool write_image(const char *path, const struct view *v, int num_bugs, struct err *e)
 {
     int channels = 10, next = 0;
     for (int b = 0; b < num_bugs; b++)
@@ -225,7 +225,7 @@ static json_t *options_json(const struct view *v)
     return list;
 }
 
-static json_t *view_json(const struct view *v, const struct catalogue *c, const char *picture,
+static json_t *view_json(const struct view *v, const struct catalogue *c, const char *image,
                          const char *sha256)
 {
     json_t *bugs = json_object();
@@ -238,13 +238,13 @@ static json_t *view_json(const struct view *v, const struct catalogue *c, const 
                      v->scene, "variant", v->variant, "options", options_json(v), "scene_sha256",
                      v->scene_sha256, "width", v->width, "height", v->height, "spp", v->spp,
                      "renders", v->renders, "fixed_spp", v->fixed_spp, "seed", (json_int_t)v->seed,
-                     "picture", picture, "picture_sha256", sha256, "n", v->correct.n, "correct",
+                     "picture", image, "picture_sha256", sha256, "n", v->correct.n, "correct",
                      facts_json(v->correct.fact, v->correct.fact_sd), "bugs", bugs);
 }
 
 bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
 {
-    char path[MAX_PATH], picture[140], sha256[65];
+    char path[MAX_PATH], image[140], sha256[65];
     json_t *bugs = json_object(), *views = json_array();
     bool ok = true;
     for (int b = 0; b < c->num_bugs; b++)
@@ -252,11 +252,11 @@ bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
                             json_pack("{ss,ss,ss}", "bug", c->bug[b].what, "where", c->bug[b].where,
                                       "patch_sha256", c->bug[b].patch_sha256));
     for (int v = 0; ok && v < c->num_views; v++) {
-        snprintf(picture, sizeof picture, "%s.exr", c->view[v].name);
-        snprintf(path, sizeof path, "%s/%s", dir, picture);
-        ok = write_picture(path, &c->view[v], c->num_bugs, e) && sha256_file(path, sha256, e);
+        snprintf(image, sizeof image, "%s.exr", c->view[v].name);
+        snprintf(path, sizeof path, "%s/%s", dir, image);
+        ok = write_image(path, &c->view[v], c->num_bugs, e) && sha256_file(path, sha256, e);
         if (ok)
-            json_array_append_new(views, view_json(&c->view[v], c, picture, sha256));
+            json_array_append_new(views, view_json(&c->view[v], c, image, sha256));
     }
     json_t *root = json_pack("{si,so,so}", "side", SIGNATURE_SIDE, "bugs", bugs, "views", views);
     snprintf(path, sizeof path, "%s/manifest.json", dir);
@@ -338,15 +338,15 @@ static bool get_effects(struct view *v, const struct catalogue *c, const json_t 
     return true;
 }
 
-static bool get_picture(const char *dir, struct view *v, const struct catalogue *c,
-                        const json_t *json, struct err *e)
+static bool get_image(const char *dir, struct view *v, const struct catalogue *c,
+                      const json_t *json, struct err *e)
 {
-    char picture[140], stored[65], sha256[65];
+    char image[140], stored[65], sha256[65];
     struct image im;
-    if (!copy_text(picture, sizeof picture, json, "picture") ||
-        !copy_text(stored, sizeof stored, json, "picture_sha256") || strchr(picture, '/') != NULL)
-        return err_set(e, "%s/manifest.json: no picture of '%s'", dir, v->name);
-    const struct path path = fs_path("%s/%s", dir, picture);
+    if (!copy_text(image, sizeof image, json, "picture") ||
+        !copy_text(stored, sizeof stored, json, "picture_sha256") || strchr(image, '/') != NULL)
+        return err_set(e, "%s/manifest.json: no image of '%s'", dir, v->name);
+    const struct path path = fs_path("%s/%s", dir, image);
     if (!sha256_file(path.s, sha256, e))
         return false;
     if (strcmp(sha256, stored) != 0)
@@ -405,7 +405,7 @@ static bool get_view(const char *dir, struct view *v, const struct catalogue *c,
         return err_set(e, "%s/manifest.json: a view is incomplete", dir);
     v->fixed_spp = fixed != 0;
     v->seed = (uint64_t)seed;
-    return get_picture(dir, v, c, json, e);
+    return get_image(dir, v, c, json, e);
 }
 
 static bool fill(const char *dir, struct catalogue *c, const json_t *root, struct err *e)

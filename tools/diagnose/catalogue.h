@@ -1,4 +1,4 @@
-/* The catalogue of known bugs: how each changes the pictures of a few scenes. golden/diagnose/ holds
+/* The catalogue of known bugs: how each changes the images of a few scenes. golden/diagnose/ holds
  *
  *   manifest.json
  *     { "side": 16,                                   cells across (signature.h)
@@ -42,11 +42,10 @@ struct view {
     char option[5][16];          /* with these options besides; none: what the suite renders */
     const char *options[6];      /* the same, NULL at the end */
     char scene_sha256[65];
-    int width,
-        height;     /* of the renders that it was made of; their ratio is that of every picture */
-    int spp;        /* of one render of a diagnosis */
-    int renders;    /* with seeds of their own; 4 or more: also stated_error.h is asked */
-    bool fixed_spp; /* the mean depends on the number of samples asked for (adaptive) */
+    int width, height; /* of the renders that it was made of; their ratio is that of every image */
+    int spp;           /* of one render of a diagnosis */
+    int renders;       /* with seeds of their own; 4 or more: also stated_error.h is asked */
+    bool fixed_spp;    /* the mean depends on the number of samples asked for (adaptive) */
     uint64_t seed;
     struct signature correct;
     struct effect **effect; /* per bug; NULL: no difference at all */

@@ -11,7 +11,7 @@
 /* Student's law instead of the normal one: a cell with a firefly costs a hypothesis a few units, not
  * hundreds [Lange89]. */
 static const double cell_dof = 5;
-/* Facts are sums over whole pictures: no firefly decides them. */
+/* Facts are sums over whole images: no firefly decides them. */
 static const double fact_dof = 30;
 /* How well an effect is known to be the same at another size. */
 static const double model_error = 0.01;
@@ -92,7 +92,7 @@ static void add_cell(const struct observation *clue, const struct effect *e, dou
     t->cells++;
 }
 
-/* What a bug makes of S at the size of the picture at hand: where all pixels depend on each other, S grows with their number. */
+/* What a bug makes of S at the size of the image at hand: where all pixels depend on each other, S grows with their number. */
 static double image_fact(const struct effect *e, const struct observation *clue)
 {
     double s = e->fact[FACT_IMAGE];
@@ -411,7 +411,7 @@ static bool gate_lead(const struct hypotheses *h, const struct candidate *best, 
         return false;
     if (out->gate[0] == '\0')
         snprintf(out->gate, sizeof out->gate,
-                 "a known bug explains the pictures 10^%.0f times better than no bug",
+                 "a known bug explains the images 10^%.0f times better than no bug",
                  best->log_likelihood / log(10));
     return true;
 }
@@ -451,7 +451,7 @@ static bool check(const struct observation *clue, struct err *e)
 {
     const struct signature *a = &clue->seen, *c = &clue->view->correct;
     return (a->columns == c->columns && a->rows == c->rows) ||
-           err_set(e, "%s: a picture of %d x %d cells, the catalogue has %d x %d: another shape",
+           err_set(e, "%s: an image of %d x %d cells, the catalogue has %d x %d: another shape",
                    clue->view->name, a->columns, a->rows, c->columns, c->rows);
 }
 

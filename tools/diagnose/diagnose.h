@@ -1,4 +1,4 @@
-/* Which known bug explains these pictures? Method, formulas and limits: tools/docs/background/diagnosis.md. */
+/* Which known bug explains these images? Method, formulas and limits: tools/docs/background/diagnosis.md. */
 #ifndef ASSAY_DIAGNOSE_H
 #define ASSAY_DIAGNOSE_H
 
@@ -18,7 +18,7 @@ struct diagnose_options {
     const char
         *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
     bool
-        by_likelihood; /* no other test says that something is wrong, as for pictures that state no error: a bug has
+        by_likelihood; /* no other test says that something is wrong, as for images that state no error: a bug has
                          * to lead by diagnose_bound() */
 };
 

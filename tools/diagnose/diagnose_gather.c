@@ -43,9 +43,9 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
     return true;
 }
 
-/* asked: 0 where a picture does not say, and it matters only for adaptive sampling. */
-static bool read_picture(const struct view *v, const char *path, int asked,
-                         struct observation *clue, struct err *e)
+/* asked: 0 where an image does not say, and it matters only for adaptive sampling. */
+static bool read_image(const struct view *v, const char *path, int asked, struct observation *clue,
+                       struct err *e)
 {
     struct moments m;
     *clue = (struct observation){.view = v, .is_consistent = true};
@@ -70,12 +70,12 @@ bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char
     if (v == NULL)
         return err_set(e, "--scene: the catalogue of bugs has no '%s' (see --help)", view);
     return catalogue_view_scene(v, opt->suite, &scene, &variant, e) &&
-           read_picture(v, path, v->spp, clue, e);
+           read_image(v, path, v->spp, clue, e);
 }
 
-/* The path of the picture that claims of this scene and engine were judged by. */
-static bool find_picture(const json_t *results, const char *json_path, const struct view *v,
-                         char *path)
+/* The path of the image that claims of this scene and engine were judged by. */
+static bool find_image(const json_t *results, const char *json_path, const struct view *v,
+                       char *path)
 {
     const char *engine = v->variant[0] != '\0' ? v->variant : "pathtracer";
     size_t i;
@@ -127,12 +127,12 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         const struct suite_scene *scene;
         const struct suite_variant *variant;
         struct err why = {""};
-        char picture[MAX_PATH];
+        char image[MAX_PATH];
         ok = catalogue_view_scene(v, opt->suite, &scene, &variant, e);
         if (!ok)
             break;
-        bool there = find_picture(results, path, v, picture) || err_set(&why, "no picture");
-        if (there && read_picture(v, picture, v->spp, &clue[*num], &why)) {
+        bool there = find_image(results, path, v, image) || err_set(&why, "no image");
+        if (there && read_image(v, image, v->spp, &clue[*num], &why)) {
             add_consistency(results, &clue[*num]);
             ++*num;
         } else {

@@ -1,4 +1,4 @@
-/* What there is to look at: clues for diagnose.h, from a program, a finished validation, or one picture. */
+/* What there is to look at: clues for diagnose.h, from a program, a finished validation, or one image. */
 #ifndef ASSAY_DIAGNOSE_GATHER_H
 #define ASSAY_DIAGNOSE_GATHER_H
 
@@ -13,7 +13,7 @@ struct diagnose_gather_options {
     uint64_t seed;
     int threads;
     double timeout_s;
-    const char *work_dir; /* for pictures while they are read; made and removed by the caller */
+    const char *work_dir; /* for images while they are read; made and removed by the caller */
 };
 
 /* At most catalogue->num_views of them, in clue[]; the number in *num. */
@@ -23,8 +23,8 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
                              struct observation *clue, int *num, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Of the pictures and claims of consistency of a results.json by `assay validate`. Views that it has no
- * picture of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
+/* Of the images and claims of consistency of a results.json by `assay validate`. Views that it has no
+ * image of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
  * if none is left. */
 bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
                              struct observation *clue, int *num, json_t *skipped, struct err *e)

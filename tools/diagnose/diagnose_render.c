@@ -19,7 +19,7 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
     struct suite_scene scene = *job->scene;
     scene.width = job->width;
     scene.height = job->height;
-    const struct path picture = fs_path("%s/diagnose.exr", job->work_dir);
+    const struct path image = fs_path("%s/diagnose.exr", job->work_dir);
     const struct path log = fs_path("%s/diagnose.log", job->work_dir);
     const struct pathtracer_job ours = {.program = job->program,
                                         .scene = &scene,
@@ -30,16 +30,16 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
                                                                           : NULL,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .picture = picture.s,
+                                        .image = image.s,
                                         .log = log.s};
     double cpu_s;
     bool ok = run_pathtracer(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
-    unlink(picture.s);
+    unlink(image.s);
     unlink(log.s);
     return ok;
 }
 
-/* A black picture has no noise to judge; that it is black is for others to find. */
+/* A black image has no noise to judge; that it is black is for others to find. */
 static bool has_noise(const struct signature *s)
 {
     double sum = 0;

@@ -15,7 +15,7 @@ struct diagnose_job {
     uint64_t seed; /* of the first; the others follow from it */
     int threads;
     double timeout_s;
-    const char *work_dir; /* for pictures, which are removed; exists */
+    const char *work_dir; /* for images, which are removed; exists */
 };
 
 /* consistent (may be NULL): false if a claim of consistency (stated_error.h) comes out DIFFERENT at `alpha`. */

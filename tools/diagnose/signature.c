@@ -19,7 +19,7 @@ static bool check(const struct moments *m, int columns, struct err *e)
             "%dth of the width",
             m->width, m->height, columns, columns);
     if (strcmp(m->unit, "sample") != 0 && strcmp(m->unit, "replicate") != 0)
-        return err_set(e, "a picture of unit '%s' does not state its error", m->unit);
+        return err_set(e, "an image of unit '%s' does not state its error", m->unit);
     size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t p = 0; p < pixels; p++)
         if (!(m->n[p] >= 2))
@@ -114,7 +114,7 @@ void signature_set_stated_error(struct signature *s, double pixels, double lo, d
     s->fact[FACT_PIXELS] = same ? SIGNATURE_SAME : log(pixels);
     s->fact_sd[FACT_PIXELS] =
         same ? 0 : log(hi / lo) / (2 * stats_t_quantile(alpha / 2, renders - 1));
-    /* Where all pictures are the same, their sums have nothing to say. The logarithm of chi^2/(K-1) has
+    /* Where all images are the same, their sums have nothing to say. The logarithm of chi^2/(K-1) has
      * the variance trigamma((K-1)/2). */
     s->fact[FACT_IMAGE] = same || !(image > 0) ? NAN : log(image);
     s->fact_sd[FACT_IMAGE] = sqrt(gsl_sf_psi_1((renders - 1) / 2.0));

@@ -1,8 +1,8 @@
-/* What a diagnosis sees of a scene's picture: means over a coarse grid of cells, how sure they are, and
+/* What a diagnosis sees of a scene's image: means over a coarse grid of cells, how sure they are, and
  * a few facts about the noise.
  *
- * A cell is a square of pixels; across a picture there are at most SIGNATURE_SIDE cells, a number that is fixed for
- * each scene, so pictures of any size whose sides are whole numbers of cells can be held against each other,
+ * A cell is a square of pixels; across an image there are at most SIGNATURE_SIDE cells, a number that is fixed for
+ * each scene, so images of any size whose sides are whole numbers of cells can be held against each other,
  * as long as they show the same field of view. Cells are numbered row by row from the top left; each has three channels, RGB. */
 #ifndef ASSAY_SIGNATURE_H
 #define ASSAY_SIGNATURE_H
@@ -16,7 +16,7 @@ enum {
     SIGNATURE_VALUES = 3 * SIGNATURE_CELLS
 };
 
-/* Logarithms of what is 1 for a picture made as asked by a renderer that states its error rightly. */
+/* Logarithms of what is 1 for an image made as asked by a renderer that states its error rightly. */
 enum fact {
     FACT_SAMPLES, /* samples in a pixel over samples asked for */
     FACT_SPREAD,  /* variance of one sample over that of the correct renderer */
@@ -47,7 +47,7 @@ bool signature_of(const struct moments *m, int columns, double asked, struct sig
  * averaged, the others are those of the first. */
 struct signature signature_average(const struct signature *s, int num);
 
-/* FACT_PIXELS and FACT_IMAGE from R with its 1 - alpha interval and S over `renders` pictures. Two pictures
+/* FACT_PIXELS and FACT_IMAGE from R with its 1 - alpha interval and S over `renders` images. Two images
  * that are the same have R = 0, kept as a logarithm of SIGNATURE_SAME. */
 #define SIGNATURE_SAME (-10.0)
 void signature_set_stated_error(struct signature *s, double pixels, double lo, double hi,

@@ -17,10 +17,10 @@ static const struct cli_option options[] = {
     {0, "golden", "DIR", "leave out what is stored there and up to date", TO(golden)},
     {0, "fresh", "", "render also what is there and up to date", TO(fresh)},
     {0, "pictures", "A:B",
-     "of one reference, pictures A to B-1 alone, unfolded, into DIR: of\n"
+     "of one reference, images A to B-1 alone, unfolded, into DIR: of\n"
      "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
      "its replicates; what a job of assay plan does",
-     CLI_TO_RANGE(struct reference_command, first), 0, INT32_MAX, .noun = "picture"},
+     CLI_TO_RANGE(struct reference_command, first), 0, INT32_MAX, .noun = "image"},
     {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
     {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
     {0, "work", "DIR", "temporary files (build/work)", TO(work)},

@@ -17,25 +17,25 @@ enum { MAX_ARGS = 96, TEXT = 8192, MAX_PATH = 8192 };
 /* Far from the seeds that submissions get. */
 static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
 
-/* Our command for a picture: that of the assignment, which our renderer understands, in the directory in which
+/* Our command for an image: that of the assignment, which our renderer understands, in the directory in which
  * "scene" is staged. */
-static bool command_of(const struct rubric *r, const struct rubric_picture *p, const char *words,
+static bool command_of(const struct rubric *r, const struct rubric_image *p, const char *words,
                        const struct answer_options *opt, const char *out, char *text,
                        const char **argv, struct err *e)
 {
     struct rubric ours = {0};
-    struct rubric_picture picture = *p;
+    struct rubric_image image = *p;
     snprintf(
         ours.command, sizeof ours.command,
         "{program} -q -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} --seed {seed} {options} %s -f {out} {scene}",
         words);
     snprintf(ours.output, sizeof ours.output, "%s", out);
     if (p->reference_options[0] != '\0')
-        snprintf(picture.options, sizeof picture.options, "%s",
+        snprintf(image.options, sizeof image.options, "%s",
                  strcmp(p->reference_options, "none") == 0 ? "" : p->reference_options);
-    picture.spp = p->reference_spp;
-    return submission_command(&ours, &picture, opt->pathtracer, answer_seed, opt->threads, text,
-                              TEXT, argv, MAX_ARGS) ||
+    image.spp = p->reference_spp;
+    return submission_command(&ours, &image, opt->pathtracer, answer_seed, opt->threads, text, TEXT,
+                              argv, MAX_ARGS) ||
            err_set(e, "%s:%d: the command of '%s' is too long", r->path, p->line, p->name);
 }
 
@@ -56,7 +56,7 @@ static bool key_of(const char *const *argv, const char *scene_file, const char *
     return true;
 }
 
-static void scene_files(const struct rubric *r, const struct rubric_picture *p, char *scene,
+static void scene_files(const struct rubric *r, const struct rubric_image *p, char *scene,
                         char *environment)
 {
     environment[0] = '\0';
@@ -70,8 +70,8 @@ static void scene_files(const struct rubric *r, const struct rubric_picture *p, 
         snprintf(environment, MAX_PATH, "%s/%s", r->dir, p->environment);
 }
 
-/* words: besides those of the picture; "" none. */
-static bool render_ours(const struct rubric *r, const struct rubric_picture *p, const char *words,
+/* words: besides those of the image; "" none. */
+static bool render_ours(const struct rubric *r, const struct rubric_image *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
 {
     char text[TEXT], key[65], scene[MAX_PATH], environment[MAX_PATH];
@@ -98,7 +98,7 @@ static bool render_ours(const struct rubric *r, const struct rubric_picture *p, 
     return moments_read(path.s, out, NULL, e);
 }
 
-static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
+static bool reference_of(const struct rubric *r, const struct rubric_image *p,
                          const struct answer_options *opt, struct moments *out, struct err *e)
 {
     if (p->reference == REFERENCE_OURS)
@@ -119,21 +119,20 @@ static bool reference_of(const struct rubric *r, const struct rubric_picture *p,
 }
 
 /* How samples vary, from a render of ours. */
-static bool noise_of(const struct rubric *r, const struct rubric_picture *p,
+static bool noise_of(const struct rubric *r, const struct rubric_image *p,
                      const struct answer_options *opt, struct moments *out, struct err *e)
 {
     enum { NOISE_SPP = 256 };
-    struct rubric_picture ours = *p;
+    struct rubric_image ours = *p;
     if (p->reference != REFERENCE_OURS)
         ours.reference_spp = NOISE_SPP;
     return render_ours(r, &ours, "", opt, out, e);
 }
 
-bool answer_key_render(const struct rubric *r, int picture, bool as_asked, const char *words,
-                       int spp, const struct answer_options *opt, struct moments *out,
-                       struct err *e)
+bool answer_key_render(const struct rubric *r, int image, bool as_asked, const char *words, int spp,
+                       const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    struct rubric_picture ours = r->picture[picture];
+    struct rubric_image ours = r->image[image];
     char all[sizeof ours.reference_options + sizeof r->set->words + 64];
     /* By the reference's estimator: its noise decides how many samples adaptive sampling takes. */
     bool has =
@@ -146,21 +145,20 @@ bool answer_key_render(const struct rubric *r, int picture, bool as_asked, const
 }
 
 /* How many samples each pixel takes, where a check wants to know. */
-static bool as_asked(const struct rubric *r, int picture, const char *words,
+static bool as_asked(const struct rubric *r, int image, const char *words,
                      const struct answer_options *opt, struct moments *out, struct err *e)
 {
     bool needed = false;
     for (int i = 0; i < r->num_checks; i++)
-        needed |= r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture;
-    return !needed ||
-           answer_key_render(r, picture, true, words, r->picture[picture].spp, opt, out, e);
+        needed |= r->check[i].kind == CHECK_RATES && r->check[i].images[0] == image;
+    return !needed || answer_key_render(r, image, true, words, r->image[image].spp, opt, out, e);
 }
 
-/* Does our renderer make another picture with these words? Told by one sample a pixel, of the same seed. */
-static bool words_matter(const struct rubric *r, const struct rubric_picture *p, const char *words,
+/* Does our renderer make another image with these words? Told by one sample a pixel, of the same seed. */
+static bool words_matter(const struct rubric *r, const struct rubric_image *p, const char *words,
                          const struct answer_options *opt, bool *matter, struct err *e)
 {
-    struct rubric_picture quick = *p;
+    struct rubric_image quick = *p;
     struct moments with = {0}, without = {0};
     quick.reference_spp = 1;
     bool ok = render_ours(r, &quick, words, opt, &with, e) &&
@@ -172,21 +170,21 @@ static bool words_matter(const struct rubric *r, const struct rubric_picture *p,
     return ok;
 }
 
-static bool read_accepted(const struct rubric *r, const struct rubric_picture *p, const char *file,
+static bool read_accepted(const struct rubric *r, const struct rubric_image *p, const char *file,
                           struct moments *out, struct err *e)
 {
     const struct path path = fs_path("%s/%s", r->dir, file);
     return moments_read(path.s, out, NULL, e) &&
            ((out->width == p->width && out->height == p->height) ||
-            err_set(e, "%s is %d x %d pixels, picture '%s' %d x %d", path.s, out->width,
-                    out->height, p->name, p->width, p->height));
+            err_set(e, "%s is %d x %d pixels, image '%s' %d x %d", path.s, out->width, out->height,
+                    p->name, p->width, p->height));
 }
 
-/* What picture i looks like with the deviations of a set; left empty where they change nothing. */
+/* What image i looks like with the deviations of a set; left empty where they change nothing. */
 static bool deviating(const struct rubric *r, const struct rubric_set *set, int i,
                       const struct answer_options *opt, struct answer *out, struct err *e)
 {
-    const struct rubric_picture *p = &r->picture[i];
+    const struct rubric_image *p = &r->image[i];
     bool matter = false;
     for (int a = 0; a < p->num_accepted; a++)
         if (strcmp(p->accept[a].name, set->name) == 0)
@@ -203,8 +201,8 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
 {
     *out = (struct answer_key){0};
     bool ok = submission_stage(r, fs_path("%s/scene", opt->cache).s, e);
-    for (int i = 0; ok && i < r->num_pictures; i++) {
-        const struct rubric_picture *p = &r->picture[i];
+    for (int i = 0; ok && i < r->num_images; i++) {
+        const struct rubric_image *p = &r->image[i];
         struct answer *a = &out->of[0][i];
         ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
         ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, "", opt, &a->as_asked, e);
@@ -219,7 +217,7 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
 void answer_key_free(struct answer_key *a)
 {
     for (int k = 0; k < RUBRIC_SETS; k++)
-        for (int i = 0; i < RUBRIC_PICTURES; i++) {
+        for (int i = 0; i < RUBRIC_IMAGES; i++) {
             moments_free(&a->of[k][i].m);
             moments_free(&a->of[k][i].noise);
             moments_free(&a->of[k][i].as_asked);

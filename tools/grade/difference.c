@@ -9,7 +9,7 @@
 static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.25;
 /* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
 static const double unknown_dof = 30;
-static const double least_used = 0.25; /* of a tile, of the picture */
+static const double least_used = 0.25; /* of a tile, of the image */
 enum { FEWEST = 60 };                  /* second differences */
 
 double interval_distance(const struct interval *i)
@@ -22,7 +22,7 @@ double interval_half(const struct interval *i)
     return (i->hi - i->lo) / 2;
 }
 
-/* A pair of pictures being compared. */
+/* A pair of images being compared. */
 struct pair {
     const struct submitted_image *a, *b;
     const unsigned char *use;
@@ -251,7 +251,7 @@ bool difference_noise(const struct submitted_image *p, const struct submitted_im
     const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};
     struct noise na = noise_in(&a, whole), nb = noise_in(&b, whole);
     if (!na.known || !nb.known)
-        return err_set(e, "there is no noise in one of the pictures");
+        return err_set(e, "there is no noise in one of the images");
     /* Var ln v = 2/dof. */
     double sd = sqrt(2 / na.dof + 2 / nb.dof), value = log(na.kappa / nb.kappa);
     double half = stats_normal_quantile(alpha / 2) * sd;

@@ -1,4 +1,4 @@
-/* By how much two pictures differ, as intervals: what points are a function of. */
+/* By how much two images differ, as intervals: what points are a function of. */
 #ifndef ASSAY_DIFFERENCE_H
 #define ASSAY_DIFFERENCE_H
 
@@ -29,17 +29,17 @@ struct difference {
  *
  * Noise. Neither file states any. What is known is the variance that a render of as many samples by our own
  * renderer has in each pixel (struct submitted_image: variance), and that neighbouring pixels of A - B differ by noise alone
- * where the pictures agree: r = second differences, as in noise_estimate.h, with E[r^2] = kappa m + c, m from those
+ * where the images agree: r = second differences, as in noise_estimate.h, with E[r^2] = kappa m + c, m from those
  * variances, c from rounding. kappa, the noise of this program over ours, is their weighted least squares slope,
- * one for the picture, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
+ * one for the image, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
  * from the residuals, times 4 for r that overlap (noise_estimate.h) and 3 for channels that one lamp makes alike, gives
  * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide.
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
  * a tile (tools/docs/background/verdict.md, "EQUIVALENT").
  *
- * Differences are relative to B's mean in the same place, but to no less than a quarter of the picture's luminance.
+ * Differences are relative to B's mean in the same place, but to no less than a quarter of the image's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
- * where less than a quarter of the picture can be compared, or B is black: a line fit for the student. The caller
+ * where less than a quarter of the image can be compared, or B is black: a line fit for the student. The caller
  * frees with difference_free(). */
 bool difference_measure(const struct submitted_image *a, const struct submitted_image *b,
                         const unsigned char *use, double alpha, struct difference *out,

@@ -26,7 +26,7 @@ static bool grade_with(const struct rubric *r, const struct answer_key *a, int s
     return true;
 }
 
-/* A picture that is wrong against our own reference and, as far as can be seen, right against another. */
+/* An image that is wrong against our own reference and, as far as can be seen, right against another. */
 static bool is_explained(const struct rubric_check *c, double plain, const struct result *with)
 {
     return plain < 1 && ((c->kind == CHECK_EQUAL && with->consistent) ||

@@ -41,28 +41,28 @@ struct work {
     double alpha;
 };
 
-static const struct rubric_picture *picture(const struct work *w, int k)
+static const struct rubric_image *image_of(const struct work *w, int k)
 {
-    return &w->r->picture[w->check->picture[k]];
+    return &w->r->image[w->check->images[k]];
 }
 
 static const struct submitted_image *student(const struct work *w, int k)
 {
-    return &w->h->picture[w->check->picture[k]];
+    return &w->h->image[w->check->images[k]];
 }
 
 /* NULL: the rubric gives none. */
 static const struct moments *reference(const struct work *w, int k)
 {
-    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m,
-                         *plain = &w->answers->of[0][w->check->picture[k]].m;
+    const struct moments *own = &w->answers->of[w->set][w->check->images[k]].m,
+                         *plain = &w->answers->of[0][w->check->images[k]].m;
     return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
 }
 
 static const struct moments *expected_noise(const struct work *w, int k)
 {
-    const struct moments *own = &w->answers->of[w->set][w->check->picture[k]].m;
-    return own->width > 0 ? own : &w->answers->of[0][w->check->picture[k]].noise;
+    const struct moments *own = &w->answers->of[w->set][w->check->images[k]].m;
+    return own->width > 0 ? own : &w->answers->of[0][w->check->images[k]].noise;
 }
 
 static bool is_masked(const struct work *w, const struct submitted_image *s, size_t p)
@@ -77,8 +77,8 @@ static unsigned char *usable(const struct work *w, struct err *e)
     bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
     for (size_t p = 0; ok && p < pixels; p++)
         use[p] = !is_masked(w, student(w, 0), p);
-    for (int k = 0; ok && k < w->check->num_pictures; k++)
-        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), picture(w, k)->spp,
+    for (int k = 0; ok && k < w->check->num_images; k++)
+        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), image_of(w, k)->spp,
                                         use, e);
     if (ok)
         return use;
@@ -86,7 +86,7 @@ static unsigned char *usable(const struct work *w, struct err *e)
     return NULL;
 }
 
-/* The noise of the reference itself, in a picture that should have noise of its own: a copy. A share of values
+/* The noise of the reference itself, in an image that should have noise of its own: a copy. A share of values
  * that lie in their code's bin around the reference, where only chance would put so many of them. */
 static bool is_copy(const struct submitted_image *s, const struct moments *m, double spp,
                     const unsigned char *use)
@@ -114,8 +114,8 @@ static void tell(const struct difference *a, char *text, size_t size)
             worst = &a->image[c];
             channel = c;
         }
-    int n = snprintf(text, size, "mean of the picture (%s) %+.2f %% (%+.2f to %+.2f)",
-                     names[channel], 100 * worst->value, 100 * worst->lo, 100 * worst->hi);
+    int n = snprintf(text, size, "mean of the image (%s) %+.2f %% (%+.2f to %+.2f)", names[channel],
+                     100 * worst->value, 100 * worst->lo, 100 * worst->hi);
     if (a->tiles > 0 && n > 0 && (size_t)n < size)
         snprintf(text + n, size - (size_t)n, "; furthest tile at %d,%d: %+.1f %% (%+.1f to %+.1f)",
                  a->tile_x, a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
@@ -160,13 +160,13 @@ static bool compare(const struct work *w, const struct submitted_image *a,
 
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
-    const struct rubric_picture *p = picture(w, 0);
-    const struct moments *plain = &w->answers->of[0][w->check->picture[0]].m;
+    const struct rubric_image *p = image_of(w, 0);
+    const struct moments *plain = &w->answers->of[0][w->check->images[0]].m;
     unsigned char *use = usable(w, e);
     struct submitted_image b;
     snprintf(
         out->expected, sizeof out->expected,
-        "the mean of the picture within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
+        "the mean of the image within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
     if (use == NULL || !submitted_image_from(reference(w, 0), student(w, 0), &b, e)) {
         free(use);
@@ -216,8 +216,8 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
     const struct moments *m = reference(w, 0), *n = reference(w, 1);
     bool deviates = w->set > 0 && m != NULL && n != NULL;
     snprintf(out->expected, sizeof out->expected,
-             "%s and %s %s, within %.3g %% (any 8 x 8 pixels: %.3g %%)", picture(w, 0)->name,
-             picture(w, 1)->name,
+             "%s and %s %s, within %.3g %% (any 8 x 8 pixels: %.3g %%)", image_of(w, 0)->name,
+             image_of(w, 1)->name,
              deviates ? "differ as in our renders with the same deviation" : "have the same mean",
              100 * w->check->image.full, 100 * w->check->tile.full);
     if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
@@ -240,10 +240,10 @@ static bool check_sum(const struct work *w, struct result *out, struct err *e)
     unsigned char *use = usable(w, e);
     bool ok = use != NULL && submitted_image_from(NULL, student(w, 0), &sum, e);
     snprintf(out->expected, sizeof out->expected,
-             "%s is the sum of the other %d pictures, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
-             picture(w, 0)->name, w->check->num_pictures - 1, 100 * w->check->image.full,
+             "%s is the sum of the other %d images, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
+             image_of(w, 0)->name, w->check->num_images - 1, 100 * w->check->image.full,
              100 * w->check->tile.full);
-    for (int k = 1; ok && k < w->check->num_pictures; k++)
+    for (int k = 1; ok && k < w->check->num_images; k++)
         submitted_image_add(&sum, student(w, k));
     if (ok)
         submitted_image_unclipped(&sum, use);
@@ -277,7 +277,7 @@ static void map_wrong(struct difference *map, int columns, int x, int y)
     map->tile_y = y / RUBRIC_TILE * RUBRIC_TILE;
 }
 
-/* A picture without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
+/* An image without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
  * the reference's own samples, and the rounding to codes. */
 static bool check_exact(const struct work *w, struct result *out, struct err *e)
 {
@@ -294,7 +294,7 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
         bool off = false, lit = false;
         for (size_t i = 3 * p; i < 3 * p + 3; i++) {
-            double sd = hypot(submitted_image_expected_sd(m, i, picture(w, 0)->spp),
+            double sd = hypot(submitted_image_expected_sd(m, i, image_of(w, 0)->spp),
                               submitted_image_expected_sd(m, i, m->n[p] * fmax(1, m->spp)));
             lit |= m->mean[i] > 0;
             off |= fabs(s->mean[i] - fmin(m->mean[i], s->clip)) >
@@ -325,7 +325,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     const struct submitted_image *p = student(w, 0), *q = student(w, 1);
     snprintf(out->expected, sizeof out->expected,
              "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
-             picture(w, 0)->name, picture(w, 1)->name, exp(w->check->log_ratio.full));
+             image_of(w, 0)->name, image_of(w, 1)->name, exp(w->check->log_ratio.full));
     if (strcmp(p->sha256, q->sha256) == 0) {
         snprintf(out->seen, sizeof out->seen,
                  "the two files are the same, though one has more samples");
@@ -361,24 +361,24 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
 static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
-    const struct made *made = &w->h->made[c->picture[0]];
-    const struct moments *own = &w->answers->of[w->set][c->picture[0]].as_asked,
-                         *ours = own->width > 0 ? own : &w->answers->of[0][c->picture[0]].as_asked;
+    const struct made *made = &w->h->made[c->images[0]];
+    const struct moments *own = &w->answers->of[w->set][c->images[0]].as_asked,
+                         *ours = own->width > 0 ? own : &w->answers->of[0][c->images[0]].as_asked;
     struct rate_image rates;
     struct err why;
     snprintf(
         out->expected, sizeof out->expected,
-        "every pixel of the rate picture stands for a multiple of %d samples, and on average for as many as in our render, within %.3g %%",
+        "every pixel of the rate image stands for a multiple of %d samples, and on average for as many as in our render, within %.3g %%",
         c->batch, 100 * c->count.full);
     if (made->rates[0] == '\0') {
-        snprintf(out->seen, sizeof out->seen, "there is no rate picture");
+        snprintf(out->seen, sizeof out->seen, "there is no rate image");
         return true;
     }
     if (!rate_image_read(made->rates, student(w, 0)->width, student(w, 0)->height,
-                         picture(w, 0)->spp, c->batch, ours->n, &rates, &why)) {
+                         image_of(w, 0)->spp, c->batch, ours->n, &rates, &why)) {
         if (err_is_of_memory(&why))
             return err_set(e, "%s", why.msg);
-        snprintf(out->seen, sizeof out->seen, "the rate picture: %.370s", why.msg);
+        snprintf(out->seen, sizeof out->seen, "the rate image: %.370s", why.msg);
         return true;
     }
     double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
@@ -395,12 +395,12 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
-/* The noise that a picture should have. */
+/* The noise that an image should have. */
 static void expect_noise(const struct work *w)
 {
-    for (int k = 0; k < w->check->num_pictures; k++)
-        submitted_image_expect(&w->h->picture[w->check->picture[k]], expected_noise(w, k),
-                               picture(w, k)->spp);
+    for (int k = 0; k < w->check->num_images; k++)
+        submitted_image_expect(&w->h->image[w->check->images[k]], expected_noise(w, k),
+                               image_of(w, k)->spp);
 }
 
 bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
@@ -412,12 +412,12 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
         [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
         [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
     const struct work w = {r, check, a, set, h, alpha};
-    *out = (struct result){.judged = true, .picture = check->picture[0]};
-    for (int k = 0; k < check->num_pictures; k++) {
-        int i = check->picture[k];
-        if (h->picture[i].mean != NULL)
+    *out = (struct result){.judged = true, .image = check->images[0]};
+    for (int k = 0; k < check->num_images; k++) {
+        int i = check->images[k];
+        if (h->image[i].mean != NULL)
             continue;
-        snprintf(out->expected, sizeof out->expected, "picture '%s'", r->picture[i].name);
+        snprintf(out->expected, sizeof out->expected, "image '%s'", r->image[i].name);
         snprintf(out->seen, sizeof out->seen, "%s", h->why[i]);
         out->judged = h->made[i].end != SANDBOX_LOST;
         return true;

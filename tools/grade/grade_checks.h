@@ -1,11 +1,11 @@
-/* From pictures to points: the checks of a rubric on one submission. */
+/* From images to points: the checks of a rubric on one submission. */
 #ifndef ASSAY_GRADE_CHECKS_H
 #define ASSAY_GRADE_CHECKS_H
 
 #include "difference.h"
 #include "submission.h"
 
-/* What the pictures of a rubric should be; made once for all submissions. */
+/* What the images of a rubric should be; made once for all submissions. */
 struct answer {
     struct moments m; /* of the reference; width 0: none */
     struct moments
@@ -15,7 +15,7 @@ struct answer {
 };
 /* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
 struct answer_key {
-    struct answer of[RUBRIC_SETS][RUBRIC_PICTURES];
+    struct answer of[RUBRIC_SETS][RUBRIC_IMAGES];
 };
 
 struct answer_options {
@@ -28,11 +28,11 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                      struct answer_key *out, struct err *e) __attribute__((warn_unused_result));
 void answer_key_free(struct answer_key *a);
 
-/* One picture by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
+/* One image by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
  * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
-bool answer_key_render(const struct rubric *r, int picture, bool as_asked, const char *words,
-                       int spp, const struct answer_options *opt, struct moments *out,
-                       struct err *e) __attribute__((warn_unused_result));
+bool answer_key_render(const struct rubric *r, int image, bool as_asked, const char *words, int spp,
+                       const struct answer_options *opt, struct moments *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
  * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
@@ -53,17 +53,17 @@ struct result {
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
     char flag[256];     /* for staff only */
-    int picture;        /* that shows it best: index in the rubric */
+    int image;          /* that shows it best: index in the rubric */
     /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
      * are wrong, and where most are. */
     struct difference agreement;
 };
 
-/* One student's pictures, read. */
+/* One student's images, read. */
 struct submitted_images {
-    struct made made[RUBRIC_PICTURES];
-    struct submitted_image picture[RUBRIC_PICTURES]; /* mean NULL: not there, or not readable */
-    char why[RUBRIC_PICTURES][400];                  /* why not */
+    struct made made[RUBRIC_IMAGES];
+    struct submitted_image image[RUBRIC_IMAGES]; /* mean NULL: not there, or not readable */
+    char why[RUBRIC_IMAGES][400];                /* why not */
 };
 
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
@@ -73,7 +73,7 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
                       struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
- * another brings 1 % of all points more and some picture that is wrong without it is consistent with it: a bug that
+ * another brings 1 % of all points more and some image that is wrong without it is consistent with it: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
 bool grade_all_checks(const struct rubric *r, const struct answer_key *a,

@@ -1,4 +1,4 @@
-/* The assignment's picture of sampling rates: blue (none) through green (half) to red (all samples), 8 bits. */
+/* The assignment's image of sampling rates: blue (none) through green (half) to red (all samples), 8 bits. */
 #ifndef ASSAY_RATE_IMAGE_H
 #define ASSAY_RATE_IMAGE_H
 
@@ -12,7 +12,7 @@ struct rate_image {
 };
 
 /* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
- * counts varies from pixel to pixel by noise alone). Fails on what is no picture of that size, and where batches are too small against `most` to tell apart. */
+ * counts varies from pixel to pixel by noise alone). Fails on what is no image of that size, and where batches are too small against `most` to tell apart. */
 bool rate_image_read(const char *path, int width, int height, int most, int batch,
                      const double *expected, struct rate_image *out, struct err *e)
     __attribute__((warn_unused_result));

@@ -15,8 +15,8 @@ struct statement {
     struct rubric *r;
     struct rubric_mistakes *m;
     int line;
-    char *rest;                     /* what has not been taken, without spaces around */
-    struct rubric_picture *picture; /* the block that the line stands in; at most one is not NULL */
+    char *rest;                 /* what has not been taken, without spaces around */
+    struct rubric_image *image; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
 };
 
@@ -135,32 +135,32 @@ static void read_mask(struct statement *s)
         take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
 }
 
-static void read_picture(struct statement *s)
+static void read_image(struct statement *s)
 {
     struct rubric *r = s->r;
     s->check = NULL;
-    s->picture = NULL;
-    if (r->num_pictures == RUBRIC_PICTURES) {
-        rubric_mistake(s->m, s->line, "more than %d pictures", RUBRIC_PICTURES);
+    s->image = NULL;
+    if (r->num_images == RUBRIC_IMAGES) {
+        rubric_mistake(s->m, s->line, "more than %d images", RUBRIC_IMAGES);
         return;
     }
-    struct rubric_picture *p = &r->picture[r->num_pictures];
-    *p = (struct rubric_picture){.line = s->line, .lights = 1, .bounces = -1};
-    s->picture = p;
+    struct rubric_image *p = &r->image[r->num_images];
+    *p = (struct rubric_image){.line = s->line, .lights = 1, .bounces = -1};
+    s->image = p;
     if (!take_name(s, "image", p->name, sizeof p->name))
         return;
-    for (int i = 0; i < r->num_pictures; i++)
-        if (strcmp(r->picture[i].name, p->name) == 0)
-            rubric_mistake(s->m, s->line, "picture '%s' is already in line %d", p->name,
-                           r->picture[i].line);
-    r->num_pictures++;
+    for (int i = 0; i < r->num_images; i++)
+        if (strcmp(r->image[i].name, p->name) == 0)
+            rubric_mistake(s->m, s->line, "image '%s' is already in line %d", p->name,
+                           r->image[i].line);
+    r->num_images++;
 }
 
 static void read_part(struct statement *s)
 {
     struct rubric *r = s->r;
     s->check = NULL;
-    s->picture = NULL;
+    s->image = NULL;
     if (r->num_parts == RUBRIC_PARTS) {
         rubric_mistake(s->m, s->line, "more than %d parts", RUBRIC_PARTS);
         return;
@@ -175,7 +175,7 @@ static void read_check(struct statement *s)
 {
     struct rubric *r = s->r;
     s->check = NULL;
-    s->picture = NULL;
+    s->image = NULL;
     if (r->num_checks == RUBRIC_CHECKS) {
         rubric_mistake(s->m, s->line, "more than %d checks", RUBRIC_CHECKS);
         return;
@@ -203,20 +203,20 @@ static void read_check(struct statement *s)
     while (s->rest[0] != '\0') {
         char *name = take_word(s);
         int i = 0;
-        while (i < r->num_pictures && strcmp(r->picture[i].name, name) != 0)
+        while (i < r->num_images && strcmp(r->image[i].name, name) != 0)
             i++;
-        if (i == r->num_pictures)
-            rubric_mistake(s->m, s->line, "no picture '%s' above", name);
-        else if (c->num_pictures == CHECK_PICTURES)
-            rubric_mistake(s->m, s->line, "more than %d pictures", CHECK_PICTURES);
+        if (i == r->num_images)
+            rubric_mistake(s->m, s->line, "no image '%s' above", name);
+        else if (c->num_images == CHECK_IMAGES)
+            rubric_mistake(s->m, s->line, "more than %d images", CHECK_IMAGES);
         else {
-            c->picture[c->num_pictures++] = i;
-            r->picture[i].used = true;
+            c->images[c->num_images++] = i;
+            r->image[i].used = true;
         }
     }
 }
 
-static void read_reference(struct statement *s, struct rubric_picture *p)
+static void read_reference(struct statement *s, struct rubric_image *p)
 {
     char *kind = take_word(s);
     if (p->reference != REFERENCE_NONE)
@@ -253,10 +253,10 @@ static void read_accept(struct statement *s, struct accepted *list, int most, in
     ++*num;
 }
 
-/* False: no statement of a picture. */
-static bool read_in_picture(struct statement *s, const char *word)
+/* False: no statement of an image. */
+static bool read_in_image(struct statement *s, const char *word)
 {
-    struct rubric_picture *p = s->picture;
+    struct rubric_image *p = s->image;
     if (strcmp(word, "scene") == 0)
         take_text(s, word, p->scene, sizeof p->scene);
     else if (strcmp(word, "size") == 0) {
@@ -337,21 +337,21 @@ static void read_statement(struct statement *s)
         read_limit(s);
     else if (strcmp(word, "mask") == 0)
         read_mask(s);
-    else if (strcmp(word, "accept") == 0 && s->picture == NULL && s->check == NULL)
+    else if (strcmp(word, "accept") == 0 && s->image == NULL && s->check == NULL)
         read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
     else if (strcmp(word, "picture") == 0) {
         r->old_word_line = r->old_word_line > 0 ? r->old_word_line : s->line;
-        read_picture(s);
+        read_image(s);
     } else if (strcmp(word, "image") == 0 && (s->check == NULL || is_name(s->rest)))
-        read_picture(s); /* a check's margin of that name is two numbers, which are no name */
+        read_image(s); /* a check's margin of that name is two numbers, which are no name */
     else if (strcmp(word, "part") == 0)
         read_part(s);
     else if (strcmp(word, "check") == 0)
         read_check(s);
-    else if (!(s->picture != NULL && read_in_picture(s, word)) &&
+    else if (!(s->image != NULL && read_in_image(s, word)) &&
              !(s->check != NULL && read_in_check(s, word))) {
         rubric_mistake(s->m, s->line, "'%s' is no statement %s", word,
-                       s->picture != NULL ? "of a picture"
+                       s->image != NULL   ? "of an image"
                        : s->check != NULL ? "of a check"
                                           : "here");
         return;

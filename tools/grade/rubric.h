@@ -9,11 +9,11 @@
 
 enum {
     RUBRIC_PARTS = 24,
-    RUBRIC_PICTURES = 96,
+    RUBRIC_IMAGES = 96,
     RUBRIC_CHECKS = 128,
-    CHECK_PICTURES = 8,
+    CHECK_IMAGES = 8,
     RUBRIC_ACCEPTED = 3,                      /* by words */
-    RUBRIC_SETS = (1 << RUBRIC_ACCEPTED) + 4, /* choices of them, and those by pictures */
+    RUBRIC_SETS = (1 << RUBRIC_ACCEPTED) + 4, /* choices of them, and those by images */
     RUBRIC_TILE = 8
 };
 
@@ -44,10 +44,10 @@ struct accepted {
 /* What a program may do wrong for which it is not to blame, all at once. The first set is empty. */
 struct rubric_set {
     char name[160];  /* "light_pdf, turned_lamp" */
-    char words[800]; /* "" of those by pictures */
+    char words[800]; /* "" of those by images */
 };
 
-struct rubric_picture {
+struct rubric_image {
     int line;
     char name[48];
     char scene[256];                 /* as written: of the suite, or ending in .dae */
@@ -73,7 +73,7 @@ struct rubric_check {
     char name[48];
     double points;
     enum check_kind kind;
-    int picture[CHECK_PICTURES], num_pictures; /* indices */
+    int images[CHECK_IMAGES], num_images; /* indices */
     struct margin image, tile, share, log_ratio, count;
     int batch;
     char title[160], hint[512], where[160], visibility[24];
@@ -96,9 +96,9 @@ struct rubric {
     struct rubric_set set[RUBRIC_SETS];
     int num_sets;
     struct rubric_part part[RUBRIC_PARTS];
-    struct rubric_picture picture[RUBRIC_PICTURES];
+    struct rubric_image image[RUBRIC_IMAGES];
     struct rubric_check check[RUBRIC_CHECKS];
-    int num_parts, num_pictures, num_checks;
+    int num_parts, num_images, num_checks;
     int old_word_line; /* the first that says "picture" for "image"; 0: none does */
 };
 

@@ -17,40 +17,40 @@
 /* How well the mean of noise that is cut off is known where a program is noisier than ours: of the clipping point. */
 static const double clip_error = 0.02;
 
-bool rubric_bugs_sees(const struct rubric *r, int picture)
+bool rubric_bugs_sees(const struct rubric *r, int image)
 {
     bool sees = false;
     for (int i = 0; i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         bool shows = c->kind == CHECK_EQUAL || c->kind == CHECK_EXACT || c->kind == CHECK_RATES ||
                      c->kind == CHECK_SUM;
-        for (int k = 0; shows && k < c->num_pictures; k++)
-            sees |= c->picture[k] == picture;
+        for (int k = 0; shows && k < c->num_images; k++)
+            sees |= c->images[k] == image;
     }
-    return sees && r->picture[picture].reference == REFERENCE_OURS;
+    return sees && r->image[image].reference == REFERENCE_OURS;
 }
 
-static const struct rubric_check *rates_check(const struct rubric *r, int picture)
+static const struct rubric_check *rates_check(const struct rubric *r, int image)
 {
     for (int i = 0; i < r->num_checks; i++)
-        if (r->check[i].kind == CHECK_RATES && r->check[i].picture[0] == picture)
+        if (r->check[i].kind == CHECK_RATES && r->check[i].images[0] == image)
             return &r->check[i];
     return NULL;
 }
 
-bool rubric_bugs_counts(const struct rubric *r, int picture)
+bool rubric_bugs_counts(const struct rubric *r, int image)
 {
-    return rates_check(r, picture) != NULL;
+    return rates_check(r, image) != NULL;
 }
 
-int rubric_bugs_set(const struct answer_key *a, int set, int picture)
+int rubric_bugs_set(const struct answer_key *a, int set, int image)
 {
-    const struct moments *m = &a->of[set][picture].m, *first = &a->of[0][picture].m;
+    const struct moments *m = &a->of[set][image].m, *first = &a->of[0][image].m;
     if (m->width == 0)
         return 0;
     size_t size = 3 * (size_t)m->width * (size_t)m->height * sizeof *m->mean;
     for (int k = 0; k < set; k++) {
-        const struct moments *other = &a->of[k][picture].m;
+        const struct moments *other = &a->of[k][image].m;
         other = other->width > 0 ? other : first;
         if (memcmp(m->mean, other->mean, size) == 0)
             return k;
@@ -58,10 +58,10 @@ int rubric_bugs_set(const struct answer_key *a, int set, int picture)
     return set;
 }
 
-bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128], char key[65],
+bool rubric_bugs_key(const struct rubric *r, int image, int set, char name[128], char key[65],
                      struct err *e)
 {
-    const struct rubric_picture *p = &r->picture[picture];
+    const struct rubric_image *p = &r->image[image];
     char text[4096], path[8192], scene[65], environment[65] = "";
     snprintf(name, 128, set > 0 ? "%s@%.70s" : "%s", p->name, r->set[set].name);
     for (char *c = strstr(name, ", "); c != NULL; c = strstr(c, ", ")) {
@@ -80,13 +80,13 @@ bool rubric_bugs_key(const struct rubric *r, int picture, int set, char name[128
     const char *options = p->reference_options[0] != '\0' ? p->reference_options : p->options;
     snprintf(text, sizeof text, "%s %s %s %d %d %d %d %d %s %s %s", r->curve, scene, environment,
              p->width, p->height, p->spp, p->lights, p->bounces, options,
-             rubric_bugs_counts(r, picture) ? p->options : "", r->set[set].words);
+             rubric_bugs_counts(r, image) ? p->options : "", r->set[set].words);
     sha256_text(text, key);
     return true;
 }
 
 /* The side of a cell: the smallest that makes at most SIGNATURE_SIDE of them each way. */
-static int cell_of(const struct rubric_picture *p)
+static int cell_of(const struct rubric_image *p)
 {
     int longer = p->width > p->height ? p->width : p->height;
     int cell = (longer + SIGNATURE_SIDE - 1) / SIGNATURE_SIDE;
@@ -95,12 +95,12 @@ static int cell_of(const struct rubric_picture *p)
     return cell;
 }
 
-static bool start(const struct rubric_picture *p, struct signature *s, struct err *e)
+static bool start(const struct rubric_image *p, struct signature *s, struct err *e)
 {
     *s = (struct signature){.cell = cell_of(p)};
     if (p->width % s->cell != 0 || p->height % s->cell != 0)
-        return err_set(e, "picture '%s': %d x %d is not of whole cells, at most %d each way",
-                       p->name, p->width, p->height, SIGNATURE_SIDE);
+        return err_set(e, "image '%s': %d x %d is not of whole cells, at most %d each way", p->name,
+                       p->width, p->height, SIGNATURE_SIDE);
     s->columns = p->width / s->cell;
     s->rows = p->height / s->cell;
     s->n = (double)p->spp * s->cell * s->cell;
@@ -136,16 +136,16 @@ static double clipped_mean(double mean, double sd, double clip)
     return clip - sd * (z * gsl_cdf_ugaussian_P(z) + gsl_ran_ugaussian_pdf(z));
 }
 
-bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments *m,
+bool rubric_bugs_sight(const struct rubric *r, int image, const struct moments *m,
                        struct signature *out, struct err *e)
 {
-    const struct rubric_picture *p = &r->picture[picture];
-    bool counts = rubric_bugs_counts(r, picture);
+    const struct rubric_image *p = &r->image[image];
+    bool counts = rubric_bugs_counts(r, image);
     double clip = clip_of(r), sum = 0, squares = 0, pixels = (double)p->width * p->height;
     if (!start(p, out, e))
         return false;
     if (m->width != p->width || m->height != p->height)
-        return err_set(e, "picture '%s': a render of %d x %d pixels", p->name, m->width, m->height);
+        return err_set(e, "image '%s': a render of %d x %d pixels", p->name, m->width, m->height);
     double area = (double)out->cell * out->cell;
     for (size_t i = 0; i < (size_t)pixels; i++) {
         double taken = m->n[i] * fmax(1, m->spp);
@@ -171,7 +171,7 @@ bool rubric_bugs_sight(const struct rubric *r, int picture, const struct moments
     return true;
 }
 
-/* ---- a student's picture */
+/* ---- a student's image */
 
 /* What a cell of it says. */
 struct seen {
@@ -217,12 +217,12 @@ static double noise_of(const struct signature *s, const struct signature *correc
     return fmax(1, gsl_stats_median_from_sorted_data(ratio, 1, num));
 }
 
-static bool sight_of_student(const struct rubric *r, int picture, const struct submitted_image *s,
+static bool sight_of_student(const struct rubric *r, int image, const struct submitted_image *s,
                              const struct moments *m, const struct signature *correct,
                              struct signature *out, struct err *e)
 {
     struct seen cells[SIGNATURE_VALUES] = {0};
-    if (!start(&r->picture[picture], out, e))
+    if (!start(&r->image[image], out, e))
         return false;
     double clip = clip_of(r), pixels = (double)out->cell * out->cell;
     fill_cells(r, s, m, clip, out, cells);
@@ -234,16 +234,16 @@ static bool sight_of_student(const struct rubric *r, int picture, const struct s
     return true;
 }
 
-static bool count_samples(const struct rubric *r, int picture, const struct answer_key *a,
+static bool count_samples(const struct rubric *r, int image, const struct answer_key *a,
                           const struct made *made, struct signature *s, struct err *e)
 {
-    const struct rubric_picture *p = &r->picture[picture];
+    const struct rubric_image *p = &r->image[image];
     struct rate_image rates;
     struct err why;
     if (made->rates[0] == '\0')
         return true;
-    if (!rate_image_read(made->rates, p->width, p->height, p->spp, rates_check(r, picture)->batch,
-                         a->of[0][picture].as_asked.n, &rates, &why)) /* its check has said so */
+    if (!rate_image_read(made->rates, p->width, p->height, p->spp, rates_check(r, image)->batch,
+                         a->of[0][image].as_asked.n, &rates, &why)) /* its check has said so */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     s->fact[FACT_SAMPLES] = log(rates.mean / p->spp);
     s->fact_sd[FACT_SAMPLES] = rates.sd;
@@ -255,14 +255,14 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
                  struct err *e)
 {
     *num = 0;
-    for (int i = 0; i < r->num_pictures; i++) {
-        if (b->view[set][i] < 0 || h->picture[i].mean == NULL)
+    for (int i = 0; i < r->num_images; i++) {
+        if (b->view[set][i] < 0 || h->image[i].mean == NULL)
             continue;
         const struct view *v = &b->catalogue.view[b->view[set][i]];
         const struct answer *answer = &a->of[rubric_bugs_set(a, set, i)][i];
         struct observation *out = &clue[(*num)++];
         *out = (struct observation){.view = v, .is_consistent = true};
-        if (!sight_of_student(r, i, &h->picture[i], &answer->m, &v->correct, &out->seen, e))
+        if (!sight_of_student(r, i, &h->image[i], &answer->m, &v->correct, &out->seen, e))
             return false;
         if (rubric_bugs_counts(r, i) && !count_samples(r, i, a, &h->made[i], &out->seen, e))
             return false;
@@ -275,7 +275,7 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                           double alpha, struct diagnosis *found, int *with, struct err *e)
 {
     const struct diagnose_options opt = {.alpha = alpha, .by_likelihood = true};
-    struct observation *clue = calloc((size_t)r->num_pictures, sizeof *clue);
+    struct observation *clue = calloc((size_t)r->num_images, sizeof *clue);
     bool ok = clue != NULL || err_set(e, "out of memory");
     double best = -INFINITY;
     *found = (struct diagnosis){0};
@@ -308,7 +308,7 @@ static bool find_views(const struct rubric *r, const struct answer_key *a, struc
                        struct err *e)
 {
     for (int k = 0; k < r->num_sets; k++)
-        for (int i = 0; i < r->num_pictures; i++) {
+        for (int i = 0; i < r->num_images; i++) {
             char name[128], key[65];
             int first = rubric_bugs_set(a, k, i);
             b->view[k][i] = -1;
@@ -320,7 +320,7 @@ static bool find_views(const struct rubric *r, const struct answer_key *a, struc
             if (v == NULL || strcmp(v->scene_sha256, key) != 0)
                 return err_set(
                     e,
-                    "%s: bugs: '%s' has no view '%s', or of another picture: make rubric-bugs, or leave out 'bugs'",
+                    "%s: bugs: '%s' has no view '%s', or of another image: make rubric-bugs, or leave out 'bugs'",
                     r->path, r->bugs, name);
             b->view[k][i] = (int)(v - b->catalogue.view);
         }

@@ -65,7 +65,7 @@ static void check_command(const char *what, const char *command, struct rubric_m
             rubric_mistake(m, LINE_WHOLE, "%s: {%s} is nothing that is replaced", what, name);
     }
     if (strstr(command, "{out}") == NULL)
-        rubric_mistake(m, LINE_WHOLE, "%s: without {out} there is no picture", what);
+        rubric_mistake(m, LINE_WHOLE, "%s: without {out} there is no image", what);
 }
 
 static bool is_beside(const struct rubric *r, const char *file)
@@ -106,58 +106,56 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
         rubric_mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
 }
 
-static void check_golden(const struct rubric_picture *p, const char *engine,
+static void check_golden(const struct rubric_image *p, const char *engine,
                          struct rubric_mistakes *m)
 {
     const struct suite_reference *ref =
         p->suite != NULL ? suite_reference_of(p->suite, engine) : NULL;
     if (ref == NULL)
-        rubric_mistake(m, p->line, "picture '%s': '%s' has no reference '%s'", p->name, p->scene,
+        rubric_mistake(m, p->line, "image '%s': '%s' has no reference '%s'", p->name, p->scene,
                        engine);
     else if (strcmp(engine, "truth") != 0 &&
              (p->width != p->suite->width || p->height != p->suite->height ||
               p->bounces != p->suite->depth))
-        rubric_mistake(m, p->line, "picture '%s': the golden of %s is %d x %d with %d bounces",
+        rubric_mistake(m, p->line, "image '%s': the golden of %s is %d x %d with %d bounces",
                        p->name, p->scene, p->suite->width, p->suite->height, p->suite->depth);
 }
 
-static void check_picture(const struct rubric *r, struct rubric_picture *p,
-                          const struct suite *suite, struct rubric_mistakes *m)
+static void check_image(const struct rubric *r, struct rubric_image *p, const struct suite *suite,
+                        struct rubric_mistakes *m)
 {
     size_t n = strlen(p->scene);
     p->suite = suite_find(suite, p->scene);
     if (p->scene[0] == '\0')
-        rubric_mistake(m, p->line, "picture '%s' has no 'scene'", p->name);
+        rubric_mistake(m, p->line, "image '%s' has no 'scene'", p->name);
     else if (p->suite == NULL && (n < 5 || strcmp(p->scene + n - 4, ".dae") != 0))
-        rubric_mistake(m, p->line,
-                       "picture '%s': the suite has no scene '%s' (a file ends in .dae)", p->name,
-                       p->scene);
+        rubric_mistake(m, p->line, "image '%s': the suite has no scene '%s' (a file ends in .dae)",
+                       p->name, p->scene);
     else if (p->suite == NULL && !is_beside(r, p->scene))
-        rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
-                       p->scene);
+        rubric_mistake(m, p->line, "image '%s': no file '%s' beside the rubric", p->name, p->scene);
     if (p->width == 0)
-        rubric_mistake(m, p->line, "picture '%s' has no 'size'", p->name);
+        rubric_mistake(m, p->line, "image '%s' has no 'size'", p->name);
     if (p->width % RUBRIC_TILE != 0 || p->height % RUBRIC_TILE != 0)
-        rubric_mistake(m, p->line, "picture '%s': %d x %d are not whole tiles of %d", p->name,
+        rubric_mistake(m, p->line, "image '%s': %d x %d are not whole tiles of %d", p->name,
                        p->width, p->height, RUBRIC_TILE);
     if (p->spp == 0)
-        rubric_mistake(m, p->line, "picture '%s' has no 'spp'", p->name);
+        rubric_mistake(m, p->line, "image '%s' has no 'spp'", p->name);
     if (p->bounces < 0)
-        rubric_mistake(m, p->line, "picture '%s' has no 'bounces'", p->name);
+        rubric_mistake(m, p->line, "image '%s' has no 'bounces'", p->name);
     if (p->reference >= REFERENCE_TRUTH && p->reference < REFERENCE_OURS && p->scene[0] != '\0')
         check_golden(p, rubric_reference_names[p->reference], m);
     if (p->environment[0] != '\0' && !is_beside(r, p->environment))
-        rubric_mistake(m, p->line, "picture '%s': no file '%s' beside the rubric", p->name,
+        rubric_mistake(m, p->line, "image '%s': no file '%s' beside the rubric", p->name,
                        p->environment);
     for (int i = 0; i < p->num_accepted; i++)
         if (!is_beside(r, p->accept[i].how))
             rubric_mistake(m, p->accept[i].line, "no file '%s' beside the rubric",
                            p->accept[i].how);
     if (!p->used)
-        rubric_mistake(m, p->line, "picture '%s' is in no check", p->name);
+        rubric_mistake(m, p->line, "image '%s' is in no check", p->name);
 }
 
-/* Which statements a kind of check has, and how many pictures. */
+/* Which statements a kind of check has, and how many images. */
 static void check_check(const struct rubric *r, struct rubric_check *c, struct rubric_mistakes *m)
 {
     static const struct {
@@ -166,7 +164,7 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
     } kinds[NUM_CHECK_KINDS] = {
         [CHECK_EQUAL] = {1, 1, true, false, false, false, true},
         [CHECK_AGREE] = {2, 2, true, false, false, false, false},
-        [CHECK_SUM] = {3, CHECK_PICTURES, true, false, false, false, false},
+        [CHECK_SUM] = {3, CHECK_IMAGES, true, false, false, false, false},
         [CHECK_EXACT] = {1, 1, false, true, false, false, true},
         [CHECK_NOISE] = {2, 2, false, false, true, false, true},
         [CHECK_RATES] = {1, 1, false, true, false, true, false},
@@ -176,11 +174,10 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
     if (c->kind == NUM_CHECK_KINDS)
         return;
     const char *kind = rubric_check_kind_name[c->kind];
-    if (c->num_pictures < kinds[c->kind].least || c->num_pictures > kinds[c->kind].most)
-        rubric_mistake(m, c->line, "check '%s': '%s' takes %d%s pictures, not %d", c->name, kind,
+    if (c->num_images < kinds[c->kind].least || c->num_images > kinds[c->kind].most)
+        rubric_mistake(m, c->line, "check '%s': '%s' takes %d%s images, not %d", c->name, kind,
                        kinds[c->kind].least,
-                       kinds[c->kind].most > kinds[c->kind].least ? " or more" : "",
-                       c->num_pictures);
+                       kinds[c->kind].most > kinds[c->kind].least ? " or more" : "", c->num_images);
     const struct {
         const char *name;
         bool given, wanted;
@@ -198,11 +195,10 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
             rubric_mistake(m, c->line, "check '%s': '%s' needs '%s'", c->name, kind,
                            statements[i].name);
     }
-    for (int i = 0; i < c->num_pictures; i++) {
-        const struct rubric_picture *p = &r->picture[c->picture[i]],
-                                    *first = &r->picture[c->picture[0]];
+    for (int i = 0; i < c->num_images; i++) {
+        const struct rubric_image *p = &r->image[c->images[i]], *first = &r->image[c->images[0]];
         if (kinds[c->kind].reference && p->reference == REFERENCE_NONE)
-            rubric_mistake(m, p->line, "picture '%s' has no 'reference', which check '%s' needs",
+            rubric_mistake(m, p->line, "image '%s' has no 'reference', which check '%s' needs",
                            p->name, c->name);
         if (p->width != first->width || p->height != first->height)
             rubric_mistake(m, c->line, "check '%s': '%s' and '%s' have different sizes", c->name,
@@ -225,7 +221,7 @@ static void append(char *text, size_t size, const char *between, const char *mor
     snprintf(text + n, size - n, "%s%s", n > 0 ? between : "", more);
 }
 
-/* Every choice of those by words, then those that pictures show. */
+/* Every choice of those by words, then those that images show. */
 static void list_sets(struct rubric *r, struct rubric_mistakes *m)
 {
     r->num_sets = 1 << r->num_accepted;
@@ -235,9 +231,9 @@ static void list_sets(struct rubric *r, struct rubric_mistakes *m)
                 append(r->set[k].name, sizeof r->set->name, ", ", r->accept[i].name);
                 append(r->set[k].words, sizeof r->set->words, " ", r->accept[i].how);
             }
-    for (int i = 0; i < r->num_pictures; i++)
-        for (int a = 0; a < r->picture[i].num_accepted; a++) {
-            const struct accepted *by = &r->picture[i].accept[a];
+    for (int i = 0; i < r->num_images; i++)
+        for (int a = 0; a < r->image[i].num_accepted; a++) {
+            const struct accepted *by = &r->image[i].accept[a];
             int k = 0;
             while (k < r->num_sets && strcmp(r->set[k].name, by->name) != 0)
                 k++;
@@ -253,8 +249,8 @@ static void list_sets(struct rubric *r, struct rubric_mistakes *m)
 void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubric_mistakes *m)
 {
     check_head(r, m);
-    for (int i = 0; i < r->num_pictures; i++)
-        check_picture(r, &r->picture[i], suite, m);
+    for (int i = 0; i < r->num_images; i++)
+        check_image(r, &r->image[i], suite, m);
     for (int i = 0; i < r->num_checks; i++)
         check_check(r, &r->check[i], m);
     list_sets(r, m);

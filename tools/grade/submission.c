@@ -46,8 +46,8 @@ bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
     if (!fs_make_dirs(dir, e))
         return false;
     chmod(dir, 0755);
-    for (int i = 0; i < r->num_pictures; i++) {
-        const struct rubric_picture *p = &r->picture[i];
+    for (int i = 0; i < r->num_images; i++) {
+        const struct rubric_image *p = &r->image[i];
         if (!stage_file(p->suite != NULL ? p->suite->dae : fs_path("%s/%s", r->dir, p->scene).s,
                         dir, e))
             return false;
@@ -92,7 +92,7 @@ static void add_words(struct words *w, const char *words)
 }
 
 /* What belongs to a scene besides its file. */
-static void add_scene_options(struct words *w, const struct rubric_picture *p)
+static void add_scene_options(struct words *w, const struct rubric_image *p)
 {
     char text[600];
     const struct suite_scene *s = p->suite;
@@ -107,7 +107,7 @@ static void add_scene_options(struct words *w, const struct rubric_picture *p)
     }
 }
 
-bool submission_command(const struct rubric *r, const struct rubric_picture *p, const char *program,
+bool submission_command(const struct rubric *r, const struct rubric_image *p, const char *program,
                         uint64_t seed, int threads, char *text, size_t size, const char **argv,
                         int most)
 {
@@ -160,7 +160,7 @@ bool submission_command(const struct rubric *r, const struct rubric_picture *p, 
     return !w.overflow && w.num > 0;
 }
 
-/* The file of a picture in a directory of images, looked for by ending; not through a link. */
+/* The file of an image in a directory of images, looked for by ending; not through a link. */
 static bool find_image(const struct submission *s, const char *name, const char *ending, char *path,
                        size_t size)
 {
@@ -182,8 +182,8 @@ static enum submission_kind kind_of(const struct rubric *r, const struct submiss
     char path[MAX_PATH];
     if (!is_directory)
         return SUBMISSION_PROGRAM;
-    for (int i = 0; i < r->num_pictures; i++)
-        if (find_image(s, r->picture[i].name, NULL, path, sizeof path))
+    for (int i = 0; i < r->num_images; i++)
+        if (find_image(s, r->image[i].name, NULL, path, sizeof path))
             return SUBMISSION_IMAGES;
     return r->build[0] != '\0' ? SUBMISSION_SOURCE : SUBMISSION_PROGRAM;
 }
@@ -252,7 +252,7 @@ static bool move_file(const char *from_dir, const char *name, const char *to, bo
 }
 
 static bool run_program(const struct rubric *r, const struct sandbox *box,
-                        const struct submission *sub, const struct rubric_picture *p,
+                        const struct submission *sub, const struct rubric_image *p,
                         const char *stage, const char *work, const char *out_dir, uint64_t seed,
                         int threads, struct made *made, struct err *e)
 {
@@ -260,7 +260,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     const char *argv[MAX_ARGS];
     const char *dot = strrchr(r->output, '.');
     if (!submission_command(r, p, sub->program, seed, threads, text, sizeof text, argv, MAX_ARGS))
-        return err_set(e, "%s: the command of picture '%s' is too long", r->path, p->name);
+        return err_set(e, "%s: the command of image '%s' is too long", r->path, p->name);
     snprintf(rates, sizeof rates, "%.*s_rate.png", (int)(dot - r->output), r->output);
     const struct path out = fs_path("%s/%s", work, p->name);
     const struct path log = fs_path("%s/%s.log", out_dir, p->name);
@@ -294,7 +294,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     return ok;
 }
 
-/* Copies a picture of a directory to where those of programs are; `to` "" and the reason where there is none. */
+/* Copies an image of a directory to where those of programs are; `to` "" and the reason where there is none. */
 static bool take_image(const struct rubric *r, const struct submission *s, const char *name,
                        const char *ending, const char *out_dir, char *to, char *why, size_t size,
                        struct err *e)
@@ -322,12 +322,11 @@ static bool take_rates(const struct rubric *r, const struct submission *s, const
     return take_image(r, s, rates, ".png", out_dir, to, why, sizeof why, e);
 }
 
-bool submission_picture(const struct rubric *r, const struct sandbox *s,
-                        const struct submission *sub, int picture, const char *stage,
-                        const char *work, const char *out_dir, uint64_t seed, int threads,
-                        struct made *made, struct err *e)
+bool submission_image(const struct rubric *r, const struct sandbox *s, const struct submission *sub,
+                      int image, const char *stage, const char *work, const char *out_dir,
+                      uint64_t seed, int threads, struct made *made, struct err *e)
 {
-    const struct rubric_picture *p = &r->picture[picture];
+    const struct rubric_image *p = &r->image[image];
     *made = (struct made){.end = SANDBOX_OK};
     if (sub->why[0] != '\0') {
         snprintf(made->why, sizeof made->why, "%.590s", sub->why);

@@ -1,4 +1,4 @@
-/* What a student handed in, and the pictures it makes. */
+/* What a student handed in, and the images it makes. */
 #ifndef ASSAY_SUBMISSION_H
 #define ASSAY_SUBMISSION_H
 
@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 enum submission_kind {
-    SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some picture of the rubric */
+    SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some image of the rubric */
     SUBMISSION_PROGRAM, /* a file, or a directory that needs no building */
     SUBMISSION_SOURCE   /* a directory, and the rubric has a `build` command */
 };
@@ -23,7 +23,7 @@ struct submission {
     char why[600];     /* what is wrong with all of it: "" if nothing */
 };
 
-/* One picture as it came out. */
+/* One image as it came out. */
 struct made {
     char path[4400], rates[4400]; /* "": there is none; rates of adaptive sampling: NAME_rate.png */
     char why[600];                /* why there is none */
@@ -31,7 +31,7 @@ struct made {
     double cpu_s, wall_s;
 };
 
-/* Directory of what all runs need, made once: scenes and environments of the rubric's pictures, by their last
+/* Directory of what all runs need, made once: scenes and environments of the rubric's images, by their last
  * names, which have to differ. */
 bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
     __attribute__((warn_unused_result));
@@ -46,16 +46,16 @@ bool submission_build(const struct rubric *r, const struct sandbox *box, const c
                       const char *log, struct submission *s, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The picture with that index: found, or made in the sandbox and then moved to out_dir, where its log goes too. A
- * picture that is not there is no error: made->why says so. */
-bool submission_picture(const struct rubric *r, const struct sandbox *s,
-                        const struct submission *sub, int picture, const char *stage,
-                        const char *work, const char *out_dir, uint64_t seed, int threads,
-                        struct made *made, struct err *e) __attribute__((warn_unused_result));
+/* The image with that index: found, or made in the sandbox and then moved to out_dir, where its log goes too. An
+ * image that is not there is no error: made->why says so. */
+bool submission_image(const struct rubric *r, const struct sandbox *s, const struct submission *sub,
+                      int image, const char *stage, const char *work, const char *out_dir,
+                      uint64_t seed, int threads, struct made *made, struct err *e)
+    __attribute__((warn_unused_result));
 
-/* The command of a picture in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
+/* The command of an image in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
  * output by its name in the rubric. False if it is too long. */
-bool submission_command(const struct rubric *r, const struct rubric_picture *p, const char *program,
+bool submission_command(const struct rubric *r, const struct rubric_image *p, const char *program,
                         uint64_t seed, int threads, char *text, size_t size, const char **argv,
                         int most);
 

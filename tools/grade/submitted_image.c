@@ -16,12 +16,12 @@ static bool check_header(const char *path, int width, int height, struct image_i
     struct err why;
     if (!image_inspect(path, info, &why)) {
         const char *what = strstr(why.msg, ": "); /* without our path */
-        return err_set(e, "the picture: %.300s", what != NULL ? what + 2 : "cannot be read");
+        return err_set(e, "the image: %.300s", what != NULL ? what + 2 : "cannot be read");
     }
     if (info->width != width || info->height != height)
-        return err_set(e, "the picture is %d x %d pixels, not %d x %d", info->width, info->height,
+        return err_set(e, "the image is %d x %d pixels, not %d x %d", info->width, info->height,
                        width, height);
-    return info->channels <= 64 || err_set(e, "the picture has %d channels", info->channels);
+    return info->channels <= 64 || err_set(e, "the image has %d channels", info->channels);
 }
 
 static bool allocate(struct submitted_image *s, struct err *e)
@@ -74,7 +74,7 @@ static bool fill(struct submitted_image *s, const struct image_file *pic, const 
     for (size_t i = 0; i < n; i++) {
         float v = pic->rgb[i];
         if (!(v >= 0))
-            return err_set(e, "the picture has negative numbers");
+            return err_set(e, "the image has negative numbers");
         if (steps > 0) {
             set_code(s, i, curve, (int)lround((double)v * steps), steps);
             continue;
@@ -207,7 +207,7 @@ static void clear_around(const struct submitted_image *s, const unsigned char *m
         }
 }
 
-/* A few pixels at the rim of a lamp, or of a caustic, can hold most of a picture's noise and all of its skewness. */
+/* A few pixels at the rim of a lamp, or of a caustic, can hold most of an image's noise and all of its skewness. */
 static void drop_loudest(const struct submitted_image *s, const struct moments *m, double spp,
                          double *v, unsigned char *use)
 {

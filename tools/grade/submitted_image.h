@@ -1,8 +1,8 @@
-/* A student's picture: what a file says of each pixel, by the course's tone curve where it is one of codes, and
+/* A student's image: what a file says of each pixel, by the course's tone curve where it is one of codes, and
  * made fit for a comparison. No noise is stated by such files: how much there should be is known from renders of ours.
  *
  * Clipping. A code of 255 says "at least so much". Dropping pixels because they came out saturated would choose
- * them by their noise, and would hide a picture that is white where it should not be. So the reference decides:
+ * them by their noise, and would hide an image that is white where it should not be. So the reference decides:
  * where it lies within 5 standard errors of the clipping point (those of a render with as many samples, from the
  * reference's own variance of a sample) nothing is compared; elsewhere both sides are cut off at that point. */
 #ifndef ASSAY_SUBMITTED_IMAGE_H
@@ -21,7 +21,7 @@ struct submitted_image {
     char sha256[65];        /* of the file */
 };
 
-/* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no picture of that size.
+/* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no image of that size.
  * The header is looked at before anything is decoded. The caller frees with submitted_image_free(). */
 bool submitted_image_read(const char *path, const char *curve, int width, int height,
                           struct submitted_image *out, struct err *e)
@@ -32,7 +32,7 @@ void submitted_image_free(struct submitted_image *s);
  * 3 x 3 pixels, as what is rare may have been missed in one. A pixel beyond the clipping point does not vary. */
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
-/* A picture of the same kind as `like`: what m says, with the variance of its mean; m NULL: black. */
+/* An image of the same kind as `like`: what m says, with the variance of its mean; m NULL: black. */
 bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                           struct submitted_image *out, struct err *e)
     __attribute__((warn_unused_result));
@@ -46,7 +46,7 @@ void submitted_image_add(struct submitted_image *dst, const struct submitted_ima
 
 /* What can be compared with a render of spp samples a pixel, told by the moments of one of ours: use[p] becomes 0
  * within 5 standard errors of the clipping point, and beside such pixels and beside clipped ones, whose variance says
- * nothing of their neighbours', and where the variance is more than 20 times the mean of the picture. use: one per pixel, set by the caller to not 0. */
+ * nothing of their neighbours', and where the variance is more than 20 times the mean of the image. use: one per pixel, set by the caller to not 0. */
 bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
                                 double spp, unsigned char *use, struct err *e)
     __attribute__((warn_unused_result));

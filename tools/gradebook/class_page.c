@@ -157,7 +157,7 @@ static void slowest(FILE *f, const json_t *grades, struct tally *t)
     fputs("</table>\n", f);
 }
 
-/* Submissions that share a picture bit by bit. A program without a seed of its own always makes the same one, and two
+/* Submissions that share an image bit by bit. A program without a seed of its own always makes the same one, and two
  * that follow the text to the letter may make the same: no proof of anything. */
 static void look_alikes(FILE *f, const json_t *grades)
 {
@@ -181,7 +181,7 @@ static void look_alikes(FILE *f, const json_t *grades)
                 continue;
             if (!any)
                 fputs(
-                    "<h2>All pictures the same, bit by bit</h2><p>No proof of anything: programs with a fixed seed that do the same "
+                    "<h2>All images the same, bit by bit</h2><p>No proof of anything: programs with a fixed seed that do the same "
                     "make the same.</p><ul>\n",
                     f);
             any = true;
@@ -236,7 +236,7 @@ static void show_same_noise(FILE *f, const json_t *grades, int *group)
             continue;
         if (number == 0)
             fputs(
-                "<h2>The same noise</h2><p>Pictures that cost no points and whose errors go together more than those of programs "
+                "<h2>The same noise</h2><p>Images that cost no points and whose errors go together more than those of programs "
                 "that draw numbers of their own: one false alarm in a thousand classes. No proof of anything: the same fixed seed in "
                 "what all were given does it too. Each line is a chain of likenesses.</p><ul>\n",
                 f);

@@ -14,10 +14,10 @@
 
 enum { MAX_PATH = 4400 };
 
-/* Seeds of pictures differ, or their noise would be the same. */
-static uint64_t picture_seed(uint64_t seed, int picture)
+/* Seeds of images differ, or their noise would be the same. */
+static uint64_t image_seed(uint64_t seed, int image)
 {
-    return (seed * 1000003u + (uint64_t)picture) % 1000000007u;
+    return (seed * 1000003u + (uint64_t)image) % 1000000007u;
 }
 
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
@@ -34,21 +34,21 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
     return true;
 }
 
-/* Pictures are made one after the other, so that a student's time does not depend on how many others there are. */
-static bool make_pictures(const struct grade_job *job, const struct submission *s, const char *work,
-                          const char *out, struct submitted_images *h, struct err *e)
+/* Images are made one after the other, so that a student's time does not depend on how many others there are. */
+static bool make_images(const struct grade_job *job, const struct submission *s, const char *work,
+                        const char *out, struct submitted_images *h, struct err *e)
 {
     const struct rubric *r = job->rubric;
-    for (int i = 0; i < r->num_pictures; i++) {
-        const struct rubric_picture *p = &r->picture[i];
+    for (int i = 0; i < r->num_images; i++) {
+        const struct rubric_image *p = &r->image[i];
         struct err why = {""};
-        if (!submission_picture(r, job->sandbox, s, i, job->stage, work, out,
-                                picture_seed(job->seed, i), job->threads, &h->made[i], e))
+        if (!submission_image(r, job->sandbox, s, i, job->stage, work, out,
+                              image_seed(job->seed, i), job->threads, &h->made[i], e))
             return false;
         if (h->made[i].path[0] == '\0')
             err_set(&why, "%s", h->made[i].why);
-        else if (submitted_image_read(h->made[i].path, r->curve, p->width, p->height,
-                                      &h->picture[i], &why))
+        else if (submitted_image_read(h->made[i].path, r->curve, p->width, p->height, &h->image[i],
+                                      &why))
             why.msg[0] = '\0';
         else if (err_is_of_memory(&why)) /* which is our trouble */
             return err_set(e, "%s: %s", p->name, why.msg);
@@ -63,7 +63,7 @@ static json_t *number(double v)
     return isfinite(v) ? json_real(v) : json_null();
 }
 
-static json_t *relative_of(const struct difference *a, const struct rubric_picture *p)
+static json_t *relative_of(const struct difference *a, const struct rubric_image *p)
 {
     if (a->relative == NULL)
         return json_null();
@@ -100,16 +100,16 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
         c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
         "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
         result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
-        result->accepted, "flag", result->flag, "picture", r->picture[result->picture].name, "tile",
+        result->accepted, "flag", result->flag, "picture", r->image[result->image].name, "tile",
         result->agreement.tiles > 0
             ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
             : json_null(),
-        "relative", relative_of(&result->agreement, &r->picture[result->picture]), "intervals",
+        "relative", relative_of(&result->agreement, &r->image[result->image]), "intervals",
         intervals_of(&result->agreement, c));
 }
 
-static json_t *picture_json(const struct rubric_picture *p, const struct made *made,
-                            const struct submitted_image *s, const char *why)
+static json_t *image_json(const struct rubric_image *p, const struct made *made,
+                          const struct submitted_image *s, const char *why)
 {
     const char *slash = strrchr(made->path, '/');
     return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, ss?}", "name", p->name, "file",
@@ -125,7 +125,7 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
                        int *set, struct err *e)
 {
     const struct rubric *r = job->rubric;
-    json_t *checks = json_array(), *parts = json_array(), *pictures = json_array();
+    json_t *checks = json_array(), *parts = json_array(), *images = json_array();
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
     struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
     bool ok = (result != NULL || err_set(e, "out of memory")) &&
@@ -143,9 +143,9 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
         json_array_append_new(parts,
                               json_pack("{ss, ss, sf, sf}", "number", r->part[i].number, "title",
                                         r->part[i].title, "points", part[i], "of", of[i]));
-    for (int i = 0; i < r->num_pictures; i++) {
-        json_array_append_new(pictures,
-                              picture_json(&r->picture[i], &h->made[i], &h->picture[i], h->why[i]));
+    for (int i = 0; i < r->num_images; i++) {
+        json_array_append_new(images,
+                              image_json(&r->image[i], &h->made[i], &h->image[i], h->why[i]));
         cpu_s += h->made[i].cpu_s;
     }
     json_object_set_new(grade, "points", json_real(points));
@@ -155,11 +155,11 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
     json_object_set_new(grade, "accepted", json_string(r->set[*set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
-    json_object_set_new(grade, "pictures", pictures);
+    json_object_set_new(grade, "pictures", images);
     return ok;
 }
 
-/* A picture that is not of the student's making looks like no bug. */
+/* An image that is not of the student's making looks like no bug. */
 static bool is_flagged(const json_t *grade)
 {
     size_t i;
@@ -172,24 +172,24 @@ static bool is_flagged(const json_t *grade)
     return false;
 }
 
-/* By the pictures that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
+/* By the images that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
 static json_t *name_bug(const struct grade_job *job, const struct submission *s,
                         const struct submitted_images *h, int set, const char *work)
 {
-    json_t *by_pictures =
+    json_t *by_images =
         job->bugs != NULL
             ? grade_diagnose_by_images(job->bugs, job->rubric, job->answers, h, set, job->alpha)
             : json_null();
     if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
-        json_array_size(json_object_get(by_pictures, "named")) == 1)
-        return by_pictures;
+        json_array_size(json_object_get(by_images, "named")) == 1)
+        return by_images;
     json_t *by_views = grade_diagnose_of(job->diagnosis, job->sandbox, s, work, job->seed,
                                          job->threads, job->alpha);
     size_t views = json_array_size(json_object_get(by_views, "named")),
-           pictures = json_array_size(json_object_get(by_pictures, "named"));
-    bool better = json_is_null(by_pictures) || (views > 0 && (pictures == 0 || views < pictures));
-    json_decref(better ? by_pictures : by_views);
-    return better ? by_views : by_pictures;
+           images = json_array_size(json_object_get(by_images, "named"));
+    bool better = json_is_null(by_images) || (views > 0 && (images == 0 || views < images));
+    json_decref(better ? by_images : by_views);
+    return better ? by_views : by_images;
 }
 
 static bool grade_made(const struct grade_job *job, const struct submission *s, const char *work,
@@ -198,13 +198,13 @@ static bool grade_made(const struct grade_job *job, const struct submission *s, 
     struct submitted_images *h = calloc(1, sizeof *h);
     int set = 0;
     bool ok = h != NULL || err_set(e, "out of memory");
-    ok = ok && make_pictures(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
+    ok = ok && make_images(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
     bool lost =
         ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
     json_object_set_new(grade, "diagnosis",
                         lost && !is_flagged(grade) ? name_bug(job, s, h, set, work) : json_null());
-    for (int i = 0; h != NULL && i < job->rubric->num_pictures; i++)
-        submitted_image_free(&h->picture[i]);
+    for (int i = 0; h != NULL && i < job->rubric->num_images; i++)
+        submitted_image_free(&h->image[i]);
     free(h);
     return ok;
 }

@@ -17,7 +17,7 @@ struct grade_job {
     const char *const *word; /* grade_options_words(), for "command" of a grade; NULL: not said */
     int num, jobs, threads;
     double alpha;                            /* of one check */
-    const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the pictures */
+    const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the images */
     const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
     uint64_t seed;
     bool again; /* also those that have been graded already */

@@ -20,18 +20,18 @@ static bool add_view(const struct view *v, const struct suite *suite, struct rub
 {
     const struct suite_scene *scene;
     const struct suite_variant *variant;
-    if (r->num_pictures == RUBRIC_PICTURES)
-        return err_set(e, "more than %d views to diagnose by", RUBRIC_PICTURES);
+    if (r->num_images == RUBRIC_IMAGES)
+        return err_set(e, "more than %d views to diagnose by", RUBRIC_IMAGES);
     if (!catalogue_view_scene(v, suite, &scene, &variant, e))
         return false;
-    struct rubric_picture *p = &r->picture[r->num_pictures++];
-    *p = (struct rubric_picture){.suite = scene,
-                                 .width = v->width,
-                                 .height = v->height,
-                                 .spp = v->spp,
-                                 .lights = 1,
-                                 .bounces = scene->depth};
-    snprintf(p->name, sizeof p->name, "view%d", r->num_pictures);
+    struct rubric_image *p = &r->image[r->num_images++];
+    *p = (struct rubric_image){.suite = scene,
+                               .width = v->width,
+                               .height = v->height,
+                               .spp = v->spp,
+                               .lights = 1,
+                               .bounces = scene->depth};
+    snprintf(p->name, sizeof p->name, "view%d", r->num_images);
     snprintf(p->scene, sizeof p->scene, "%s", scene->name);
     join(v->options[0] != NULL ? v->options
          : variant != NULL     ? variant->options
@@ -70,7 +70,7 @@ void grade_diagnose_close(struct grade_diagnosis *d)
     *d = (struct grade_diagnosis){0};
 }
 
-/* One view rendered by the submission; the picture goes away again. */
+/* One view rendered by the submission; the image goes away again. */
 static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
                  const struct submission *s, int view, const char *work, uint64_t seed, int threads,
                  double alpha, struct observation *clue, struct err *e)
@@ -80,8 +80,8 @@ static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
         .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
     const struct path out = fs_path("%s/diagnose", work);
     if (!fs_make_dirs(out.s, e) ||
-        !submission_picture(d->rubric, box, s, view, d->stage, work, out.s,
-                            seed * 1000u + (uint64_t)view, threads, &made, e))
+        !submission_image(d->rubric, box, s, view, d->stage, work, out.s,
+                          seed * 1000u + (uint64_t)view, threads, &made, e))
         return false;
     bool ok = made.why[0] == '\0'
                   ? diagnose_gather_image(&opt, d->catalogue.view[view].name, made.path, clue, e)
@@ -110,10 +110,10 @@ json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubri
 {
     struct diagnosis found;
     struct err e;
-    int with, pictures = 0;
-    for (int i = 0; i < r->num_pictures; i++)
-        pictures += b->view[0][i] >= 0 && h->picture[i].mean != NULL;
-    if (pictures == 0)
+    int with, images = 0;
+    for (int i = 0; i < r->num_images; i++)
+        images += b->view[0][i] >= 0 && h->image[i].mean != NULL;
+    if (images == 0)
         return json_null();
     if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, &found, &with, &e))
         return json_pack("{ss}", "error", e.msg);

@@ -1,4 +1,4 @@
-/* The bug's name in a student's feedback: by the pictures that were graded (rubric_bugs.h), and by the views of `assay
+/* The bug's name in a student's feedback: by the images that were graded (rubric_bugs.h), and by the views of `assay
  * diagnose`, rendered by a submission in the sandbox, for programs that can write our moments (rubric.h: diagnose). */
 #ifndef ASSAY_GRADE_DIAGNOSE_H
 #define ASSAY_GRADE_DIAGNOSE_H
@@ -10,7 +10,7 @@
 struct grade_diagnosis {
     struct catalogue catalogue;
     const struct suite *suite;
-    struct rubric *rubric; /* its pictures are the views */
+    struct rubric *rubric; /* its images are the views */
     char stage[512];       /* their scenes */
 };
 
@@ -20,8 +20,8 @@ bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
                          struct err *e) __attribute__((warn_unused_result));
 void grade_diagnose_close(struct grade_diagnosis *d);
 
-/* By the pictures, graded with the deviations of `set`, in the form of tools/docs/formats/grades.md ("diagnosis");
- * "correct" is never said of pictures that lost points: "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no picture. */
+/* By the images, graded with the deviations of `set`, in the form of tools/docs/formats/grades.md ("diagnosis");
+ * "correct" is never said of images that lost points: "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no image. */
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
                                  const struct answer_key *a, const struct submitted_images *h,
                                  int set, double alpha);

@@ -29,7 +29,7 @@ static const struct cli_option options[] = {
      "where grades and pages go (grades); what is there already is not done again", TO(out)},
     {'j', "jobs", "N", "submissions at a time; 0: as many as processors (1)", TO(jobs), 0, 64},
     {'t', "threads", "N", "{threads} of a program (1)", TO(threads), 1, 1024},
-    {0, "seed", "N", "from which {seed} of each picture is made (1)", TO(seed)},
+    {0, "seed", "N", "from which {seed} of each image is made (1)", TO(seed)},
     {0, "alpha", "A", "chance of a check that a right program loses points (1e-5)", TO(alpha),
      1e-12, 0.1},
     {0, "again", "", "grade also what has been graded", TO(again)},
@@ -90,7 +90,7 @@ void grade_options_help(void)
         "usage: assay grade [options] RUBRIC SUBMISSION...\n"
         "       assay grade --check-rubric RUBRIC\n"
         "       assay grade --prepare [-o DIR] RUBRIC\n\n"
-        "A submission is a directory of pictures, a program, or a source tree that the rubric says how to build.\n"
+        "A submission is a directory of images, a program, or a source tree that the rubric says how to build.\n"
         "Programs run in a sandbox, without which nothing is graded.\n",
         options);
     puts(

@@ -18,7 +18,7 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
         return;
     fprintf(
         f,
-        "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"Tiles of the picture by their difference\">",
+        "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"Tiles of the image by their difference\">",
         GRADE_SHOWN, width, height);
     json_array_foreach(values, i, v)
     {
@@ -79,7 +79,7 @@ void grade_plot_intervals(FILE *f, const json_t *check)
     json_array_foreach(list, i, v) draw_interval(&p, v, (double)(num - 1 - i));
     plot_segment(&p, "expected", 0, 0, 0, (double)num);
     plot_close(&p);
-    fputs("<figcaption>by how much, with the noise of your picture: all points while a bar touches "
+    fputs("<figcaption>by how much, with the noise of your image: all points while a bar touches "
           "green, none once it has left yellow</figcaption></figure>\n",
           f);
 }

@@ -56,7 +56,7 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
     if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
-            "Different from the right pictures in a way that no known bug explains.");
+            "Different from the right images in a way that no known bug explains.");
     json_array_foreach(json_object_get(diagnosis, "named"), i, b)
     {
         if (n < size)

@@ -106,8 +106,8 @@ static int set_of(const struct rubric *r, const json_t *grade)
     return k;
 }
 
-/* Is it the picture of an `equal` check, and did it cost no points? */
-static bool is_right(const json_t *grade, const char *picture)
+/* Is it the image of an `equal` check, and did it cost no points? */
+static bool is_right(const json_t *grade, const char *image)
 {
     size_t i;
     json_t *c;
@@ -115,7 +115,7 @@ static bool is_right(const json_t *grade, const char *picture)
     json_array_foreach(json_object_get(grade, "checks"), i, c)
     {
         if (strcmp(member_or_empty(c, "kind"), "equal") != 0 ||
-            strcmp(member_or_empty(c, "picture"), picture) != 0)
+            strcmp(member_or_empty(c, "picture"), image) != 0)
             continue;
         asked = true;
         if (member_number(c, "share") < 1)
@@ -124,12 +124,12 @@ static bool is_right(const json_t *grade, const char *picture)
     return asked;
 }
 
-/* Pictures that cannot be read any more are left out; for want of memory none is. */
+/* Images that cannot be read any more are left out; for want of memory none is. */
 static bool read_noise(const char *out, const struct rubric *r, const struct answer_key *a, int i,
                        const json_t *grade, struct noise_print *noise, struct err *e)
 {
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
-    const struct rubric_picture *p = &r->picture[i];
+    const struct rubric_image *p = &r->image[i];
     const struct moments *own = &a->of[set_of(r, grade)][i].m, *plain = &a->of[0][i].m;
     struct submitted_image s;
     struct err why;
@@ -145,8 +145,7 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     return ok;
 }
 
-static void add_like(json_t *grade, const json_t *other, const char *picture, double t,
-                     double bound)
+static void add_like(json_t *grade, const json_t *other, const char *image, double t, double bound)
 {
     json_t *list = json_object_get(grade, "alike");
     if (list == NULL) {
@@ -157,9 +156,9 @@ static void add_like(json_t *grade, const json_t *other, const char *picture, do
     const char *id = member_or_empty(other, "id");
     for (size_t i = 0; i < last; i++)
         if (strcmp(member_or_empty(json_array_get(list, i), "id"), id) == 0)
-            return; /* by an earlier picture */
+            return; /* by an earlier image */
     json_array_append_new(
-        list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", picture, "t", t, "bound", bound));
+        list, json_pack("{ss, ss, sf, sf}", "id", id, "picture", image, "t", t, "bound", bound));
 }
 
 bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a, json_t *grades,
@@ -168,9 +167,9 @@ bool same_noise(const char *out, const struct rubric *r, const struct answer_key
     size_t num = json_array_size(grades);
     struct noise_print *noise = calloc(num + 1, sizeof *noise);
     double bound =
-        same_noise_bound((double)num * ((double)num - 1) / 2 * r->num_pictures, SAME_NOISE_ALPHA);
+        same_noise_bound((double)num * ((double)num - 1) / 2 * r->num_images, SAME_NOISE_ALPHA);
     bool ok = noise != NULL || err_set(e, "out of memory");
-    for (int i = 0; ok && i < r->num_pictures; i++) {
+    for (int i = 0; ok && i < r->num_images; i++) {
         for (size_t k = 0; ok && k < num; k++)
             ok = a->of[0][i].m.width == 0 ||
                  read_noise(out, r, a, i, json_array_get(grades, k), &noise[k], e);
@@ -179,8 +178,8 @@ bool same_noise(const char *out, const struct rubric *r, const struct answer_key
                 double t = same_noise_t(&noise[k], &noise[j]); /* NAN: not told */
                 json_t *x = json_array_get(grades, k), *y = json_array_get(grades, j);
                 if (t > bound) {
-                    add_like(x, y, r->picture[i].name, t, bound);
-                    add_like(y, x, r->picture[i].name, t, bound);
+                    add_like(x, y, r->image[i].name, t, bound);
+                    add_like(y, x, r->image[i].name, t, bound);
                 }
             }
         for (size_t k = 0; noise != NULL && k < num; k++)

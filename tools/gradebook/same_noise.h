@@ -1,9 +1,9 @@
 /* Submissions that have the same noise: for staff to look at, never worth points. Programs that draw numbers of their own
- * err independently of each other, also where both are right or share an idea; a copy, or a picture rendered by somebody
+ * err independently of each other, also where both are right or share an idea; a copy, or an image rendered by somebody
  * else's program, errs as its original does, retouched or not. So does a program with the same fixed seed that
  * follows the same text to the letter.
  *
- * A picture less its reference in blocks of 2 x 2 pixels, green: the three differences that are orthogonal to the mean (Haar
+ * An image less its reference in blocks of 2 x 2 pixels, green: the three differences that are orthogonal to the mean (Haar
  * details), in which what differs smoothly hardly shows. P = sum over the three of A times B, less what both have of the
  * reference's noise. If A and B are independent E[P] = 0, blocks are independent, and the law of P is symmetric as that of a
  * difference of like pixels is; then T = sum P / sqrt(sum P^2) exceeds x with a probability of at most exp(-x^2/2)
@@ -15,7 +15,7 @@
 
 #include <jansson.h>
 
-enum { SAME_NOISE_FEWEST = 150 }; /* blocks that two pictures have to have in common */
+enum { SAME_NOISE_FEWEST = 150 }; /* blocks that two images have to have in common */
 
 struct noise_print {
     int blocks;
@@ -23,8 +23,8 @@ struct noise_print {
     float *shared; /* per block: what the reference's noise adds to P */
 };
 
-/* Of a picture of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
- * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the picture has less
+/* Of an image of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
+ * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the image has less
  * than a quarter of the noise of ours, no block is. False: out of memory. The caller frees. */
 bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
                    struct noise_print *out, struct err *e) __attribute__((warn_unused_result));
@@ -35,7 +35,7 @@ double same_noise_t(const struct noise_print *a, const struct noise_print *b);
 /* What T has to exceed for a chance of alpha over `tests` of them. */
 double same_noise_bound(double tests, double alpha);
 
-/* Compares every pair of a class by the pictures in out/ID that cost neither of them points in an `equal` check (a bug that both
+/* Compares every pair of a class by the images in out/ID that cost neither of them points in an `equal` check (a bug that both
  * have would not be noise), at most ALPHA false alarms in a class on average. Each grade that has a like gets
  * "alike": [{"id": , "picture": , "t": , "bound": }]. */
 #define SAME_NOISE_ALPHA 1e-3

@@ -1,6 +1,6 @@
 /* A student's page: what was asked, what was seen, where. One file, no script, nothing from elsewhere. Checks that
  * are not visible now are left out: the page may be handed to the student. The reference is not shown, only how the
- * student's picture differs from it. */
+ * student's image differs from it. */
 #include "student_page.h"
 
 #include "renderer/base/fs.h"
@@ -70,8 +70,8 @@ static bool show_crop(FILE *f, const struct image_file *pic, uint8_t *rgb8, cons
     return ok;
 }
 
-static bool show_picture(FILE *f, const char *path, const char *name, const json_t *tile,
-                         struct err *e)
+static bool show_image(FILE *f, const char *path, const char *name, const json_t *tile,
+                       struct err *e)
 {
     struct image_file pic;
     struct err why;
@@ -103,7 +103,7 @@ static void show_chance(FILE *f, double chance, bool moves, const char *here)
     fputs("</p>\n", f);
 }
 
-static const json_t *picture_of(const json_t *grade, const char *name)
+static const json_t *image_of(const json_t *grade, const char *name)
 {
     size_t i;
     json_t *p;
@@ -128,7 +128,7 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
               member_or_empty(c, "accepted"), "");
     double share = member_number(c, "share");
     show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
-    const json_t *p = picture_of(grade, member_or_empty(c, "picture"));
+    const json_t *p = image_of(grade, member_or_empty(c, "picture"));
     bool ok = true;
     if (!full) {
         paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
@@ -136,7 +136,7 @@ static bool show_check(FILE *f, const char *dir, const json_t *grade, const json
         if (json_is_string(json_object_get(p, "sha256"))) {
             const struct path path =
                 fs_path("%s/%s/%s", dir, member_or_empty(grade, "id"), member_or_empty(p, "file"));
-            ok = show_picture(f, path.s, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
+            ok = show_image(f, path.s, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
             grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
             grade_plot_intervals(f, c);
         }
@@ -154,7 +154,7 @@ static void show_bug(FILE *f, const json_t *diagnosis)
     const char *finding = member_or_empty(diagnosis, "finding");
     if (strcmp(finding, "unknown") == 0)
         fputs(
-            "<p>The pictures differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
+            "<p>The images differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
             f);
     if (json_array_size(named) == 0)
         return;

@@ -7,14 +7,14 @@
 #include <jansson.h>
 #include <stdio.h>
 
-enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of a picture on the page */ };
+enum { GRADE_TILE = 8, GRADE_SHOWN = 384 /* width of an image on the page */ };
 
-/* Of one grade.json (grade_batch.h); its pictures are in dir/ID. */
+/* Of one grade.json (grade_batch.h); its images are in dir/ID. */
 bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     __attribute__((warn_unused_result));
 
 /* A check's tiles. Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. Of `exact`: the share of
- * pixels that differ. width, height: of the picture. */
+ * pixels that differ. width, height: of the image. */
 void grade_plot_difference(FILE *f, const json_t *check, double width, double height);
 
 /* A check's intervals against its margins, each over that beyond which there are no points. Nothing where there are

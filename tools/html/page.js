@@ -1,4 +1,4 @@
-// The viewer of each scene: pictures in place (keys 1 to 9, 0 side by side) and maps of two of them, one
+// The viewer of each scene: images in place (keys 1 to 9, 0 side by side) and maps of two of them, one
 // zoom, exposure and pixel for all frames of the scene. Verdicts and numbers are in the page without it.
 
 class Scene {
@@ -38,7 +38,7 @@ class Scene {
       this.ready = all.every((layer) => layer !== null);
       if (!this.ready) {
         this.box.replaceChildren(make("p", { className: "caption" },
-          "To stay below 5 MB this page has no room for the numbers behind these pictures."));
+          "To stay below 5 MB this page has no room for the numbers behind these images."));
         this.section.querySelectorAll(".maps .map[data-kind]").forEach((f) => f.remove());
         return;
       }
@@ -76,8 +76,8 @@ class Scene {
 
   shotSource(shot) {
     if (!this.ready) return null;
-    return { id: "picture " + shot.id, key: this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
-             layer: shot.layer, paint: (rgba, layer) => paintPicture(rgba, layer, 2 ** this.stops / this.white, this.curve) };
+    return { id: "image " + shot.id, key: this.stops + " " + this.curve, label: this.section.dataset.scene + " by " + shot.name,
+             layer: shot.layer, paint: (rgba, layer) => paintImage(rgba, layer, 2 ** this.stops / this.white, this.curve) };
   }
 
   stageSource() {
@@ -125,7 +125,7 @@ class Scene {
     this.stageLegend.replaceChildren();
     this.stageCaption.replaceChildren(make("b", {}, shot.name), " " + shot.about + (this.wiping ?
       ", left of the line; right of it " + other.name + ". Where both agree, no edge shows at the line." :
-      ". Swap pictures by their keys: what jumps is a difference, what flickers is noise."));
+      ". Swap images by their keys: what jumps is a difference, what flickers is noise."));
   }
 
   toggleWipe() {
@@ -154,7 +154,7 @@ class Scene {
     this.redraw();
   }
 
-  // To that factor, the picture's point (x, y) staying where it is; up to single pixels.
+  // To that factor, the image's point (x, y) staying where it is; up to single pixels.
   zoom(factor, x = this.view.x + this.width / this.view.zoom / 2, y = this.view.y + this.height / this.view.zoom / 2) {
     const most = Math.max(this.width, this.height) / 4, v = this.view;
     const next = Math.min(Math.max(factor, 1), most), keep = v.zoom / next;

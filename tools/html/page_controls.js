@@ -1,6 +1,6 @@
 // What a scene is operated with.
 
-// Makes the buttons, frames and captions of a scene, and puts them in place of its list of pictures.
+// Makes the buttons, frames and captions of a scene, and puts them in place of its list of images.
 function buildControls(scene) {
   const group = (label, ...children) => make("div", { className: "tabs", role: "group", "aria-label": label }, ...children);
   const button = (key, text, action, title) => {
@@ -10,7 +10,7 @@ function buildControls(scene) {
   };
   scene.shotButtons = ["Side by side", ...scene.shots.map((s) => s.name)].map((name, i) => {
     const b = button(String(i), name, () => scene.show(i, null));
-    // Sweeping over the tabs swaps the pictures, but never changes the layout by surprise.
+    // Sweeping over the tabs swaps the images, but never changes the layout by surprise.
     b.addEventListener("pointerenter", (e) => {
       if (e.pointerType === "mouse" && scene.shown > 0 && !scene.kind && i > 0) scene.show(i, null);
     });
@@ -37,29 +37,29 @@ function buildControls(scene) {
   let exposure, curve, pair, against;
   [exposure, scene.stopsInput, scene.stopsOutput] = slider("Exposure", "-8", "8", "0.25", 0, stopsText, (v) => scene.expose(v));
   [curve] = select("Curve", "Curve", Object.keys(curves), 0, (i) => { scene.curve = Object.keys(curves)[i]; scene.redraw(); });
-  [pair, scene.pairSelect] = select("of", "Pictures of the map", scene.claims.map((c) => c.name), 0, (i) => {
+  [pair, scene.pairSelect] = select("of", "Images of the map", scene.claims.map((c) => c.name), 0, (i) => {
     scene.claim = scene.claims[i];
     scene.show(scene.shown, scene.kind);
   });
-  [against, scene.againstSelect] = select("over", "Picture that is wiped in", scene.shots.map((s) => s.name), scene.against, (i) => {
+  [against, scene.againstSelect] = select("over", "Image that is wiped in", scene.shots.map((s) => s.name), scene.against, (i) => {
     scene.against = i;
     scene.show(scene.shown, null);
   });
   [scene.wipeLabel, scene.wipeInput] = slider("at", "0", "1", "0.005", 0.5,
     (v) => Math.round(100 * v) + " %", (v) => scene.setWipe(v));
-  scene.wipeButton = button("w", "Wipe", () => scene.toggleWipe(), "The shown picture left of a line, another one right of it");
+  scene.wipeButton = button("w", "Wipe", () => scene.toggleWipe(), "The shown image left of a line, another one right of it");
   scene.gridButton = button("g", "Tiles", () => scene.toggleGrid(), "Outlines the tiles that are judged");
   scene.zoomOutput = make("output", {}, "1 \u00d7");
 
   const row = (what, ...children) =>
     make("div", { className: "tools" }, make("span", { className: "what", "aria-hidden": "true" }, what), ...children);
-  const rows = [row("Picture", group("Which picture is shown", ...scene.shotButtons))];
-  if (scene.claims.length > 0) rows.push(row("Map", group("Which map of two pictures is shown", ...scene.kindButtons), pair));
+  const rows = [row("Image", group("Which image is shown", ...scene.shotButtons))];
+  if (scene.claims.length > 0) rows.push(row("Map", group("Which map of two images is shown", ...scene.kindButtons), pair));
   scene.wipeRow = row("Wipe", against, scene.wipeLabel);
   rows.push(row("View",
     group("Zoom", button("\u2212", "", () => scene.zoom(scene.view.zoom / 2), "Zoom out"),
       button("+", "", () => scene.zoom(scene.view.zoom * 2), "Zoom in"),
-      button("f", "Fit", () => scene.zoom(1), "The whole picture"), scene.zoomOutput),
+      button("f", "Fit", () => scene.zoom(1), "The whole image"), scene.zoomOutput),
     group("Overlays", ...(scene.shots.length > 1 ? [scene.wipeButton] : []), scene.gridButton), exposure, curve), scene.wipeRow);
 
   scene.side = make("div", { className: "side" });

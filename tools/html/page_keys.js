@@ -1,4 +1,4 @@
-// The scenes of the page, its keys, and when pictures are unpacked.
+// The scenes of the page, its keys, and when images are unpacked.
 
 const scenes = [...document.querySelectorAll("section.scene")].filter((s) => s.querySelector(".viewer")).map((s) => new Scene(s));
 

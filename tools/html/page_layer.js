@@ -1,5 +1,5 @@
 "use strict";
-// The numbers behind a picture, unpacked from the page (format: pixel_codec.h).
+// The numbers behind an image, unpacked from the page (format: pixel_codec.h).
 
 // 2^n for whole n from -1022 to 1023, exact.
 const POWER = (() => {

@@ -1,4 +1,4 @@
-// What is made of two pictures, pixel by pixel, and how numbers become colours.
+// What is made of two images, pixel by pixel, and how numbers become colours.
 
 const lutElement = document.getElementById("colours");
 // Red, green, blue of 257 steps of the diverging map, then of 256 of the sequential one.
@@ -9,7 +9,7 @@ const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const luminance = (three, i) =>
   LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
 
-// The picture's luminance, its standard error for channels that err together, and its mean.
+// The image's luminance, its standard error for channels that err together, and its mean.
 function greyOf(layer) {
   if (!layer.grey) {
     const pixels = layer.width * layer.height, value = new Float64Array(pixels), error = new Float64Array(pixels);
@@ -56,7 +56,7 @@ function shares(from, to) {
   });
 }
 
-// The mean radiance of each of width x height parts of a layer's picture, {value}; kept for a few sizes.
+// The mean radiance of each of width x height parts of a layer's image, {value}; kept for a few sizes.
 function reduceLayer(layer, width, height) {
   layer.reduced = layer.reduced || new Map();
   const known = layer.reduced.get(width);
@@ -146,8 +146,8 @@ const mapKinds = {
   },
   error: {
     key: "e", name: "Error", diverging: false, range: (v) => [0, symmetric(v, 0.001, 1)[1]], label: percent,
-    says: () => "How far off the picture is around each pixel (5 \u00d7 5) once the error that noise alone " +
-      "explains is taken out. Noise leaves scattered blotches on about half of a right picture; what follows " +
+    says: () => "How far off the image is around each pixel (5 \u00d7 5) once the error that noise alone " +
+      "explains is taken out. Noise leaves scattered blotches on about half of a right image; what follows " +
       "the shapes of the scene is error.",
   },
   variance: {
@@ -159,7 +159,7 @@ const mapKinds = {
   flip: {
     key: "p", name: "FLIP", diverging: false, range: (v) => [0, symmetric(v, 0.02, 1)[1]], label: digits,
     says: (a, b, v) => (v[0] === v[0] ? "How much the eye sees when " + a + " and " + b + " are swapped in place, at any exposure: " +
-      "0 nothing, 1 as green against blue. It knows nothing of noise: a right but noisy picture lights up too. Mean " +
+      "0 nothing, 1 as green against blue. It knows nothing of noise: a right but noisy image lights up too. Mean " +
       digits(v.reduce((s, x) => s + x, 0) / v.length) + "." : "There is no such map of this pair on this page."),
   },
   samples: {
@@ -225,7 +225,7 @@ function curveTable(name) {
 
 // Fills RGBA bytes with radiance times gain through a curve: all of a million pixels within a frame. A pixel
 // is one word, its lowest byte red, as on every machine that browsers run on.
-function paintPicture(rgba, layer, gain, curve) {
+function paintImage(rgba, layer, gain, curve) {
   const table = curveTable(curve), [r, g, b] = layer.value, scale = gain * CURVE_STEPS;
   const words = new Uint32Array(rgba.buffer);
   for (let i = 0; i < words.length; i++) {

@@ -1,12 +1,12 @@
 // What is read off: the marked pixel and the marked tile, in words and tables.
 
-// One row for each picture, then one for each pair.
+// One row for each image, then one for each pair.
 function readPixel(scene) {
   if (!scene.ready) return;
   const { x, y } = scene.pixel, i = y * scene.width + x;
   const row = (head, cells, tag = "td") => make("tr", {}, make("th", { scope: tag === "th" ? "col" : "row" }, head),
     ...cells.map((c) => make(tag, { className: "num" }, c)));
-  const pictures = scene.shots.map(({ name, layer }) => row(name, [
+  const images = scene.shots.map(({ name, layer }) => row(name, [
     ...[0, 1, 2].map((k) => withError(layer.value[k][i], layer.error[k][i])),
     layer.unit === "exact" ? "exact" : digits(countAt(layer, i), 7)]));
   const pairs = scene.claims.map((c) => {
@@ -16,7 +16,7 @@ function readPixel(scene) {
   });
   const table = (...rows) => make("table", {}, make("thead", {}, rows[0]), make("tbody", {}, ...rows[1]));
   scene.probe.replaceChildren(
-    table(row("Pixel " + x + ", " + y, ["red", "green", "blue", "n"], "th"), pictures),
+    table(row("Pixel " + x + ", " + y, ["red", "green", "blue", "n"], "th"), images),
     ...(pairs.length ? [table(row("Luminance", ["difference", "t"], "th"), pairs)] : []));
 }
 

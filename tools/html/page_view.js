@@ -1,4 +1,4 @@
-// One frame of the page: a canvas that shows a picture or a map through its scene's zoom, with the marked
+// One frame of the page: a canvas that shows an image or a map through its scene's zoom, with the marked
 // tile and pixel, and hands pointer and keys to the scene.
 
 function make(tag, properties, ...children) {
@@ -50,8 +50,8 @@ class Pane {
     resized.observe(this.frame);
   }
 
-  // A picture of so many pixels, for all frames; painted again only when its key has changed. Fewer than it has: a
-  // picture's radiance is averaged before the curve, a map is painted whole and made smaller.
+  // An image of so many pixels, for all frames; painted again only when its key has changed. Fewer than it has: an
+  // image's radiance is averaged before the curve, a map is painted whole and made smaller.
   buffer(source, width = this.scene.width, height = this.scene.height) {
     const { buffers } = this.scene, id = source.id + " " + width, whole = width === this.scene.width;
     let b = buffers.get(id);
@@ -127,7 +127,7 @@ class Pane {
     if (s.pixel) box(s.pixel.x, s.pixel.y, 1, 1, true);
   }
 
-  // Where in the picture a pointer event is, in pixels and parts of them.
+  // Where in the image a pointer event is, in pixels and parts of them.
   place(e) {
     const r = this.frame.getBoundingClientRect(), s = this.scene, scale = r.width / s.width * s.view.zoom;
     return { x: s.view.x + (e.clientX - r.left) / scale, y: s.view.y + (e.clientY - r.top) / scale,

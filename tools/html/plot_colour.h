@@ -11,7 +11,7 @@
 double luminance(const double rgb[3]);
 
 /* The radiance that is shown as white: the 99th percentile of the n luminances is shown at 0.8 of
- * white. Where a lamp fills so much of the picture that this would leave all else black (it is over
+ * white. Where a lamp fills so much of the image that this would leave all else black (it is over
  * 6 times the median of the positive luminances), 6 times that median takes its place and *capped is
  * true. 1 if no luminance is positive. Sorts `luminances`. */
 double plot_display_white(double *luminances, size_t n, bool *capped);

@@ -101,7 +101,7 @@ static bool make_feature_kernel(int order, double ppd, struct kernel *k)
     return true;
 }
 
-/* All that pictures of one size need. */
+/* All that images of one size need. */
 struct flip {
     int width, height;
     size_t pixels;

@@ -1,9 +1,9 @@
-/* FLIP: how much the eye sees when two pictures are swapped in place, 0 to 1 a pixel. LDR-FLIP after [Andersson20], HDR-FLIP
+/* FLIP: how much the eye sees when two images are swapped in place, 0 to 1 a pixel. LDR-FLIP after [Andersson20], HDR-FLIP
  * after [Andersson21] with the ACES tone curve. It knows nothing of noise and judges nothing: it stands beside the
  * statistics.
  *
- * Pictures are linear RGB of BT.709, 3 doubles a pixel, row 0 at the top; maps one float a pixel. Beyond its
- * border a picture goes on as its last pixel. */
+ * Images are linear RGB of BT.709, 3 doubles a pixel, row 0 at the top; maps one float a pixel. Beyond its
+ * border an image goes on as its last pixel. */
 #ifndef ASSAY_FLIP_H
 #define ASSAY_FLIP_H
 

@@ -1,5 +1,5 @@
 /* The rule of OpenImageIO's idiff, with the thresholds of Blender's own render tests: quoted beside our verdicts,
- * never part of them. A is the tested picture, B the reference; same sizes. Nothing here fails. */
+ * never part of them. A is the tested image, B the reference; same sizes. Nothing here fails. */
 #ifndef ASSAY_IDIFF_H
 #define ASSAY_IDIFF_H
 
@@ -8,11 +8,11 @@
 #include <stdint.h>
 
 /* Blender, tests/python/modules/render_report.py (read at commit 002f5b8): idiff -fail 0.016
- * -failpercent 1 on 8-bit pictures. A pixel fails if any of its channels differs by more than `fail`;
- * the picture fails if more than `percent` of the pixels do [OpenImageIO idiff]. */
+ * -failpercent 1 on 8-bit images. A pixel fails if any of its channels differs by more than `fail`;
+ * the image fails if more than `percent` of the pixels do [OpenImageIO idiff]. */
 #define BLENDER_FAIL    0.016
 #define BLENDER_PERCENT 1.0
-/* The 8-bit sRGB picture of the means, 3 bytes a pixel; radiance `white` is 255. */
+/* The 8-bit sRGB image of the means, 3 bytes a pixel; radiance `white` is 255. */
 void idiff_quantise(const struct moments *m, double white, uint8_t *rgb8);
 /* How many pixels have which largest difference of a channel, in steps of 1/255. */
 void idiff_histogram(const uint8_t *a, const uint8_t *b, size_t pixels, size_t count[256]);

@@ -14,17 +14,17 @@ static bool check_file(const char *path, const struct image_info *info, struct e
                   is_float);
     if (!known)
         return err_set(e,
-                       "%s: a picture to compare is an EXR, HDR or PFM of floats or a PNG of 8 or "
+                       "%s: an image to compare is an EXR, HDR or PFM of floats or a PNG of 8 or "
                        "16 bits, this is %s",
                        path, info->format);
     if (info->parts > 1)
-        return err_set(e, "%s: has %d pictures in one file, which of them?", path, info->parts);
+        return err_set(e, "%s: has %d images in one file, which of them?", path, info->parts);
     if (info->orientation != 1)
         return err_set(e, "%s: is stored rotated or mirrored (orientation %d)", path,
                        info->orientation);
     if (info->is_cropped)
         return err_set(e,
-                       "%s: stores another rectangle than the picture (data and display windows "
+                       "%s: stores another rectangle than the image (data and display windows "
                        "differ)",
                        path);
     return true;

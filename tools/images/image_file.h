@@ -1,4 +1,4 @@
-/* A picture file of any engine as RGB radiance (or code values), with the hygiene that every kind of
+/* An image file of any engine as RGB radiance (or code values), with the hygiene that every kind of
  * input needs. No colour conversion, no guesses: what is not understood is refused with a line. */
 #ifndef ASSAY_IMAGE_FILE_H
 #define ASSAY_IMAGE_FILE_H
@@ -13,8 +13,8 @@ struct image_file {
 };
 
 /* EXR, HDR (RGBE), PFM, and PNG of 8 or 16 bits. Channels R, G, B, or Y alone for all three; A only
- * where it is 1 everywhere. Fails on other formats and channels, on a rotated or cropped picture, on
- * several pictures in one file, on NaN and infinity. The caller frees with image_file_free(). */
+ * where it is 1 everywhere. Fails on other formats and channels, on a rotated or cropped image, on
+ * several images in one file, on NaN and infinity. The caller frees with image_file_free(). */
 bool image_file_read(const char *path, struct image_file *out, struct err *e)
     __attribute__((warn_unused_result));
 /* The same of a file that image_inspect() has looked at, so that it is opened once less. */

@@ -1,4 +1,4 @@
-/* A picture's numbers, packed for the page: mean and standard error of every pixel and channel, as exact
+/* An image's numbers, packed for the page: mean and standard error of every pixel and channel, as exact
  * as their noise warrants and no more. page_layer.js unpacks them.
  *
  * Precision. A value is stored as q 2^e, q whole, |q| <= 2^20, with e such that it is off by at most 1/16

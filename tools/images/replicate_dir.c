@@ -35,7 +35,7 @@ static bool list_names(const char *dir, struct replicate_dir *r, struct err *e)
     if (!ok)
         return err_set(e, "%s: out of memory for its file names", dir);
     if (r->num < 3)
-        return err_set(e, "%s: has %d pictures, at least 3 replicates are needed", dir, r->num);
+        return err_set(e, "%s: has %d images, at least 3 replicates are needed", dir, r->num);
     qsort(r->name, (size_t)r->num, sizeof *r->name, by_name);
     return true;
 }
@@ -62,7 +62,7 @@ static bool read_one(const char *dir, struct replicate_dir *r, int k, struct err
     size_t bytes = 3 * (size_t)r->width * (size_t)r->height * sizeof **r->rgb;
     for (int i = 0; i < k; i++)
         if (memcmp(r->rgb[i], r->rgb[k], bytes) == 0)
-            return err_set(e, "%s: %s and %s are the same picture: the seed was ignored", dir,
+            return err_set(e, "%s: %s and %s are the same image: the seed was ignored", dir,
                            r->name[i], r->name[k]);
     return true;
 }

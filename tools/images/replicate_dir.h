@@ -1,4 +1,4 @@
-/* A directory of pictures of one scene by one engine, each with a seed of its own. */
+/* A directory of images of one scene by one engine, each with a seed of its own. */
 #ifndef ASSAY_REPLICATE_DIR_H
 #define ASSAY_REPLICATE_DIR_H
 
@@ -6,12 +6,12 @@
 
 struct replicate_dir {
     int num, width, height;
-    float **rgb; /* num pictures: 3 floats a pixel */
+    float **rgb; /* num images: 3 floats a pixel */
     char **name; /* their file names, sorted */
 };
 
 /* Reads every file of the directory (but hidden ones) in the order of their names. Fails with a line
- * unless all are pictures of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
+ * unless all are images of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
  * same ("the seed was ignored"). The caller frees with replicate_dir_free(). */
 bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e)
     __attribute__((warn_unused_result));

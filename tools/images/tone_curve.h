@@ -1,4 +1,4 @@
-/* Tone curves of 8 and 16-bit pictures, backwards: from a code to linear radiance. */
+/* Tone curves of 8 and 16-bit images, backwards: from a code to linear radiance. */
 #ifndef ASSAY_TONE_CURVE_H
 #define ASSAY_TONE_CURVE_H
 

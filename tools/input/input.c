@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const double most_censored = 0.05;     /* of the picture, for EQUIVALENT */
+static const double most_censored = 0.05;     /* of the image, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
 
 static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
@@ -132,22 +132,22 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
     }
     a->num_censored = b->num_censored = num;
     if (num == pixels)
-        return err_set(e, "every pixel is saturated in one of the pictures");
+        return err_set(e, "every pixel is saturated in one of the images");
     input_notes_add(
         notes,
-        "saturated: %zu of %zu pixels (%.2g %%) have the darkest or brightest code in a "
-        "picture; they are in no sum and nothing is said of them. Regions around them are "
+        "saturated: %zu of %zu pixels (%.2g %%) have the darkest or brightest code in an "
+        "image; they are in no sum and nothing is said of them. Regions around them are "
         "measured by what is left",
         num, pixels, 100 * (double)num / (double)pixels);
     return true;
 }
 
-static bool pair_pictures(struct input *a, struct input *b, struct notes *notes, struct err *e)
+static bool pair_images(struct input *a, struct input *b, struct notes *notes, struct err *e)
 {
     struct noise_estimate s;
-    if (a->kind != INPUT_PICTURE || b->kind != INPUT_PICTURE)
+    if (a->kind != INPUT_IMAGE || b->kind != INPUT_IMAGE)
         input_notes_add(notes, "the variance that %c has is not used: the other side has none",
-                        a->kind == INPUT_PICTURE ? 'B' : 'A');
+                        a->kind == INPUT_IMAGE ? 'B' : 'A');
     if (!noise_estimate_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
         return false;
     a->is_guessed = b->is_guessed = true;
@@ -184,8 +184,8 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
     }
     if (!censor(a, b, notes, e))
         return false;
-    if (a->kind == INPUT_PICTURE || b->kind == INPUT_PICTURE)
-        return pair_pictures(a, b, notes, e);
+    if (a->kind == INPUT_IMAGE || b->kind == INPUT_IMAGE)
+        return pair_images(a, b, notes, e);
     /* The unknown skewness must add to the other side's in A - B, not cancel it. */
     if (a->kind == INPUT_VARIANCE)
         input_bound_skewness(&a->m, b->kind == INPUT_VARIANCE ? 1 : -1);

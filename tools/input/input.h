@@ -1,6 +1,6 @@
 /* What `assay compare` takes for a side, turned into moments (tools/docs/background/inputs.md):
  *   a moments EXR; a directory of replicates; the output of Mitsuba 3's moment integrator, or its
- *   reference with a variance image beside it; a plain picture: EXR, HDR, PFM of floats; a PNG of
+ *   reference with a variance image beside it; a plain image: EXR, HDR, PFM of floats; a PNG of
  *   known tone curve.
  * What has been assumed on the way is told in notes, which belong beside every verdict. */
 #ifndef ASSAY_INPUT_H
@@ -20,17 +20,17 @@ enum input_kind {
     INPUT_MOMENTS,    /* all there */
     INPUT_REPLICATES, /* all there, from a directory */
     INPUT_VARIANCE,   /* mean and variance, no skewness */
-    INPUT_PICTURE     /* the mean alone */
+    INPUT_IMAGE       /* the mean alone */
 };
 
 struct input_options {
-    const char *curve; /* of integer pictures (tone_curve.h); NULL: not known */
+    const char *curve; /* of integer images (tone_curve.h); NULL: not known */
     double spp;        /* samples per pixel of a side whose file does not say; 0: not known */
 };
 
 struct input {
     enum input_kind kind;
-    struct moments m;        /* of INPUT_VARIANCE M3 is 0, of INPUT_PICTURE n, M2, M3 are 0, until
+    struct moments m;        /* of INPUT_VARIANCE M3 is 0, of INPUT_IMAGE n, M2, M3 are 0, until
                                 input_pair() */
     bool is_xyz;             /* CIE X, Y, Z instead of R, G, B */
     unsigned char *censored; /* 1 per pixel: not 0 where nothing is known, or NULL */
@@ -45,13 +45,13 @@ bool input_read(const char *path, char side, const struct input_options *opt, st
 void input_free(struct input *in);
 
 /* Makes both fit for compare_moments(): the same colour space, censored pixels out of both (0, exact,
- * whatever they were), skewness bounded where it is not known, and variance from the pictures
+ * whatever they were), skewness bounded where it is not known, and variance from the images
  * themselves if one of them has none. */
 bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
     __attribute__((warn_unused_result));
 
 /* After compare_moments() on a pair: EQUIVALENT becomes INCONCLUSIVE, with the reason, if more than
- * 5 % of the picture or half of a reporting tile is censored; in the latter case nothing is detectable
+ * 5 % of the image or half of a reporting tile is censored; in the latter case nothing is detectable
  * in that tile, and mdb_tile says so. */
 void input_limit(const struct input *a, int tile, struct comparison *c);
 

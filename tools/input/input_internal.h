@@ -16,7 +16,7 @@ void input_to_xyz(struct input *in);
 /* Skewness of a log-normal law of the same mean and variance, as M3, times sign. */
 void input_bound_skewness(struct moments *m, double sign);
 
-/* Pictures without moments (plain_image.c). */
+/* Images without moments (plain_image.c). */
 bool plain_image_input(const char *path, char side, const struct input_options *opt,
                        struct input *out, struct notes *notes, struct err *e)
     __attribute__((warn_unused_result));

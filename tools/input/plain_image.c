@@ -77,7 +77,7 @@ static bool check_options(const char *path, char side, const struct image_file *
                           const struct input_options *opt, struct err *e)
 {
     if (opt->spp > 0)
-        return err_set(e, "%s: --spp-%c is for a picture with variance, this one has none", path,
+        return err_set(e, "%s: --spp-%c is for an image with variance, this one has none", path,
                        side);
     if (is_coded(pic) && opt->curve == NULL)
         return err_set(e,
@@ -117,7 +117,7 @@ bool plain_image_input(const char *path, char side, const struct input_options *
         if (b.saturated && out->censored != NULL)
             out->censored[i / 3] = 1;
     }
-    out->kind = INPUT_PICTURE;
+    out->kind = INPUT_IMAGE;
     if (ok)
         tell(path, &pic, opt->curve, notes);
     image_file_free(&pic);

@@ -39,15 +39,14 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct
               rubric_read(s->rubric, &suite, r, &m, e);
     if (ok && m.num > 0)
         ok = err_set(e, "%s:%d: %s", s->rubric, m.at[0].line, m.at[0].text);
-    for (int i = 0; ok && i < r->num_pictures; i++) {
-        const struct rubric_picture *picture = &r->picture[i];
-        if (picture->suite == NULL)
-            ok = beside_rubric(p, r, picture->scene, e) &&
-                 beside_rubric(p, r, picture->environment, e);
+    for (int i = 0; ok && i < r->num_images; i++) {
+        const struct rubric_image *image = &r->image[i];
+        if (image->suite == NULL)
+            ok = beside_rubric(p, r, image->scene, e) && beside_rubric(p, r, image->environment, e);
         else
-            ok = plan_input(p, picture->suite->dae, e) &&
-                 (picture->suite->environment[0] == '\0' ||
-                  plan_input(p, picture->suite->environment, e));
+            ok = plan_input(p, image->suite->dae, e) &&
+                 (image->suite->environment[0] == '\0' ||
+                  plan_input(p, image->suite->environment, e));
     }
     ok = ok && beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
          (r->diagnose[0] == '\0' || plan_input(p, s->catalogue, e));

@@ -35,7 +35,7 @@ bool plan_job(struct plan *p, const char *const *word, int num, const char *cons
 /* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
 bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                      struct err *e);
-/* Without naming the pictures on stdout. */
+/* Without naming the images on stdout. */
 bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, struct err *e)
     __attribute__((warn_unused_result));
 int job_render_gather(const struct plan *p, int argc, char **argv, struct err *e);

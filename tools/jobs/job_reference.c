@@ -1,7 +1,7 @@
-/* References as jobs: each renders some pictures of one of them (replicate_images.h), a replicate of Cycles say; what is there and up
+/* References as jobs: each renders some images of one of them (replicate_images.h), a replicate of Cycles say; what is there and up
  * to date has none. The plan's head also has
  *   "references": [{"scene": , "engine": , "seed": , "key": reference_key(), "binary_sha256": of the engine,
- *                   "job": of its first pictures, "jobs": how many}] */
+ *                   "job": of its first images, "jobs": how many}] */
 #include "reference/base/process.h"
 #include "reference/external/engine_bindings.h"
 #include "renderer/base/cli_rewrite.h"
@@ -71,13 +71,13 @@ struct wanted {
     const struct suite_scene *scene;
     const struct suite_reference *ref;
     struct reference_state state;
-    int pictures;
+    int images;
 };
 
 struct planning {
     const struct reference_command *c;
     struct wanted *wanted;
-    int num, pictures; /* of all */
+    int num, images; /* of all */
 };
 
 static bool look_at_one(void *ctx, const struct suite_scene *scene,
@@ -93,18 +93,18 @@ static bool look_at_one(void *ctx, const struct suite_scene *scene,
     if (more == NULL)
         return err_set(e, "out of memory");
     g->wanted = more;
-    if (!reference_count(scene, ref, &w.state.opt, &w.pictures, e))
+    if (!reference_count(scene, ref, &w.state.opt, &w.images, e))
         return false;
     g->wanted[g->num++] = w;
-    g->pictures += w.pictures;
+    g->images += w.images;
     return true;
 }
 
-/* Its share of all jobs, one at least and at most one for each picture. */
-static int jobs_of(const struct wanted *w, int parts, int pictures)
+/* Its share of all jobs, one at least and at most one for each image. */
+static int jobs_of(const struct wanted *w, int parts, int images)
 {
-    long long share = ((long long)parts * w->pictures + pictures / 2) / pictures;
-    return share < 1 ? 1 : share > w->pictures ? w->pictures : (int)share;
+    long long share = ((long long)parts * w->images + images / 2) / images;
+    return share < 1 ? 1 : share > w->images ? w->images : (int)share;
 }
 
 static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const char *binary,
@@ -124,8 +124,8 @@ static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const cha
     bool ok = json_array_append_new(json_object_get(p->head, "references"), entry) == 0 ||
               err_set(e, "%s: cannot be written into a plan", s->name);
     for (int i = 0; ok && i < jobs; i++) {
-        snprintf(range, sizeof range, "%d:%d", (int)((long long)w->pictures * i / jobs),
-                 (int)((long long)w->pictures * (i + 1) / jobs));
+        snprintf(range, sizeof range, "%d:%d", (int)((long long)w->images * i / jobs),
+                 (int)((long long)w->images * (i + 1) / jobs));
         ok = plan_job(p, word, sizeof word / sizeof *word, input, e);
     }
     return ok;
@@ -155,7 +155,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     json_object_set_new(p->head, "references", json_array());
     for (int i = 0; ok && i < g->num; i++) {
         const struct wanted *w = &g->wanted[i];
-        ok = plan_one(p, w, jobs_of(w, parts, g->pictures), binary[index_of(w)], e);
+        ok = plan_one(p, w, jobs_of(w, parts, g->images), binary[index_of(w)], e);
     }
     return ok;
 }

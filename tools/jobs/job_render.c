@@ -1,5 +1,5 @@
-/* A render as jobs: cells of its picture. What a pixel is depends on no other, so cells with all samples of their pixels, put beside
- * each other, are the picture of one render bit by bit, whatever the cells. --ranges: each cell in sample ranges, whose
+/* A render as jobs: cells of its image. What a pixel is depends on no other, so cells with all samples of their pixels, put beside
+ * each other, are the image of one render bit by bit, whatever the cells. --ranges: each cell in sample ranges, whose
  * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
@@ -24,8 +24,9 @@ static bool check_ranges(const struct options *o, int ranges, struct err *e)
         return err_set(e, "--ranges: not with --adaptive, whose rule stops a pixel by all of its "
                           "samples (--adaptive-unbiased can be cut)");
     if (ranges > 1 && o->keep_state)
-        return err_set(e, "--ranges: not with --keep-state, as who goes on with added sums makes a "
-                          "picture that no command makes again (assay merge adds samples)");
+        return err_set(e,
+                       "--ranges: not with --keep-state, as who goes on with added sums makes an "
+                       "image that no command makes again (assay merge adds samples)");
     return true;
 }
 
@@ -35,10 +36,10 @@ static bool check_options(const struct options *o, struct err *e)
         bool given;
         const char *name, *why;
     } no[] = {{o->action != ACTION_RENDER, "--help and the like", "are no render"},
-              {o->max_seconds > 0, "--time", "asks when all of the picture is done"},
-              {o->max_error > 0, "--error", "looks at all of the picture"},
-              {o->write_every > 0, "--write-every", "needs all of the picture"},
-              {o->resume != NULL, "--resume", "goes on with all of the picture"},
+              {o->max_seconds > 0, "--time", "asks when all of the image is done"},
+              {o->max_error > 0, "--error", "looks at all of the image"},
+              {o->write_every > 0, "--write-every", "needs all of the image"},
+              {o->resume != NULL, "--resume", "goes on with all of the image"},
               {o->heatmap != NULL, "--heatmap", "is made at once, without jobs"}};
     for (size_t i = 0; i < sizeof no / sizeof *no; i++)
         if (no[i].given)
@@ -46,7 +47,7 @@ static bool check_options(const struct options *o, struct err *e)
     return true;
 }
 
-/* As near to `parts` as whole rows of cells allow: rows of the picture as long as there are enough for 16 each, then
+/* As near to `parts` as whole rows of cells allow: rows of the image as long as there are enough for 16 each, then
  * columns too. out: x y dx dy, origin at the bottom left. */
 static void cell_of(const struct options *o, int parts, int k, int *num, int out[4])
 {

@@ -13,7 +13,7 @@
 
 /* A part, and its state while its rows are needed. */
 struct part {
-    int x, y, width, height;  /* in the picture, origin at the top left */
+    int x, y, width, height;  /* in the image, origin at the top left */
     int first, last;          /* its samples */
     struct checkpoint *state; /* NULL: not yet, or no more */
 };
@@ -146,7 +146,7 @@ static bool add_rows(struct gathering *g, const struct part *part, struct film *
     return true;
 }
 
-/* Rows y .. y+num-1 of the picture, from all parts that have some of them: those of a cell in the order of their samples, as
+/* Rows y .. y+num-1 of the image, from all parts that have some of them: those of a cell in the order of their samples, as
  * they were planned. */
 static bool read_band(struct gathering *g, int y, int num, struct film *band, struct err *e)
 {
@@ -181,7 +181,7 @@ static bool band_alloc(const struct options *o, int height, struct film *f, stru
     return f->target != NULL || err_set(e, "out of memory");
 }
 
-/* All rows by bands into the pictures; with --keep-state one band is all of it, which must fit into memory. */
+/* All rows by bands into the images; with --keep-state one band is all of it, which must fit into memory. */
 static bool write_whole(struct gathering *g, const struct output *out, struct err *e)
 {
     const struct options *o = g->o;

@@ -30,7 +30,7 @@ static bool check_pair(const struct share *a, const struct share *b, struct err 
                            share_common[i][1], va, vb);
     }
     if (a->cell[4] != b->cell[4] || a->cell[5] != b->cell[5])
-        return err_set(e, "%s and %s: of pictures of %d x %d and %d x %d pixels", a->path, b->path,
+        return err_set(e, "%s and %s: of images of %d x %d and %d x %d pixels", a->path, b->path,
                        a->cell[4], a->cell[5], b->cell[4], b->cell[5]);
     if (!same_cell(a, b)) {
         bool apart = a->cell[0] + a->cell[2] <= b->cell[0] ||

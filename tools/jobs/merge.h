@@ -1,4 +1,4 @@
-/* Shares of one picture put together: cells beside each other, sample ranges on top of each other. */
+/* Shares of one image put together: cells beside each other, sample ranges on top of each other. */
 #ifndef ASSAY_MERGE_H
 #define ASSAY_MERGE_H
 
@@ -14,7 +14,7 @@ struct share_part {
     int channel[PART_VALUES]; /* of the share's image; those of layers -1 where it has none */
 };
 
-/* A picture of pathtracer with what its metadata says about its part in the whole. Owns m and im;
+/* An image of pathtracer with what its metadata says about its part in the whole. Owns m and im;
  * the texts belong to im. */
 struct share {
     const char *path;
@@ -23,13 +23,13 @@ struct share {
     int cell[6];          /* x y dx dy of W H, origin at the bottom left */
     uint32_t (*range)[2]; /* sample numbers [0] .. [1]-1, in order, apart from each other */
     int num_ranges;
-    /* A picture that was merged from several sample ranges keeps them (attribute assay:parts, "0:4,4:9", and channels "0:4.R" ..), so
+    /* An image that was merged from several sample ranges keeps them (attribute assay:parts, "0:4,4:9", and channels "0:4.R" ..), so
      * that it is merged further as they would have been. Any other has one part, itself. In order. */
     struct share_part *part;
     int num_parts;
 };
 
-/* Reads one. Fails with a line on a file that is no picture of pathtracer or lacks the metadata. */
+/* Reads one. Fails with a line on a file that is no image of pathtracer or lacks the metadata. */
 bool share_read(const char *path, struct share *out, struct err *e)
     __attribute__((warn_unused_result));
 void share_free(struct share *s);

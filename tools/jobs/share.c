@@ -1,4 +1,4 @@
-/* Shares of a picture as files. */
+/* Shares of an image as files. */
 #include "merge.h"
 
 #include "renderer/pathtracer/render_id.h"
@@ -127,7 +127,7 @@ bool share_read(const char *path, struct share *s, struct err *e)
         ok = ok && image_get_attr(&s->im, share_common[i][0]) != NULL;
     if (!ok)
         err_set(e,
-                "%s: does not say which part of which picture it is (attributes assay:cell, "
+                "%s: does not say which part of which image it is (attributes assay:cell, "
                 "assay:samples, assay:scene, ...)",
                 path);
     ok = ok && parse_ranges(samples, true, s->path, &s->range, &s->num_ranges, e) &&

@@ -93,11 +93,11 @@ void plot_convergence(FILE *f, const json_t *scene, bool against_time)
 {
     const json_t *engines = json_object_get(scene, "engines"), *j;
     const char *what =
-        against_time ? "CPU seconds of a picture, without the engine's start" : "samples per pixel";
+        against_time ? "CPU seconds of an image, without the engine's start" : "samples per pixel";
     struct plot p = plot_sized(f, 340, 240);
     size_t k;
     p.x = (struct plot_axis){.label = what, .is_log = true, .has_grid = true};
-    p.y = (struct plot_axis){.label = "relative RMS error of a picture",
+    p.y = (struct plot_axis){.label = "relative RMS error of an image",
                              .is_log = true,
                              .has_grid = true,
                              .unit = "\u00a0%"};
@@ -116,7 +116,7 @@ void plot_convergence(FILE *f, const json_t *scene, bool against_time)
               ? "<figcaption><b>Error against time.</b> Further left is better: the same error for "
                 "less work. Times are this machine's. "
               : "<figcaption><b>Error against samples.</b> The RMS over the pixels of the relative "
-                "error of one picture, with the noise of the reference taken out. The dashed line "
+                "error of one image, with the noise of the reference taken out. The dashed line "
                 "falls as the square root of the samples does, which is what independent samples "
                 "must do; stratified ones may fall faster. A line that bends flat has a bias. "
                 "Upright strokes are intervals. ",

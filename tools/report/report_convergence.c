@@ -77,10 +77,10 @@ static void write_rungs(FILE *f, const json_t *scene)
         }
     }
     html_table_close(f);
-    fputs("<p class=\"caption\"><b>Variance</b>: of one picture, relative, mean over "
+    fputs("<p class=\"caption\"><b>Variance</b>: of one image, relative, mean over "
           "the pixels. <b>RMS bias</b>: what is left of the "
           "error when noise is taken out; negative where the noise, by chance, was more. "
-          "<b>CPU s</b>: of one picture, its share of the engine's start included. "
+          "<b>CPU s</b>: of one image, its share of the engine's start included. "
           "<b>Efficiency</b>: 1/(variance × CPU seconds), start left out. ",
           f);
     write_csv(f, engines);
@@ -92,7 +92,7 @@ static void write_scene(FILE *f, const json_t *scene)
     const char *title = member_text(scene, "title");
     html_print(f,
                "<section class=\"scene\">\n<h2>Convergence: %s <code>%s</code></h2>\n"
-               "<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f pictures with seeds of "
+               "<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f images with seeds of "
                "their own for each number of samples. Errors are against %s (RMS noise %s). Each "
                "interval has the level %.6g\u00a0%%.</p>\n",
                title != NULL ? title : member_text(scene, "scene"), member_text(scene, "scene"),

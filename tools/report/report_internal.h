@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* Numbers behind a picture (pixel_codec.h), written at the page's end as long as there is room. */
+/* Numbers behind an image (pixel_codec.h), written at the page's end as long as there is room. */
 struct page_layer {
     char *path;
     int width, height;
@@ -53,8 +53,8 @@ bool report_pixel_data_add(struct page *p, const char *path, const struct moment
 void report_pixel_data_write(struct page *p);
 void report_pixel_data_free(struct page *p);
 
-/* <section> of one scene: what it is for, its pictures, each of its claims. All claims are of the
- * same scene. Fails when a picture cannot be read or the sizes differ. */
+/* <section> of one scene: what it is for, its images, each of its claims. All claims are of the
+ * same scene. Fails when an image cannot be read or the sizes differ. */
 bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, struct err *e)
     __attribute__((warn_unused_result));
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* The page of a suite stays below 5 MB: what is left after the text goes to the numbers behind the
- * pictures. The page of one scene has them whatever their size. */
+ * images. The page of one scene has them whatever their size. */
 enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
 
 bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
@@ -94,7 +94,7 @@ void report_pixel_data_write(struct page *p)
         fprintf(
             p->f,
             "<p class=\"caption\">To stay below 5 MB this page leaves out the numbers of %zu of "
-            "its %zu pictures, and with them the pictures.</p>\n",
+            "its %zu images, and with them the images.</p>\n",
             left_out, p->num_layers);
     if (maps_left_out > 0)
         fprintf(p->f,

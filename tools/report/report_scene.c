@@ -160,11 +160,11 @@ static void write_images(struct page *p, const struct scene *s)
             html_number(s->white).s);
     fputs(s->white_capped ? " (7.5 times the median of " : " (the 99th percentile of ", p->f);
     html_text(p->f, s->anchor);
-    fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the picture)"
+    fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the image)"
                           : " is shown at 80 % of white)",
           p->f);
     fputs(
-        ", then the sRGB curve. A frame smaller than its picture shows means. Values are exact to 1/16 of their own "
+        ", then the sRGB curve. A frame smaller than its image shows means. Values are exact to 1/16 of their own "
         "standard error or a millionth of themselves.</p>\n",
         p->f);
 }

@@ -71,7 +71,7 @@ static void write_line(FILE *f, const struct similarity *l)
     if (l->has_flip)
         fprintf(
             f,
-            "Mean FLIP, what the eye would see on swapping the pictures (0 nothing, 1 all): %.4f over "
+            "Mean FLIP, what the eye would see on swapping the images (0 nothing, 1 all): %.4f over "
             "%d exposures from %s to %s stops (HDR), %.4f as shown here (LDR). ",
             l->hdr, l->exposures.num, html_number(l->exposures.start).s,
             html_number(l->exposures.stop).s, l->ldr);
@@ -165,7 +165,7 @@ void report_similarity_table(const struct page *p)
     }
     fputs(
         "<section id=\"alike\">\n<h2>Beside the statistics</h2>\n"
-        "<p>What two measures that know nothing of noise say of the same pictures. They are quoted to compare, and "
+        "<p>What two measures that know nothing of noise say of the same images. They are quoted to compare, and "
         "have no part in any verdict.</p>\n",
         f);
     html_table_open(f, NULL, "Table of FLIP and idiff",
@@ -178,11 +178,11 @@ void report_similarity_table(const struct page *p)
     fprintf(
         f,
         "</p>\n<p class=\"caption\"><b>FLIP</b> (Andersson et al. 2020, 2021) is how much an eye sees "
-        "when the two pictures are swapped in place, %.0f pixels to a degree of sight, from 0, nothing, to 1, "
-        "as green against blue; here its mean over the picture. <b>HDR</b>: the most that is seen at any "
+        "when the two images are swapped in place, %.0f pixels to a degree of sight, from 0, nothing, to 1, "
+        "as green against blue; here its mean over the image. <b>HDR</b>: the most that is seen at any "
         "exposure that the reference asks for; <b>LDR</b>: at 0 stops as this page shows it. It counts noise as "
-        "it counts error, so that a right but noisy picture has a FLIP too. <b>idiff</b> (OpenImageIO) with the "
-        "thresholds of Blender’s own tests, -fail %g -failpercent %g, on the 8-bit sRGB pictures at 0 stops: it "
+        "it counts error, so that a right but noisy image has a FLIP too. <b>idiff</b> (OpenImageIO) with the "
+        "thresholds of Blender’s own tests, -fail %g -failpercent %g, on the 8-bit sRGB images at 0 stops: it "
         "fails where more than %g\u00a0%% of the pixels differ by more than 4 of 255 steps. Of %zu EQUIVALENT "
         "pairs it would fail %zu, of %zu DIFFERENT ones pass %zu.</p>\n</section>\n",
         FLIP_PPD, BLENDER_FAIL, BLENDER_PERCENT, BLENDER_PERCENT, equal, equal_fail, different,

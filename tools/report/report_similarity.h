@@ -1,4 +1,4 @@
-/* What stands on the page beside the statistics: how alike the two pictures of a claim look (FLIP), and what another
+/* What stands on the page beside the statistics: how alike the two images of a claim look (FLIP), and what another
  * renderer's test rule would have said of them (idiff). Neither has a part in any verdict. */
 #ifndef ASSAY_REPORT_SIMILARITY_H
 #define ASSAY_REPORT_SIMILARITY_H
@@ -8,7 +8,7 @@
 
 struct similarity {
     bool has_flip;   /* false where the reference is black */
-    double hdr, ldr; /* mean FLIP; LDR: as the page shows the pictures at 0 stops */
+    double hdr, ldr; /* mean FLIP; LDR: as the page shows the images at 0 stops */
     struct flip_exposures exposures;
     double idiff_percent; /* of the pixels differ by more than Blender's threshold */
     bool idiff_differs;

@@ -63,7 +63,7 @@ void report_stated_error(FILE *f, const json_t *consistency)
         "<p class=\"caption\">The scene is rendered several times with "
         "seeds of their own. <b>Pixels</b>: variance between the renders over the variance that "
         "they state; 1 if samples are independent, 2 if each is computed twice, 0 if the seed has "
-        "no effect. <b>Sum of pixels</b>: the same of the whole picture's sum; large if pixels "
+        "no effect. <b>Sum of pixels</b>: the same of the whole image's sum; large if pixels "
         "share their random numbers. <b>Noise</b>: what is stated over the closed form of this "
         "estimator's noise; 2 if every other sample is wasted. <b>Stopped wrong</b>: pixels that "
         "adaptive sampling stopped too early + too late.</p>\n</section>\n",

@@ -55,7 +55,7 @@ void report_tiles(FILE *f, const json_t *claim)
         fputs(
             "</div>\n<p class=\"caption tile-reading\" aria-live=\"polite\">Each is x, y of its "
             "corner; p asks if the tile's means are equal, without a margin. The first is outlined "
-            "in the maps. Press one to mark and enlarge it, or a tile in any picture to mark "
+            "in the maps. Press one to mark and enlarge it, or a tile in any image to mark "
             "it.</p></div>\n",
             f);
     }

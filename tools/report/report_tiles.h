@@ -6,7 +6,7 @@
 #include <stdio.h>
 
 /* The reporting tiles of smallest p as buttons (data-x, data-y: their corner, pixels) that mark the tile
- * in the pictures, and an empty line for what the page's script reads there. Nothing if no tile has
+ * in the images, and an empty line for what the page's script reads there. Nothing if no tile has
  * noise. */
 void report_tiles(FILE *f, const json_t *claim);
 

@@ -2,7 +2,7 @@
  * samples a pixel stops once 1.96 sqrt(v/n) <= tolerance x mean, v the variance of the luminance of its
  * samples. A rule that stops too early after the first batch, or never, leaves every mean right.
  *
- * For pictures in which all samples have one colour (one lamp, direct light), so that the channels of a
+ * For images in which all samples have one colour (one lamp, direct light), so that the channels of a
  * pixel are proportional and each of them has the relative interval of luminance. Then, from n, mean and
  * M2 of a pixel alone and without any chance of error but for rounding, which is allowed 0.1 %:
  *

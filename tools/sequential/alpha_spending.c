@@ -20,7 +20,7 @@ int alpha_spending_count(int look, int declared, int least)
     return n < 1 << 24 ? (int)n : 1 << 24;
 }
 
-/* A picture without any noise is the same for every seed. */
+/* An image without any noise is the same for every seed. */
 static bool check_fresh(const struct moments *m, const struct moments *again, const char *side,
                         struct err *e)
 {

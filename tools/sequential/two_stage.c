@@ -157,6 +157,6 @@ bool two_stage_check_fresh(const struct moments *first, const struct moments *ag
     size_t values = 3 * (size_t)first->width * (size_t)first->height * sizeof *first->mean;
     if (strcmp(first->unit, "exact") != 0 && memcmp(first->mean, again->mean, values) == 0)
         return err_set(e,
-                       "is the same picture as its first render: a second stage needs fresh seeds");
+                       "is the same image as its first render: a second stage needs fresh seeds");
     return true;
 }

@@ -18,7 +18,7 @@ void convergence_rate_reference_free(struct converge_reference *r)
     *r = (struct converge_reference){0};
 }
 
-/* Mean and variance of value c of the small picture's pixel (x, y), a mean over shrink x shrink
+/* Mean and variance of value c of the small image's pixel (x, y), a mean over shrink x shrink
  * pixels; *n is the smallest count of observations among them. */
 static bool box_value(const struct moments *m, int shrink, int x, int y, int c, double *mean,
                       double *var, double *n, struct err *e)
@@ -44,7 +44,7 @@ bool convergence_rate_reference_init(struct converge_reference *r, const struct 
 {
     assert(shrink > 0);
     if (m->width % shrink != 0 || m->height % shrink != 0)
-        return err_set(e, "a picture of %d x %d pixels cannot be made %d times smaller", m->width,
+        return err_set(e, "an image of %d x %d pixels cannot be made %d times smaller", m->width,
                        m->height, shrink);
     int width = m->width / shrink, height = m->height / shrink;
     size_t size = 3 * (size_t)width * (size_t)height;
@@ -127,7 +127,7 @@ static bool check_distinct(const float *images, int count, size_t size, struct e
     return true;
 }
 
-/* Sums over the values of a rung's pictures: |x_k - r|^2, |x_k - m|^2 and (x_k - r)(m - r) of each
+/* Sums over the values of a rung's images: |x_k - r|^2, |x_k - m|^2 and (x_k - r)(m - r) of each
  * replicate, |m - r|^2 of their mean. */
 struct sums {
     double *to_ref, *to_mean, *along;
@@ -186,8 +186,7 @@ static bool estimate_rung(const struct sums *s, int count, const struct converge
     for (int k = 0; k < count; k++) {
         double left = (to_ref - s->to_ref[k]) / (N * (K - 1)) - ref->noise;
         if (!(left > 0) || !(mse > 0))
-            return err_set(e,
-                           "the reference is noisier than this picture: its RMS noise is %.3g %%",
+            return err_set(e, "the reference is noisier than this image: its RMS noise is %.3g %%",
                            100 * sqrt(ref->noise));
         without[k] = log(left);
     }

@@ -1,7 +1,7 @@
 /* Convergence and variance of an engine, from K replicates at each rung of a ladder of sample counts.
  * Statistics only: no engine, no file. The procedure: tools/docs/background/convergence.md.
  *
- * A picture is `size` values (3 a pixel, linear radiance). Each is divided by a unit of its own, the
+ * An image is `size` values (3 a pixel, linear radiance). Each is divided by a unit of its own, the
  * reference's value there or 5 % of its mean if that is more, so that all errors are relative and a few
  * bright pixels do not make up the whole error. Below, x_k is replicate k in these units, m the mean of
  * all K, r the reference with the variance v of its own mean; N = size. Per rung
@@ -27,9 +27,9 @@ struct converge_reference {
                            pixel taken as fully correlated, pixels as independent */
 };
 
-/* The reference for pictures `shrink` times smaller on both sides: box averages, which with a box
- * filter of one pixel are the smaller picture exactly. Fails where shrink does not divide the size,
- * on stratified moments, on fewer than two observations, and on a black picture. */
+/* The reference for images `shrink` times smaller on both sides: box averages, which with a box
+ * filter of one pixel are the smaller image exactly. Fails where shrink does not divide the size,
+ * on stratified moments, on fewer than two observations, and on a black image. */
 bool convergence_rate_reference_init(struct converge_reference *r, const struct moments *m,
                                      int shrink, struct err *e) __attribute__((warn_unused_result));
 void convergence_rate_reference_free(struct converge_reference *r);

@@ -113,7 +113,7 @@ static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
     return true;
 }
 
-/* Mean of D over the blocks around one, which follows what the pictures differ by, and 1.25 times the
+/* Mean of D over the blocks around one, which follows what the images differ by, and 1.25 times the
  * mean distance from it, the sd of a normal law. */
 static void local_scale(const struct grid *d, int bx, int by, double *mean, double *sd)
 {
@@ -207,7 +207,7 @@ static bool level(const struct grid *d, double *factor, double *bound, struct er
     return ok;
 }
 
-/* Mean of (r/sd)^3 over the picture; the error from the scatter of the blocks' sums. */
+/* Mean of (r/sd)^3 over the image; the error from the scatter of the blocks' sums. */
 static void skewness(const struct blocks *g, double *skew, double *error)
 {
     size_t blocks = (size_t)g->nx * (size_t)g->ny;
@@ -288,7 +288,7 @@ bool noise_estimate_variance(struct moments *a, struct moments *b, const double 
     for (size_t i = 0; i < 3 * pixels && same; i++)
         same = (censored != NULL && censored[i / 3]) || a->mean[i] == b->mean[i];
     if (same)
-        return err_set(e, "A and B are the same picture: nothing tells how noisy it is");
+        return err_set(e, "A and B are the same image: nothing tells how noisy it is");
     if (a->width < 4 * BLOCK || a->height < 4 * BLOCK)
         return err_set(e,
                        "%d x %d pixels are too few to tell noise by its neighbours, 32 x 32 are "

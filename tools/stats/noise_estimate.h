@@ -1,4 +1,4 @@
-/* The noise of two pictures that come without any: from how their difference varies from pixel to
+/* The noise of two images that come without any: from how their difference varies from pixel to
  * pixel. The difference of two unbiased renders is nothing but noise; if they differ by more, then
  * by something smooth, which second differences do not see.
  *
@@ -11,8 +11,8 @@
  * survives the cut, heavy tails do not.
  *
  * Degrees of freedom: Var(sum r^2) is at most 4 sum r^4, for normal noise (2.52: neighbouring r are
- * correlated) and for the heaviest tails alike; a picture of N pixels of normal noise has N/6.
- * Skewness of D: 6 sum r^3 (the kernel cubed sums to 1/6), one coefficient for the picture, with its
+ * correlated) and for the heaviest tails alike; an image of N pixels of normal noise has N/6.
+ * Skewness of D: 6 sum r^3 (the kernel cubed sums to 1/6), one coefficient for the image, with its
  * jackknife error over the blocks on top.
  *
  * What this cannot see: an error as fine as a pixel or two looks like noise and hides itself; noise
@@ -33,7 +33,7 @@ struct noise_estimate {
  * written as 3 observations so that the comparison finds the variance, the degrees of freedom and
  * the skewness above; n is no count of anything. `more` (3 per pixel and side, or NULL) is variance
  * that the side has besides. Pixels with censored[p] != 0 take no part and get no noise. Fails with a
- * line where the pictures are the same, smaller than 32 x 32, or too much is censored. */
+ * line where the images are the same, smaller than 32 x 32, or too much is censored. */
 bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
                              const double *more_b, const unsigned char *censored,
                              struct noise_estimate *out, struct err *e)

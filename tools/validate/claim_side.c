@@ -156,7 +156,7 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                                        .options = s->variant != NULL ? s->variant->options : NULL,
                                        .threads = v->opt->threads,
                                        .timeout_s = program_time(v),
-                                       .picture = path.s,
+                                       .image = path.s,
                                        .log = log.s};
     if (!fs_make_parent_dirs(path.s, e) ||
         !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))

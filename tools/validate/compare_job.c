@@ -39,7 +39,7 @@ static bool pair_read(const struct compare_job *job, const char *const path[2], 
     for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
              p->in[1].censored != NULL ||
-             err_set(e, "--curve is for pictures of integers, neither %s nor %s is one", path[0],
+             err_set(e, "--curve is for images of integers, neither %s nor %s is one", path[0],
                      path[1]);
     ok = ok && input_pair(&p->in[0], &p->in[1], notes, e);
     if (!ok)
@@ -104,8 +104,7 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     bool ok = two ? two_stage_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
     if (ok && p.in[0].is_guessed && opt.margin_variance > 0)
-        ok =
-            err_set(e, "--margin-variance: a picture without moments tells no variance of its own");
+        ok = err_set(e, "--margin-variance: an image without moments tells no variance of its own");
     if (ok)
         input_limit(&p.in[0], opt.tile, &out->r);
     keep_pair(job->path, &p, out);
@@ -115,8 +114,8 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     return ok && (!two || out->r.verdict != VERDICT_DIFFERENT || second_stage(job, &opt, out, e));
 }
 
-static bool same_picture(const struct replicate_dir *r, const struct replicate_dir *s,
-                         const char *dir, struct err *e)
+static bool same_image(const struct replicate_dir *r, const struct replicate_dir *s,
+                       const char *dir, struct err *e)
 {
     if (r->width != s->width || r->height != s->height)
         return err_set(e, "%s: is %d x %d pixels, the first render %d x %d", dir, s->width,
@@ -141,7 +140,7 @@ static bool permute_again(const struct compare_job *job, const struct replicate_
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
         ok = replicate_dir_read(job->again[i], &again[i], e) &&
-             same_picture(&first[i], &again[i], job->again[i], e);
+             same_image(&first[i], &again[i], job->again[i], e);
     ok = ok && permutation_confirm(&found, &again[0], &again[1], stage, &out->perm, e);
     replicate_dir_free(&again[0]);
     replicate_dir_free(&again[1]);

@@ -32,9 +32,9 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
     snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
     snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
     snprintf(range, sizeof range, "%d:%d", job->first, job->spp);
-    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,       "-s",
-                                       spp,          "-m", depth, "-t",         threads,
-                                       "--seed",     seed, "-f",  job->picture, s->dae};
+    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,     "-s",
+                                       spp,          "-m", depth, "-t",       threads,
+                                       "--seed",     seed, "-f",  job->image, s->dae};
     int argc = 15;
     if (s->environment[0] != '\0') {
         argv[argc++] = "-e";
@@ -58,7 +58,7 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
     const struct process p = {.argv = argv, .log = job->log, .timeout_s = job->timeout_s};
     struct process_usage usage;
     struct image im;
-    if (!process_run(&p, &usage, e) || !moments_read(job->picture, out, &im, e))
+    if (!process_run(&p, &usage, e) || !moments_read(job->image, out, &im, e))
         return false;
     if (rays != NULL)
         *rays = read_rays(&im);

@@ -13,17 +13,17 @@ struct pathtracer_job {
     const char *const *options; /* further ones, NULL at the end; NULL: none */
     int threads;
     double timeout_s;
-    const char *picture, *log; /* files to write; their directory exists */
+    const char *image, *log; /* files to write; their directory exists */
 };
 
-/* What tracing took, as the picture says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
+/* What tracing took, as the image says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
  * leaves, of up to eight boxes or triangles each (renderer/bvh/bvh.h). */
 struct pathtracer_rays {
     double rays, box_tests, primitive_tests;
 };
 
-/* The picture's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
- * fails, and on a picture of another size. */
+/* The image's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
+ * fails, and on an image of another size. */
 bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
                     struct pathtracer_rays *rays, struct err *e)
     __attribute__((warn_unused_result));

@@ -215,7 +215,7 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     }
     if (engine_can) /* of the same scene, also 9x */
         add_task(v, s, &own->engine, &own->ours, &self, VERDICT_EQUIVALENT);
-    /* Our other ways to the same picture, against the closed form or else the first reference. */
+    /* Our other ways to the same image, against the closed form or else the first reference. */
     for (int i = 0; i < s->num_variants; i++) {
         struct suite_reference ref = s->reference[t];
         ref.margin_global = s->variant[i].margin_global;

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* Render k of the scene with those samples and further options; the picture is removed. */
+/* Render k of the scene with those samples and further options; the image is removed. */
 static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
                        int spp, const char *const *options, double deadline, struct moments *out,
                        double *seconds, struct err *e)
@@ -21,7 +21,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     double left = deadline - now_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
-    const struct path picture = fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
+    const struct path image = fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
     const struct path log = fs_path("%s/data/%s/consistency.log", opt->out_dir, s->name);
     const struct pathtracer_job job = {.program = opt->pathtracer,
                                        .scene = s,
@@ -30,13 +30,13 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                        .seed = replicate_seed((uint32_t)opt->seed, k),
                                        .threads = opt->threads,
                                        .timeout_s = fmin(left, opt->timeout_s),
-                                       .picture = picture.s,
+                                       .image = image.s,
                                        .log = log.s};
     double cpu_s;
-    if (!fs_make_parent_dirs(picture.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
+    if (!fs_make_parent_dirs(image.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
-    unlink(picture.s);
+    unlink(image.s);
     unlink(log.s);
     return true;
 }

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What starting a program and judging its picture costs, in vertices of paths. */
+/* What starting a program and judging its image costs, in vertices of paths. */
 static const double start_cost = 3e5;
 
 /* About what the next look of a claim costs, in vertices of paths. */

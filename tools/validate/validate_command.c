@@ -43,7 +43,7 @@ static const struct cli_option options[] = {
      TO(engine_file)},
     {0, "engine-spp", "N", "its samples per pixel (as in its file)", TO(opt.engine_spp), 1,
      1 << 24},
-    {0, "engine-replicates", "K", "its pictures (as in its file)", TO(opt.engine_replicates), 3,
+    {0, "engine-replicates", "K", "its images (as in its file)", TO(opt.engine_replicates), 3,
      4096},
     {0, "seed", "N", "seed of our render (1)", TO(opt.seed)},
     {0, "reference-seed", "N", "with --live (a fresh one), of --engine otherwise (0)",

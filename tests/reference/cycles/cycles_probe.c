@@ -64,7 +64,7 @@ void probe_need_blender(void)
     skip();
 }
 
-/* Statistics of a part of the picture: the sum over its pixels of the mean, and its standard error;
+/* Statistics of a part of the image: the sum over its pixels of the mean, and its standard error;
  * pixels are independent (box filter of one pixel, random numbers of their own). */
 struct part {
     double sum, variance, truth;
@@ -86,7 +86,7 @@ static struct part take(const struct moments *m, const double *truth, int x0, in
 
 bool probe_agrees(const struct moments *m, const double *truth, double allowed)
 {
-    /* A picture without noise is its own mean. */
+    /* An image without noise is its own mean. */
     double t = m->n[0] > 1 ? gsl_cdf_tdist_Qinv(5e-7, m->n[0] - 1) : 0;
     int w = m->width, h = m->height;
     bool agree = true;

@@ -51,7 +51,7 @@ void probe_render(struct probe *f, struct moments *m);
 bool probe_agrees(const struct moments *m, const double *truth, double allowed);
 
 /* It agrees, and the negative controls do not: 1 % brighter, and left and right exchanged unless the
- * picture is symmetric. Prints the figures, frees both. */
+ * image is symmetric. Prints the figures, frees both. */
 void probe_judge(struct probe *f, struct moments *m, double *truth, double allowed, bool symmetric);
 
 #endif

@@ -143,7 +143,7 @@ static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, st
     probe_ok(image_write_exr(path, im, &e), &e);
 }
 
-/* Different pictures all, but two were made with the same random numbers up to the last row. */
+/* Different images all, but two were made with the same random numbers up to the last row. */
 TEST_WITH(replicates_that_share_their_noise_are_refused, probe_setup, probe_teardown)
 {
     struct probe *f = *state;

@@ -67,7 +67,7 @@ static double seen_sky(const struct sky *sky, const double w[3])
     return sky_radiance(sky, phi / (2 * M_PI) * sky->width, theta / M_PI * sky->height);
 }
 
-/* Looks straight up, with +X to the right and +Z up in the picture: the pole in its middle. */
+/* Looks straight up, with +X to the right and +Z up in the image: the pole in its middle. */
 static void zenith_radiance(const double d[3], double out[3], const void *data)
 {
     const double w[3] = {d[0], -d[2], d[1]};

@@ -357,7 +357,7 @@ TEST_WITH(mirror_with_tilted_normals, probe_setup, probe_teardown)
     build_camera(&f->s, v3(0, 0, 0), 120);
     probe_render(f, &m);
     /* Cycles moves reflections nearer than 0.01 to the true surface up to there: the line along which
-     * they graze it crosses the whole picture. */
+     * they graze it crosses the whole image. */
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, tilted_mirror_radiance, &sky), 3e-3,
                 false);
 }

@@ -1,6 +1,6 @@
 /* Descriptions of engines: what is read and refused, which scenes need what, and what comes of
- * programs that behave and that do not. The programs are a few words of shell; their pictures are
- * written here first, so that every number of the folded picture is known. Renderers that trace rays
+ * programs that behave and that do not. The programs are a few words of shell; their images are
+ * written here first, so that every number of the folded image is known. Renderers that trace rays
  * are run by end_to_end.sh. */
 #define _GNU_SOURCE
 #include "tests/support/build_scene.h"
@@ -78,7 +78,7 @@ static float not_a_number(int pixel, int k)
     return pixel == 6 ? NAN : (float)k;
 }
 
-/* Runs `script` with the scene, the picture's path and the seed as $1, $2, $3. */
+/* Runs `script` with the scene, the image's path and the seed as $1, $2, $3. */
 static void engine_of_script(const char *script, const char *more, struct engine *en)
 {
     char json[2048];
@@ -356,7 +356,7 @@ TEST(what_cannot_be_expressed_is_said)
     engine_free(&en);
 }
 
-/* Three pictures whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
+/* Three images whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
  * sum (x - 8/3)^2 = 1 + 4 + 25 - 64/3 = 26/3, M3 = (-5/3)^3 + (-2/3)^3 + (7/3)^3 = 210/27. */
 TEST(replicates_are_folded)
 {
@@ -419,7 +419,7 @@ TEST(replicates_are_folded)
     engine_free(&en);
 }
 
-TEST(pictures_without_noise_are_exact)
+TEST(images_without_noise_are_exact)
 {
     struct engine en;
     struct moments m;
@@ -466,8 +466,7 @@ TEST(programs_that_misbehave_are_errors)
         {"cp {here}/large.pfm $2", "5 x 3 pixels, not 4 x 3"},
         {"cp {here}/nan.pfm $2", "pixel 2,1 is not finite"},
         {"cp {here}/grey.pfm $2", "no channels R, G and B"},
-        {"cp {here}/ramp.pfm $2",
-         "replicate 1 is the same picture as an earlier one: the seed has"},
+        {"cp {here}/ramp.pfm $2", "replicate 1 is the same image as an earlier one: the seed has"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct engine en;

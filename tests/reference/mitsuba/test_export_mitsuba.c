@@ -50,7 +50,7 @@ static void expect_ply(const char *name, unsigned n)
     test_same_text(text, expected);
 }
 
-static struct image read_picture(const char *name)
+static struct image read_image(const char *name)
 {
     struct image im;
     struct err e;
@@ -121,7 +121,7 @@ TEST(the_text_is_that_of_the_description)
     expect_ply("scene_object_0.ply", 3);
     expect_ply("scene_object_1.ply", 3);
     expect_ply("scene_object_2.ply", 6);
-    struct image im = read_picture("scene_material_4_eta.exr");
+    struct image im = read_image("scene_material_4_eta.exr");
     for (int i = 0; i < im.width * im.height; i++)
         assert_true(im.data[3 * i] == .25f && im.data[3 * i + 1] == 1.5f &&
                     im.data[3 * i + 2] == 1.25f);
@@ -160,7 +160,7 @@ static struct scene lit_by(struct light l)
     return s;
 }
 
-TEST(environment_pictures)
+TEST(environment_images)
 {
     static const char *const names[3] = {"R", "G", "B"};
     /* to_world of environment.xml.expected */
@@ -175,7 +175,7 @@ TEST(environment_pictures)
     struct camera c = build_finish(&s, 40, 30);
     assert_true(scene_add_environment(&s, environment_from_image(&im, "test", &e), &e));
     expect(&s, &c, EXPECTED "environment.xml.expected");
-    struct image got = read_picture("scene_environment.exr");
+    struct image got = read_image("scene_environment.exr");
     for (int i = 0; i < 2000; i++) {
         double y = 1 - 2 * (i + .5) / 2000, phi = 2.399963 * i, r = sqrt(1 - y * y);
         vec3 w = v3((float)(r * cos(phi)), (float)y, (float)(r * sin(phi)));

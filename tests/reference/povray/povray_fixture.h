@@ -1,10 +1,10 @@
-/* What tests of the POV-Ray driver share: a job for povray_driver, and our own picture of it. */
+/* What tests of the POV-Ray driver share: a job for povray_driver, and our own image of it. */
 #ifndef ASSAY_POVRAY_FIXTURE_H
 #define ASSAY_POVRAY_FIXTURE_H
 
 #include "reference/povray/povray_driver.h"
 
-/* POV-Ray sleeps through most of the 0.7 s that a small picture takes. */
+/* POV-Ray sleeps through most of the 0.7 s that a small image takes. */
 enum { THREADS = 8 };
 
 /* What povray_driver is given, in a directory that goes with it. */
@@ -21,9 +21,9 @@ struct fixture {
 /* Takes over the scene and completes it. Two replicates of subgrid 1. Aborts the test on failure. */
 void fixture_init(struct fixture *f, struct scene s, int size, int depth);
 void fixture_free(struct fixture *f);
-/* POV-Ray's picture; aborts the test if there is none. */
+/* POV-Ray's image; aborts the test if there is none. */
 struct moments must_render(struct fixture *f, json_t *manifest);
-/* Looks straight down at the plane y = 0 from height h; the picture is 2 h x 2 h wide. */
+/* Looks straight down at the plane y = 0 from height h; the image is 2 h x 2 h wide. */
 void look_down(struct scene *s, float h);
 /* Says so where there is none. */
 bool have_povray(void);

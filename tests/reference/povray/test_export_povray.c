@@ -345,8 +345,8 @@ TEST(test_rotation)
     free(text[1]);
 }
 
-/* A window moved by half a picture to the right and a quarter up looks along the ray that the
- * unmoved picture has there: -backward + (2 x 1/2) tan_h right + (2 x 1/4) tan_v up. */
+/* A window moved by half an image to the right and a quarter up looks along the ray that the
+ * unmoved image has there: -backward + (2 x 1/2) tan_h right + (2 x 1/4) tan_v up. */
 TEST(test_shift)
 {
     struct scene s = floor_and_ball(true);

@@ -1,4 +1,4 @@
-/* The POV-Ray driver: the pictures of a replicate, an engine that fails (a shell script that is
+/* The POV-Ray driver: the images of a replicate, an engine that fails (a shell script that is
  * called povray), and POV-Ray itself against closed forms and against our own renderer. */
 #include "tests/support/build_scene.h"
 #include "povray_fixture.h"
@@ -128,7 +128,7 @@ static struct scene plane(void)
     return s;
 }
 
-/* A corner of three walls and a ball, lit by a lamp above the picture: indirect light without a
+/* A corner of three walls and a ball, lit by a lamp above the image: indirect light without a
  * bright edge in view. */
 static struct scene corner(void)
 {
@@ -211,7 +211,7 @@ TEST(test_engine_failures)
 }
 
 /* The one failure that is tried again, ten times at most: the script leaves a line in its count for
- * each start, with the picture's directory. */
+ * each start, with the image's directory. */
 TEST(test_slow_start_is_tried_again)
 {
     char count[64] = "/tmp/fake_count.XXXXXX", script[256];
@@ -235,12 +235,12 @@ TEST(test_slow_start_is_tried_again)
     assert_int_equal(starts, 10);
 }
 
-/* A grey picture of w x h for the fakes to hand out. */
+/* A grey image of w x h for the fakes to hand out. */
 static void grey_exr(char path[64], int w, int h)
 {
     struct err e;
     struct image im;
-    strcpy(path, "/tmp/fake_picture.XXXXXX");
+    strcpy(path, "/tmp/fake_image.XXXXXX");
     int fd = mkstemp(path);
     assert_true(fd >= 0);
     close(fd);
@@ -253,9 +253,9 @@ static void grey_exr(char path[64], int w, int h)
     image_free(&im);
 }
 
-/* Pictures that look fine but must not be believed. 4 x 4 pixels: windows are 8 x 8, the pictures of
+/* Images that look fine but must not be believed. 4 x 4 pixels: windows are 8 x 8, the images of
  * replicates at subgrid 1 are 4 x 4. */
-TEST(test_implausible_pictures)
+TEST(test_implausible_images)
 {
     char small[64], large[64], script[512];
     grey_exr(small, 4, 4);
@@ -273,7 +273,7 @@ TEST(test_implausible_pictures)
     unlink(large);
 }
 
-/* Largest relative difference of a picture from a closed form, and that of the mean. The picture
+/* Largest relative difference of an image from a closed form, and that of the mean. The image
  * shows [-1/2, 1/2]^2; a pixel is the mean of 8 x 8 points. */
 static void compare(const struct moments *m, double (*irradiance)(double, double), rgb light,
                     double *worst, double *of_mean)

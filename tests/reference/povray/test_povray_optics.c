@@ -15,7 +15,7 @@
 enum { SIZE = 16 };
 
 /* Renders without noise and frees the fixture. */
-static struct moments exact_picture(struct scene s, int depth)
+static struct moments exact_image(struct scene s, int depth)
 {
     struct fixture f;
     fixture_init(&f, s, SIZE, depth);
@@ -27,7 +27,7 @@ static struct moments exact_picture(struct scene s, int depth)
     return m;
 }
 
-/* A function of the place (u, v) in the picture, both 0 .. 1 from its top left corner. */
+/* A function of the place (u, v) in the image, both 0 .. 1 from its top left corner. */
 typedef void radiance_at(double u, double v, const void *with, double out[3]);
 
 /* Largest relative difference of a pixel, the mean of 8 x 8 points. Pixels where those and the
@@ -100,7 +100,7 @@ TEST(test_spot_light)
                                        .cos_cutoff = (float)spot.cos_cutoff,
                                        .exponent = 3,
                                        .attenuation = {0, 0, 1}});
-        struct moments m = exact_picture(s, 5);
+        struct moments m = exact_image(s, 5);
         int used;
         assert_true(worst_pixel(&m, under_spot, &spot, .4, &used) < 5e-4);
         assert_true(cut ? used > SIZE * SIZE : used == 3 * SIZE * SIZE);
@@ -131,7 +131,7 @@ TEST(test_ball_lamp)
                build_material(&s, (rgb){.8f, .5f, .3f}, grey(0)));
     build_sphere(&s, v3(0, 1, 0), .2f, 1, build_material(&s, grey(0), (rgb){4, 5, 3}));
     look_down(&s, .5f);
-    struct moments m = exact_picture(s, 1);
+    struct moments m = exact_image(s, 1);
     double radius = .2, wrong = .202;
     int used;
     assert_true(worst_pixel(&m, under_ball, &radius, 1, &used) < 1e-3);
@@ -180,16 +180,16 @@ TEST(test_mirror_box)
         s.materials[m].radiance_both_sides = true;
         build_box(&s, v3(-1, -1, -1), v3(2, 2.5f, 2.25f), m);
         build_camera(&s, v3(.125f, .25f, .25f), 60);
-        struct moments picture = exact_picture(s, depth);
+        struct moments image = exact_image(s, depth);
         double ought[3], more[3];
         int used;
         for (int k = 0; k < 3; k++) {
             ought[k] = truth_furnace(es[k], rs[k], depth);
             more[k] = truth_furnace(es[k], rs[k], depth + 1);
         }
-        assert_true(worst_pixel(&picture, constant, ought, 1, &used) < 2.5e-4);
-        assert_false(worst_pixel(&picture, constant, more, 1, &used) < 2.5e-4);
-        moments_free(&picture);
+        assert_true(worst_pixel(&image, constant, ought, 1, &used) < 2.5e-4);
+        assert_false(worst_pixel(&image, constant, more, 1, &used) < 2.5e-4);
+        moments_free(&image);
     }
 }
 
@@ -232,11 +232,11 @@ TEST(test_glass_slab)
         build_camera(&s, v3(0, 1, 0), 20);
         s.camera.backward = v3(0, .5f, sqrtf(.75f));
         s.camera.up = v3(0, sqrtf(.75f), -.5f);
-        struct moments picture = exact_picture(s, depth);
+        struct moments image = exact_image(s, depth);
         int used, more = depth + 1;
-        assert_true(worst_pixel(&picture, slab_radiance, &depth, 1, &used) < 3e-4);
-        assert_false(worst_pixel(&picture, slab_radiance, &more, 1, &used) < 3e-4);
-        moments_free(&picture);
+        assert_true(worst_pixel(&image, slab_radiance, &depth, 1, &used) < 3e-4);
+        assert_false(worst_pixel(&image, slab_radiance, &more, 1, &used) < 3e-4);
+        moments_free(&image);
     }
 }
 

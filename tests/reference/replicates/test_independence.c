@@ -8,7 +8,7 @@
 
 enum { SIDE = 32, PIXELS = SIDE * SIDE };
 
-/* K pictures of one law; where `blur`, each pixel is half its own draw and half its left neighbour's,
+/* K images of one law; where `blur`, each pixel is half its own draw and half its left neighbour's,
  * which correlates pixels but not replicates. */
 static struct replicates draw_all(enum law law, int count, bool blur, uint64_t *state)
 {

@@ -141,7 +141,7 @@ static void albedos_are_2_percent_apart(const char *line_a, const char *line_b)
         assert_true(b[c] > 1.0199999 * a[c] && b[c] < 1.0200001 * a[c]);
 }
 
-/* Half a pixel at the picture's centre: atan(tan(39.6 deg / 2) / 128) = 0.16115402 deg. */
+/* Half a pixel at the image's centre: atan(tan(39.6 deg / 2) / 128) = 0.16115402 deg. */
 static void turn_is_half_a_pixel(const char *line_a, const char *line_b)
 {
     double a, b;

@@ -1,6 +1,6 @@
 /* Scenes of the suite that have no closed form as a whole, by other routes: closed forms of their
  * direct light, a mirror unfolded into a second room, lamps one by one. H0 of every z-test: both sides
- * have the same mean. Two-sided at alpha = 1e-6 each (|z| < 4.89), one seed for each picture, fixed n,
+ * have the same mean. Two-sided at alpha = 1e-6 each (|z| < 4.89), one seed for each image, fixed n,
  * no retry; each has a negative control that the same test must reject. The power is what the control
  * shows: it is off by the amount that its comment says. */
 #include "reference/suite/suite.h"
@@ -38,7 +38,7 @@ static struct scene open_shipped(const char *name)
     return s;
 }
 
-/* Camera ray of the picture's point (x, y) in pixels of size x size, as the scene's .md has it. */
+/* Camera ray of the image's point (x, y) in pixels of size x size, as the scene's .md has it. */
 struct view {
     double eye[3], right[3], up[3], forward[3], tan_half;
 };
@@ -71,7 +71,7 @@ static double hit(const double o[3], const double d[3], double p[3][3], double w
     return w[0] >= 0 && w[1] >= 0 && w[2] >= 0 && t > 0 ? t : 0;
 }
 
-/* z of the difference between the picture and what is expected of it, over the pixels of a square, the
+/* z of the difference between the image and what is expected of it, over the pixels of a square, the
  * ones with a negative expectation left out; `slack` is the error allowed to the expectation's mean. */
 static double z_square(const struct moments *m, const double *expected, int channel, int x0, int y0,
                        int side, double slack)
@@ -90,7 +90,7 @@ static double z_square(const struct moments *m, const double *expected, int chan
     return n == 0 ? 0 : fmax(0, fabs(difference) - n * slack) / sqrt(var);
 }
 
-/* The largest of those z over the squares of a picture, all channels. */
+/* The largest of those z over the squares of an image, all channels. */
 static double worst_z(const struct moments *m, const double *expected, int side, double slack)
 {
     double worst = 0;
@@ -170,7 +170,7 @@ static bool mesh_lamp_ray(const struct view *view, const double d[3], int skip, 
 }
 
 /* Means over pixels by n x n midpoints; -1 where the lamp is in sight, half a pixel around included. */
-static void mesh_lamp_picture(int size, int n, int skip, double *out)
+static void mesh_lamp_image(int size, int n, int skip, double *out)
 {
     const struct view view = {{0, 0.75, 3}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, tan(19.8 * DEGREE)};
     for (int p = 0; p < size * size; p++) {
@@ -197,8 +197,8 @@ TEST(mesh_lamp_direct_light_is_the_closed_form)
 {
     enum { SIZE = 32, TILE = 8 };
     static double expected[2][3 * SIZE * SIZE];
-    mesh_lamp_picture(SIZE, 8, -1, expected[0]);
-    mesh_lamp_picture(SIZE, 8, 7, expected[1]);
+    mesh_lamp_image(SIZE, 8, -1, expected[0]);
+    mesh_lamp_image(SIZE, 8, 7, expected[1]);
     struct scene s = open_shipped("36_mesh_lamp");
     struct integrator_options io = paths(1, 20261136);
     io.first_bounce = 1;
@@ -256,7 +256,7 @@ static void smooth_ray(const struct scene *s, const struct view *view, const dou
 
 /* Means over pixels by a Fibonacci lattice of n points, `step` being the Fibonacci number before n: even
  * for edges along the rows of pixels, which the rim of the dome has. */
-static void smooth_picture(const struct scene *s, int size, int n, int step, bool flat, double *out)
+static void smooth_image(const struct scene *s, int size, int n, int step, bool flat, double *out)
 {
     const struct view view = {.eye = {0, 2.8, 0},
                               .right = {1, 0, 0},
@@ -286,9 +286,9 @@ TEST(smooth_normals_in_sunlight_are_the_closed_form)
     const double slack = 5e-4;
     static double coarse[3 * SIZE * SIZE], fine[3 * SIZE * SIZE], flat[3 * SIZE * SIZE];
     struct scene s = open_shipped("27_smooth_normals");
-    smooth_picture(&s, SIZE, 144, 89, false, coarse);
-    smooth_picture(&s, SIZE, 377, 233, false, fine);
-    smooth_picture(&s, SIZE, 34, 21, true, flat);
+    smooth_image(&s, SIZE, 144, 89, false, coarse);
+    smooth_image(&s, SIZE, 377, 233, false, fine);
+    smooth_image(&s, SIZE, 34, 21, true, flat);
     for (int y = 0; y < SIZE; y += TILE)
         for (int x = 0; x < SIZE; x += TILE)
             for (int c = 0; c < 3; c++) {
@@ -344,7 +344,7 @@ static void set_wall(struct scene *s, float reflectance)
             s->materials[s->tri_material[i]].reflectance = grey(reflectance);
 }
 
-/* Difference of two pictures in each square, in standard errors; the largest. */
+/* Difference of two images in each square, in standard errors; the largest. */
 static double worst_difference(const struct moments *a, const struct moments *b, int side)
 {
     double worst = 0;

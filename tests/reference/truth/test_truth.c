@@ -182,7 +182,7 @@ TEST(wide_rectangle_gives_pi)
     assert_false(same(truth_rectangle_irradiance(1, narrow, narrow, 0.3, -0.2), M_PI));
 }
 
-TEST(pictures_are_exact_moments)
+TEST(images_are_exact_moments)
 {
     static const char *const names[] = {"11_furnace", "12_point_plane", "13_square_patch"};
     for (size_t s = 0; s < COUNT(names); s++) {
@@ -203,7 +203,7 @@ TEST(pictures_are_exact_moments)
 
 /* 11_furnace: E = (.5, 1, 2), rho = (.8, .5, .2), five bounces, each written as a fraction:
  * .5 (1-.8^6)/.2 = 1.84464, (1-.5^6)/.5 = 1.96875, 2 (1-.2^6)/.8 = 2.49984. */
-TEST(furnace_picture_is_flat)
+TEST(furnace_image_is_flat)
 {
     static const double expected[3] = {1.84464, 1.96875, 2.49984};
     struct moments m;
@@ -290,7 +290,7 @@ TEST(pixels_are_box_filtered)
     }
 }
 
-/* A picture of twice the resolution, averaged 2 x 2, is the same picture: the quadrature over a
+/* An image of twice the resolution, averaged 2 x 2, is the same image: the quadrature over a
  * pixel has converged, and pixels tile the footprint. */
 TEST(pixels_do_not_depend_on_resolution)
 {
@@ -314,8 +314,8 @@ TEST(pixels_do_not_depend_on_resolution)
 }
 
 /* Where the bright spot lies (the pixel, or its neighbour if the spot is on their border), and that
- * each flip, turn or transposition of the picture would put it elsewhere. */
-TEST(pictures_are_the_right_way_round)
+ * each flip, turn or transposition of the image would put it elsewhere. */
+TEST(images_are_the_right_way_round)
 {
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
         struct moments m;

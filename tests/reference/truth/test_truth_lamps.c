@@ -88,7 +88,7 @@ TEST(furnace_matches_quadrature)
 }
 
 /* 10: 1.2 (1 + .3), .8 (1 + .6), .4 (1 + .9). 14: the series' closed form, 20 bounces. */
-TEST(furnace_pictures_are_flat)
+TEST(furnace_images_are_flat)
 {
     const struct {
         const char *name;

@@ -166,7 +166,7 @@ TEST(pixels_match_rays)
     moments_free(&m);
 }
 
-/* Away from both edges the picture is one panel or the background; up is +Y and right is +X. */
+/* Away from both edges the image is one panel or the background; up is +Y and right is +X. */
 TEST(panels_are_where_they_belong)
 {
     struct moments m;

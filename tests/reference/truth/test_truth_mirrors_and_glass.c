@@ -74,7 +74,7 @@ static double pixel_mean(radiance_at *f, const void *scene, double half, int siz
     return value / (w * w);
 }
 
-/* The shipped scene's picture at another depth and size; its own where they are 0. */
+/* The shipped scene's image at another depth and size; its own where they are 0. */
 static void render(const char *name, int depth, int size, struct moments *out)
 {
     struct suite suite;
@@ -173,7 +173,7 @@ static void marched_box(const void *scene, double sx, double sy, double light[3]
 
 TEST(mirror_box_pixels)
 {
-    /* Of 60 x 60, whose borders the picture's edges do not share as they do those of 64 x 64: plain ones, ones
+    /* Of 60 x 60, whose borders the image's edges do not share as they do those of 64 x 64: plain ones, ones
      * with an edge across, corners, fine structure of later arrivals. */
     enum { SIZE = 60 };
     static const int at[][2] = {{3, 8}, {11, 20}, {33, 3}, {11, 33}, {38, 36}, {52, 43}, {33, 56}};
@@ -430,7 +430,7 @@ TEST(ball_is_a_tree_of_rays)
 {
     for (int depth = 0; depth <= 8; depth++)
         assert_int_equal(count_ball_differences(depth, NONE), 0);
-    /* More than half of the picture is the ball. */
+    /* More than half of the image is the ball. */
     for (enum mistake m = SCHLICK; m <= REFLECTION_FREE; m++)
         assert_true(count_ball_differences(ball.depth, m) > 8000);
 }
@@ -445,7 +445,7 @@ static void ball_scene(const void *scene, double sx, double sy, double light[3])
 
 TEST(ball_pixels)
 {
-    /* Of a picture of 16 x 16: a wall, the middle of the ball, its rim, edges of walls through it. */
+    /* Of an image of 16 x 16: a wall, the middle of the ball, its rim, edges of walls through it. */
     static const int at[][2] = {{1, 8}, {9, 9}, {3, 9}, {4, 13}, {9, 14}, {13, 6}};
     struct moments m;
     render("22_glass_sphere", 0, 16, &m);
@@ -457,7 +457,7 @@ TEST(ball_pixels)
     moments_free(&m);
 }
 
-/* The largest difference, relative to the larger of the two, of a square, a sixteenth of the picture's side (4 pixels of 64), in
+/* The largest difference, relative to the larger of the two, of a square, a sixteenth of the image's side (4 pixels of 64), in
  * the mean of its channels, with its sign. */
 static double worst_square(const struct moments *a, const struct moments *b)
 {

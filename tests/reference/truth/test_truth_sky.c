@@ -345,7 +345,7 @@ TEST(map_stands_for_the_gradient)
     image_free(&plain);
 }
 
-/* Of the shipped pictures: one pixel's mean by the midpoints of 40 x 40 cells of it, exact to 1e-6, with
+/* Of the shipped images: one pixel's mean by the midpoints of 40 x 40 cells of it, exact to 1e-6, with
  * the camera's geometry written once more. */
 static void render(const char *name, struct moments *out)
 {

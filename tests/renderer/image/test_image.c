@@ -1,4 +1,4 @@
-/* Our readers and writers of picture files against OpenImageIO's, a route of its own: the same bits of
+/* Our readers and writers of image files against OpenImageIO's, a route of its own: the same bits of
  * every channel, whichever way OpenEXR and RGBE pack them; and files that are cut short or damaged. */
 #include "renderer/base/fs.h"
 #include "reference/base/image_oiio.h"

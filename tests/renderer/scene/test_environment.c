@@ -301,7 +301,7 @@ static size_t half_exr(uint8_t *out)
     return (size_t)(p - out);
 }
 
-/* The same picture in RGBE: m 2^(e-136), so (64, 128, 192) with e = 130 is 1 2 3. */
+/* The same image in RGBE: m 2^(e-136), so (64, 128, 192) with e = 130 is 1 2 3. */
 static size_t radiance_hdr(uint8_t *out)
 {
     static const uint8_t pixels[8] = {64, 128, 192, 130, 32, 64, 96, 130};

@@ -23,7 +23,7 @@ static void look(struct scene *s, vec3 eye, vec3 backward, vec3 up)
 }
 
 /* A plate 6 x 6 around the origin with the unit normal n, seen at 45 degrees through an angle so
- * narrow that irradiance is constant over the picture. */
+ * narrow that irradiance is constant over the image. */
 static struct scene plate(vec3 n, float albedo)
 {
     struct scene s = build_scene();
@@ -202,7 +202,7 @@ TEST(seen_directly_and_in_mirrors)
                 double mean = 0;
                 for (int p = 0; p < 4; p++)
                     mean += film.mean[3 * p] / 4;
-                /* The picture is 0.0003 radians wide, on which the map changes by 1e-3 at most. */
+                /* The image is 0.0003 radians wide, on which the map changes by 1e-3 at most. */
                 double expected = factor[view] * le;
                 if (fabs(mean - expected) > 1e-3 + 2e-3 * expected)
                     fail_msg("direction %d, view %d, %s: %.6f, expected %.6f", k, view,
@@ -281,7 +281,7 @@ static struct scene corner_scene(void)
 }
 
 /* A constant environment, and a sphere of radius 50 around everything that emits the same to its
- * inside: two ways through the code, one picture. 32 x 24 pixels, 256 samples, standard error of the
+ * inside: two ways through the code, one image. 32 x 24 pixels, 256 samples, standard error of the
  * difference about 0.2 %. */
 TEST(sky_or_sphere_of_emitters)
 {
@@ -343,7 +343,7 @@ TEST(spot_light)
             struct moments film = check_render(&s, io, 4, 4, 64);
             for (int c = 0; c < 3; c++) {
                 double expected = 0.7 / M_PI * (c + 2) * share * 0.8 / pow(1.25, 1.5);
-                /* Near the right angle the picture's width shows: 0.0003 radians of 1 degree. */
+                /* Near the right angle the image's width shows: 0.0003 radians of 1 degree. */
                 double mean = 0;
                 for (int p = 0; p < 16; p++)
                     mean += film.mean[3 * p + c] / 16;

@@ -1,4 +1,4 @@
-/* Mirrors, glass and metals in scenes with closed forms. H0 of every z-test: the mean of the pictures'
+/* Mirrors, glass and metals in scenes with closed forms. H0 of every z-test: the mean of the images'
  * samples is the closed form. Two-sided at alpha = 1e-6 (|z| < 4.89), one seed, fixed n, no retry;
  * float rounding along a path allows 2e-5 relative where there is no noise at all. Each group has a
  * negative control that the same test must reject. */
@@ -17,7 +17,7 @@ static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
                                                        .roulette = ROULETTE_THROUGHPUT,
                                                        .sampler = {SAMPLER_INDEPENDENT, 20260204}};
 
-/* Mean over the picture and all samples of its pixels. */
+/* Mean over the image and all samples of its pixels. */
 static struct check_result look(const struct scene *s, struct integrator_options io, int size,
                                 int spp)
 {
@@ -27,7 +27,7 @@ static struct check_result look(const struct scene *s, struct integrator_options
     return r;
 }
 
-/* A pinhole so narrow that the picture is one direction: (0, sin, -cos) of the angle. */
+/* A pinhole so narrow that the image is one direction: (0, sin, -cos) of the angle. */
 static void aim(struct scene *s, vec3 eye, double degrees)
 {
     build_camera(s, eye, 0.02f);

@@ -155,7 +155,7 @@ TEST(resumed_equals_uninterrupted)
     drop(&f);
 }
 
-/* Negative control of the above: sums that went through float32, as pictures have them, and another
+/* Negative control of the above: sums that went through float32, as images have them, and another
  * seed do not give the same bits. */
 TEST(rounded_state_differs)
 {
@@ -442,7 +442,7 @@ TEST(rule_is_biased_and_pilot_is_not)
     drop(&f);
 }
 
-/* A wall that fills the left half of the view, parallel to the picture, 3 away from a camera that looks along
+/* A wall that fills the left half of the view, parallel to the image, 3 away from a camera that looks along
  * -X: depth 3 everywhere on it, whatever the angle; normal towards the camera. */
 TEST(layers_of_a_wall)
 {
@@ -480,7 +480,7 @@ TEST(layers_of_a_wall)
         assert_true(fabsf(variance[i] - part * (1 - part) * 16 / 15) < 1e-6f);
         assert_true(fabsf(variance[i + 3] - sqrtf(variance[i] / 16)) < 1e-6f);
     }
-    /* The edge, 0.3/3 from the middle of a picture 2 tan(30 deg) wide, crosses one column of pixels. */
+    /* The edge, 0.3/3 from the middle of an image 2 tan(30 deg) wide, crosses one column of pixels. */
     assert_true(seen[0] > 500 && seen[1] == SIZE && seen[2] > 300);
     image_free(&im);
     film_free(&film);

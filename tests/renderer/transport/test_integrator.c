@@ -62,7 +62,7 @@ static double polygon_irradiance(const double (*v)[3], int n)
 }
 
 /* A floor patch at the origin seen from a distance through a pinhole so narrow that irradiance is
- * constant over the picture. */
+ * constant over the image. */
 static struct scene floor_scene(float albedo)
 {
     struct scene s = build_scene();
@@ -223,7 +223,7 @@ TEST(same_bits_for_any_threads)
         assert_true(same_bits(&one, &many));
         moments_free(&many);
     }
-    /* Negative control: another seed is another picture. */
+    /* Negative control: another seed is another image. */
     io.sampler.seed++;
     struct moments other = check_render(&s, io, 50, 38, 8);
     assert_false(same_bits(&one, &other));
@@ -232,7 +232,7 @@ TEST(same_bits_for_any_threads)
     scene_free(&s);
 }
 
-/* A cell, and a range of samples, are the same numbers as in the whole picture. */
+/* A cell, and a range of samples, are the same numbers as in the whole image. */
 TEST(cells_and_sample_ranges_add_up)
 {
     struct err e = {0};
@@ -278,7 +278,7 @@ TEST(cells_and_sample_ranges_add_up)
     scene_free(&s);
 }
 
-/* Bounces 0..4 rendered one by one add up to the picture that accumulates them: the same random
+/* Bounces 0..4 rendered one by one add up to the image that accumulates them: the same random
  * numbers, so up to float rounding and not only in the mean. */
 TEST(bounces_add_up)
 {

@@ -1,7 +1,7 @@
-/* What must hold between pictures, whatever is in them. One scene with all that a change of frame
+/* What must hold between images, whatever is in them. One scene with all that a change of frame
  * could break: triangles with shading normals, a sphere, a rough metal, glass, an area lamp, a point
- * light and a spot light. Two pictures are compared by the mean of each channel over each quarter of
- * the picture, 12 numbers. H0: the means are equal. Two-sided, alpha = 1e-6 each (|z| < 4.89), one
+ * light and a spot light. Two images are compared by the mean of each channel over each quarter of
+ * the image, 12 numbers. H0: the means are equal. Two-sided, alpha = 1e-6 each (|z| < 4.89), one
  * seed each, fixed n, no retry. With 1024 samples of 24 x 18 pixels the standard error of each
  * difference is below 1.5 % (checked), so that a quarter off by 10 % is found with 96 %. */
 #include "tests/support/render_check.h"
@@ -135,7 +135,7 @@ static void move(struct scene *s, float size, bool mirrored)
     c->backward = turned(c->backward, mirrored);
 }
 
-/* Column x of the one picture is column WIDTH-1-x of the other. */
+/* Column x of the one image is column WIDTH-1-x of the other. */
 static void flip(struct moments *m)
 {
     for (int y = 0; y < HEIGHT; y++)
@@ -152,7 +152,7 @@ static void flip(struct moments *m)
             }
 }
 
-/* Largest |z| over channels and four quarters of the picture: 12 tests. */
+/* Largest |z| over channels and four quarters of the image: 12 tests. */
 static double worst_z(const struct moments *a, const struct moments *b)
 {
     double worst = 0;
@@ -180,7 +180,7 @@ TEST(rigid_motion_and_scale)
     static const float sizes[] = {1, 37.5f, 0.004f};
     for (size_t i = 0; i < 3; i++)
         for (int mirrored = 0; mirrored < 2; mirrored++) {
-            /* The reflected camera must stay right-handed, so its picture is reflected instead. */
+            /* The reflected camera must stay right-handed, so its image is reflected instead. */
             s = build(&original);
             move(&s, sizes[i], mirrored);
             if (mirrored)
@@ -234,7 +234,7 @@ TEST(channels_permute)
     moments_free(&plain);
 }
 
-/* The picture by all lights is the sum of the pictures by each. */
+/* The image by all lights is the sum of the images by each. */
 TEST(lights_add)
 {
     static const enum lamps single[] = {AREA, POINT, SPOT};

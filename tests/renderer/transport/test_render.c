@@ -1,4 +1,4 @@
-/* Whole pictures: the samplers agree, threads change nothing, and the counts are right. */
+/* Whole images: the samplers agree, threads change nothing, and the counts are right. */
 #include "renderer/transport/render.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/test.h"
@@ -30,7 +30,7 @@ struct how {
     int bounces, spp, threads;
 };
 
-static struct moments picture(const struct scene *s, struct how how, struct render_stats *stats)
+static struct moments image(const struct scene *s, struct how how, struct render_stats *stats)
 {
     struct err e = {0};
     struct camera c;
@@ -62,7 +62,7 @@ static bool same_bits(const struct moments *a, const struct moments *b)
            memcmp(a->m2, b->m2, 3 * n * sizeof *a->m2) == 0;
 }
 
-/* The same picture, and the same rays and tests counted, by 1, 2 and 7 threads: every ray is traced
+/* The same image, and the same rays and tests counted, by 1, 2 and 7 threads: every ray is traced
  * once whoever does it, so the sums over threads have to be those of one thread, to the last ray. */
 TEST(threads_change_nothing)
 {
@@ -71,9 +71,9 @@ TEST(threads_change_nothing)
         for (int accel = BVH_BRUTE_FORCE; accel <= BVH_WIDE; accel++) {
             struct how how = {{(enum sampler_kind)sampler, 3}, (enum bvh_kind)accel, 4, 4, 1};
             struct render_stats one, many;
-            struct moments a = picture(&s, how, &one);
+            struct moments a = image(&s, how, &one);
             for (how.threads = 2; how.threads <= 7; how.threads += 5) {
-                struct moments b = picture(&s, how, &many);
+                struct moments b = image(&s, how, &many);
                 assert_true(same_bits(&a, &b));
                 assert_true(one.rays.rays == many.rays.rays);
                 assert_true(one.rays.box_tests == many.rays.box_tests);
@@ -81,9 +81,9 @@ TEST(threads_change_nothing)
                 assert_true(one.samples == many.samples);
                 moments_free(&b);
             }
-            /* Negative control: another seed is another picture with other counts. */
+            /* Negative control: another seed is another image with other counts. */
             how.sampler.seed++;
-            struct moments b = picture(&s, how, &many);
+            struct moments b = image(&s, how, &many);
             assert_false(same_bits(&a, &b));
             assert_true(one.rays.rays != many.rays.rays);
             moments_free(&a);
@@ -100,7 +100,7 @@ TEST(counts_are_right)
     struct render_stats stats;
     for (int accel = BVH_BRUTE_FORCE; accel <= BVH_SAH; accel++) {
         struct how how = {{SAMPLER_INDEPENDENT, 3}, (enum bvh_kind)accel, 0, 3, 2};
-        struct moments m = picture(&s, how, &stats);
+        struct moments m = image(&s, how, &stats);
         moments_free(&m);
         assert_true(stats.rays.rays == WIDTH * HEIGHT * 3);
         assert_true(stats.samples == WIDTH * HEIGHT * 3);
@@ -115,7 +115,7 @@ TEST(counts_are_right)
     scene_free(&s);
 }
 
-/* Mean over the picture of each of `count` replicates with seeds of their own; their mean and its
+/* Mean over the image of each of `count` replicates with seeds of their own; their mean and its
  * variance. */
 static void replicates(const struct scene *s, struct how how, int count, double *mean, double *var)
 {
@@ -124,7 +124,7 @@ static void replicates(const struct scene *s, struct how how, int count, double 
     for (int k = 0; k < count; k++) {
         struct render_stats stats;
         how.sampler.seed++;
-        struct moments m = picture(s, how, &stats);
+        struct moments m = image(s, how, &stats);
         double sum = 0;
         for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
             sum += m.mean[i] / (WIDTH * HEIGHT * 3);
@@ -158,13 +158,13 @@ TEST(samplers_agree)
     scene_free(&s);
 }
 
-/* Sum over pixels of the variance between two pictures with different seeds. */
+/* Sum over pixels of the variance between two images with different seeds. */
 static double noise(const struct scene *s, struct how how)
 {
     struct render_stats stats;
-    struct moments a = picture(s, how, &stats);
+    struct moments a = image(s, how, &stats);
     how.sampler.seed += 50;
-    struct moments b = picture(s, how, &stats);
+    struct moments b = image(s, how, &stats);
     double sum = 0;
     for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
         sum += (a.mean[i] - b.mean[i]) * (a.mean[i] - b.mean[i]) / 2;
@@ -190,12 +190,12 @@ TEST(sobol_has_less_noise)
     assert_true(sobol < independent / 2);
     assert_true(again > independent / 2 && again < independent * 2);
     struct render_stats stats;
-    struct moments m = picture(&s, how, &stats);
+    struct moments m = image(&s, how, &stats);
     assert_string_equal(m.unit, "stratified");
     assert_true(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);
     how.sampler.kind = SAMPLER_INDEPENDENT;
-    m = picture(&s, how, &stats);
+    m = image(&s, how, &stats);
     assert_string_equal(m.unit, "sample");
     assert_false(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);

@@ -128,7 +128,7 @@ struct how {
     int width, height; /* 0: WIDTH, HEIGHT */
 };
 
-static struct moments picture(const struct scene *s, const struct how *how)
+static struct moments image_of(const struct scene *s, const struct how *how)
 {
     struct err e = {0};
     struct camera c;
@@ -184,17 +184,17 @@ static int machine_isas(enum isa isa[MAX_ISAS])
     return n;
 }
 
-/* One picture of every set of instructions and, as the negative control, of the next seed. */
+/* One image of every set of instructions and, as the negative control, of the next seed. */
 static void compare(const struct scene *s, struct how how)
 {
     enum isa isa[MAX_ISAS];
     int n = machine_isas(isa);
     how.opt.isa = ISA_SCALAR;
-    struct moments scalar = picture(s, &how);
+    struct moments scalar = image_of(s, &how);
     assert_true(brightness(&scalar) > 0);
     for (int i = 0; i < n; i++) {
         how.opt.isa = isa[i];
-        struct moments m = picture(s, &how);
+        struct moments m = image_of(s, &how);
         if (!same(&scalar, &m))
             fail_msg("%s differs: direct %s, %d light samples, %s", isa_names[isa[i]],
                      direct_kind_names[how.opt.direct], how.opt.light_samples,
@@ -202,7 +202,7 @@ static void compare(const struct scene *s, struct how how)
         moments_free(&m);
     }
     how.opt.sampler.seed++;
-    struct moments other = picture(s, &how);
+    struct moments other = image_of(s, &how);
     assert_false(same(&scalar, &other));
     moments_free(&other);
     moments_free(&scalar);
@@ -264,8 +264,8 @@ TEST(depths_and_threads_do_not_matter)
     scene_free(&s);
 }
 
-/* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the picture's edge. */
-TEST(small_pictures_with_several_light_samples)
+/* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the image's edge. */
+TEST(small_images_with_several_light_samples)
 {
     struct scene s = all_kinds();
     complete(&s, false);

@@ -183,7 +183,7 @@ static bool finish(struct crew_job *j, struct err *e)
     return true;
 }
 
-/* What a file of kept pictures was made for. */
+/* What a file of kept images was made for. */
 struct kept_header {
     char magic[16], sha256[72];
     int32_t side, spp, num_renders, reference_spp;
@@ -313,7 +313,7 @@ static bool render_pool(struct crew_job *j, struct err *e)
 static bool open_and_render(struct crew_job *j, const struct suite_scene *scene, struct err *e)
 {
     const struct kept_header h = header_of(j->job, scene);
-    struct suite_scene square = *scene; /* another size of picture: the camera knows its shape */
+    struct suite_scene square = *scene; /* another size of image: the camera knows its shape */
     square.width = square.height = j->job->side;
     if (!suite_open(&square, &j->scene, &j->camera, e))
         return false;

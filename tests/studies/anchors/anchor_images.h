@@ -1,5 +1,5 @@
-/* The pictures of tests/studies/anchors/make_anchors.c: many renders of one scene by our renderer, each with a seed of
- * its own, a long render as Mitsuba's rule asks for one, and what is done to a picture to make it
+/* The images of tests/studies/anchors/make_anchors.c: many renders of one scene by our renderer, each with a seed of
+ * its own, a long render as Mitsuba's rule asks for one, and what is done to an image to make it
  * wrong by a known amount. */
 #ifndef ASSAY_TESTS_ANCHOR_IMAGES_H
 #define ASSAY_TESTS_ANCHOR_IMAGES_H
@@ -19,7 +19,7 @@ struct anchor_pool {
         *bounced;   /* 3 a pixel, in [0, 1]: the share of `expected` that is not light of an emitter
                         seen directly */
     int num_places; /* regions where a local error is put: of the nine squares at 4, 24 and 44 in x
-                        and y, those with at least half of the picture's mean of bounced light */
+                        and y, those with at least half of the image's mean of bounced light */
     int place[9][2];
 };
 
@@ -28,8 +28,8 @@ struct anchor_job {
     int side, spp, num_renders, reference_spp;
     uint64_t seed; /* of the reference; the renders' count up from there */
     int threads;
-    /* A file that keeps the pictures, so that a change of a rule need not render again; NULL: none. It
-     * is believed if it was made for the same job and its first picture is still what the renderer
+    /* A file that keeps the images, so that a change of a rule need not render again; NULL: none. It
+     * is believed if it was made for the same job and its first image is still what the renderer
      * draws, bit for bit; else it is written again. */
     const char *kept;
     void (*progress)(double share); /* from 0 to 1; NULL: none */
@@ -40,7 +40,7 @@ bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct
     __attribute__((warn_unused_result));
 void anchor_pool_free(struct anchor_pool *p);
 
-/* The standard deviation of one sample over the mean, of the picture's luminance: a scene's noise. */
+/* The standard deviation of one sample over the mean, of the image's luminance: a scene's noise. */
 double anchor_noise(const struct anchor_pool *p);
 
 enum anchor_error {

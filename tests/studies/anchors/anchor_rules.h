@@ -1,7 +1,7 @@
-/* The rules by which other renderers' tests judge a picture, as published, on our moments images: what
+/* The rules by which other renderers' tests judge an image, as published, on our moments images: what
  * tests/studies/anchors/make_anchors.c runs beside our own gate on the same renders. Each is a number ("score") and a
  * threshold that is part of the rule, so that the threshold can be set to another false-alarm rate. A
- * is the tested picture, B the reference; same sizes. Nothing here fails. */
+ * is the tested image, B the reference; same sizes. Nothing here fails. */
 #ifndef ASSAY_TESTS_ANCHOR_RULES_H
 #define ASSAY_TESTS_ANCHOR_RULES_H
 
@@ -15,7 +15,7 @@ void anchor_xyz(const double light[3], double xyz[3]);
 /* Mitsuba 3, src/render/tests/test_renders.py (read at commit 042f6af). A long render is the reference,
  * taken as exact; its moments give the variance of one sample, in XYZ, never below 1e-4. Per pixel and
  * channel z = |A - reference| sqrt(samples of A / variance), two-sided normal p. A channel fails if p
- * <= 1 - (1 - level)^(1/pixels), level 0.01: Sidak over pixels, not channels. The picture passes if
+ * <= 1 - (1 - level)^(1/pixels), level 0.01: Sidak over pixels, not channels. The image passes if
  * passed channels / 3 >= 0.9975 pixels. */
 struct mitsuba_reference {
     int width, height;
@@ -33,13 +33,13 @@ double mitsuba_critical_z(double level, size_t pixels);
 size_t mitsuba_failures(const double *z, size_t pixels, double critical_z);
 /* The most channels that may fail. */
 size_t mitsuba_allowed(double share, size_t pixels);
-/* The critical z at and below which the picture fails when `allowed` channels may: the (allowed+1)-th
+/* The critical z at and below which the image fails when `allowed` channels may: the (allowed+1)-th
  * largest. Reorders z. */
 double mitsuba_score(double *z, size_t pixels, size_t allowed);
 
 /* Eradiate, src/eradiate/test_tools/regression.py, class ZTest (read at commit 00b1015): the
  * difference of every value of the two sides over the root of the sum of the variances of both means,
- * the family p of the smallest by Sidak; the picture passes if that is above the level. Its p is the
+ * the family p of the smallest by Sidak; the image passes if that is above the level. Its p is the
  * normal law's; here it is Student's with Welch's degrees of freedom, which keeps its level with few
  * samples. A value without noise on either side, 0/0 there and so never passed, is left out. */
 #define WELCH_LEVEL 0.01
@@ -47,7 +47,7 @@ double mitsuba_score(double *z, size_t pixels, size_t allowed);
 double welch_log10_p(const struct moments *a, const struct moments *b);
 
 /* The smallest difference in 1/255 such that no more than `percent` of the pixels differ by more: the
- * picture passes with any `fail` of at least that. */
+ * image passes with any `fail` of at least that. */
 int idiff_fail_score(const size_t count[256], size_t pixels, double percent);
 
 #endif

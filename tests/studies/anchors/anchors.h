@@ -8,7 +8,7 @@
 
 #include <jansson.h>
 
-/* Every choice was made before the first full run. Mitsuba renders 2e6 samples for a picture and 32000
+/* Every choice was made before the first full run. Mitsuba renders 2e6 samples for an image and 32000
  * a pixel for its reference; at 64 x 64 pixels that is 488 and 32000, and 64 and 4224 have that ratio. */
 struct anchor_settings {
     int side, spp, reference_spp;
@@ -52,7 +52,7 @@ struct anchor_bias {
 };
 
 struct anchor_outcome {
-    double threshold; /* the picture fails if its score is above */
+    double threshold; /* the image fails if its score is above */
     int false_alarms; /* of num_pairs */
     struct anchor_bias bias[NUM_ANCHOR_ERRORS];
 };

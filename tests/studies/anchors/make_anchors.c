@@ -1,6 +1,6 @@
 /* make_anchors DIR WORK | --page DIR | --quick DIR WORK: what our gate and the rules of other renderers'
- * tests find on the same pictures. Writes DIR/results.json, README.md and plots; --page makes the last
- * two again; --quick measures two scenes with few pairs, to see that it runs. The pictures are kept in
+ * tests find on the same images. Writes DIR/results.json, README.md and plots; --page makes the last
+ * two again; --quick measures two scenes with few pairs, to see that it runs. The images are kept in
  * WORK (900 MB). For `make anchors`. */
 #include "anchors.h"
 
@@ -18,10 +18,10 @@
 
 /* What one thread judges with. */
 struct bench {
-    struct moments a; /* the wrong picture */
+    struct moments a; /* the wrong image */
     double *z;
     uint8_t *a8, *b8;
-    const struct moments *in_b8; /* whose picture b8 is */
+    const struct moments *in_b8; /* whose image b8 is */
 };
 
 struct measurement {

@@ -1,5 +1,5 @@
-/* The rules of tests/studies/anchors/anchor_rules.c on pictures small enough for a pencil, at their boundaries, and
- * against GSL and the program idiff; the pictures of tests/studies/anchors/anchor_images.c; and that the page of `make
+/* The rules of tests/studies/anchors/anchor_rules.c on images small enough for a pencil, at their boundaries, and
+ * against GSL and the program idiff; the images of tests/studies/anchors/anchor_images.c; and that the page of `make
  * anchors` is what its record says, with the settings that the code has. */
 #include "anchors.h"
 
@@ -151,7 +151,7 @@ static bool real_idiff(const char *program, const char *a, const char *b)
     return true;
 }
 
-/* Pictures with a few differences around the threshold, in a number of pixels around what is allowed,
+/* Images with a few differences around the threshold, in a number of pixels around what is allowed,
  * 40 of 4096, and noise: differences of 5 in about 1 - (5/6)^3 = 42 % of the pixels fail, of 3 do not. */
 TEST(test_idiff_program)
 {
@@ -162,7 +162,7 @@ TEST(test_idiff_program)
         print_message("SKIPPED: no idiff (package openimageio-tools): its rule is not checked\n");
         skip();
     }
-    static uint8_t picture[2][3 * PIXELS];
+    static uint8_t image[2][3 * PIXELS];
     size_t count[256];
     uint64_t seed = 5;
     static const struct {
@@ -173,17 +173,17 @@ TEST(test_idiff_program)
                  {41, 9, 4, true},    {0, 0, 6, true}};
     for (size_t i = 0; i < COUNT(cases); i++) {
         for (size_t v = 0; v < 3 * PIXELS; v++) {
-            picture[0][v] = (uint8_t)(250 * uniform(&seed)) / 2;
-            picture[1][v] = (uint8_t)(picture[0][v] + cases[i].noise * uniform(&seed));
+            image[0][v] = (uint8_t)(250 * uniform(&seed)) / 2;
+            image[1][v] = (uint8_t)(image[0][v] + cases[i].noise * uniform(&seed));
         }
         for (int k = 0; k < cases[i].pixels; k++) {
             size_t at = 3 * (size_t)k + (size_t)k % 3;
-            picture[k % 2][at] = 0;
-            picture[1 - k % 2][at] = (uint8_t)cases[i].step;
+            image[k % 2][at] = 0;
+            image[1 - k % 2][at] = (uint8_t)cases[i].step;
         }
         for (int k = 0; k < 2; k++)
-            MUST(image_write_png(path[k], SIDE, SIDE, picture[k], &e));
-        idiff_histogram(picture[0], picture[1], PIXELS, count);
+            MUST(image_write_png(path[k], SIDE, SIDE, image[k], &e));
+        idiff_histogram(image[0], image[1], PIXELS, count);
         bool ours = idiff_differs(count, PIXELS, BLENDER_FAIL, BLENDER_PERCENT);
         if (ours != real_idiff(program, path[0], path[1]))
             fail_msg("picture %zu: ours says %s, idiff the opposite", i, ours ? "fail" : "pass");
@@ -268,8 +268,8 @@ static void assert_same_pool(const struct anchor_pool *a, const struct anchor_po
     assert_int_equal(a->num_places, b->num_places);
 }
 
-/* Kept pictures come back bit for bit, which shows by a mark in the last one; a file whose first
- * picture is not the renderer's is not believed, and then all is rendered as before. */
+/* Kept images come back bit for bit, which shows by a mark in the last one; a file whose first
+ * image is not the renderer's is not believed, and then all is rendered as before. */
 static void check_kept(const struct anchor_job *job, const struct anchor_pool *rendered)
 {
     struct anchor_pool p;
@@ -304,7 +304,7 @@ static void check_kept(const struct anchor_job *job, const struct anchor_pool *r
 
 /* Real renders of a sphere lamp over a plane, 24 x 24 pixels, 64 samples. H0: A and B have the same
  * mean; Welch at 1e-6 must not reject it, and the mean of the long reference must be that of the pool
- * (|z| < 4.89 of the whole picture's luminance, alpha 1e-6). Power: a picture twice as bright is
+ * (|z| < 4.89 of the whole image's luminance, alpha 1e-6). Power: an image twice as bright is
  * rejected by every rule (its z per pixel is about 1/0.31 sqrt(64/2) = 18). */
 TEST(test_real_renders)
 {

@@ -1,4 +1,4 @@
-/* The programs that `make bench` holds against each other, behind one call: pictures of one view with seeds
+/* The programs that `make bench` holds against each other, behind one call: images of one view with seeds
  * of their own, and the CPU time of them. */
 #ifndef ASSAY_BENCH_ENGINES_H
 #define ASSAY_BENCH_ENGINES_H
@@ -28,7 +28,7 @@ struct bench_view {
     struct embree_tracer *embree; /* NULL: cannot */
 };
 
-/* Renders count >= 3 pictures of spp samples, one after the other into images (3 floats a pixel), on one
+/* Renders count >= 3 images of spp samples, one after the other into images (3 floats a pixel), on one
  * thread. *cpu_s: of all of it; children, their start and what writes their input are part of it. work_dir
  * exists. */
 bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, int spp, int count,

@@ -1,4 +1,4 @@
-/* What a user waits for: the course's own jobs by the program, its normal pictures against brute force, and
+/* What a user waits for: the course's own jobs by the program, its normal images against brute force, and
  * the way from a file to the first ray. */
 #include "bench.h"
 #include "bench_scenes.h"
@@ -26,14 +26,14 @@ enum { NUM_PATHS = 3, NUM_NORMALS = 4, NORMALS_THREADS = 2, MAX_ARGS = 32 };
 static bool run_program(const struct bench_options *o, const char *scene, bool is_course,
                         const char *const *options, double *median, struct err *e)
 {
-    char program[4096], picture[4096], log[4096];
+    char program[4096], image[4096], log[4096];
     double cpu[BENCH_MAX_ROUNDS];
     snprintf(program, sizeof program, "%s/pathtracer", o->build);
-    snprintf(picture, sizeof picture, "%s/job.exr", o->out);
+    snprintf(image, sizeof image, "%s/job.exr", o->out);
     snprintf(log, sizeof log, "%s/job.log", o->out);
     const char *argv[MAX_ARGS] = {
         program, "--accel", "wide", "--isa",     isa_names[o->isa],
-        "-f",    picture,   "-q",   "--dialect", is_course ? "cgl" : "auto",
+        "-f",    image,     "-q",   "--dialect", is_course ? "cgl" : "auto",
         scene};
     int argc = 11;
     for (; *options != NULL; options++)
@@ -77,7 +77,7 @@ static bool paths_job(const struct bench_options *o, int i, json_t *jobs, struct
 }
 
 /* What brute force costs a camera ray over what the hierarchy does, by a few hundred rays in the
- * picture's order for both. */
+ * image's order for both. */
 static bool brute_force_factor(const struct bench_scene *s, const struct bvh *wide, double *factor,
                                struct err *e)
 {

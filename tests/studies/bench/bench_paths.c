@@ -1,9 +1,9 @@
 /* Paths per CPU second, relMSE, and 1/(relMSE x CPU seconds), of our renderer, of a tracer on Embree,
- * of Cycles and of POV-Ray: the same view, one thread. Each engine renders pictures of FEW and of MANY
+ * of Cycles and of POV-Ray: the same view, one thread. Each engine renders images of FEW and of MANY
  * samples in turn; what a sample costs is the slope between the two, so no start is counted. Image means
  * have to agree first.
  *
- * POV-Ray is slow by the recipe that makes its picture ours: it renders the view with a quarter of the
+ * POV-Ray is slow by the recipe that makes its image ours: it renders the view with a quarter of the
  * pixels, and fewer samples. */
 #include "bench.h"
 #include "bench_engines.h"
@@ -49,11 +49,11 @@ struct runs {
     bool done;
     char why[256]; /* not done */
     float *images[NUM_RUNGS];
-    int count[NUM_RUNGS], spp[NUM_RUNGS]; /* pictures, all rounds; samples of one */
+    int count[NUM_RUNGS], spp[NUM_RUNGS]; /* images, all rounds; samples of one */
     int shrink;                           /* of both sides */
     double cost[MAX_ROUNDS];              /* CPU seconds of a sample of all pixels */
     double mpaths, share, share_se;       /* M paths per CPU s; image mean over ours - 1 */
-    double relmse[NUM_RUNGS];             /* of one picture */
+    double relmse[NUM_RUNGS];             /* of one image */
     double efficiency, efficiency_lo, efficiency_hi; /* at MANY */
 };
 
@@ -141,7 +141,7 @@ static bool run(enum bench_engine engine, const struct bench_options *o, const s
     return true;
 }
 
-/* Mean over all values, and the variance of it by the spread between pictures. */
+/* Mean over all values, and the variance of it by the spread between images. */
 static double mean_of(const float *images, int count, size_t size, double *var)
 {
     double sum = 0, sum2 = 0;
@@ -301,7 +301,7 @@ static bool measure(const struct bench_options *o, const struct bench_view *v, j
             runs[k].done = false; /* what it cannot express, too */
             snprintf(runs[k].why, sizeof runs[k].why, "%.200s", inner.msg);
         }
-    /* In units of each value's mean over our own pictures. */
+    /* In units of each value's mean over our own images. */
     bool ok = runs[BENCH_MIS].done || err_set(e, "%s", runs[BENCH_MIS].why);
     ok = ok && moments_alloc(&m, v->camera.width, v->camera.height, e);
     for (int k = 0; ok && k < o->rounds * COUNT; k++)

@@ -1,5 +1,5 @@
-/* One POV-Ray picture: what reference/povray/povray_replicate_parts.h calls indirect_i, which by itself has all the light,
- * with lamps by a small Gauss rule. The recipe of the suite adds pictures to it with finer lamps, which all
+/* One POV-Ray image: what reference/povray/povray_replicate_parts.h calls indirect_i, which by itself has all the light,
+ * with lamps by a small Gauss rule. The recipe of the suite adds images to it with finer lamps, which all
  * replicates share. */
 #include "bench_povray.h"
 
@@ -14,9 +14,9 @@
 
 enum { LAMP_CELLS = 4 };
 
-/* image += the picture, averaged over grid x grid sub-pixels. */
-static bool add_picture(const char *path, const struct povray_image *p, const struct camera *c,
-                        float *image, struct err *e)
+/* image += the image, averaged over grid x grid sub-pixels. */
+static bool add_image(const char *path, const struct povray_image *p, const struct camera *c,
+                      float *image, struct err *e)
 {
     struct image im;
     if (!image_read_exr(path, &im, NULL, e))
@@ -73,7 +73,7 @@ bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, co
                                     NULL};
         const struct process run = {.argv = argv, .cwd = dir, .log = log, .timeout_s = 3600};
         snprintf(path, sizeof path, "%s/scene.exr", dir);
-        if (!process_run(&run, NULL, e) || !add_picture(path, &p, c, image, e))
+        if (!process_run(&run, NULL, e) || !add_image(path, &p, c, image, e))
             return false;
     }
     return true;

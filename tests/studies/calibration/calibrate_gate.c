@@ -59,8 +59,8 @@ static bool stages_chunk(void *arg, int chunk, struct err *e)
     return ok;
 }
 
-/* Never all black, which two pictures could both be: the same picture twice is refused. */
-static void draw_picture(enum law law, uint64_t *state, float *pixels)
+/* Never all black, which two images could both be: the same image twice is refused. */
+static void draw_image(enum law law, uint64_t *state, float *pixels)
 {
     float sum = 0;
     while (sum == 0)
@@ -77,22 +77,22 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
     struct gate_job *job = arg;
     uint64_t state = (job->permutation->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
     float pixels[2 * REPLICATES][3 * PERMUTED_SIDE * PERMUTED_SIDE];
-    float *picture[2 * REPLICATES];
+    float *image[2 * REPLICATES];
     char name[2 * REPLICATES][16], *names[2 * REPLICATES];
     for (int k = 0; k < 2 * REPLICATES; k++) {
         snprintf(name[k], sizeof name[k], "%d", k);
-        picture[k] = pixels[k];
+        image[k] = pixels[k];
         names[k] = name[k];
     }
-    struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture, names};
-    struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, picture + REPLICATES,
+    struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image, names};
+    struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image + REPLICATES,
                               names + REPLICATES};
     struct permutation_options opt = {.alpha = permutation_level[0], .min_side = 2};
     size_t end = (size_t)(chunk + 1) * CHUNK;
     for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
         struct permutation p;
         for (int k = 0; k < 2 * REPLICATES; k++)
-            draw_picture(job->permutation->law, &state, pixels[k]);
+            draw_image(job->permutation->law, &state, pixels[k]);
         if (!permutation_test(&a, &b, &opt, &p, e))
             return false;
         for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)

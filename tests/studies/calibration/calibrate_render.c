@@ -18,7 +18,7 @@ struct render_job {
     int depth;
 };
 
-static bool picture(const struct render_job *job, uint64_t seed, struct moments *m, struct err *e)
+static bool image(const struct render_job *job, uint64_t seed, struct moments *m, struct err *e)
 {
     struct progress quiet;
     struct render_stats stats;
@@ -49,7 +49,7 @@ static bool replicates(const struct render_job *job, uint64_t seed, struct momen
     bool ok = moments_alloc(m, side, side, e);
     for (int k = 0; ok && k < job->cell->replicates; k++) {
         struct moments one;
-        ok = picture(job, seed + (uint64_t)k, &one, e);
+        ok = image(job, seed + (uint64_t)k, &one, e);
         if (!ok)
             break;
         for (size_t i = 0; i < values; i++)
@@ -75,9 +75,9 @@ static bool render_chunk(void *arg, int chunk, struct err *e)
     for (size_t i = (size_t)chunk * CHUNK; ok && i < end && i < job->pairs; i++) {
         uint64_t seed = (cell->seed << 32) + i * per_pair;
         struct moments a = {0}, b = {0};
-        if (!picture(job, seed, &a, e))
+        if (!image(job, seed, &a, e))
             return false;
-        ok = (cell->replicates > 0 ? replicates : picture)(job, seed + 1, &b, e);
+        ok = (cell->replicates > 0 ? replicates : image)(job, seed + 1, &b, e);
         if (ok) {
             ok = null_pair(&job->run, i, &a, &b, TILE, e);
             moments_free(&b);
@@ -90,8 +90,8 @@ static bool render_chunk(void *arg, int chunk, struct err *e)
 double render_cost(const struct render_cell *cell, size_t pairs)
 {
     double pixels = (double)cell->side * cell->side;
-    double pictures = cell->replicates > 0 ? 1 + cell->replicates : 2;
-    return (double)pairs * pixels * (pictures * cell->spp * 1e-3 + 5e-3);
+    double images = cell->replicates > 0 ? 1 + cell->replicates : 2;
+    return (double)pairs * pixels * (images * cell->spp * 1e-3 + 5e-3);
 }
 
 static bool open_scene(struct render_job *job, const char *scenes, struct err *e)

@@ -1,4 +1,4 @@
-/* Null pairs of real renders: two pictures of one scene of the suite from disjoint seeds, by the
+/* Null pairs of real renders: two images of one scene of the suite from disjoint seeds, by the
  * renderer in this process. */
 #ifndef ASSAY_CALIBRATE_RENDER_H
 #define ASSAY_CALIBRATE_RENDER_H

@@ -29,7 +29,7 @@ for bug in "${bugs[@]}" cosine_missing beckmann_lambda; do
 done
 [ ${#stale[@]} -eq 0 ] || tests/mutants/mutants.sh --build-only "$build" "${stale[@]}" || exit 1
 cp -R tools/rubrics/*.dae tools/rubrics/*.exr tools/rubrics/cs184-bugs "$work/rubric"
-# As the course's program would: lights are sampled alone. Bugs are named by the 8-bit pictures alone.
+# As the course's program would: lights are sampled alone. Bugs are named by the 8-bit images alone.
 sed "s/^command {program} /&--direct light /" tools/rubrics/cs184.rubric >"$rubric"
 
 # sub NAME WHAT: a program from stdin, described for the table
@@ -43,7 +43,7 @@ for bug in "${bugs[@]}"; do
     mkdir -p "$subs/$bug"
     cp "$build/mutants/$bug/mutant" "$build/mutants/$bug/pathtracer" "$subs/$bug"
 done
-# That bug is in the writer of EXR files: its picture as a PNG is made of that.
+# That bug is in the writer of EXR files: its image as a PNG is made of that.
 [ -z "$few" ] && cat >"$subs/mean_over_n_plus_1/pathtracer" <<'EOF'
 #!/bin/sh
 ./mutant --accel sah --isa scalar "$@" || exit 1
@@ -73,7 +73,7 @@ for w in "64 48" "128 96"; do
     "$build/pathtracer" -q -r $w -s 256 -m 5 -f "$subs/other_scene/other_${w% *}.png" tools/rubrics/torus.dae >/dev/null || exit 1
 done
 
-# Pictures instead of a program: all right ones, and the references themselves, by our seed for those (tools/grade/answer_key.c).
+# Images instead of a program: all right ones, and the references themselves, by our seed for those (tools/grade/answer_key.c).
 pictures() { # NAME SEED OWN: OWN 1: as the assignment asks, 0: as the reference is made
     mkdir -p "$subs/$1"
     awk -v own="$3" '

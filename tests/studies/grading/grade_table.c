@@ -97,7 +97,7 @@ static void print_names(const json_t *grade, const char *id, bool known)
                                                                    : "different, cause unknown");
 }
 
-static bool has_right_picture(const json_t *grade)
+static bool has_right_image(const json_t *grade)
 {
     size_t i;
     json_t *c;
@@ -162,7 +162,7 @@ int main(int argc, char **argv)
           stdout);
     json_array_foreach(grades, i, g)
     {
-        if (has_right_picture(g) && json_array_size(json_object_get(g, "alike")) == 0)
+        if (has_right_image(g) && json_array_size(json_object_get(g, "alike")) == 0)
             printf(" %s", text_of(g, "id"));
     }
     puts(".");

@@ -2,12 +2,12 @@
  * (tools/grade/rubric_bugs.h). Every bug of PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only),
  * the correct renderer is BUILD/pathtracer.
  *
- * The correct pictures are the references. Of each view, each bug and the correct renderer make BATCHES pictures of a
+ * The correct images are the references. Of each view, each bug and the correct renderer make BATCHES images of a
  * quarter of the samples asked for, with the same seeds, so that what a bug does not touch has no noise in the
  * difference; with all samples where their number is a fact. The effect is the mean of the differences; its variance that of
- * independent pictures times the level at which the batches scatter, and what one picture with the bug has more noise than
- * one without. A bug that changes no pixel of a picture of one sample has no effect on it, nor on it with deviations; an
- * effect within its noise is stored as none. Pictures are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
+ * independent images times the level at which the batches scatter, and what one image with the bug has more noise than
+ * one without. A bug that changes no pixel of an image of one sample has no effect on it, nor on it with deviations; an
+ * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
 #include "tests/mutants/bug_effect.h"
@@ -27,12 +27,12 @@ struct maker {
     struct rubric *rubric;
     struct answer_key *answers;
     struct catalogue made;
-    int picture[RUBRIC_SETS * RUBRIC_PICTURES], set[RUBRIC_SETS * RUBRIC_PICTURES]; /* of a view */
+    int image[RUBRIC_SETS * RUBRIC_IMAGES], set[RUBRIC_SETS * RUBRIC_IMAGES]; /* of a view */
     struct signature (*batch)[BATCHES]; /* of a view: the correct renderer's */
     struct moments *one; /* likewise, one sample a pixel; of views without deviations */
 };
 
-/* Where a program's pictures are kept; hash tells its versions apart. */
+/* Where a program's images are kept; hash tells its versions apart. */
 static bool open_cache(const struct maker *m, const char *name, const char *hash,
                        const char *program, char cache[PATH_MAX], struct answer_options *opt,
                        struct err *e)
@@ -52,15 +52,15 @@ static bool render(const struct maker *m, int view, int batch, const struct answ
                    struct signature *out, struct err *e)
 {
     const struct rubric *r = m->rubric;
-    int picture = m->picture[view], spp = r->picture[picture].spp;
-    bool counts = rubric_bugs_counts(r, picture);
+    int image = m->image[view], spp = r->image[image].spp;
+    bool counts = rubric_bugs_counts(r, image);
     char words[1024];
     struct moments made;
     snprintf(words, sizeof words, "--seed %d %s", SEED + batch, r->set[m->set[view]].words);
     spp = counts || spp / 4 < LEAST_SPP ? spp : spp / 4;
-    if (!answer_key_render(r, picture, counts, words, spp, opt, &made, e))
+    if (!answer_key_render(r, image, counts, words, spp, opt, &made, e))
         return false;
-    bool ok = rubric_bugs_sight(r, picture, &made, out, e);
+    bool ok = rubric_bugs_sight(r, image, &made, out, e);
     moments_free(&made);
     return ok;
 }
@@ -71,7 +71,7 @@ static bool is_same(const struct maker *m, int view, const struct answer_options
 {
     struct moments a;
     const struct moments *b = &m->one[view];
-    if (!answer_key_render(m->rubric, m->picture[view], false, "", 1, bug, &a, e))
+    if (!answer_key_render(m->rubric, m->image[view], false, "", 1, bug, &a, e))
         return false;
     *same = a.width == b->width && a.height == b->height &&
             memcmp(a.mean, b->mean, 3 * (size_t)a.width * (size_t)a.height * sizeof *a.mean) == 0;
@@ -79,10 +79,10 @@ static bool is_same(const struct maker *m, int view, const struct answer_options
     return true;
 }
 
-/* For the variance of one picture: c->n is to that of a picture as the variances are. */
-static double of_one(const struct rubric *r, int picture, const struct signature *s, int i)
+/* For the variance of one image: c->n is to that of an image as the variances are. */
+static double of_one(const struct rubric *r, int image, const struct signature *s, int i)
 {
-    return s->var[i] * s->n / ((double)r->picture[picture].spp * s->cell * s->cell);
+    return s->var[i] * s->n / ((double)r->image[image].spp * s->cell * s->cell);
 }
 
 static void set_effect(const struct maker *m, int view, const struct signature *bug,
@@ -91,8 +91,8 @@ static void set_effect(const struct maker *m, int view, const struct signature *
     const struct signature *correct = m->batch[view], a = signature_average(bug, BATCHES);
     double more[SIGNATURE_VALUES] = {0};
     for (int i = 0; i < 3 * a.columns * a.rows; i++)
-        more[i] = fmax(0, of_one(m->rubric, m->picture[view], &bug[0], i) -
-                              of_one(m->rubric, m->picture[view], &correct[0], i));
+        more[i] = fmax(0, of_one(m->rubric, m->image[view], &bug[0], i) -
+                              of_one(m->rubric, m->image[view], &correct[0], i));
     bug_effect(bug, correct, BATCHES, 0, more, &a, out);
 }
 
@@ -108,9 +108,9 @@ static bool make_view(struct maker *m, int view, int b, const struct answer_opti
     struct signature s[BATCHES];
     struct view *v = &m->made.view[view];
     const struct view *plain = &m->made.view[0];
-    bool same = false, counts = rubric_bugs_counts(m->rubric, m->picture[view]);
+    bool same = false, counts = rubric_bugs_counts(m->rubric, m->image[view]);
     for (int k = 0; k < view; k++)
-        if (m->picture[k] == m->picture[view] && m->set[k] == 0)
+        if (m->image[k] == m->image[view] && m->set[k] == 0)
             plain = &m->made.view[k];
     if (m->set[view] > 0 && plain->effect[b] == NULL)
         return true;
@@ -157,15 +157,15 @@ static bool make_correct(struct maker *m, int view, const struct answer_options 
                          struct err *e)
 {
     struct view *v = &m->made.view[view];
-    int picture = m->picture[view];
+    int image = m->image[view];
     for (int k = 0; k < BATCHES; k++)
         if (!render(m, view, k, ours, &m->batch[view][k], e))
             return false;
     if (m->set[view] == 0 &&
-        !answer_key_render(m->rubric, picture, false, "", 1, ours, &m->one[view], e))
+        !answer_key_render(m->rubric, image, false, "", 1, ours, &m->one[view], e))
         return false;
-    if (!rubric_bugs_counts(m->rubric, picture))
-        return rubric_bugs_sight(m->rubric, picture, &m->answers->of[m->set[view]][picture].m,
+    if (!rubric_bugs_counts(m->rubric, image))
+        return rubric_bugs_sight(m->rubric, image, &m->answers->of[m->set[view]][image].m,
                                  &v->correct, e);
     v->correct = signature_average(m->batch[view], BATCHES);
     return true;
@@ -174,27 +174,27 @@ static bool make_correct(struct maker *m, int view, const struct answer_options 
 static bool add_views(struct maker *m, const struct answer_options *ours, struct err *e)
 {
     const struct rubric *r = m->rubric;
-    size_t most = (size_t)r->num_sets * (size_t)r->num_pictures;
+    size_t most = (size_t)r->num_sets * (size_t)r->num_images;
     m->made.view = calloc(most, sizeof *m->made.view);
     m->batch = calloc(most, sizeof *m->batch);
     m->one = calloc(most, sizeof *m->one);
     if (m->made.view == NULL || m->batch == NULL || m->one == NULL)
         return err_set(e, "out of memory");
     for (int k = 0; k < r->num_sets; k++)
-        for (int i = 0; i < r->num_pictures; i++) {
+        for (int i = 0; i < r->num_images; i++) {
             if (!rubric_bugs_sees(r, i) || rubric_bugs_set(m->answers, k, i) != k ||
                 (k > 0 && r->set[k].words[0] == '\0'))
                 continue;
             int at = m->made.num_views++;
             struct view *v = &m->made.view[at];
-            *v = (struct view){.width = r->picture[i].width,
-                               .height = r->picture[i].height,
-                               .spp = r->picture[i].spp > 2 ? r->picture[i].spp : 3,
+            *v = (struct view){.width = r->image[i].width,
+                               .height = r->image[i].height,
+                               .spp = r->image[i].spp > 2 ? r->image[i].spp : 3,
                                .renders = 1,
                                .fixed_spp = true,
                                .seed = SEED,
                                .effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *))};
-            m->picture[at] = i;
+            m->image[at] = i;
             m->set[at] = k;
             if (v->effect == NULL)
                 return err_set(e, "out of memory");

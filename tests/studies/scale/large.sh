@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/studies/scale/large.sh BUILD SIDE: a picture of SIDE x SIDE pixels, of which the sums alone are 96 bytes each, made in 64 jobs and put together
+# tests/studies/scale/large.sh BUILD SIDE: an image of SIDE x SIDE pixels, of which the sums alone are 96 bytes each, made in 64 jobs and put together
 # while no program may have more than 2 GiB of addresses. Its pixels are those of a render of some cells by themselves. Prints the
 # measured figures, "ok NAME" or "not ok NAME: why".
 set -u
@@ -17,7 +17,7 @@ limited "$assay" plan --plan "$tmp/plan" --parts 64 pathtracer "${render[@]}" -f
 num=$(grep -c '^{"job"' "$tmp/out")
 echo "$num jobs:"
 time limited "$assay" run-job "$tmp/plan" $(seq 0 $((num - 1))) >"$tmp/out" 2>&1
-tell "jobs of a picture of $side x $side within 2 GiB each" "$([ "$(grep -c ': made' "$tmp/out")" -eq "$num" ] || tail -n 1 "$tmp/out")"
+tell "jobs of an image of $side x $side within 2 GiB each" "$([ "$(grep -c ': made' "$tmp/out")" -eq "$num" ] || tail -n 1 "$tmp/out")"
 echo "gather, of $(du -sh "$tmp/plan" | cut -f 1):"
 time limited "$assay" gather "$tmp/plan" >"$tmp/out" 2>&1
 tell "put together within 2 GiB" "$([ -e "$tmp/x.exr" ] && [ -e "$tmp/x.png" ] || tail -n 1 "$tmp/out")"

@@ -11,7 +11,7 @@ failures=0
 
 what=jobs
 . tests/end_to_end/expect.sh
-# in_jobs NAME PARTS again|once ARGUMENT...: the pictures of the arguments, l.exr and l.png whole, x.exr and x.png from jobs, the last first.
+# in_jobs NAME PARTS again|once ARGUMENT...: the images of the arguments, l.exr and l.png whole, x.exr and x.png from jobs, the last first.
 in_jobs() {
     local name=$1 parts=$2 again=$3 why="" num
     shift 3
@@ -32,7 +32,7 @@ in_jobs() {
         ;;
     *) cmp "$tmp/l.exr.state" "$tmp/x.exr.state" >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")" ;;
     esac
-    # The picture by another way: made again at once, and compared value by value.
+    # The image by another way: made again at once, and compared value by value.
     [ -z "$why" ] && [ "$again" = again ] && { "$assay" reproduce "$tmp/x.exr" >"$tmp/out" 2>&1 || why="$(cat "$tmp/out")"; }
     tell "$name" "$why"
 }
@@ -42,7 +42,7 @@ in_jobs "the assignment's adaptive rule" 2 once -s 24 -a 4 0.3 "$scene"
 in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 \
     -e reference/scenes/46_sky.exr -- reference/scenes/46_sky.dae
 
-# Sample ranges: in_ranges NAME again|once JOBS PARTS RANGES ARGUMENT...: the picture of one render, l.exr, and of ranges, x.exr, in which all
+# Sample ranges: in_ranges NAME again|once JOBS PARTS RANGES ARGUMENT...: the image of one render, l.exr, and of ranges, x.exr, in which all
 # channels agree to float32 rounding, so that counts, being whole, are the same. Made again as one cell in as many ranges: the same bits.
 in_ranges() {
     local name=$1 again=$2 jobs=$3 parts=$4 ranges=$5 why=""
@@ -137,7 +137,7 @@ mv "$tmp/t.dae" "$tmp/s.dae"
 expect "no such job" 3 "is not a whole number from 0 to 3" "$san_assay" run-job "$plan" 4
 head -n 3 "$plan/plan.jsonl" >"$tmp/p" && mkdir "$tmp/half" && cp "$tmp/p" "$tmp/half/plan.jsonl"
 expect "a plan cut short" 3 "not a whole plan" "$san_assay" run-job "$tmp/half" 0
-expect "a render that looks at all of its picture" 3 "cannot be cut into jobs" "$san_assay" plan --plan "$tmp/p1" pathtracer --error 1% -f "$tmp/y.exr" "$scene"
+expect "a render that looks at all of its image" 3 "cannot be cut into jobs" "$san_assay" plan --plan "$tmp/p1" pathtracer --error 1% -f "$tmp/y.exr" "$scene"
 expect "what cannot be planned" 3 "begins with pathtracer, grade, validate or reference" "$san_assay" plan report x.json
 expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay" plan --plan "$tmp/p1" pathtracer -f x.exr -e "{out}" -s 1 "{job}"
 
@@ -178,7 +178,7 @@ validation() { # NAME scene|claim JOBS
     cmp -s <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") || why="$why $(diff <(no_times "$tmp/v1/results.json") <(no_times "$tmp/v2/results.json") | head -n 6)"
     cmp -s <(grep -v index.html "$tmp/table1") <(grep -v index.html "$tmp/table2") || why="$why another table"
     cmp -s <(sed -E 's/ time(stamp)?="[^"]*"//g' "$tmp/v1/junit.xml") <(sed -E 's/ time(stamp)?="[^"]*"//g' "$tmp/v2/junit.xml") || why="$why another junit.xml"
-    # Of the page, with its pictures, all but digits: times differ, and numbers are those of results.json.
+    # Of the page, with its images, all but digits: times differ, and numbers are those of results.json.
     cmp -s <(tr -d '0-9.:TZ-' <"$tmp/v1/index.html") <(tr -d '0-9.:TZ-' <"$tmp/v2/index.html") || why="$why another page"
     [ -s "$tmp/v2/index.html" ] && [ -e "$tmp/v2/data/38_spot_edge/pathtracer.exr" ] || why="$why files are missing"
     tell "$name" "$why"

@@ -17,7 +17,7 @@ what="live jobs"
 run_all() { "$assay" run-job "$1" $(seq $(($(grep -c '^{"job"' "$1/plan.jsonl") - 1)) -1 0); } # the last first
 no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a|b)": [0-9.e-]+//; /"(command|date)":/d' "$1"; }
 
-# A room of noise for both engines: of Cycles each replicate a job, of POV-Ray 36 pictures in 6.
+# A room of noise for both engines: of Cycles each replicate a job, of POV-Ray 36 images in 6.
 mkdir "$tmp/suite"
 cp reference/scenes/41_cornell.dae "$tmp/suite"
 sed 's/"width": [0-9]*, "height": [0-9]*/"width": 16, "height": 16/; s/"tile": 16/"tile": 8/; /"consistency"/d

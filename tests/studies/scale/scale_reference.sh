@@ -1,7 +1,7 @@
 #!/bin/bash
 # tests/studies/scale/scale_reference.sh BUILD: references in jobs (`assay plan reference`, `run-job`, `gather`) have the bits of `assay reference`,
 # and replicates that are missing, damaged, exchanged or made twice are refused. In the engines' places our own program
-# renders a picture for each seed; the engines themselves: tests/studies/scale/scale_live.sh. Prints "ok NAME" or "not ok NAME: why".
+# renders an image for each seed; the engines themselves: tests/studies/scale/scale_live.sh. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/studies/scale/scale_reference.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay san_assay=$build/san/assay
@@ -29,7 +29,7 @@ for seed in \$(grep -o '[0-9]*' seeds.json); do
 done
 echo 'ASSAY OK {"version": "Blender 0", "settings": {"samples": 4}}'
 END
-# A window is twice as wide as the picture; the rest are replicates, of which no two have the same file.
+# A window is twice as wide as the image; the rest are replicates, of which no two have the same file.
 "$pathtracer" -q -r 32 32 -s 4 -m 1 -f "$tmp/window.exr" "$suite.dae" >/dev/null
 cat >"$tmp/bin/povray" <<END
 #!/bin/bash
@@ -44,7 +44,7 @@ chmod +x "$tmp/bin/blender" "$tmp/bin/povray"
 export PATH="$tmp/bin:$PATH"
 words=(reference --suite "$tmp/suite" --work "$tmp/work")
 
-# Each replicate a job, and 36 pictures, 32 of them windows, in 3; the last job first.
+# Each replicate a job, and 36 images, 32 of them windows, in 3; the last job first.
 "$assay" "${words[@]}" -t 1 --out "$tmp/l" >"$tmp/out" 2>&1 || cat "$tmp/out"
 in_jobs() { # ENGINE PARTS
     local plan=$tmp/$1 why num
@@ -92,7 +92,7 @@ expect "a replicate that was damaged" 3 "job 3: .* is not what the job wrote" "$
 sign "$three"
 expect "and signed" 3 "picture_0003.exr" "$san_assay" gather "$plan"
 rm -rf "$three" && cp -r "$(artefact 2)" "$three"
-expect "another job's artefact" 3 "has pictures 2:3, those from 3 on are wanted" "$assay" gather "$plan"
+expect "another job's artefact" 3 "has images 2:3, those from 3 on are wanted" "$assay" gather "$plan"
 again && cp "$(artefact 2)/picture_0002.exr" "$three/picture_0003.exr" && sign "$three"
 expect "another job's replicate" 3 "Cycles: replicate 3 is the same image as an earlier one" "$san_assay" gather "$plan"
 # The seed of replicate 2 again, of whose four samples it shares all, with a fifth.
@@ -104,7 +104,7 @@ expect "a replicate of another version" 3 "made by Blender 1 with other settings
 again
 tell "nothing was written by any of these" "$([ ! -e "$tmp/x/41_cornell/cycles.exr" ] || echo there is a cycles.exr)"
 cp "$plan/plan.jsonl" "$tmp/kept" && sed -i '1s/"job":0,"jobs":4/"job":0,"jobs":3/' "$plan/plan.jsonl"
-expect "a plan that does not know of all its jobs" 3 "pictures 3:4 are missing" "$san_assay" gather "$plan"
+expect "a plan that does not know of all its jobs" 3 "images 3:4 are missing" "$san_assay" gather "$plan"
 cp "$tmp/kept" "$plan/plan.jsonl"
 cp "$suite.json" "$tmp/kept" && sed -i 's/"replicates": 4, "spp": 4/"replicates": 4, "spp": 8/' "$suite.json"
 expect "a suite that asks for something else by now" 3 "of another reference, or of other settings" "$san_assay" gather "$plan"
@@ -116,8 +116,8 @@ plan=$tmp/povray
 two=$(artefact 2)
 cp "$two/picture_0034.exr" "$two/picture_0035.exr" && sign "$two"
 expect "a replicate of POV-Ray twice" 3 "POV-Ray: replicates 2 and 3 are the same" "$san_assay" gather "$plan"
-expect "pictures that there are not" 3 "no pictures 35:37 among its 36" "$san_assay" "${words[@]}" --engine povray --pictures 35:37 --out "$tmp/p"
+expect "images that there are not" 3 "no images 35:37 among its 36" "$san_assay" "${words[@]}" --engine povray --pictures 35:37 --out "$tmp/p"
 expect "no range" 3 "'7' is not a range A:B" "$assay" "${words[@]}" --pictures 7
-expect "pictures of two references" 3 "is of one reference" "$assay" "${words[@]}" --pictures 0:1 --out "$tmp/p"
-expect "pictures planned" 3 "these are a job already" "$assay" plan --plan "$tmp/p1" "${words[@]}" --engine cycles --pictures 0:1
+expect "images of two references" 3 "is of one reference" "$assay" "${words[@]}" --pictures 0:1 --out "$tmp/p"
+expect "images planned" 3 "these are a job already" "$assay" plan --plan "$tmp/p1" "${words[@]}" --engine cycles --pictures 0:1
 [ $failures -eq 0 ]

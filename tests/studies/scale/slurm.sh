@@ -136,8 +136,8 @@ done <begun
 [ "$(wc -l <begun)" -eq 8 ] || why="$why $(wc -l <begun) jobs began"
 [ -n "$lost" ] || why="$why no job was lost"
 tell "nothing was made twice but what node $victim lost, job $lost, though follower and controller were killed too" "$why"
-why=$(cd / && "$assay" reproduce "$tmp/x.exr" 2>&1 | grep -q "the same bits" || echo "not the picture that its words make")
-tell "the picture says how it was made" "$why"
+why=$(cd / && "$assay" reproduce "$tmp/x.exr" 2>&1 | grep -q "the same bits" || echo "not the image that its words make")
+tell "the image says how it was made" "$why"
 why=$([ -e plan/assay-*-2 ] && echo "" || echo "no second round: $(ls plan)")
 tell "what was lost was submitted again" "$why"
 
@@ -147,7 +147,7 @@ until_so 60 idle_nodes 4
 # pathtracer hands over by itself; its plan goes when all is done.
 "$pathtracer" -q -r 64 64 -s 16 -f l2.exr -f l2.png "$scene" >/dev/null
 why=$("$pathtracer" -q -r 64 64 -s 16 --slurm 3 -f x2.exr -f x2.png "$scene" 2>&1 >/dev/null) && why=""
-cmp -s l2.png x2.png || why="another picture: $why"
+cmp -s l2.png x2.png || why="another image: $why"
 [ -e x2.exr.plan ] && why="$why the plan was left"
 tell "pathtracer --slurm" "$why"
 

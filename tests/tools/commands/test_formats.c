@@ -370,7 +370,7 @@ static bool rubric_says(const char *text, const char *words)
     return says;
 }
 
-/* In the whole, in a picture or in a check. */
+/* In the whole, in an image or in a check. */
 static bool knows_statement(const char *word)
 {
     static const char *const above[] = {"rubric A", "image p", "part 1 x\ncheck c 1 equal"};

@@ -258,7 +258,7 @@ static double most_likely(double n, double m)
     return most;
 }
 
-/* One pixel whose 64 samples are all 1.0002 here and whose 20 are all 1 there, in a picture where a rare
+/* One pixel whose 64 samples are all 1.0002 here and whose 20 are all 1 there, in an image where a rare
  * event of brightness 1000 was seen elsewhere. Missed events could explain it (0.0002 * 20 / 1000 of one
  * is expected); one law for both sides cannot. Where a side is black, or not observed but exact, rare
  * events may make up for it, and nothing is said; nor where samples differ, or inside the margin. */

@@ -20,14 +20,14 @@ static struct replicate_dir new_renders(int num, int width, int height)
     return r;
 }
 
-enum law_of_pictures {
+enum law_of_images {
     NORMAL,
     CORRELATED, /* one number shared by all pixels, as much as each has of its own */
     FIREFLIES,  /* 0, but 1000 in 2 % of the pixels */
     NUM_LAWS
 };
 
-static void paint(struct replicate_dir *r, enum law_of_pictures law, double scale, uint64_t *state)
+static void paint(struct replicate_dir *r, enum law_of_images law, double scale, uint64_t *state)
 {
     for (int k = 0; k < r->num; k++) {
         double shared = draw(LAW_NORMAL, state) - 1;
@@ -53,7 +53,7 @@ static struct permutation test_pair(const struct replicate_dir *a, const struct 
 }
 
 /* |t|, two samples with pooled variance, of those of 8 pixels with a bit set in `labels`, from the
- * definition; the largest over the 4 + 1 squares (sides 1 and 2 of a 2 x 2 picture). Grey, so channels
+ * definition; the largest over the 4 + 1 squares (sides 1 and 2 of a 2 x 2 image). Grey, so channels
  * add nothing. */
 static double largest_t(const double v[6][4], int labels)
 {
@@ -129,7 +129,7 @@ TEST(test_smallest)
 }
 
 /* p <= alpha in how many of `runs` pairs from one law. */
-static int count_rejected(enum law_of_pictures law, double scale, double alpha, int runs,
+static int count_rejected(enum law_of_images law, double scale, double alpha, int runs,
                           uint64_t seed)
 {
     struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
@@ -151,7 +151,7 @@ static int count_rejected(enum law_of_pictures law, double scale, double alpha, 
 TEST(test_level)
 {
     for (int law = 0; law < NUM_LAWS; law++) {
-        int got = count_rejected((enum law_of_pictures)law, 1, 0.05, 2000, 40 + (uint64_t)law);
+        int got = count_rejected((enum law_of_images)law, 1, 0.05, 2000, 40 + (uint64_t)law);
         print_message("law %d: %d of 2000 at 5 %%\n", law, got);
         assert_true(got <= 128);
         if (law != FIREFLIES)
@@ -225,8 +225,7 @@ TEST(test_refused)
     paint(&c, NORMAL, 1, &seed);
     REFUSES(permutation_test(&a, &c, &opt, &p, &e), "4 x 4");
     memcpy(b.rgb[1], a.rgb[2], 48 * sizeof **a.rgb);
-    REFUSES(permutation_test(&a, &b, &opt, &p, &e),
-            "2.exr of A and 1.exr of B are the same picture");
+    REFUSES(permutation_test(&a, &b, &opt, &p, &e), "2.exr of A and 1.exr of B are the same image");
     replicate_dir_free(&a);
     replicate_dir_free(&b);
     replicate_dir_free(&c);

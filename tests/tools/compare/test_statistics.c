@@ -1,8 +1,8 @@
 /* The statistics of tools/compare/compare.c besides those of single regions: dense, directed, noise. Their sizes,
  * their power against closed forms, what they name, and what is refused. Seeds were fixed before
- * the first run and nothing is retried. Designs that were changed after it: the picture is averaged over
+ * the first run and nothing is retried. Designs that were changed after it: the image is averaged over
  * pixels (edges sampled at points do not shift); the dense test has n = 1024, so that single pixels are
- * testable; amounts are told with uniform noise and more contrast; the noise test has a larger picture of normal noise
+ * testable; amounts are told with uniform noise and more contrast; the noise test has a larger image of normal noise
  * and asks that every claim that could be tested is found; two laws were left out of the sizes for time, both
  * within 1 % before. Sizes: see test_compare_rates.c for what "at most alpha" means. */
 #include "tests/support/rates.h"
@@ -19,7 +19,7 @@
 static const double pi = 3.14159265358979323846;
 
 /* Coloured waves around 0.6 (times contrast), a bright disc of up to 1.2, nothing symmetric: averaged over
- * the pixel whose upper left corner is at x, y of a picture of side x side pixels. */
+ * the pixel whose upper left corner is at x, y of an image of side x side pixels. */
 static double scene(double x, double y, int side, int channel, double contrast)
 {
     enum { SUB = 8 };
@@ -62,8 +62,8 @@ struct size_case {
     bool grey;
 };
 
-/* H0: equal means and equal variances. Each statistic's own p <= 1 % in at most 1 % of 2000 claims, on a
- * picture with edges and colours, 16 x 16, in which the noise is proportional to radiance. The interval
+/* H0: equal means and equal variances. Each statistic's own p <= 1 % in at most 1 % of 2000 claims, on an
+ * image with edges and colours, 16 x 16, in which the noise is proportional to radiance. The interval
  * of the variance ratio holds 1 in at least its 98 %. A statistic that tests nothing at all in a row is
  * no proof of its size: dense and directed must test in all rows but those named. */
 TEST(test_sizes)
@@ -200,7 +200,7 @@ TEST(test_dense_margin)
     assert_int_equal(found[1], CLAIMS);
 }
 
-/* What each bug does to the picture of fill_scene(). */
+/* What each bug does to the image of fill_scene(). */
 static double bugged(const double *truth, int side, int bug, int x, int y, int c)
 {
     static const int swap[3][3] = {{2, 1, 0}, {1, 0, 2}, {0, 2, 1}};
@@ -225,7 +225,7 @@ static double bugged(const double *truth, int side, int bug, int x, int y, int c
 
 /* Thirteen bugs, each with a name; 32 x 32, 5 claims each at alpha = 1e-3: DIFFERENT, and the sentence says
  * what it looks like, in every one. The differences are of many standard errors. Controls: the same
- * picture without a bug is not DIFFERENT; a hole in one tile is DIFFERENT and is called none of these. */
+ * image without a bug is not DIFFERENT; a hole in one tile is DIFFERENT and is called none of these. */
 TEST(test_names)
 {
     enum { SIDE = 32, N = 64, CLAIMS = 5 };
@@ -468,7 +468,7 @@ TEST(test_variance_ratio)
 }
 
 /* The same seeds on both sides are refused, as a whole and in three quarters of the pixels. Controls: other
- * seeds; an exact picture compared with itself; and laws of two values, in which independent pixels can
+ * seeds; an exact image compared with itself; and laws of two values, in which independent pixels can
  * agree in every moment: 500 claims of the rare and of the firefly law, none refused (each has less than
  * 1e-6 of it). */
 TEST(test_shared_seeds)

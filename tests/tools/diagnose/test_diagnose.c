@@ -141,7 +141,7 @@ TEST(test_a_damaged_catalogue_is_refused)
     const char *dir = test_path("damaged");
     assert_true(fs_make_dirs(dir, &e));
     copy(CATALOGUE, "manifest.json", dir, -1);
-    assert_false(catalogue_read(dir, &c, &e)); /* no pictures */
+    assert_false(catalogue_read(dir, &c, &e)); /* no images */
     for (int v = 0; v < f->c.num_views; v++) {
         snprintf(name, sizeof name, "%s.exr", f->c.view[v].name);
         copy(CATALOGUE, name, dir, v == 1 ? 3000 : -1);

@@ -1,4 +1,4 @@
-/* From pictures to points, with pictures whose truth is known: made here from gamma laws, written as 8-bit PNG by
+/* From images to points, with images whose truth is known: made here from gamma laws, written as 8-bit PNG by
  * the assignment's curve, and read back as a student's would be.
  *
  * The scene: a gradient of mean .02 to .4, a lamp of radiance 8 in a corner. A sample is exponential (a pixel of spp of
@@ -28,7 +28,7 @@ static double truth(size_t p, size_t c)
     return (0.02 + 0.38 * (double)(p / WIDTH) / HEIGHT) * (c == 0 ? 1.2 : c == 1 ? 1 : 0.7);
 }
 
-/* What a program does to the right picture. */
+/* What a program does to the right image. */
 struct bug {
     double scale;  /* of everything */
     double square; /* of the 8 x 8 pixels at 32,24 */
@@ -108,63 +108,62 @@ static int tear_down(void **state)
     return 0;
 }
 
-static struct rubric *a_rubric(enum check_kind kind, int pictures)
+static struct rubric *a_rubric(enum check_kind kind, int images)
 {
     struct rubric *r = calloc(1, sizeof *r);
     assert_non_null(r);
     r->num_checks = r->num_parts = 1;
-    r->num_pictures = pictures;
+    r->num_images = images;
     struct rubric_check *c = &r->check[0];
     c->kind = kind;
-    c->num_pictures = pictures;
+    c->num_images = images;
     c->points = 10;
     c->image = (struct margin){0.01, 0.05, true};
     c->tile = (struct margin){0.04, 0.2, true};
     c->log_ratio = (struct margin){0.3, 1, true};
     c->share = (struct margin){0.01, 0.2, true};
-    for (int i = 0; i < pictures; i++) {
-        c->picture[i] = i;
-        r->picture[i] = (struct rubric_picture){
+    for (int i = 0; i < images; i++) {
+        c->images[i] = i;
+        r->image[i] = (struct rubric_image){
             .width = WIDTH, .height = HEIGHT, .spp = SPP, .reference = REFERENCE_OURS};
-        snprintf(r->picture[i].name, sizeof r->picture[i].name, "p%d", i);
+        snprintf(r->image[i].name, sizeof r->image[i].name, "p%d", i);
     }
     return r;
 }
 
-/* The rubric's one check on these pictures, which it frees, as it does the rubric. */
-static struct result run_check(struct rubric *r, const struct submitted_image *pictures,
-                               double alpha)
+/* The rubric's one check on these images, which it frees, as it does the rubric. */
+static struct result run_check(struct rubric *r, const struct submitted_image *images, double alpha)
 {
     struct submitted_images *h = calloc(1, sizeof *h);
     struct answer_key *a = calloc(1, sizeof *a);
     struct result out;
     struct err e;
     assert_true(h != NULL && a != NULL);
-    for (int i = 0; i < r->num_pictures; i++) {
-        h->picture[i] = pictures[i];
+    for (int i = 0; i < r->num_images; i++) {
+        h->image[i] = images[i];
         a->of[0][i].m = a->of[0][i].noise = reference;
     }
     MUST(grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e));
-    for (int i = 0; i < r->num_pictures; i++)
-        submitted_image_free(&h->picture[i]);
+    for (int i = 0; i < r->num_images; i++)
+        submitted_image_free(&h->image[i]);
     free(r);
     free(h);
     free(a);
     return out;
 }
 
-/* One check on pictures with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
+/* One check on images with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
 static struct result check(enum check_kind kind, int num, const struct bug *const *bug,
                            const double *spp, const int *asked, double alpha)
 {
     struct rubric *r = a_rubric(kind, num);
-    struct submitted_image picture[RUBRIC_PICTURES];
+    struct submitted_image image[RUBRIC_IMAGES];
     for (int i = 0; i < num; i++) {
-        picture[i] = submit_render(bug[i], spp[i]);
+        image[i] = submit_render(bug[i], spp[i]);
         if (asked != NULL)
-            r->picture[i].spp = asked[i];
+            r->image[i].spp = asked[i];
     }
-    return run_check(r, picture, alpha);
+    return run_check(r, image, alpha);
 }
 
 static struct result equal(const struct bug *bug, double spp, double alpha)
@@ -239,7 +238,7 @@ TEST(a_right_program_keeps_its_score)
         most = fmax(most, r.chance);
         result_free(&r);
     }
-    printf("largest chance of other points, of %d right pictures: %.2g\n", RUNS, most);
+    printf("largest chance of other points, of %d right images: %.2g\n", RUNS, most);
     assert_true(most < 1e-4);
     const struct bug near = {.scale = 1.03, .square = 1, .noise = 1};
     struct result r = equal(&near, SPP, 1e-5);
@@ -247,9 +246,9 @@ TEST(a_right_program_keeps_its_score)
     result_free(&r);
 }
 
-/* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 pictures; by
+/* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 images; by
  * chance more than 34 have a probability below 1e-3 (binomial). Control: 3 % too bright. */
-TEST(a_right_picture_keeps_its_points)
+TEST(a_right_image_keeps_its_points)
 {
     enum { RUNS = 400 };
     int misses = 0, lost = 0, found = 0;
@@ -278,7 +277,7 @@ TEST(a_right_picture_keeps_its_points)
     assert_int_equal(found, 40);
 }
 
-/* Noisier than ours by 4, or by a quarter: known from the picture, still right. By 100: too noisy to be worth points. */
+/* Noisier than ours by 4, or by a quarter: known from the image, still right. By 100: too noisy to be worth points. */
 TEST(noise_is_not_bias)
 {
     static const double samples[] = {0.25, 1, 4};
@@ -365,13 +364,13 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
         struct result out;
         int set = -1;
         assert_non_null(h);
-        h->picture[0] = submit_render(&cases[k].bug, SPP);
+        h->image[0] = submit_render(&cases[k].bug, SPP);
         MUST(grade_all_checks(r, a, h, 1e-5, &out, &set, &e));
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");
         result_free(&out);
-        submitted_image_free(&h->picture[0]);
+        submitted_image_free(&h->image[0]);
         free(h);
     }
     moments_free(m);
@@ -433,7 +432,7 @@ TEST(parts_add_up_or_not)
     result_free(&r);
 }
 
-/* The second picture is asked for with 16 times the samples, and has them; or has as many as the first. */
+/* The second image is asked for with 16 times the samples, and has them; or has as many as the first. */
 TEST(noise_falls_or_not)
 {
     const struct bug *const two[] = {&none, &none};
@@ -491,8 +490,8 @@ TEST(rates_are_whole_batches_or_not)
     assert_false(rate_image_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
 }
 
-/* Files that are no pictures, and one that says it is large: the header alone is read. */
-TEST(bad_pictures_get_a_line)
+/* Files that are no images, and one that says it is large: the header alone is read. */
+TEST(bad_images_get_a_line)
 {
     static const unsigned char bomb[] = {
         0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49,
@@ -505,7 +504,7 @@ TEST(bad_pictures_get_a_line)
         const void *bytes;
         size_t size;
     } files[] = {{"empty", "", 0},
-                 {"text", "not a picture", 13},
+                 {"text", "not an image", 13},
                  {"short", "\x89PNG", 4},
                  {"bomb", bomb, sizeof bomb},
                  {"pfm", "PF\n100000 100000\n-1.0\n", 22},
@@ -530,7 +529,7 @@ TEST(bad_pictures_get_a_line)
     struct err e;
     submitted_image_free(&s);
     assert_false(submitted_image_read(test_path("submitted.png"), "cgl", WIDTH, WIDTH, &s, &e));
-    assert_string_equal(e.msg, "the picture is 64 x 48 pixels, not 64 x 64");
+    assert_string_equal(e.msg, "the image is 64 x 48 pixels, not 64 x 64");
 }
 
 TEST_GROUP(set_up, tear_down)

@@ -79,10 +79,10 @@ TEST(a_right_one_is_read)
     if (mistakes.num > 0)
         fail_msg("%d: %s", mistakes.at[0].line, mistakes.at[0].text);
     assert_string_equal(rubric->title, "A course");
-    assert_int_equal(rubric->num_pictures, 1);
-    assert_int_equal(rubric->picture[0].spp, 16);
-    assert_int_equal(rubric->picture[0].lights, 1);
-    assert_int_equal(rubric->picture[0].reference, REFERENCE_TRUTH);
+    assert_int_equal(rubric->num_images, 1);
+    assert_int_equal(rubric->image[0].spp, 16);
+    assert_int_equal(rubric->image[0].lights, 1);
+    assert_int_equal(rubric->image[0].reference, REFERENCE_TRUTH);
     assert_string_equal(rubric->part[0].title, "Light");
     assert_int_equal(rubric->num_checks, 1);
     assert_int_equal(rubric->check[0].kind, CHECK_EQUAL);
@@ -99,7 +99,7 @@ TEST(images_by_their_old_word)
     read_text(with(2, "picture p"));
     assert_int_equal(mistakes.num, 0);
     assert_int_equal(rubric->old_word_line, 2);
-    assert_string_equal(rubric->picture[0].name, "p");
+    assert_string_equal(rubric->image[0].name, "p");
     read_text(with(0, ""));
     assert_int_equal(rubric->old_word_line, 0);
 }
@@ -108,8 +108,8 @@ TEST(images_by_their_old_word)
 TEST(images_below_a_check)
 {
     read_text(with(11, " tile 0.03 0.1\nimage 2nd\n scene 12_point_plane"));
-    assert_int_equal(rubric->num_pictures, 2);
-    assert_string_equal(rubric->picture[1].name, "2nd");
+    assert_int_equal(rubric->num_images, 2);
+    assert_string_equal(rubric->image[1].name, "2nd");
     assert_true(rubric->check[0].image.full == 0.01);
 }
 
@@ -174,7 +174,7 @@ TEST(each_mistake_is_named_with_its_line)
         {7, 2, " bounces 3\n reference cycles", "the golden of"},
         {7, 7, " referense truth", "'referense'"},
         {8, 8, "part 1 Light\npart 2 Nothing", "has no checks"},
-        {9, 9, "check c 4 equal q", "no picture 'q'"},
+        {9, 9, "check c 4 equal q", "no image 'q'"},
         {9, 9, "check c four equal p", "points"},
         {9, 9, "check c 4 equals p", "'equals'"},
         {9, 9, "check c 0 equal p", "worth nothing"},

@@ -1,4 +1,4 @@
-/* Bugs named by 8-bit pictures alone, with the catalogue that ships. Pictures are made here of what the catalogue says: flat
+/* Bugs named by 8-bit images alone, with the catalogue that ships. Images are made here of what the catalogue says: flat
  * cells of the right mean and of the bug's effect, normal noise of as much as a render of ours has, written as PNG by the
  * assignment's curve and read back. So this is about codes, clipping and noise; what real renders give is measured by
  * make grade-show. */
@@ -15,15 +15,15 @@ static struct rubric *rubric;
 static struct answer_key *answers;
 static struct rubric_bugs bugs;
 
-static const struct view *view_of(int picture, int set)
+static const struct view *view_of(int image, int set)
 {
     char name[128], key[65];
     struct err e;
-    MUST(rubric_bugs_key(rubric, picture, set, name, key, &e));
+    MUST(rubric_bugs_key(rubric, image, set, name, key, &e));
     return catalogue_view(&bugs.catalogue, name);
 }
 
-/* The first of the three values of pixel p's cell; the variance of a pixel of one picture. */
+/* The first of the three values of pixel p's cell; the variance of a pixel of one image. */
 static int value_at(const struct view *v, size_t p)
 {
     size_t cell = (size_t)v->correct.cell, width = (size_t)v->width;
@@ -36,9 +36,9 @@ static double variance_at(const struct view *v, int spp, int i)
 }
 
 /* Flat cells, so that cells of the reference are those of the catalogue. */
-static void make_answer(const struct view *v, int picture, struct moments *m)
+static void make_answer(const struct view *v, int image, struct moments *m)
 {
-    const struct rubric_picture *p = &rubric->picture[picture];
+    const struct rubric_image *p = &rubric->image[image];
     struct err e;
     assert_true(moments_alloc(m, p->width, p->height, &e));
     for (size_t i = 0; i < 3 * (size_t)p->width * (size_t)p->height; i++) {
@@ -64,7 +64,7 @@ static int set_up(void **state)
         mistakes.num > 0 || !catalogue_read("tools/rubrics/cs184-bugs", &bugs.catalogue, &e))
         return -1;
     for (int k = 0; k < rubric->num_sets; k++)
-        for (int i = 0; i < rubric->num_pictures; i++) {
+        for (int i = 0; i < rubric->num_images; i++) {
             /* All deviations together may look like one of them. */
             const struct view *v = view_of(i, k);
             for (int j = 1; j < k && v == NULL && k == rubric->num_sets - 1; j++)
@@ -92,8 +92,8 @@ static int tear_down(void **state)
 static void hand_in(int set, int bug, double noise, struct submitted_images *h)
 {
     static uint8_t rgb8[3 * 128 * 96];
-    for (int i = 0; i < rubric->num_pictures; i++) {
-        const struct rubric_picture *p = &rubric->picture[i];
+    for (int i = 0; i < rubric->num_images; i++) {
+        const struct rubric_image *p = &rubric->image[i];
         const char *path = test_path("submitted.png");
         struct err e;
         if (bugs.view[set][i] < 0)
@@ -107,7 +107,7 @@ static void hand_in(int set, int bug, double noise, struct submitted_images *h)
             rgb8[k] = tone_map(TONE_CGL, fmax(0, mean + gsl_ran_gaussian(rng, sd)));
         }
         MUST(image_write_png(path, p->width, p->height, rgb8, &e));
-        MUST(submitted_image_read(path, rubric->curve, p->width, p->height, &h->picture[i], &e));
+        MUST(submitted_image_read(path, rubric->curve, p->width, p->height, &h->image[i], &e));
     }
 }
 
@@ -120,8 +120,8 @@ static const char *name(int set, int bug, double noise, int graded, int *with, i
     assert_non_null(h);
     hand_in(set, bug, noise, h);
     MUST(rubric_bugs_diagnose(&bugs, rubric, answers, h, graded, 1e-5, &found, with, &e));
-    for (int i = 0; i < rubric->num_pictures; i++)
-        submitted_image_free(&h->picture[i]);
+    for (int i = 0; i < rubric->num_images; i++)
+        submitted_image_free(&h->image[i]);
     free(h);
     *named = found.num_named;
     return found.num_named > 0 ? bugs.catalogue.bug[found.candidate[0].bug].name : "";
@@ -129,7 +129,7 @@ static const char *name(int set, int bug, double noise, int graded, int *with, i
 
 /* H0: right programs are told a name with a probability of at most 1e-5 a set. 6 of them, as noisy as ours and 4 times so; and
  * those with the first accepted deviation, which are graded with it. */
-TEST(right_pictures_have_no_name)
+TEST(right_images_have_no_name)
 {
     for (int k = 0; k < 6; k++) {
         int with, named, set = k % 2;
@@ -169,17 +169,17 @@ TEST(every_bug_is_in_it)
         fail_msg("%s (make rubric-bugs)", e.msg);
 }
 
-/* A catalogue of other pictures is refused. */
+/* A catalogue of other images is refused. */
 TEST(another_rubric_is_refused)
 {
     struct rubric_bugs other;
     struct err e;
     (void)state;
-    for (int i = 0; i < rubric->num_pictures; i++)
-        if (strcmp(rubric->picture[i].name, "box") == 0) {
-            rubric->picture[i].bounces++;
+    for (int i = 0; i < rubric->num_images; i++)
+        if (strcmp(rubric->image[i].name, "box") == 0) {
+            rubric->image[i].bounces++;
             REFUSES(rubric_bugs_open(rubric, answers, &other, &e), "'box'");
-            rubric->picture[i].bounces--;
+            rubric->image[i].bounces--;
         }
 }
 

@@ -1,4 +1,4 @@
-/* Whose noise is the same? Pictures made here, gamma noise of 64 exponential samples a pixel on a gradient, as 8-bit PNG would
+/* Whose noise is the same? Images made here, gamma noise of 64 exponential samples a pixel on a gradient, as 8-bit PNG would
  * have them by the assignment's curve; the reference has 1024 samples, and its noise is in all of them. */
 
 #include "renderer/image/tone.h"
@@ -52,7 +52,7 @@ static void draw(double *factor, double spp)
         factor[p] = gsl_ran_gamma(rng, spp, 1 / spp);
 }
 
-/* What is known of a picture: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
+/* What is known of an image: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
 static struct noise_print noise_of(const double *own, const double *other, double share,
                                    double scale)
 {
@@ -79,7 +79,7 @@ static struct noise_print noise_of(const double *own, const double *other, doubl
     return out;
 }
 
-/* H0: pictures with noise of their own. All 1770 pairs of 60: T above 2.33 in about 1 % of them (normal law; the bound says
+/* H0: images with noise of their own. All 1770 pairs of 60: T above 2.33 in about 1 % of them (normal law; the bound says
  * 6.6 %), at most 40 of 1770, and none above the bound at alpha 1e-3 over all. All are 1 % too bright, as within margins a bug
  * that they share may make them. */
 TEST(noise_of_their_own)
@@ -109,7 +109,7 @@ TEST(noise_of_their_own)
         same_noise_free(&noise[k]);
 }
 
-/* Power, each of 20 times, over the pairs and pictures of a class of 300: the same noise, retouched to be 2 % brighter; half of
+/* Power, each of 20 times, over the pairs and images of a class of 300: the same noise, retouched to be 2 % brighter; half of
  * it and half of one's own. */
 TEST(noise_of_others)
 {
@@ -131,7 +131,7 @@ TEST(noise_of_others)
     assert_true(least > bound && half > bound);
 }
 
-/* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of pictures without noise. */
+/* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of images without noise. */
 TEST(too_fine_to_tell)
 {
     static double one[PIXELS], two[PIXELS];

@@ -1,6 +1,6 @@
 /* FLIP against what is known without it: the numbers that its authors publish, the chromaticities of BT.709, published
- * L*a*b* of its primaries, the Fourier transform of the contrast sensitivity, closed forms on flat pictures, and a
- * second implementation in double precision with whole two-dimensional filters. The pictures whose means its authors
+ * L*a*b* of its primaries, the Fourier transform of the contrast sensitivity, closed forms on flat images, and a
+ * second implementation in double precision with whole two-dimensional filters. The images whose means its authors
  * publish are not here. */
 #include "tools/images/flip.h"
 #include "tools/images/flip_colour.h"
@@ -192,7 +192,7 @@ static void fill(double *rgb, size_t pixels, double r, double g, double b)
 
 enum { SIDE = 24, OTHER = 19, PIXELS = SIDE * OTHER };
 
-/* Flat pictures have no features, and filters leave them alone: the error is that of two colours. */
+/* Flat images have no features, and filters leave them alone: the error is that of two colours. */
 TEST(test_flat)
 {
     static double a[3 * PIXELS], b[3 * PIXELS];
@@ -325,10 +325,10 @@ static double filtered(const struct oracle *o, int filter, const double *plane, 
 static void oracle_ldr(const struct oracle *o, const double *a, const double *b, double *map)
 {
     static double plane[2][3][PIXELS];
-    const double *picture[2] = {a, b};
+    const double *image[2] = {a, b};
     for (int s = 0; s < 2; s++)
         for (size_t i = 0; i < PIXELS; i++) {
-            struct colour c = xyz(&picture[s][3 * i]);
+            struct colour c = xyz(&image[s][3 * i]);
             plane[s][0][i] = 116 * c.v[1] - 16;
             plane[s][1][i] = 500 * (c.v[0] - c.v[1]);
             plane[s][2][i] = 200 * (c.v[1] - c.v[2]);

@@ -95,7 +95,7 @@ TEST(noisy_grey_is_small)
     moments_free(&m);
 }
 
-TEST(hard_pictures_are_exact)
+TEST(hard_images_are_exact)
 {
     uint32_t seed = 7;
     for (int kind = 0; kind < 6; kind++) {
@@ -124,7 +124,7 @@ TEST(hard_pictures_are_exact)
     }
 }
 
-TEST(small_pictures)
+TEST(small_images)
 {
     static const int size[][2] = {{1, 1}, {1, 5}, {5, 1}, {2, 2}};
     uint32_t seed = 9;

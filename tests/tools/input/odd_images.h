@@ -1,4 +1,4 @@
-/* Picture files that our own writers never make, byte by byte from their specifications, for the
+/* Image files that our own writers never make, byte by byte from their specifications, for the
  * readers' tests. All abort() where the file cannot be written. */
 #ifndef ASSAY_TESTS_ODD_IMAGES_H
 #define ASSAY_TESTS_ODD_IMAGES_H

@@ -74,7 +74,7 @@ TEST(test_directory)
 
     write_floats(test_path("runs/s4.exr"), 2, 1, 3, rgb_names, v[0]);
     assert_refused(test_path("runs"), (struct input_options){0},
-                   "s1.exr and s4.exr are the same picture: the seed was ignored");
+                   "s1.exr and s4.exr are the same image: the seed was ignored");
     write_floats(test_path("runs/s4.exr"), 1, 2, 3, rgb_names, v[0]);
     assert_refused(test_path("runs"), (struct input_options){0},
                    "is 1 x 2 pixels, s1.exr is 2 x 1");
@@ -82,7 +82,7 @@ TEST(test_directory)
     assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
     odd_png(test_path("runs/s4.exr"), 2, 1, 3, 8, (uint16_t[6]){1, 2, 3, 4, 5, 6});
     assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
-    odd_file(test_path("runs/s4.exr"), "no picture");
+    odd_file(test_path("runs/s4.exr"), "no image");
     assert_refused(test_path("runs"), (struct input_options){0}, "s4.exr: cannot read");
     assert_int_equal(unlink(test_path("runs/s4.exr")), 0);
     assert_refused(test_path("runs"), (struct input_options){.spp = 4}, "--spp-a");
@@ -240,7 +240,7 @@ TEST(test_codes)
     odd_png(test_path("deep.png"), 2, 1, 3, 16, (uint16_t[6]){1000, 1, 65534, 0, 5, 5});
     struct input in = read_side(test_path("deep.png"), opt, &notes);
     double step = 1 / 65535.0;
-    assert_int_equal(in.kind, INPUT_PICTURE);
+    assert_int_equal(in.kind, INPUT_IMAGE);
     assert_near(in.m.mean[0], 1000 * step, 1e-9);
     assert_near(in.m.tolerance[0], step / 2, 1e-12);
     assert_near(in.rounding[0], step * step / 12, 1e-18);
@@ -316,7 +316,7 @@ TEST(test_hygiene)
     struct notes notes = {0};
     struct input in = read_side(test_path("ok.exr"), none, &notes);
     input_free(&in);
-    odd_file(test_path("words.exr"), "no picture");
+    odd_file(test_path("words.exr"), "no image");
     assert_refused(test_path("words.exr"), none, "cannot read");
     assert_refused(test_path("gone.exr"), none, "gone.exr: cannot read");
     assert_refused(test_path("gone.exr"), none, "No such file");
@@ -391,7 +391,7 @@ TEST(test_censored)
     assert_int_equal(compare_files(pa, pb, &notes, &censored), VERDICT_DIFFERENT);
 }
 
-/* Half a code is allowed for: pictures of one code, and of the next, are equal within two halves; two
+/* Half a code is allowed for: images of one code, and of the next, are equal within two halves; two
  * codes apart they are not. 100 -> 101 -> 102 of 255, margins of 0. Noise: one pixel in 16 one code up
  * in A, elsewhere in B. */
 TEST(test_rounding_is_no_difference)

@@ -1,4 +1,4 @@
-/* Shares of a made-up picture of 4 x 2 pixels, put together, against all their samples added one by one. */
+/* Shares of a made-up image of 4 x 2 pixels, put together, against all their samples added one by one. */
 #include "renderer/transport/film.h"
 #include "renderer/math/sampler.h"
 #include "tools/jobs/merge.h"
@@ -13,7 +13,7 @@ static const char *part_path(int k)
     return test_path(name);
 }
 
-/* Sample k of channel c at column x, row y of the full picture: skewed, with an offset. */
+/* Sample k of channel c at column x, row y of the full image: skewed, with an offset. */
 static double observation(int x, int y, uint32_t k, uint32_t c)
 {
     return 0.5 - log(1 - sampler_get(9, (uint32_t)(y * WIDTH + x), k, c, 0).u[0]);
@@ -300,7 +300,7 @@ TEST(refusals)
         {"not sample ranges", {{ALL, 0, 7, "7:0"}, {ALL, 7, 9}}},
         {"not sample ranges", {{ALL, 0, 7, "0:7x"}, {ALL, 7, 9}}},
         {"not sample ranges", {{ALL, 0, 7, ":"}, {ALL, 7, 9}}},
-        {"which part of which picture", {{.x = 1, 0, 4, 2, 0, 7}, {ALL, 7, 9}}},
+        {"which part of which image", {{.x = 1, 0, 4, 2, 0, 7}, {ALL, 7, 9}}},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         struct share whole = {0};

@@ -1,4 +1,4 @@
-/* The report page. Its pictures are decoded again (how they look is for tests/browser), its markup is read by libxml2's HTML parser, its drawings against brute force. */
+/* The report page. Its images are decoded again (how they look is for tests/browser), its markup is read by libxml2's HTML parser, its drawings against brute force. */
 #include "tools/report/report.h"
 
 #include "renderer/base/fs.h"
@@ -58,7 +58,7 @@ static void run_write_results(const struct run *r)
     json_decref(root);
 }
 
-/* Uniform on (0, 1), for pictures that PNG cannot compress. */
+/* Uniform on (0, 1), for images that PNG cannot compress. */
 static double noise(uint32_t *state)
 {
     *state = *state * 1664525u + 1013904223u;
@@ -445,7 +445,7 @@ TEST(page_is_whole)
     assert_text_has(doc, "//article[@id='claim-0']//table", 0, "not asked for");
     assert_text_has(doc, "//section[@class='scene']", 1, "64 replicates of 1 samples per pixel");
 
-    /* Two scenes share two pictures, which are there once. */
+    /* Two scenes share two images, which are there once. */
     assert_int_equal(count_nodes(doc, "//div[@class='viewer']"), 2);
     assert_int_equal(count_nodes(doc, "//div[@class='viewer']//li"), 4);
     assert_int_equal(count_nodes(doc, "//script[starts-with(@id, 'layer-')]"), 2);
@@ -485,7 +485,7 @@ static struct layer_numbers page_layer(htmlDocPtr doc, int index, int side)
 
 /* White is 0.25 / 0.8 = 0.3125, since at least 99 % of the reference is 0.25. M2 is 1 and n 64, so a
  * standard error is sqrt(1/(64 x 63)) = 0.01575. */
-TEST(pictures_have_the_values)
+TEST(images_have_the_values)
 {
     struct run r = run_of_small_files();
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
@@ -631,14 +631,14 @@ TEST(page_stays_small)
     assert_text_has(doc, "//h1", 0, "All 10 claims came out as expected.");
     assert_int_equal(count_nodes(doc, "//table[@id='claims']/tbody/tr"), 10);
     assert_int_equal(count_nodes(doc, "//section[@class='scene']"), 5);
-    /* A scene's own picture is there once: 5 x 3. An exact value has 20 bits, a noisy one 7: the ten
-     * exact pictures alone are 10 x 65536 x 3 x 20/8 bytes and a third more. The page says what is not
+    /* A scene's own image is there once: 5 x 3. An exact value has 20 bits, a noisy one 7: the ten
+     * exact images alone are 10 x 65536 x 3 x 20/8 bytes and a third more. The page says what is not
      * there. */
     int layers = count_nodes(doc, "//script[starts-with(@id, 'layer-')]");
     assert_int_equal(count_nodes(doc, "//div[@class='viewer']//li"), 15);
     assert_true(layers > 0 && layers < 15);
     char said[64];
-    snprintf(said, sizeof said, "the numbers of %d of its 15 pictures", 15 - layers);
+    snprintf(said, sizeof said, "the numbers of %d of its 15 images", 15 - layers);
     assert_text_has(doc, "//body/p", 0, said);
     xmlFreeDoc(doc);
     run_free(&r);
@@ -730,7 +730,7 @@ TEST(alike)
     moments_free(&b);
 }
 
-/* Identical pictures, and a table that names who disagrees. */
+/* Identical images, and a table that names who disagrees. */
 TEST(alike_on_the_page)
 {
     struct run r = run_of_small_files();

@@ -1,4 +1,4 @@
-/* tools/stats/noise_estimate.c: two pictures without moments. Closed forms of what the kernel sees; error rates of
+/* tools/stats/noise_estimate.c: two images without moments. Closed forms of what the kernel sees; error rates of
  * the comparison that is built on it, with noise of a pixel's own and noise that neighbours share. */
 #include "tests/support/simulate.h"
 
@@ -17,7 +17,7 @@ static double normal(uint64_t *state)
 enum noise { OWN, SHARED, SKEWED };
 static const double noise_sd = 0.1;
 
-/* A picture of mean `scale` by a smooth shade, with noise of sd 0.1 of a pixel's own, or sums of 2 x 2
+/* An image of mean `scale` by a smooth shade, with noise of sd 0.1 of a pixel's own, or sums of 2 x 2
  * independent ones over 2 (sd 0.1 again, shared by neighbours), or exponential; R, G, B alike. */
 static void paint(struct moments *m, enum noise kind, double scale, uint64_t *state)
 {
@@ -128,7 +128,7 @@ TEST(test_refused)
     paint(&b, OWN, 1, &seed);
     REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e), "32 x 32");
     memcpy(b.mean, a.mean, 3 * 32 * 31 * sizeof *a.mean);
-    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e), "same picture");
+    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e), "same image");
     moments_free(&a);
     moments_free(&b);
     a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
