@@ -82,7 +82,7 @@ check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang pro
 programs-no-memory: $(BUILD)/san/no_memory/pathtracer $(BUILD)/san/no_memory/assay $(BUILD)/no_memory/pathtracer
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay $(BUILD)/san/oiio.so
 # What the fuzzers are linked from, and all the rest as far as clang's warnings look.
-programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,$(MAINS) $(wildcard tests/support/*.c tests/[a-eg-z]*/*.c tests/*/*/*.c))
+programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,$(MAINS) $(filter-out tests/fuzz/% tests/lint/%,$(wildcard tests/*/*.c tests/*/*/*.c)))
 $(BUILD)/clang/%.c.ok: %.c | $(BUILD)/deps-test
 	$(call say,CC,$@)
 	$(Q)mkdir -p $(@D) && $(CC) $(cflags) -MMD -MP -MF $@.d -MT $@ -fsyntax-only $< && touch $@

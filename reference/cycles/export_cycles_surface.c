@@ -1,4 +1,5 @@
 #include "export_cycles_internal.h"
+#include "reference/suite/features.h"
 
 #include "renderer/scene/environment.h"
 
@@ -33,29 +34,30 @@ static const char *unsampled_light(const struct scene *s)
     return NULL;
 }
 
+/* The kinds that cycles_material.py makes, by its names. */
+static const char *const KIND[NUM_MATERIAL_KINDS] = {[MATERIAL_DIFFUSE] = "diffuse",
+                                                     [MATERIAL_MIRROR] = "mirror",
+                                                     [MATERIAL_REFRACTION] = "refraction",
+                                                     [MATERIAL_GLASS] = "glass",
+                                                     [MATERIAL_MICROFACET] = "microfacet"};
+
 static json_t *reflection(const struct material *m)
 {
-    static const char *const KIND[] = {"diffuse", "mirror", "refraction", "glass", "microfacet"};
     json_t *o = json_pack("{so,ss,so,so,sb}", "name", cycles_name(m->name), "kind", KIND[m->kind],
                           "reflectance", cycles_rgb(m->reflectance), "radiance",
                           cycles_rgb(m->radiance), "both_sides", m->radiance_both_sides);
     json_t *more = NULL;
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MIRROR: return o;
-    case MATERIAL_REFRACTION:
-    case MATERIAL_GLASS:
+    if (m->kind == MATERIAL_DIFFUSE || m->kind == MATERIAL_MIRROR)
+        return o;
+    if (m->kind == MATERIAL_REFRACTION || m->kind == MATERIAL_GLASS)
         more = json_pack("{so,sf,sb}", "transmittance", cycles_rgb(m->transmittance), "ior",
                          (double)m->ior, "schlick", m->schlick);
-        break;
-    case MATERIAL_MICROFACET:
+    else
         more = json_pack("{ss,sf,sb,sb,so,so}", "distribution",
                          m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann", "alpha",
                          (double)m->alpha, "separable", m->separable, "facets", needs_facets(m),
                          "eta", m->conductor ? cycles_rgb(m->eta) : json_null(), "k",
                          m->conductor ? cycles_rgb(m->k) : json_null());
-        break;
-    }
     if (json_object_update_missing(o, more) != 0) {
         json_decref(o);
         o = NULL;
@@ -70,6 +72,12 @@ json_t *cycles_materials(const struct scene *s, struct err *e)
     const char *light = unsampled_light(s);
     for (uint32_t i = 0; i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
+        if (KIND[m->kind] == NULL) {
+            err_set(e, "Cycles does not have %s (material '%s')", features_material_names[m->kind],
+                    m->name);
+            json_decref(out);
+            return NULL;
+        }
         if (needs_facets(m) && light != NULL) {
             err_set(
                 e,

@@ -110,11 +110,49 @@ static bool put_rough_metal(struct writer *w, uint32_t index, struct err *e)
     return ok;
 }
 
+static bool put_diffuse(struct writer *w, uint32_t index, struct err *e)
+{
+    (void)e;
+    mitsuba_begin(w->xml, "bsdf", "diffuse", NULL, NULL);
+    mitsuba_rgb(w->xml, "reflectance", w->s->materials[index].reflectance);
+    mitsuba_end(w->xml);
+    return true;
+}
+
+static bool put_mirror(struct writer *w, uint32_t index, struct err *e)
+{
+    (void)e;
+    mitsuba_begin(w->xml, "bsdf", "conductor", NULL, NULL);
+    mitsuba_text(w->xml, "string", "material", "none");
+    mitsuba_rgb(w->xml, "specular_reflectance", w->s->materials[index].reflectance);
+    mitsuba_end(w->xml);
+    return true;
+}
+
+static bool put_glass(struct writer *w, uint32_t index, struct err *e)
+{
+    const struct material *m = &w->s->materials[index];
+    (void)e;
+    mitsuba_real(w->xml, "float", "int_ior", (double)m->ior);
+    mitsuba_real(w->xml, "float", "ext_ior", 1);
+    mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
+    mitsuba_rgb(w->xml, "specular_transmittance", m->transmittance);
+    return true;
+}
+
+/* NULL: Mitsuba does not have it. */
+static bool (*const put_bsdf[NUM_MATERIAL_KINDS])(struct writer *w, uint32_t index,
+                                                  struct err *e) = {
+    [MATERIAL_DIFFUSE] = put_diffuse,
+    [MATERIAL_MIRROR] = put_mirror,
+    [MATERIAL_GLASS] = put_glass,
+    [MATERIAL_MICROFACET] = put_rough_metal};
+
 static bool check_material(const struct material *m, struct err *e)
 {
     const char *why = NULL;
-    if (m->kind == MATERIAL_REFRACTION)
-        why = "a boundary that only refracts";
+    if (put_bsdf[m->kind] == NULL)
+        why = features_material_names[m->kind];
     else if (m->kind == MATERIAL_GLASS && m->schlick)
         why = "Schlick's approximation";
     else if (m->kind == MATERIAL_MICROFACET && !m->separable)
@@ -128,32 +166,11 @@ static bool put_material(struct writer *w, uint32_t index, struct err *e)
 {
     const struct material *m = &w->s->materials[index];
     char id[32];
-    bool ok = true;
     if (!check_material(m, e))
         return false;
     snprintf(id, sizeof id, "material_%u", index);
     mitsuba_begin(w->xml, "bsdf", m->kind == MATERIAL_GLASS ? "dielectric" : "twosided", "id", id);
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-        mitsuba_begin(w->xml, "bsdf", "diffuse", NULL, NULL);
-        mitsuba_rgb(w->xml, "reflectance", m->reflectance);
-        mitsuba_end(w->xml);
-        break;
-    case MATERIAL_MIRROR:
-        mitsuba_begin(w->xml, "bsdf", "conductor", NULL, NULL);
-        mitsuba_text(w->xml, "string", "material", "none");
-        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
-        mitsuba_end(w->xml);
-        break;
-    case MATERIAL_GLASS:
-        mitsuba_real(w->xml, "float", "int_ior", (double)m->ior);
-        mitsuba_real(w->xml, "float", "ext_ior", 1);
-        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
-        mitsuba_rgb(w->xml, "specular_transmittance", m->transmittance);
-        break;
-    case MATERIAL_MICROFACET: ok = put_rough_metal(w, index, e); break;
-    case MATERIAL_REFRACTION: assert(false); break; /* refused above */
-    }
+    bool ok = put_bsdf[m->kind](w, index, e);
     mitsuba_end(w->xml);
     return ok;
 }

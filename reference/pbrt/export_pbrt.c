@@ -63,59 +63,75 @@ static bool is_one(rgb c)
     return c.r == 1 && c.g == 1 && c.b == 1;
 }
 
-static const char *what_is_missing(const struct material *m)
+static const char *what_mirrors_lack(const struct material *m)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE: return NULL;
-    case MATERIAL_MIRROR:
-        return is_one(m->reflectance) ? NULL : "a mirror whose reflectance is not 1";
-    case MATERIAL_REFRACTION: return "a boundary that only refracts";
-    case MATERIAL_GLASS:
-        if (m->schlick)
-            return "Schlick's approximation";
-        return is_one(m->reflectance) && is_one(m->transmittance) ? NULL : "tinted glass";
-    case MATERIAL_MICROFACET:
-        if (m->microfacet != MICROFACET_GGX)
-            return "Beckmann's distribution";
-        if (m->separable)
-            return "shadowing and masking that are independent";
-        return m->conductor || is_one(m->reflectance)
-                   ? NULL
-                   : "a rough metal without an index of refraction whose reflectance is not 1";
-    }
-    return NULL;
+    return is_one(m->reflectance) ? NULL : "a mirror whose reflectance is not 1";
 }
+
+static const char *what_glass_lacks(const struct material *m)
+{
+    if (m->schlick)
+        return "Schlick's approximation";
+    return is_one(m->reflectance) && is_one(m->transmittance) ? NULL : "tinted glass";
+}
+
+static const char *what_metals_lack(const struct material *m)
+{
+    if (m->microfacet != MICROFACET_GGX)
+        return "Beckmann's distribution";
+    if (m->separable)
+        return "shadowing and masking that are independent";
+    return m->conductor || is_one(m->reflectance)
+               ? NULL
+               : "a rough metal without an index of refraction whose reflectance is not 1";
+}
+
+static void put_diffuse(const struct writer *w, const struct material *m)
+{
+    put_rgb(w, "reflectance", m->reflectance);
+}
+
+static void put_glass(const struct writer *w, const struct material *m)
+{
+    fprintf(w->f, " \"float eta\" [%.9g]", (double)m->ior);
+}
+
+static void put_metal(const struct writer *w, const struct material *m)
+{
+    if (m->kind == MATERIAL_MICROFACET && m->conductor) {
+        put_rgb(w, "eta", m->eta);
+        put_rgb(w, "k", m->k);
+    } else {
+        put_rgb(w, "reflectance", grey(1));
+    }
+    if (m->kind == MATERIAL_MICROFACET)
+        fprintf(w->f, " \"float roughness\" [%.9g] \"bool remaproughness\" [false]",
+                (double)m->alpha);
+}
+
+/* Without a type: pbrt does not have it. */
+static const struct {
+    const char *type;
+    const char *(*missing)(const struct material *m); /* NULL: it has all of these */
+    void (*put)(const struct writer *w, const struct material *m);
+} KIND[NUM_MATERIAL_KINDS] = {[MATERIAL_DIFFUSE] = {"diffuse", NULL, put_diffuse},
+                              [MATERIAL_MIRROR] = {"conductor", what_mirrors_lack, put_metal},
+                              [MATERIAL_GLASS] = {"dielectric", what_glass_lacks, put_glass},
+                              [MATERIAL_MICROFACET] = {"conductor", what_metals_lack, put_metal}};
 
 static bool put_material(const struct writer *w, uint32_t index, struct err *e)
 {
     const struct material *m = &w->s->materials[index];
-    const char *missing = what_is_missing(m);
+    const char *missing = NULL;
+    if (KIND[m->kind].type == NULL)
+        missing = features_material_names[m->kind];
+    else if (KIND[m->kind].missing != NULL)
+        missing = KIND[m->kind].missing(m);
     if (missing != NULL)
         return err_set(e, "pbrt does not have %s (material '%s')", missing, m->name);
-    fprintf(w->f, "MakeNamedMaterial \"material_%u\" \"string type\" ", index);
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-        fputs("[\"diffuse\"]", w->f);
-        put_rgb(w, "reflectance", m->reflectance);
-        break;
-    case MATERIAL_GLASS:
-        fprintf(w->f, "[\"dielectric\"] \"float eta\" [%.9g]", (double)m->ior);
-        break;
-    case MATERIAL_MIRROR:
-    case MATERIAL_MICROFACET:
-        fputs("[\"conductor\"]", w->f);
-        if (m->kind == MATERIAL_MICROFACET && m->conductor) {
-            put_rgb(w, "eta", m->eta);
-            put_rgb(w, "k", m->k);
-        } else {
-            put_rgb(w, "reflectance", grey(1));
-        }
-        if (m->kind == MATERIAL_MICROFACET)
-            fprintf(w->f, " \"float roughness\" [%.9g] \"bool remaproughness\" [false]",
-                    (double)m->alpha);
-        break;
-    case MATERIAL_REFRACTION: assert(false); break; /* refused above */
-    }
+    fprintf(w->f, "MakeNamedMaterial \"material_%u\" \"string type\" [\"%s\"]", index,
+            KIND[m->kind].type);
+    KIND[m->kind].put(w, m);
     fputc('\n', w->f);
     return true;
 }

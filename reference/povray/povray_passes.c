@@ -55,8 +55,11 @@ static bool one_plane_reflects(const struct scene *s, double extent)
 
 static bool check_material(const struct material *m, struct err *e)
 {
-    if (m->kind == MATERIAL_MICROFACET)
-        return err_set(e, "POV-Ray has no microfacets: material '%s'", m->name);
+    const unsigned expressed = 1u << MATERIAL_DIFFUSE | 1u << MATERIAL_MIRROR |
+                               1u << MATERIAL_REFRACTION | 1u << MATERIAL_GLASS;
+    if (!(1u << m->kind & expressed))
+        return err_set(e, "POV-Ray does not have %s (material '%s')",
+                       features_material_names[m->kind], m->name);
     if (m->kind != MATERIAL_DIFFUSE)
         return true;
     rgb a = m->reflectance, l = m->radiance;

@@ -83,6 +83,13 @@ static bool may_be_cut(const struct scene *s, const struct camera *c)
     return !(nearest - lens > (double)c->near && furthest + lens < (double)c->far);
 }
 
+const char *const features_material_names[NUM_MATERIAL_KINDS] = {
+    [MATERIAL_DIFFUSE] = "diffuse surfaces",
+    [MATERIAL_MIRROR] = "mirrors",
+    [MATERIAL_REFRACTION] = "a boundary that only refracts",
+    [MATERIAL_GLASS] = "glass",
+    [MATERIAL_MICROFACET] = "microfacets"};
+
 static unsigned material_features(const struct material *m)
 {
     unsigned f = 0;

@@ -39,6 +39,9 @@ bool features_triangle_is_flat(const struct scene *s, uint32_t triangle);
  * the larger of its plane's and its box's), and that of the furthest. */
 void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
 
+/* What a kind of material is called in the line of an engine that does not have it. */
+extern const char *const features_material_names[NUM_MATERIAL_KINDS];
+
 /* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry: */
 bool features_check_clipping(const char *engine, const struct scene *s, const struct camera *c,
                              struct err *e) __attribute__((warn_unused_result));

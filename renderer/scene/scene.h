@@ -32,6 +32,7 @@ enum material_kind {
     MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
     MATERIAL_MICROFACET  /* rough conductor */
 };
+enum { NUM_MATERIAL_KINDS = MATERIAL_MICROFACET + 1 };
 
 enum microfacet_kind {
     MICROFACET_GGX,
