@@ -17,8 +17,8 @@ includes() {
 
 # "FILE SYMBOL TYPE" of the .c files on stdin; one that is compiled for several instruction sets has as many objects.
 symbols() {
-    sed -E 's,(.*)\.c$,\1.c.o \1_sse42.c.o \1_avx2.c.o \1_avx512.c.o,' | (cd "$1" && xargs -n 4 ls 2>/dev/null | xargs nm -AgP) |
-        sed -E 's,(_(sse42|avx2|avx512))?\.c\.o: ,.c ,'
+    sed -E 's,(.*)\.c$,\1.c.o \1_sse42.c.o \1_avx2.c.o \1_avx512.c.o \1_scalar.c.o,' | (cd "$1" && xargs -n 5 ls 2>/dev/null | xargs nm -AgP) |
+        sed -E 's,(_(sse42|avx2|avx512|scalar))?\.c\.o: ,.c ,'
 }
 
 # "FROM TO" of such symbols.
