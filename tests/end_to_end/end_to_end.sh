@@ -370,7 +370,7 @@ expect "export: what pbrt has not" 3 "no environment image" \
 if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
     ok "a refused export leaves no file"
 fi
-expect "export: unknown kind" 3 "neither" "$san_assay" export -o "$tmp/c.txt" $scene
+expect "export: unknown kind" 3 "ends in none of" "$san_assay" export -o "$tmp/c.txt" $scene
 
 # validate, against the goldens.
 out=$tmp/report
