@@ -70,7 +70,7 @@ void test_same_text(const char *text, const char *expected);
 #define REFUSES(call, why)                                                                         \
     do {                                                                                           \
         const char *why_ = (why);                                                                  \
-        *e.msg = '\0';                                                                             \
+        e.msg[0] = '\0';                                                                           \
         if (call)                                                                                  \
             fail_msg("does not fail with '%s'", why_);                                             \
         if (strstr(e.msg, why_) == NULL || strchr(e.msg, '\n') != NULL)                            \
