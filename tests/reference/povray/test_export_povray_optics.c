@@ -203,9 +203,9 @@ TEST(test_sky_refused)
 
 TEST(test_glass_refused)
 {
-    static const char *const why[] = {"no microfacets",  "Schlick",       "is not 1",
-                                      "must be above 1", "that emits",    "front is inside",
-                                      "the camera",      "may be inside", "at depth 7"};
+    static const char *const why[] = {"not have microfacets", "Schlick",       "is not 1",
+                                      "must be above 1",      "that emits",    "front is inside",
+                                      "the camera",           "may be inside", "at depth 7"};
     for (size_t i = 0; i < sizeof why / sizeof *why; i++) {
         struct scene s = ball_of(i == 0 ? MATERIAL_MICROFACET : MATERIAL_GLASS);
         struct material *m = &s.materials[2];
