@@ -171,6 +171,17 @@ static void read_part(struct statement *s)
     take_text(s, "part NUMBER", p->title, sizeof p->title);
 }
 
+static bool take_image(struct statement *s, int *out)
+{
+    char *name = take_word(s);
+    for (*out = 0; *out < s->r->num_images; ++*out)
+        if (strcmp(s->r->image[*out].name, name) == 0)
+            return true;
+    rubric_mistake(s->m, s->line, "no image '%s' above", name);
+    *out = -1;
+    return false;
+}
+
 static void read_check(struct statement *s)
 {
     struct rubric *r = s->r;
@@ -181,7 +192,7 @@ static void read_check(struct statement *s)
         return;
     }
     struct rubric_check *c = &r->check[r->num_checks++];
-    *c = (struct rubric_check){.line = s->line, .part = r->num_parts - 1};
+    *c = (struct rubric_check){.line = s->line, .part = r->num_parts - 1, .after = -1};
     s->check = c;
     if (r->num_parts == 0)
         rubric_mistake(s->m, s->line, "a check before the first 'part'");
@@ -201,13 +212,10 @@ static void read_check(struct statement *s)
         rubric_mistake(s->m, s->line,
                        "'%s' is no kind of check: equal, agree, sum, exact, noise or rates", kind);
     while (s->rest[0] != '\0') {
-        char *name = take_word(s);
-        int i = 0;
-        while (i < r->num_images && strcmp(r->image[i].name, name) != 0)
-            i++;
-        if (i == r->num_images)
-            rubric_mistake(s->m, s->line, "no image '%s' above", name);
-        else if (c->num_images == CHECK_IMAGES)
+        int i;
+        if (!take_image(s, &i))
+            continue;
+        if (c->num_images == CHECK_IMAGES)
             rubric_mistake(s->m, s->line, "more than %d images", CHECK_IMAGES);
         else {
             c->images[c->num_images++] = i;
@@ -294,7 +302,11 @@ static bool read_in_check(struct statement *s, const char *word)
         take_margin(s, word, &c->share);
     else if (strcmp(word, "ratio") == 0) {
         take_margin(s, word, &c->log_ratio);
-    } else if (strcmp(word, "batch") == 0)
+    } else if (strcmp(word, "carried") == 0)
+        take_margin(s, word, &c->carried);
+    else if (strcmp(word, "after") == 0)
+        take_image(s, &c->after);
+    else if (strcmp(word, "batch") == 0)
         take_int(s, word, 1, 1 << 20, &c->batch);
     else if (strcmp(word, "title") == 0)
         take_text(s, word, c->title, sizeof c->title);

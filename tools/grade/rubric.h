@@ -74,8 +74,9 @@ struct rubric_check {
     double points;
     enum check_kind kind;
     int images[CHECK_IMAGES], num_images; /* indices */
-    struct margin image, tile, share, log_ratio, count;
+    struct margin image, tile, share, log_ratio, count, carried;
     int batch;
+    int after; /* index of the image of an earlier part by which a mistake is carried on; -1: none */
     char title[160], hint[512], where[160], visibility[24];
 };
 

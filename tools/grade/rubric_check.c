@@ -155,6 +155,33 @@ static void check_image(const struct rubric *r, struct rubric_image *p, const st
         rubric_mistake(m, p->line, "image '%s' is in no check", p->name);
 }
 
+static bool is_of_earlier_part(const struct rubric *r, const struct rubric_check *c, int image)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        for (int k = 0; r->check[i].part < c->part && k < r->check[i].num_images; k++)
+            if (r->check[i].images[k] == image)
+                return true;
+    return false;
+}
+
+static void check_carried(const struct rubric *r, struct rubric_check *c, struct rubric_mistakes *m)
+{
+    if (!c->carried.given)
+        c->carried = (struct margin){.full = 0.15, .none = 0.5};
+    else if (c->after < 0)
+        rubric_mistake(m, c->line, "check '%s': 'carried' needs 'after IMAGE'", c->name);
+    if (c->after < 0)
+        return;
+    if (c->kind != CHECK_EQUAL)
+        rubric_mistake(m, c->line, "check '%s': 'after' is for 'equal'", c->name);
+    else if (!is_of_earlier_part(r, c, c->after))
+        rubric_mistake(m, c->line, "check '%s': 'after %s' is in no check of an earlier part",
+                       c->name, r->image[c->after].name);
+    else if (r->image[c->after].reference == REFERENCE_NONE)
+        rubric_mistake(m, c->line, "check '%s': 'after %s' has no reference", c->name,
+                       r->image[c->after].name);
+}
+
 /* Which statements a kind of check has, and how many images. */
 static void check_check(const struct rubric *r, struct rubric_check *c, struct rubric_mistakes *m)
 {
@@ -213,6 +240,7 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
             "check '%s': visibility '%s' is none of hidden, after_due_date, after_published, visible",
             c->name, c->visibility);
     set_default(c->title, sizeof c->title, c->name);
+    check_carried(r, c, m);
 }
 
 static void append(char *text, size_t size, const char *between, const char *more)

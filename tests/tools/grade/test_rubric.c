@@ -94,6 +94,16 @@ TEST(a_right_one_is_read)
     assert_true(rubric_points(rubric) == 4);
 }
 
+TEST(what_is_carried_on)
+{
+    read_text(
+        with(11, " tile 0.1 0.2\npart 2 More\ncheck d 1 equal p\n image 1 2\n tile 1 2\n after p"));
+    assert_int_equal(mistakes.num, 0);
+    assert_int_equal(rubric->check[0].after, -1);
+    assert_int_equal(rubric->check[1].after, 0);
+    assert_true(rubric->check[1].carried.full == 0.15 && rubric->check[1].carried.none == 0.5);
+}
+
 TEST(images_by_their_old_word)
 {
     read_text(with(2, "picture p"));
@@ -186,6 +196,12 @@ TEST(each_mistake_is_named_with_its_line)
         {10, 10, " imagine 0.01 0.05", "'imagine'"},
         {11, 9, " tile 0.1 0.2\n ratio 0.1 0.2", "not for 'equal'"},
         {11, 9, " tile 0.1 0.2\n visibility never", "'never'"},
+        {11, 12, " tile 0.1 0.2\n after q", "no image 'q'"},
+        {11, 9, " tile 0.1 0.2\n after p", "no check of an earlier part"},
+        {11, 9, " tile 0.1 0.2\n carried 0.1 0.2", "needs 'after"},
+        {11, 12,
+         " tile 0.1 0.2\npart 2 Light\ncheck d 1 agree p p\n image 1 2\n tile 1 2\n after p",
+         "is for 'equal'"},
         {11, 12, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2", "already in line 9"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
