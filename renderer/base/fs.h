@@ -38,6 +38,8 @@ bool fs_make_parent_dirs(const char *path, struct err *e) __attribute__((warn_un
 /* rm -r of a directory that we made; missing is fine. */
 bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
 
+/* Copies a file; everybody may read the copy. */
+bool fs_copy(const char *from, const char *to, struct err *e) __attribute__((warn_unused_result));
 /* The name of a file without its directories, within `path`. */
 const char *fs_base(const char *path);
 /* The file `name` in the directory of the file `path`. */

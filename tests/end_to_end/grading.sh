@@ -47,6 +47,18 @@ check "the same points and reasons on one and on two" test "$(sums "$tmp/one")" 
 rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"
 check "after an interruption" grade -o "$tmp/one" -j 2
 check "the same again" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
+
+# Another rubric for the same images: they are judged anew, not rendered; --again renders them (control).
+times() { (cd "$1" && grep -h '"wall_s"' */grade.json); }
+sed 's/^check point 4/check point 5/; s/^check cornell 6/check cornell 5/; s/0.06 0.2/0.06 0.3/' "$rubric" >"$tmp/other.rubric"
+before=$(times "$tmp/two")
+again() { "$build/assay" grade -q -o "$tmp/two" "$@" "$tmp/other.rubric" "$tmp/submissions"/*; }
+check "another rubric" again
+check "its points" points bob 5.00
+check "of the same runs" test "$(times "$tmp/two")" = "$before"
+check "graded again" again --again
+check "of other runs (control)" test "$(times "$tmp/two")" != "$before"
+
 check "another seed" grade -o "$tmp/other" --seed 2
 check "other numbers (control)" test "$(sums "$tmp/other")" != "$(sums "$tmp/two")"
 [ $failures -eq 0 ]

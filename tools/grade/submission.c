@@ -1,5 +1,6 @@
 #include "submission.h"
 
+#include "kept_run.h"
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
@@ -17,28 +18,11 @@ const char *const submission_kind_name[] = {"images", "program", "source"};
 static const char *const endings[] = {".png", ".exr", ".pfm", ".hdr"};
 enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
 
-/* Copies a file of ours; everybody may read it. */
-static bool copy_file(const char *from, const char *to, struct err *e)
-{
-    char buffer[1 << 16];
-    FILE *in = fopen(from, "rb"), *out = in != NULL ? fopen(to, "wb") : NULL;
-    bool ok = in != NULL && out != NULL;
-    for (size_t n; ok && (n = fread(buffer, 1, sizeof buffer, in)) > 0;)
-        ok = fwrite(buffer, 1, n, out) == n;
-    ok = ok && ferror(in) == 0;
-    if (in != NULL)
-        fclose(in);
-    if (out != NULL && fclose(out) != 0)
-        ok = false;
-    return (ok && chmod(to, 0644) == 0) ||
-           err_set(e, "cannot copy %s to %s: %s", from, to, strerror(errno));
-}
-
 static bool stage_file(const char *from, const char *dir, struct err *e)
 {
     char to[2 * MAX_PATH];
     snprintf(to, sizeof to, "%.4000s/%.4000s", dir, fs_base(from));
-    return copy_file(from, to, e);
+    return fs_copy(from, to, e);
 }
 
 bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
@@ -91,14 +75,23 @@ static void add_words(struct words *w, const char *words)
     }
 }
 
+/* The files of an image that are staged; environment: "" if it has none. */
+static void scene_names(const struct rubric_image *p, char scene[300], char environment[300])
+{
+    const struct suite_scene *s = p->suite;
+    snprintf(scene, 300, "%.280s", s != NULL ? fs_base(s->dae) : fs_base(p->scene));
+    snprintf(environment, 300, "%.280s",
+             fs_base(p->environment[0] != '\0' || s == NULL ? p->environment : s->environment));
+}
+
 /* What belongs to a scene besides its file. */
 static void add_scene_options(struct words *w, const struct rubric_image *p)
 {
-    char text[600];
+    char text[600], scene[300], environment[300];
     const struct suite_scene *s = p->suite;
-    if (p->environment[0] != '\0' || (s != NULL && s->environment[0] != '\0')) {
-        snprintf(text, sizeof text, "-e scene/%.500s",
-                 p->environment[0] != '\0' ? p->environment : fs_base(s->environment));
+    scene_names(p, scene, environment);
+    if (environment[0] != '\0') {
+        snprintf(text, sizeof text, "-e scene/%s", environment);
         add_words(w, text);
     }
     if (s != NULL && s->lens_radius > 0) {
@@ -112,9 +105,9 @@ bool submission_command(const struct rubric *r, const struct rubric_image *p, co
                         int most)
 {
     struct words w = {.text = text, .size = size, .argv = argv, .most = most};
-    char scene[300], number[7][24];
-    snprintf(scene, sizeof scene, "scene/%.280s",
-             p->suite != NULL ? fs_base(p->suite->dae) : p->scene);
+    char file[300], environment[300], scene[320], number[7][24];
+    scene_names(p, file, environment);
+    snprintf(scene, sizeof scene, "scene/%s", file);
     snprintf(number[0], sizeof *number, "%d", p->width);
     snprintf(number[1], sizeof *number, "%d", p->height);
     snprintf(number[2], sizeof *number, "%d", p->spp);
@@ -248,7 +241,24 @@ static bool move_file(const char *from_dir, const char *name, const char *to, bo
     char from[2 * MAX_PATH];
     snprintf(from, sizeof from, "%s/%s", from_dir, name);
     *moved = access(from, R_OK) == 0;
-    return !*moved || copy_file(from, to, e);
+    return !*moved || fs_copy(from, to, e);
+}
+
+/* One run, or what it was before, if that is kept. */
+static bool run_or_recall(const struct rubric *r, const struct sandbox *box,
+                          const struct submission *sub, const struct rubric_image *p,
+                          const struct sandbox_job *job, struct sandbox_result *out, struct err *e)
+{
+    char of[1024], scene[300], environment[300];
+    scene_names(p, scene, environment);
+    const char *const inputs[] = {scene, environment[0] != '\0' ? environment : NULL, NULL};
+    struct path dir;
+    if (sub->runs == NULL)
+        return sandbox_run(box, job, out, e);
+    snprintf(of, sizeof of, "%s %s %s %s", sub->id, sub->sha256, r->build, fs_base(job->log));
+    return kept_run_path(sub->runs, of, box, job, inputs, &dir, e) &&
+           ((!sub->runs_again && kept_run_read(dir.s, job, out)) ||
+            (sandbox_run(box, job, out, e) && kept_run_write(dir.s, job, out, e)));
 }
 
 static bool run_program(const struct rubric *r, const struct sandbox *box,
@@ -273,7 +283,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
                                     .log = log.s,
                                     .limit = r->limit};
     struct sandbox_result result;
-    if (!sandbox_run(box, &job, &result, e))
+    if (!run_or_recall(r, box, sub, p, &job, &result, e))
         return false;
     made->end = result.end;
     made->cpu_s = result.cpu_s;
@@ -311,7 +321,7 @@ static bool take_image(const struct rubric *r, const struct submission *s, const
         return true;
     }
     snprintf(to, MAX_PATH, "%.4000s/%.300s", out_dir, fs_base(from));
-    return copy_file(from, to, e);
+    return fs_copy(from, to, e);
 }
 
 static bool take_rates(const struct rubric *r, const struct submission *s, const char *name,

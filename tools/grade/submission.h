@@ -21,6 +21,8 @@ struct submission {
     char program[160]; /* as {program} is replaced */
     char sha256[65];   /* of the tar of what was handed in */
     char why[600];     /* what is wrong with all of it: "" if nothing */
+    const char *runs;  /* where runs are kept (kept_run.h), borrowed; NULL: nowhere */
+    bool runs_again;   /* what is kept is run again all the same */
 };
 
 /* One image as it came out. */

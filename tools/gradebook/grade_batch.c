@@ -14,10 +14,13 @@
 
 enum { MAX_PATH = 4400 };
 
-/* Seeds of images differ, or their noise would be the same. */
-static uint64_t image_seed(uint64_t seed, int image)
+/* Seeds of images differ, or their noise would be the same; and they do not depend on what other images a rubric has [FNV-1a]. */
+static uint64_t image_seed(uint64_t seed, const char *name)
 {
-    return (seed * 1000003u + (uint64_t)image) % 1000000007u;
+    uint64_t hash = 14695981039346656037u ^ seed;
+    for (; *name != '\0'; name++)
+        hash = (hash ^ (unsigned char)*name) * 1099511628211u;
+    return hash % 1000000007u;
 }
 
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
@@ -43,7 +46,7 @@ static bool make_images(const struct grade_job *job, const struct submission *s,
         const struct rubric_image *p = &r->image[i];
         struct err why = {""};
         if (!submission_image(r, job->sandbox, s, i, job->stage, work, out,
-                              image_seed(job->seed, i), job->threads, &h->made[i], e))
+                              image_seed(job->seed, p->name), job->threads, &h->made[i], e))
             return false;
         if (h->made[i].path[0] == '\0')
             err_set(&why, "%s", h->made[i].why);
@@ -246,6 +249,9 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     if (!submission_open(job->rubric, path, work, &s, e) || !key_of(job, &s, key, e))
         return false;
     const struct path out = fs_path("%s/%s", job->out, s.id);
+    const struct path runs = fs_path("%s/.runs/%s", job->out, s.id);
+    s.runs = runs.s;
+    s.runs_again = job->again;
     const struct path file = fs_path("%s/grade.json", out.s);
     const struct path log = fs_path("%s/build.log", out.s);
     if (!job->again && is_done(file.s, key, grade))
