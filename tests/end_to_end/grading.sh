@@ -56,6 +56,14 @@ again() { "$build/assay" grade -q -o "$tmp/two" "$@" "$tmp/other.rubric" "$tmp/s
 check "another rubric" again
 check "its points" points bob 5.00
 check "of the same runs" test "$(times "$tmp/two")" = "$before"
+check "what changed is said" grep -q '"was": 4.0' "$tmp/two/bob/grade.json"
+printf '# id check points reason\nbob cornell 3.5 shown to staff\n' >"$tmp/appeals"
+check "with an appeal" again --appeals "$tmp/appeals"
+check "its points" points bob 8.50
+check "of the same runs" test "$(times "$tmp/two")" = "$before"
+check "the appeal withdrawn, beside what was" "$build/assay" grade -q -o "$tmp/three" --before "$tmp/two" "$tmp/other.rubric" "$tmp/submissions"/*
+check "of the same runs" test "$(times "$tmp/three")" = "$before"
+check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
 check "graded again" again --again
 check "of other runs (control)" test "$(times "$tmp/two")" != "$before"
 

@@ -1,6 +1,8 @@
 #include "grade_batch.h"
+#include "grade_change.h"
 
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/shell_quote.h"
@@ -26,13 +28,14 @@ static uint64_t image_seed(uint64_t seed, const char *name)
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
-    char rubric[65], bugs[65] = "", path[MAX_PATH], text[1024];
+    char rubric[65], bugs[65] = "", appeals[65], path[MAX_PATH], text[1024];
     snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
     if (!sha256_file(job->rubric->path, rubric, e) ||
         (job->bugs != NULL && !sha256_file(path, bugs, e)))
         return false;
-    snprintf(text, sizeof text, "%s %s %s %s %llu %.17g %d", assay_version, rubric, bugs, s->sha256,
-             (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
+    appeals_key(job->appeals, s->id, appeals);
+    snprintf(text, sizeof text, "%s %s %s %s %s %llu %.17g %d", assay_version, rubric, bugs,
+             appeals, s->sha256, (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
     sha256_text(text, key);
     return true;
 }
@@ -212,17 +215,6 @@ static bool grade_made(const struct grade_job *job, const struct submission *s, 
     return ok;
 }
 
-static bool is_done(const char *path, const char *key, json_t **grade)
-{
-    *grade = json_load_file(path, 0, NULL);
-    const char *old = json_string_value(json_object_get(*grade, "key"));
-    if (old != NULL && strcmp(old, key) == 0)
-        return true;
-    json_decref(*grade);
-    *grade = NULL;
-    return false;
-}
-
 /* NULL where there is none to say. */
 static json_t *command_of(const struct grade_job *job, const char *path)
 {
@@ -241,6 +233,36 @@ static json_t *command_of(const struct grade_job *job, const char *path)
     return command;
 }
 
+static bool grade_anew(const struct grade_job *job, const char *path, const char *work,
+                       const char *key, const json_t *old, struct submission *s, json_t **grade,
+                       struct err *e)
+{
+    const struct path out = fs_path("%s/%s", job->out, s->id);
+    const struct path log = fs_path("%s/build.log", out.s);
+    if (!fs_remove_tree(out.s, e) || !fs_make_dirs(out.s, e) ||
+        !submission_build(job->rubric, job->sandbox, work, log.s, s, e))
+        return false;
+    json_t *command = command_of(job, path);
+    if (command == NULL && job->word != NULL && job->word[0] != NULL)
+        return err_set(e, "%s: out of memory", path);
+    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
+                       s->id, "kind", submission_kind_name[s->kind], "command", command, "version",
+                       assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
+                       !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
+                       "trouble", "wrong", s->why[0] != '\0' ? s->why : NULL);
+    if (*grade != NULL && grade_made(job, s, work, out.s, *grade, e)) {
+        appeals_apply(job->appeals, job->rubric, *grade);
+        json_t *before = grade_change(old, *grade);
+        if (before != NULL)
+            json_object_set_new(*grade, "before", before);
+        if (json_write(fs_path("%s/grade.json", out.s).s, *grade, e))
+            return true;
+    }
+    json_decref(*grade);
+    *grade = NULL;
+    return e->msg[0] != '\0' ? false : err_set(e, "%s: out of memory", path);
+}
+
 static bool grade_one(const struct grade_job *job, const char *path, const char *work,
                       json_t **grade, struct err *e)
 {
@@ -248,31 +270,18 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     char key[65];
     if (!submission_open(job->rubric, path, work, &s, e) || !key_of(job, &s, key, e))
         return false;
-    const struct path out = fs_path("%s/%s", job->out, s.id);
-    const struct path runs = fs_path("%s/.runs/%s", job->out, s.id);
+    const struct path runs = fs_path("%s/.runs/%s", job->before, s.id);
     s.runs = runs.s;
     s.runs_again = job->again;
-    const struct path file = fs_path("%s/grade.json", out.s);
-    const struct path log = fs_path("%s/build.log", out.s);
-    if (!job->again && is_done(file.s, key, grade))
-        return true;
-    if (!fs_remove_tree(out.s, e) || !fs_make_dirs(out.s, e) ||
-        !submission_build(job->rubric, job->sandbox, work, log.s, &s, e))
-        return false;
-    json_t *command = command_of(job, path);
-    if (command == NULL && job->word != NULL && job->word[0] != NULL)
-        return err_set(e, "%s: out of memory", path);
-    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
-                       s.id, "kind", submission_kind_name[s.kind], "command", command, "version",
-                       assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
-                       !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
-                       "trouble", "wrong", s.why[0] != '\0' ? s.why : NULL);
-    if (*grade != NULL && grade_made(job, &s, work, out.s, *grade, e) &&
-        json_write(file.s, *grade, e))
+    *grade = json_load_file(fs_path("%s/%s/grade.json", job->out, s.id).s, 0, NULL);
+    if (!job->again && strcmp(member_or_empty(*grade, "key"), key) == 0)
         return true;
     json_decref(*grade);
+    json_t *old = json_load_file(fs_path("%s/%s/grade.json", job->before, s.id).s, 0, NULL);
     *grade = NULL;
-    return e->msg[0] != '\0' ? false : err_set(e, "%s: out of memory", path);
+    bool ok = grade_anew(job, path, work, key, old, &s, grade, e);
+    json_decref(old);
+    return ok;
 }
 
 /* What the workers share. */

@@ -2,6 +2,7 @@
 #ifndef ASSAY_GRADE_BATCH_H
 #define ASSAY_GRADE_BATCH_H
 
+#include "appeals.h"
 #include "grade_diagnose.h"
 #include "tools/grade/grade_checks.h"
 
@@ -20,7 +21,11 @@ struct grade_job {
     const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the images */
     const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
     uint64_t seed;
-    bool again; /* also those that have been graded already */
+    bool again; /* also those that have been graded already, and run anew what has been run */
+    const char *
+        before; /* OUT of a run before this one, maybe the same: its images are judged anew where nothing that decides them
+                         * changed, and what changed in points is "before" of a grade */
+    const struct appeals *appeals; /* NULL: none */
     void (*done)(void *ctx, int num, const char *id,
                  const json_t *grade); /* one at a time; may be NULL */
     void *ctx;

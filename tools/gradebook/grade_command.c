@@ -4,6 +4,7 @@
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
 #include "grade_batch.h"
+#include "grade_change.h"
 #include "same_noise.h"
 
 #include <limits.h>
@@ -35,15 +36,18 @@ static void tell(void *ctx, int num, const char *path, const json_t *grade)
     const struct progress *p = ctx;
     const char *trouble = json_string_value(json_object_get(grade, "trouble")),
                *wrong = json_string_value(json_object_get(grade, "wrong"));
+    char change[1024];
     (void)path;
+    grade_change_text(grade, change, sizeof change);
     if (p->quiet)
         return;
     printf("[%d/%d] %-32s ", num, p->num, json_string_value(json_object_get(grade, "id")));
     if (trouble != NULL)
         printf("NOT GRADED: %s\n", trouble);
     else
-        printf("%6.2f of %g%s%s\n", member_number(grade, "points"), member_number(grade, "of"),
-               wrong != NULL ? "  " : "", wrong != NULL ? wrong : "");
+        printf("%6.2f of %g%s%s%s%s\n", member_number(grade, "points"), member_number(grade, "of"),
+               wrong != NULL ? "  " : "", wrong != NULL ? wrong : "", change[0] != '\0' ? "  " : "",
+               change);
     fflush(stdout);
 }
 
@@ -64,6 +68,23 @@ static bool needs_staff(const json_t *grades)
     return false;
 }
 
+/* Where it may be a slip of the pen: a class may be graded in pieces. */
+static void warn_of_strangers(const char *file, const struct appeals *a, const json_t *grades)
+{
+    for (int i = 0; i < a->num; i++) {
+        size_t k;
+        json_t *g;
+        bool known = false;
+        json_array_foreach(grades, k, g)
+        {
+            known = known || strcmp(member_or_empty(g, "id"), a->of[i].id) == 0;
+        }
+        if (!known)
+            fprintf(stderr, "%s:%d: there is no submission '%s' here\n", file, a->of[i].line,
+                    a->of[i].id);
+    }
+}
+
 static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const struct suite *suite, const struct answer_key *answers,
                      const char *const *word, const struct sandbox *box, struct err *e)
@@ -72,6 +93,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
+    struct appeals appeals = {0};
     struct grade_job job = {.rubric = r,
                             .answers = answers,
                             .sandbox = box,
@@ -85,13 +107,17 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                             .alpha = s->alpha,
                             .seed = s->seed,
                             .again = s->again,
+                            .before = s->before != NULL ? s->before : s->out,
+                            .appeals = &appeals,
                             .done = tell,
                             .ctx = &p};
     json_t *grades = NULL;
     int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
     const struct path views = fs_path("%s/views", box->dir.path);
-    bool ok = (bugs != NULL || err_set(e, "out of memory")) && submission_stage(r, stage, e);
+    bool ok = (bugs != NULL || err_set(e, "out of memory")) &&
+              (s->appeals == NULL || appeals_read(s->appeals, r, &appeals, e)) &&
+              submission_stage(r, stage, e);
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
         job.bugs = bugs;
@@ -101,9 +127,11 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
         job.diagnosis = &diagnosis;
     }
     ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
+    warn_of_strangers(s->appeals, &appeals, grades);
     if (ok && grade_write(s->out, grades, e))
         code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
     json_decref(grades);
+    appeals_free(&appeals);
     grade_diagnose_close(&diagnosis);
     if (bugs != NULL)
         rubric_bugs_close(bugs);
@@ -124,7 +152,10 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
     }
     if (realpath(s->pathtracer, pathtracer) == NULL)
         snprintf(pathtracer, sizeof pathtracer, "%s", s->pathtracer);
-    snprintf(cache, sizeof cache, "%.4000s%s", s->references != NULL ? s->references : s->out,
+    snprintf(cache, sizeof cache, "%.4000s%s",
+             s->references != NULL ? s->references
+             : s->before != NULL   ? s->before
+                                   : s->out,
              s->references != NULL ? "" : "/.references");
     const struct answer_options opt = {.golden_dir = s->golden,
                                        .pathtracer = pathtracer,

@@ -32,7 +32,13 @@ static const struct cli_option options[] = {
     {0, "seed", "N", "from which {seed} of each image is made (1)", TO(seed)},
     {0, "alpha", "A", "chance of a check that a right program loses points (1e-5)", TO(alpha),
      1e-12, 0.1},
-    {0, "again", "", "grade also what has been graded", TO(again)},
+    {0, "again", "", "grade also what has been graded, and run anew what has been run", TO(again)},
+    {0, "before", "DIR",
+     "grades of an earlier run (those in OUT): what changed is listed, and programs are\n"
+     "not run again for images that the rubric asks for as it did then",
+     TO(before)},
+    {0, "appeals", "FILE", "points that staff decided, in lines of ID CHECK POINTS REASON",
+     TO(appeals)},
     {0, "unsafe-no-sandbox", "",
      "run programs without a sandbox: they can read and write all that you can\n"
      "(as root: that nobody can)",
@@ -42,7 +48,8 @@ static const struct cli_option options[] = {
     {0, "golden", "DIR", "stored references (golden)", TO(golden)},
     {0, "suite", "DIR", "scenes (reference/scenes)", TO(suite)},
     {0, "catalogue", "DIR", "the stored effects of bugs (golden/diagnose)", TO(catalogue)},
-    {0, "references", "DIR", "where the references are kept (OUT/.references)", TO(references)},
+    {0, "references", "DIR",
+     "where the references are kept (.references in OUT, or in that of --before)", TO(references)},
     {0, "slurm", "", "a job for each submission on a Slurm cluster", TO(slurm)},
     {'q', "quiet", "", "no lines on submissions", TO(quiet)},
     {'h', "help", "", "print this", TO(help), .stops = true},
@@ -62,9 +69,17 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
 
 char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
 {
-    static const struct option_words how[] = {
-        {"-o", 1},      {"--out", 1}, {"-j", 1},      {"--jobs", 1},  {"--references", 1},
-        {"--slurm", 0}, {"-q", 0},    {"--quiet", 0}, {"--again", 0}, {0}};
+    static const struct option_words how[] = {{"-o", 1},
+                                              {"--out", 1},
+                                              {"-j", 1},
+                                              {"--jobs", 1},
+                                              {"--references", 1},
+                                              {"--before", 1},
+                                              {"--slurm", 0},
+                                              {"-q", 0},
+                                              {"--quiet", 0},
+                                              {"--again", 0},
+                                              {0}};
     char **word = cli_apart(options, argc, argv);
     if (word == NULL)
         return NULL;

@@ -7,7 +7,8 @@
 #include <stdint.h>
 
 struct grade_settings {
-    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references;
+    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references, *before,
+        *appeals;            /* NULL: out; none */
     const char **submission; /* num of them, words of the command */
     int num, jobs, threads;
     uint64_t seed;
