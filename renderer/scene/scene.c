@@ -43,16 +43,11 @@ static bool is_radiometric(rgb c)
 
 static bool material_numbers_are_valid(const struct material *m)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MIRROR: break;
-    case MATERIAL_REFRACTION:
-    case MATERIAL_GLASS: return m->ior >= 1 / MAX_IOR && m->ior <= MAX_IOR;
-    case MATERIAL_MICROFACET:
-        return m->alpha >= MICROFACET_MIN_ALPHA && isfinite(m->alpha) && is_radiometric(m->eta) &&
-               is_radiometric(m->k);
-    }
-    return true;
+    const int kind = 1 << m->kind;
+    return (!(kind & MATERIAL_REFRACTS) || (m->ior >= 1 / MAX_IOR && m->ior <= MAX_IOR)) &&
+           (!(kind & MATERIAL_IS_ROUGH) ||
+            (m->alpha >= MICROFACET_MIN_ALPHA && isfinite(m->alpha))) &&
+           is_radiometric(m->eta) && is_radiometric(m->k);
 }
 
 static bool check_materials(const struct scene *s, const char *where, struct err *e)
@@ -308,12 +303,5 @@ bool scene_read_environment(struct scene *s, const char *path, struct err *e)
 
 bool material_is_black(const struct material *m)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MIRROR: return rgb_is_zero(m->reflectance);
-    case MATERIAL_REFRACTION: return rgb_is_zero(m->transmittance);
-    case MATERIAL_GLASS: return rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance);
-    case MATERIAL_MICROFACET: return !m->conductor && rgb_is_zero(m->reflectance);
-    }
-    return true;
+    return !m->conductor && rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance);
 }

@@ -32,7 +32,13 @@ enum material_kind {
     MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
     MATERIAL_MICROFACET  /* rough conductor */
 };
-enum { NUM_MATERIAL_KINDS = MATERIAL_MICROFACET + 1 };
+/* Sets of kinds, of bits 1 << kind: what a kind needs and does, for all who need not know its name. */
+enum {
+    NUM_MATERIAL_KINDS = MATERIAL_MICROFACET + 1,
+    MATERIAL_REFRACTS = 1 << MATERIAL_REFRACTION | 1 << MATERIAL_GLASS, /* by ior */
+    MATERIAL_IS_ROUGH = 1 << MATERIAL_MICROFACET,                       /* by alpha */
+    MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | MATERIAL_IS_ROUGH       /* no delta lobe */
+};
 
 enum microfacet_kind {
     MICROFACET_GGX,
@@ -43,7 +49,8 @@ enum microfacet_kind {
 /* Smoother than this is a mirror: float32 hardly tells the normals apart. */
 #define MICROFACET_MIN_ALPHA 1e-4f
 
-/* Emission and reflection are independent: an emitter may reflect too. */
+/* Emission and reflection are independent: an emitter may reflect too. A factor that a kind does not
+ * have is 0, and only rough conductors are `conductor`. */
 struct material {
     char name[64];
     enum material_kind kind;

@@ -1,6 +1,6 @@
 /* Scattering (bsdf.h) by lanes, which may be of different materials. Directions in the local frame. A new material has
- * a header of its own, lines in eval_lobes() and sample_lobes() and, unless all its lobes are delta, its bit in
- * MATERIAL_SCATTERS. */
+ * a header of its own, lines in eval_lobes() and sample_lobes(), and its bit in the sets of kinds that it belongs to
+ * (scene.h). */
 #ifndef ASSAY_BSDF_SIMD_H
 #define ASSAY_BSDF_SIMD_H
 

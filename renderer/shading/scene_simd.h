@@ -37,8 +37,7 @@ enum {
     MATERIAL_IS_BLACK = 1 << 8,
     MATERIAL_IS_SCHLICK = 1 << 9,
     MATERIAL_IS_SEPARABLE = 1 << 10,
-    MATERIAL_IS_CONDUCTOR = 1 << 11,
-    MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_MICROFACET /* no delta lobe */
+    MATERIAL_IS_CONDUCTOR = 1 << 11
 };
 
 struct scene_simd {

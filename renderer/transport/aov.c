@@ -4,23 +4,15 @@
 
 static rgb albedo_of(const struct material *m)
 {
-    switch (m->kind) {
-    case MATERIAL_DIFFUSE:
-    case MATERIAL_MIRROR: return m->reflectance;
-    case MATERIAL_REFRACTION: return m->transmittance;
-    case MATERIAL_GLASS: {
-        float cos_t, f = fresnel_dielectric(1, m->ior, &cos_t);
-        rgb through = rgb_scale(m->transmittance, 1 - f), back = rgb_scale(m->reflectance, f);
-        return (rgb){through.r + back.r, through.g + back.g, through.b + back.b};
-    }
-    case MATERIAL_MICROFACET:
-        if (m->conductor)
-            return (rgb){fresnel_conductor(1, m->eta.r, m->k.r),
-                         fresnel_conductor(1, m->eta.g, m->k.g),
-                         fresnel_conductor(1, m->eta.b, m->k.b)};
-        return m->reflectance;
-    }
-    return grey(0);
+    rgb mirror = m->reflectance;
+    float cos_t, back = 1;
+    if (m->conductor)
+        mirror =
+            (rgb){fresnel_conductor(1, m->eta.r, m->k.r), fresnel_conductor(1, m->eta.g, m->k.g),
+                  fresnel_conductor(1, m->eta.b, m->k.b)};
+    if (1 << m->kind & MATERIAL_REFRACTS)
+        back = m->kind == MATERIAL_REFRACTION ? 0 : fresnel_dielectric(1, m->ior, &cos_t);
+    return rgb_add(rgb_scale(mirror, back), rgb_scale(m->transmittance, 1 - back));
 }
 
 void first_hits_record(const struct integrator *it, struct batch *b, int num_active)
