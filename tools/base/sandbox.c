@@ -6,6 +6,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <glob.h>
 #include <limits.h>
 #include <math.h>
 #include <signal.h>
@@ -16,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MAX_ARGS = 256, TEXT = 16 << 10, NOBODY = 65534, ALSO_NOBODY = 65533, MAX_PATH = 4096 };
+enum { MAX_ARGS = 512, TEXT = 16 << 10, NOBODY = 65534, ALSO_NOBODY = 65533, MAX_PATH = 4096 };
 
 const struct sandbox_limits sandbox_default = {.wall_s = 120,
                                                .cpu_s = 120,
@@ -111,21 +112,90 @@ static void add_text(struct line *l, const char *format, ...)
     l->used += (size_t)n + 1;
 }
 
-static void add_variable(struct line *l, const char *name, const char *value)
-{
-    add_all(l, (const char *const[]){"--setenv", name, value, NULL});
-}
-
 static const char search_path[] = "/usr/local/bin:/usr/bin:/bin";
 
+/* The program's environment, as bwrap is told it or as env(1) is. box, cache: where the program sees them. */
+static void add_environment(struct line *l, const struct sandbox *s, const struct sandbox_job *job,
+                            const char *box, const char *cache)
+{
+    /* Hits must depend neither on where the sources lie nor on when they were unpacked. */
+    const char *const variable[][2] = {
+        {"PATH", search_path},
+        {"HOME", box},
+        {"TMPDIR", "/tmp"},
+        {"LD_LIBRARY_PATH", job->library},
+        {"CCACHE_DIR", cache},
+        {"CCACHE_BASEDIR", box},
+        {"CCACHE_NOHASHDIR", "1"},
+        {"CCACHE_SLOPPINESS", "include_file_ctime,include_file_mtime"},
+        {"CCACHE_TEMPDIR", "/tmp"},
+        {"CCACHE_UMASK", "022"},
+        {"CCACHE_NOSTATS", "1"},
+        {job->fill_cache ? "CCACHE_MAXSIZE" : "CCACHE_READONLY", job->fill_cache ? "2G" : "1"},
+    };
+    for (size_t i = 0; i < sizeof variable / sizeof *variable; i++) {
+        const char *name = variable[i][0], *value = variable[i][1];
+        if (value == NULL || (cache == NULL && strncmp(name, "CCACHE", 6) == 0))
+            continue;
+        const char *before = i == 0 && cache != NULL ? "/usr/lib/ccache:" : "";
+        if (s->unsafe) {
+            add_text(l, "%s=%s%s", name, before, value);
+            continue;
+        }
+        add_all(l, (const char *const[]){"--setenv", name, NULL});
+        add_text(l, "%s%s", before, value);
+    }
+}
+
+/* What a program may need that is no compiler: a shell, and what scripts are made of. */
+static const char *const programs[] = {
+    "sh",  "bash",  "env", "prlimit", "python3",  "awk",    "basename", "cat",   "chmod", "cp",
+    "cut", "date",  "dd",  "dirname", "echo",     "expr",   "false",    "find",  "grep",  "head",
+    "id",  "ln",    "ls",  "mkdir",   "mkfifo",   "mktemp", "mv",       "nproc", "od",    "printf",
+    "pwd", "rm",    "sed", "seq",     "setsid",   "sleep",  "sort",     "tail",  "tee",   "test",
+    "[",   "touch", "tr",  "true",    "truncate", "uname",  "uniq",     "wc",
+};
+
+/* All of /usr; or its libraries and `programs`, without what compilers keep among the libraries. Neither another renderer
+ * that is installed here nor ours is a part of either's machine: a program might run it. */
+static void add_usr(struct line *l, bool tools)
+{
+    if (tools) {
+        add_all(l, (const char *const[]){"--ro-bind", "/usr", "/usr", NULL});
+        return;
+    }
+    static const char *const libraries[] = {"/usr/lib", "/usr/lib32", "/usr/lib64", "/usr/libx32",
+                                            "/usr/local/lib"};
+    for (size_t i = 0; i < sizeof libraries / sizeof *libraries; i++)
+        add_all(l, (const char *const[]){"--ro-bind-try", libraries[i], libraries[i], NULL});
+    glob_t found = {0};
+    if (glob("/usr/lib{,64}/{gcc,llvm*,clang,ccache}", GLOB_BRACE, NULL, &found) == GLOB_NOSPACE)
+        l->overflow = true;
+    for (size_t i = 0; i < found.gl_pathc; i++) {
+        struct stat st;
+        if (lstat(found.gl_pathv[i], &st) != 0 || !S_ISDIR(st.st_mode))
+            continue;
+        add_all(l, (const char *const[]){"--size", "4096", "--tmpfs", NULL});
+        add_text(l, "%s", found.gl_pathv[i]);
+    }
+    globfree(&found);
+    for (size_t i = 0; i < sizeof programs / sizeof *programs; i++) {
+        add(l, "--ro-bind-try");
+        add_text(l, "/usr/bin/%s", programs[i]);
+        add_text(l, "/usr/bin/%s", programs[i]);
+    }
+}
+
 /* What both machines have: programs and libraries, no environment, nothing else. */
-static void add_system(struct line *l, const struct sandbox *s, const struct sandbox_limits *limit)
+static void add_system(struct line *l, const struct sandbox *s, const struct sandbox_limits *limit,
+                       bool tools)
 {
     static const char *const roots[] = {"bin", "sbin", "lib", "lib32", "lib64"};
     static const char *const etc[] = {"/etc/ld.so.cache", "/etc/alternatives"};
-    add_all(l, (const char *const[]){"bwrap", "--unshare-user", "--unshare-all",
-                                     "--die-with-parent", "--new-session", "--clearenv",
-                                     "--hostname", "box", "--ro-bind", "/usr", "/usr", NULL});
+    add_all(l,
+            (const char *const[]){"bwrap", "--unshare-user", "--unshare-all", "--die-with-parent",
+                                  "--new-session", "--clearenv", "--hostname", "box", NULL});
+    add_usr(l, tools);
     for (int i = 0; i < s->num_hidden; i++)
         add_all(l, (const char *const[]){"--size", "4096", "--tmpfs", s->hidden[i], "--remount-ro",
                                          s->hidden[i], NULL});
@@ -144,8 +214,8 @@ static void add_system(struct line *l, const struct sandbox *s, const struct san
     add_all(l, (const char *const[]){"--proc", "/proc", "--dev", "/dev", "--size", NULL});
     add_text(l, "%zu", limit->disk);
     add_all(l, (const char *const[]){"--tmpfs", "/tmp", NULL});
-    add_variable(l, "PATH", search_path);
-    add_variable(l, "LANG", "C.UTF-8");
+    add_all(l, (const char *const[]){"--setenv", "PATH", search_path, "--setenv", "LANG", "C.UTF-8",
+                                     NULL});
 }
 
 static void add_limits(struct line *l, const struct sandbox_job *job)
@@ -162,13 +232,16 @@ static void add_limits(struct line *l, const struct sandbox_job *job)
 
 static void add_inner(struct line *l, const struct sandbox *s, const struct sandbox_job *job)
 {
-    add_system(l, s, &job->limit);
+    const char *cache = job->cache != NULL ? "/cache" : NULL;
+    add_system(l, s, &job->limit, job->tools);
+    if (cache != NULL)
+        add_all(
+            l, (const char *const[]){job->fill_cache ? "--bind" : "--ro-bind", cache, cache, NULL});
     add_all(l, (const char *const[]){"--disable-userns", "--bind", "/box", "/box", "--size", NULL});
     add_text(l, "%zu", job->limit.disk);
     add_all(l, (const char *const[]){"--tmpfs", "/dev/shm", "--remount-ro", "/dev", "--remount-ro",
                                      "/", NULL});
-    add_variable(l, "HOME", "/box");
-    add_variable(l, "TMPDIR", "/tmp");
+    add_environment(l, s, job, "/box", cache);
     add_all(l, (const char *const[]){"--chdir", "/box", "--", NULL});
     add_limits(l, job);
 }
@@ -205,15 +278,14 @@ static void compose(struct line *l, const struct sandbox *s, const struct sandbo
         add_supervisor(l, s, job, keep,
                        (const char *const[]){box, job->out, job->tree, job->scene});
         add_all(l, (const char *const[]){"env", "-i", NULL});
-        add_text(l, "PATH=%s", search_path);
-        add_text(l, "HOME=%s", box);
+        add_environment(l, s, job, box, job->cache);
         add_limits(l, job);
         return;
     }
     if (s->drop)
         add_all(l, (const char *const[]){"setpriv", "--reuid", "65534", "--regid", "65534",
                                          "--clear-groups", "--no-new-privs", NULL});
-    add_system(l, s, &job->limit);
+    add_system(l, s, &job->limit, true);
     add(l, "--size");
     add_text(l, "%zu", job->limit.disk);
     add_all(l, (const char *const[]){"--tmpfs", "/box", "--bind", job->out, "/out", NULL});
@@ -221,6 +293,9 @@ static void compose(struct line *l, const struct sandbox *s, const struct sandbo
         add_all(l, (const char *const[]){"--ro-bind", job->tree, "/in/tree.tar", NULL});
     if (job->scene != NULL)
         add_all(l, (const char *const[]){"--ro-bind", job->scene, "/in/scene", NULL});
+    if (job->cache != NULL)
+        add_all(l, (const char *const[]){job->fill_cache ? "--bind" : "--ro-bind", job->cache,
+                                         "/cache", NULL});
     add_all(l, (const char *const[]){"--remount-ro", "/", "--", NULL});
     add_supervisor(l, s, job, keep,
                    (const char *const[]){"/box", "/out", job->tree != NULL ? "/in/tree.tar" : NULL,
@@ -317,27 +392,43 @@ static void drop_large(const char *out, const struct sandbox_job *job)
         unlink(path);
 }
 
-static bool make_out(const struct sandbox *s, const char *out, struct err *e)
+/* A directory that what runs in the sandbox may write. */
+static bool make_dir_for(const struct sandbox *s, const char *dir, bool program, struct err *e)
 {
-    if (!fs_make_dirs(out, e))
+    unsigned user = s->unsafe ? ALSO_NOBODY : NOBODY;
+    if (!fs_make_dirs(dir, e))
         return false;
-    if (s->drop && !s->unsafe && chown(out, NOBODY, NOBODY) != 0)
-        return err_set(e, "%s: cannot give it to nobody: %s", out, strerror(errno));
+    if (s->drop && (!s->unsafe || program) && chown(dir, user, user) != 0)
+        return err_set(e, "%s: cannot give it to nobody: %s", dir, strerror(errno));
     return true;
+}
+
+/* What stands for /box, where nothing but a directory does. */
+static bool make_box(const struct sandbox *s, const char *tree, char *box, size_t size,
+                     struct err *e)
+{
+    if (tree == NULL) {
+        snprintf(box, size, "%s/box.XXXXXX", s->dir.path);
+        if (mkdtemp(box) == NULL)
+            return err_set(e, "%s: %s", box, strerror(errno));
+    } else {
+        const char *slash = strrchr(tree, '/');
+        snprintf(box, size, "%.*sbox", slash != NULL ? (int)(slash - tree) + 1 : 0, tree);
+        if (!fs_remove_tree(box, e))
+            return false;
+    }
+    return make_dir_for(s, box, true, e);
 }
 
 bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct sandbox_result *out,
                  struct err *e)
 {
-    char keep[4096], box[sizeof s->dir.path + 16] = "";
+    char keep[4096], box[MAX_PATH] = "";
     struct line *l = calloc(1, sizeof *l);
     bool ok = (l != NULL || err_set(e, "out of memory")) &&
-              join_names(job->keep, keep, sizeof keep, e) && make_out(s, job->out, e);
-    if (ok && s->unsafe) {
-        snprintf(box, sizeof box, "%s/box.XXXXXX", s->dir.path);
-        ok = (mkdtemp(box) != NULL && (!s->drop || chown(box, ALSO_NOBODY, ALSO_NOBODY) == 0)) ||
-             err_set(e, "%s: %s", box, strerror(errno));
-    }
+              join_names(job->keep, keep, sizeof keep, e) && make_dir_for(s, job->out, false, e) &&
+              (!job->fill_cache || make_dir_for(s, job->cache, true, e)) &&
+              (!s->unsafe || make_box(s, job->tree, box, sizeof box, e));
     if (ok) {
         compose(l, s, job, keep, box);
         ok = !l->overflow || err_set(e, "%s: the command is too long", job->argv[0]);

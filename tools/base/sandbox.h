@@ -1,5 +1,6 @@
 /* Runs programs that nobody vouches for. Each run gets an empty machine of its own, made with bubblewrap
- * (bwrap) in two shells: the program sees /usr and the few files of /etc that linking needs, read-only, a /proc
+ * (bwrap) in two shells: the program sees the libraries of /usr, a shell with small programs, and the few files of
+ * /etc that linking needs, read-only (a build all of /usr: compilers, headers), a /proc
  * of its own processes, and two places it may write, /box (its directory, where it starts) and /tmp, both in
  * memory and of a size that the kernel enforces. No network, no environment, no other user's files, no further
  * namespaces. Around it, in a second such machine, a few lines of shell unpack the submission, watch the memory
@@ -36,13 +37,20 @@ extern const struct sandbox_limits sandbox_default; /* 2 min, 4 GiB, 512 MiB, 12
 
 struct sandbox_job {
     const char *const *argv; /* NULL-terminated; argv[0] relative to /box or in PATH */
-    const char *tree;        /* a tar that everybody can read, unpacked into /box; NULL: none */
+    const char *
+        tree; /* a tar that everybody can read, unpacked into /box; NULL: none. Where the sandbox is unsafe, "box" beside
+                       * it stands for /box, for one run at a time, so that programs find what they were linked with */
     const char *scene; /* a directory that everybody can read, copied to /box/scene; NULL: none */
     const char *const
-        *keep;       /* names in /box (letters, digits, . _ -; no directories), NULL at the end */
-    bool keep_tree;  /* also everything in /box, as "tree.tar" */
-    const char *out; /* directory that receives them; made if need be */
-    const char *log; /* stdout and stderr; NULL: none */
+        *keep;      /* names in /box (letters, digits, . _ -; no directories), NULL at the end */
+    bool keep_tree; /* also everything in /box, as "tree.tar" */
+    bool tools;     /* a build: it sees all of /usr */
+    const char
+        *cache; /* of ccache, which then stands for the compilers, read-only; NULL: none is used */
+    bool fill_cache;     /* it is made, if need be, and may be written */
+    const char *library; /* LD_LIBRARY_PATH; NULL: none */
+    const char *out;     /* directory that receives them; made if need be */
+    const char *log;     /* stdout and stderr; NULL: none */
     struct sandbox_limits limit;
 };
 

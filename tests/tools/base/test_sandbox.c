@@ -16,6 +16,9 @@ enum { MIB = 1 << 20 };
 static struct sandbox box;
 static bool has_sandbox;
 static char out_dir[700];
+/* Of the next runs: a build, with a compiler cache. */
+static bool tools, fill_cache;
+static const char *cache, *library;
 
 static const struct sandbox_limits small = {.wall_s = 60,
                                             .cpu_s = 30,
@@ -36,6 +39,10 @@ static struct sandbox_result run_with(const char *script, struct sandbox_limits 
                                     .tree = tree,
                                     .keep = (const char *const[]){"out.png", "second", NULL},
                                     .out = out_dir,
+                                    .tools = tools,
+                                    .cache = cache,
+                                    .fill_cache = fill_cache,
+                                    .library = library,
                                     .limit = limit};
     MUST(sandbox_run(&box, &job, &r, &e));
     return r;
@@ -251,12 +258,87 @@ TEST(nothing_of_ours_can_be_read)
         sandbox_open(false, (const char *const[]){"/usr/share", "/nowhere", NULL}, &other, &e));
     const struct sandbox ours = box;
     box = other;
+    tools = true;
     run("ls /usr/share | wc -l >out.png");
     box = ours;
     assert_string_equal(kept("out.png"), "0\n");
     sandbox_close(&other);
     run("ls /usr/share | wc -l >out.png");
+    tools = false;
     assert_true(atoi(kept("out.png")) > 3);
+}
+
+/* Nor other people's renderers, which a program might run: what is installed is seen by builds alone. */
+TEST(only_a_build_sees_compilers)
+{
+    static const char look[] =
+        "ls -d /usr/include/stdio.h /usr/lib/gcc/*/* /usr/share/* 2>/dev/null | head -n 20 >out.png;"
+        "for p in cc gcc as ld make cmake pathtracer /usr/lib/gcc/*/*/cc1; do command -v $p; done >>out.png; true";
+    run(look);
+    assert_string_equal(kept("out.png"), "");
+    tools = true;
+    run(look);
+    tools = false;
+    assert_non_null(strstr(kept("out.png"), "stdio.h"));
+    assert_non_null(strstr(kept("out.png"), "/bin/make"));
+    /* What has been linked runs without them. */
+    char tree[600], from[800];
+    const struct sandbox_job job = {
+        .argv = (const char *const[]){"sh", "-c",
+                                      "echo 'int main(void){return 42;}' >a.c; cc -o a a.c", NULL},
+        .keep_tree = true,
+        .tools = true,
+        .out = out_dir,
+        .limit = small};
+    struct sandbox_result r;
+    struct err e;
+    MUST(sandbox_run(&box, &job, &r, &e));
+    assert_int_equal(r.end, SANDBOX_OK);
+    snprintf(from, sizeof from, "%s/tree.tar", out_dir);
+    snprintf(tree, sizeof tree, "%s/linked.tar", box.dir.path);
+    assert_int_equal(rename(from, tree), 0);
+    assert_int_equal(run_with("./a", small, tree).status, 42);
+    library = "/box/lib";
+    run("echo $LD_LIBRARY_PATH >out.png");
+    library = NULL;
+    assert_string_equal(kept("out.png"), "/box/lib\n");
+}
+
+/* ccache's own account of hits and misses, and of what its directory holds before and after. */
+TEST(only_staff_fill_the_compiler_cache)
+{
+    if (!has_sandbox || system("command -v ccache >/dev/null") != 0)
+        skip();
+    static const char build[] =
+        "mkdir -p $D && cd $D && echo 'int three(void){return 3;}' >a.c && CCACHE_LOGFILE=/box/log cc -c a.c;"
+        "cd /box; grep 'Result: .*cache_hit' log >out.png; (: >$CCACHE_DIR/x) && echo written >second; true";
+    char dir[600], count[800], script[1400];
+    snprintf(dir, sizeof dir, "%s/cache", box.dir.path);
+    snprintf(count, sizeof count, "test \"$(find %s -type f -name '*[RM]' | wc -l)\" ", dir);
+    cache = dir;
+    tools = fill_cache = true;
+    snprintf(script, sizeof script, "D=src; %s", build);
+    assert_int_equal(run(script).end, SANDBOX_OK);
+    assert_string_equal(kept("second"), "written\n");
+    snprintf(script, sizeof script, "%s -gt 0", count);
+    assert_int_equal(system(script), 0);
+    fill_cache = false;
+    snprintf(script, sizeof script, "D=src; %s", build);
+    assert_int_equal(run(script).end, SANDBOX_OK);
+    assert_non_null(strstr(kept("out.png"), "cache_hit"));
+    assert_null(kept("second"));
+    snprintf(script, sizeof script, "cp -R %s %s.before", dir, dir);
+    assert_int_equal(system(script), 0);
+    /* Other text: compiled, and not kept. */
+    assert_int_equal(
+        run("echo 'int four(void){return 4;}' >b.c && cc -c b.c && cp b.o out.png; rm -rf $CCACHE_DIR/*; true")
+            .end,
+        SANDBOX_OK);
+    assert_non_null(kept("out.png"));
+    snprintf(script, sizeof script, "diff -r %s %s.before", dir, dir);
+    assert_int_equal(system(script), 0);
+    cache = NULL;
+    tools = false;
 }
 
 /* A server of ours on the loopback, which a program outside reaches. */
