@@ -6,7 +6,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double least_kappa = 0.05, overlap = 4, channels_alike = 3, floor_fraction = 0.25;
+static const double least_kappa = 0.05, overlap = 4, runs_shared = 1.5, channels_alike = 3,
+                    floor_fraction = 0.25;
 /* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
 static const double unknown_dof = 30;
 static const double least_used = 0.25; /* of a tile, of the image */
@@ -44,27 +45,62 @@ static bool all_used(const struct pair *p, int x, int y)
     return true;
 }
 
-/* At each place that has noise: r^2 = kappa m + c, weight 1/(m + c)^2. */
-static void add_place(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+/* A difference r with E[r^2] = kappa m + known + rounding; weight 1/(m + known + rounding)^2. */
+static void add_square(double r, double m, double known, double rounding, double kappa,
+                       struct slope *s)
 {
-    static const double kernel[3] = {1, -2, 1};
-    double r = 0, m = 0, rounding = 0;
-    for (int k = 0; k < 9; k++) {
-        size_t i =
-            3 * ((size_t)(y - 1 + k / 3) * (size_t)p->a->width + (size_t)(x - 1 + k % 3)) + c;
-        double w = kernel[k / 3] * kernel[k % 3] / 6;
-        r += w * (p->a->mean[i] - p->b->mean[i]);
-        m += w * w * (p->a->variance[i] + p->b->variance[i]);
-        rounding += w * w * (p->a->rounding[i] + p->b->rounding[i]);
-    }
     /* Where rounding is the larger, r^2 says nothing of noise: a flat area is rounded alike everywhere. */
     if (m <= rounding)
         return;
-    double weight = 1 / ((m + rounding) * (m + rounding));
+    double c = known + rounding, weight = 1 / ((m + c) * (m + c));
     s->num++;
     s->xx += weight * m * m;
-    s->xy += weight * m * (r * r - rounding);
-    s->residual += pow(weight * m * (r * r - rounding - kappa * m), 2);
+    s->xy += weight * m * (r * r - c);
+    s->residual += pow(weight * m * (r * r - c - kappa * m), 2);
+}
+
+/* Second difference of a channel of `of` at a place, and the variance of it by its planes. */
+struct second {
+    double value, variance, rounding;
+};
+
+static struct second second_difference(const struct submitted_image *of, int x, int y, size_t c)
+{
+    static const double kernel[3] = {1, -2, 1};
+    struct second s = {0};
+    for (int k = 0; k < 9; k++) {
+        size_t i = 3 * ((size_t)(y - 1 + k / 3) * (size_t)of->width + (size_t)(x - 1 + k % 3)) + c;
+        double w = kernel[k / 3] * kernel[k % 3] / 6;
+        s.value += w * of->mean[i];
+        s.variance += w * w * of->variance[i];
+        s.rounding += w * w * of->rounding[i];
+    }
+    return s;
+}
+
+static void add_place(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+{
+    struct second a = second_difference(p->a, x, y, c), b = second_difference(p->b, x, y, c);
+    double known = p->b->known ? b.variance : 0;
+    add_square(a.value - b.value, a.variance + b.variance - known, known, a.rounding + b.rounding,
+               kappa, s);
+}
+
+/* Each run of A less the next, at one pixel, whatever is wrong with both. */
+static void add_runs(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+{
+    size_t i = 3 * ((size_t)y * (size_t)p->a->width + (size_t)x) + c;
+    for (int k = 0; k + 1 < p->a->num_runs; k++) {
+        const struct submitted_image *one = &p->a->run[k], *next = one + 1;
+        if (!one->clipped[i] && !next->clipped[i])
+            add_square(one->mean[i] - next->mean[i], one->variance[i] + next->variance[i], 0,
+                       one->rounding[i] + next->rounding[i], kappa, s);
+    }
+}
+
+static bool has_runs(const struct pair *p)
+{
+    return p->a->num_runs > 1 && p->b->known;
 }
 
 static struct slope sum_places(const struct pair *p, struct rect r, double kappa)
@@ -72,8 +108,11 @@ static struct slope sum_places(const struct pair *p, struct rect r, double kappa
     struct slope s = {0};
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++)
-            for (size_t c = 0; c < 3 && all_used(p, x, y); c++)
-                add_place(p, x, y, c, kappa, &s);
+            for (size_t c = 0; c < 3; c++)
+                if (has_runs(p) && p->use[(size_t)y * (size_t)p->a->width + (size_t)x])
+                    add_runs(p, x, y, c, kappa, &s);
+                else if (!has_runs(p) && all_used(p, x, y))
+                    add_place(p, x, y, c, kappa, &s);
     return s;
 }
 
@@ -91,7 +130,8 @@ static struct noise noise_in(const struct pair *p, struct rect r)
     struct noise n = {.kappa = s.xy / s.xx, .known = s.xy > 0};
     n.kappa = fmax(least_kappa, n.kappa);
     s = sum_places(p, r, n.kappa);
-    double variance = overlap * channels_alike * s.residual / (s.xx * s.xx);
+    double variance =
+        (has_runs(p) ? runs_shared : overlap) * channels_alike * s.residual / (s.xx * s.xx);
     n.dof = fmax(3, stats_dof(n.kappa, variance));
     return n;
 }
@@ -121,12 +161,12 @@ static double weighted_root(const double *x, int channel, double power)
 
 static void add_pixel(const struct pair *p, size_t i, int channel, double kappa, struct sums *s)
 {
-    double v[3], k3[3], tolerance[3];
+    double v[3], k3[3], tolerance[3], of_b = p->b->known ? 1 : kappa;
     for (size_t c = 0; c < 3; c++) {
         size_t k = 3 * i + c;
-        v[c] =
-            kappa * (p->a->variance[k] + p->b->variance[k]) + p->a->rounding[k] + p->b->rounding[k];
-        k3[c] = kappa * sqrt(kappa) * (p->a->k3[k] - p->b->k3[k]);
+        v[c] = kappa * p->a->variance[k] + of_b * p->b->variance[k] + p->a->rounding[k] +
+               p->b->rounding[k];
+        k3[c] = kappa * sqrt(kappa) * p->a->k3[k] - of_b * sqrt(of_b) * p->b->k3[k];
         tolerance[c] = p->a->tolerance[k] + p->b->tolerance[k];
     }
     s->used++;
@@ -224,7 +264,8 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
     for (int c = 0; c < NUM_CHANNELS; c++) {
         struct sums s = sum_pixels(&p, whole, c, noise.kappa);
         if (!interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &out->image[c]))
-            return err_set(e, "rare bright pixels keep it from being judged");
+            return !(out->skewed = true) ||
+                   err_set(e, "rare bright pixels keep it from being judged");
     }
     out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);
     if (out->relative == NULL)
@@ -241,6 +282,36 @@ void difference_free(struct difference *a)
 {
     free(a->relative);
     *a = (struct difference){0};
+}
+
+double difference_kappa(const struct submitted_image *a, const struct submitted_image *reference,
+                        const unsigned char *use)
+{
+    const struct pair p = {a, reference, use};
+    return noise_in(&p, (struct rect){0, 0, a->width, a->height}).kappa;
+}
+
+bool difference_correlated(const struct submitted_image *a, const struct submitted_image *b,
+                           const struct submitted_image *reference, const unsigned char *use)
+{
+    static const double certain = 6; /* standard deviations */
+    const struct pair p = {a, reference, use};
+    double num = 0, ab = 0, aa = 0, bb = 0;
+    for (int y = 0; y < a->height; y++)
+        for (int x = 0; x < a->width; x++)
+            for (size_t c = 0; c < 3 && all_used(&p, x, y); c++) {
+                struct second u = second_difference(a, x, y, c), v = second_difference(b, x, y, c),
+                              r = second_difference(reference, x, y, c);
+                if (u.variance <= u.rounding || v.variance <= v.rounding)
+                    continue;
+                u.value -= r.value;
+                v.value -= r.value;
+                num++;
+                ab += (u.value * v.value - r.variance) / sqrt(u.variance * v.variance);
+                aa += u.value * u.value / u.variance;
+                bb += v.value * v.value / v.variance;
+            }
+    return num >= FEWEST && ab > certain * sqrt(overlap * channels_alike / num * aa * bb);
 }
 
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,

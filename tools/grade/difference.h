@@ -22,18 +22,20 @@ struct difference {
     int tiles;               /* that could be judged */
     double compared;         /* share of the pixels */
     double kappa;            /* noise variance over that of our renderer */
+    bool skewed;             /* where it fails: more samples would mend it */
     double *relative;        /* per tile, difference in luminance; NAN where not judged */
 };
 
 /* A against B over the pixels with use[p] != 0; means elsewhere are not looked at.
  *
- * Noise. Neither file states any. What is known is the variance that a render of as many samples by our own
+ * Noise. A student's file states none. What is known is the variance that a render of as many samples by our own
  * renderer has in each pixel (struct submitted_image: variance), and that neighbouring pixels of A - B differ by noise alone
  * where the images agree: r = second differences, as in noise_estimate.h, with E[r^2] = kappa m + c, m from those
- * variances, c from rounding. kappa, the noise of this program over ours, is their weighted least squares slope,
+ * variances, c from rounding and from a B whose variance is known. kappa, the noise of this program over ours, is their weighted least squares slope,
  * one for the image, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
  * from the residuals, times 4 for r that overlap (noise_estimate.h) and 3 for channels that one lamp makes alike, gives
- * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide.
+ * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide. Where A has
+ * several runs and B is a reference, r is the difference of two runs at one pixel, in which no error of both is.
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
  * a tile (tools/docs/background/verdict.md, "EQUIVALENT").
  *
@@ -45,6 +47,17 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
                         const unsigned char *use, double alpha, struct difference *out,
                         struct err *e) __attribute__((warn_unused_result));
 void difference_free(struct difference *a);
+
+/* kappa of the image. */
+double difference_kappa(const struct submitted_image *a, const struct submitted_image *reference,
+                        const unsigned char *use);
+
+/* Do the errors of two runs, in second differences, go together more than those of independent runs, by 6 standard
+ * deviations? (Products of independent errors: variance 1/n, times 4 for overlap and 3 for channels alike; what the noise of
+ * the reference adds to both is taken off.) Errors as fine as a pixel that both runs make look the same; either way the mean of the two is worth no more than one. */
+bool difference_correlated(const struct submitted_image *a, const struct submitted_image *b,
+                           const struct submitted_image *reference, const unsigned char *use)
+    __attribute__((warn_unused_result));
 
 /* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
  * that of ours does. Fails where there is no noise in one of them. */

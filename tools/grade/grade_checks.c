@@ -10,10 +10,18 @@
 
 double score_share(const struct margin *m, const struct interval *i)
 {
-    double distance = interval_distance(i), half = interval_half(i);
-    double near = fmin(1, fmax(0, (m->none - distance) / (m->none - m->full)));
-    double quiet = fmin(1, fmax(0, 2 - half / m->none));
-    return fmin(near, quiet);
+    return fmin(1, fmax(0, (m->none - interval_distance(i)) / (m->none - m->full)));
+}
+
+double score_width(const struct margin *m, const struct interval *i)
+{
+    return fmin(1, fmax(0, 2 - interval_half(i) / m->none));
+}
+
+double score_more(const struct margin *m, const struct interval *i)
+{
+    double wide = interval_half(i) / m->none;
+    return wide > 1 && score_share(m, i) > 0 ? wide * wide : 0;
 }
 
 static double beyond(double distance, double sd)
@@ -26,9 +34,7 @@ double score_chance(const struct margin *m, const struct interval *i)
     double share = score_share(m, i), half = interval_half(i), v = fabs(i->value);
     if (share == 1)
         return fmin(1, beyond(m->full + half - v, i->sd) + beyond(m->full + half + v, i->sd));
-    if (share == 0 && half < 2 * m->none)
-        return beyond(v - half - m->none, i->sd);
-    return share == 0 ? 0 : 1;
+    return share == 0 ? beyond(v - half - m->none, i->sd) : 1;
 }
 
 /* One check being made. */
@@ -70,16 +76,72 @@ static bool is_masked(const struct work *w, const struct submitted_image *s, siz
     return rubric_masks(w->r, s->width, s->height, p);
 }
 
-static unsigned char *usable(const struct work *w, struct err *e)
+/* Times the samples, where it is not known how many it takes. */
+static const double few = 4;
+
+/* More samples can be had of all its images. */
+static bool can_buy(const struct work *w)
 {
-    size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height;
-    unsigned char *use = malloc(pixels);
+    bool all = w->h->can_buy;
+    for (int k = 0; k < w->check->num_images; k++)
+        all = all && !w->h->fixed[w->check->images[k]];
+    return all;
+}
+
+/* Of the smallest of its runs, which is cut off first. */
+static double least_samples(const struct work *w, int k)
+{
+    const struct submitted_image *s = student(w, k);
+    double least = s->num_runs > 0 ? INFINITY : image_of(w, k)->spp;
+    for (int run = 0; run < s->num_runs; run++)
+        least = fmin(least, s->run[run].spp);
+    return least;
+}
+
+/* kappa of image k, and the variance that it adds to a sum of pixels. */
+static bool measure_noise(const struct work *w, int k, const unsigned char *use, double *kappa,
+                          double *noise, struct err *e)
+{
+    struct submitted_image right;
+    const struct submitted_image *s = student(w, k);
+    if (!submitted_image_from(expected_noise(w, k), s, &right, e))
+        return false;
+    *kappa = difference_kappa(s, &right, use);
+    *noise = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
+        *noise += use[i / 3] ? *kappa * s->variance[i] : 0;
+    submitted_image_free(&right);
+    return true;
+}
+
+/* Pixels that can be compared. What is noisier than our renders reaches the clipping point from further away; where
+ * that leaves too little, and more samples can be had, they are needed first. NULL: our trouble. */
+static unsigned char *usable(const struct work *w, struct result *out, struct err *e)
+{
+    static const double louder = 1.3, fewest = 0.3;
+    size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height, left = 0;
+    unsigned char *use = malloc(2 * pixels), *quiet = use + pixels;
+    double kappa[CHECK_IMAGES];
     bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
     for (size_t p = 0; ok && p < pixels; p++)
         use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; ok && k < w->check->num_images; k++)
-        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), image_of(w, k)->spp,
+        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), least_samples(w, k),
                                         use, e);
+    for (int k = 0; ok && k < w->check->num_images; k++)
+        ok = measure_noise(w, k, use, &kappa[k], &out->noise[k], e);
+    if (ok)
+        memcpy(quiet, use, pixels);
+    for (int k = 0; ok && k < w->check->num_images; k++)
+        if (kappa[k] > louder)
+            ok = submitted_image_comparable(student(w, k), expected_noise(w, k),
+                                            least_samples(w, k) / kappa[k], quiet, e);
+    for (size_t p = 0; ok && p < pixels; p++)
+        left += quiet[p];
+    if (ok && (double)left >= fewest * (double)pixels)
+        memcpy(use, quiet, pixels);
+    else if (ok && memcmp(use, quiet, pixels) != 0)
+        out->more = few;
     if (ok)
         return use;
     free(use);
@@ -121,8 +183,36 @@ static void tell(const struct difference *a, char *text, size_t size)
                  a->tile_x, a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
 }
 
-static void score_agreement(const struct rubric_check *c, struct result *out)
+/* One more interval that decides: the smallest share counts. */
+static void judge(const struct work *w, const struct margin *m, const struct interval *i,
+                  struct result *out)
 {
+    double share = score_share(m, i), chance = score_chance(m, i), width = score_width(m, i);
+    if (can_buy(w)) {
+        out->more = fmax(out->more, score_more(m, i));
+    } else if (width < share) {
+        share = width;
+        chance = width > 0;
+    }
+    if (share < out->share)
+        out->chance = chance;
+    else if (share == 1 && out->share == 1)
+        out->chance = fmin(1, out->chance + chance);
+    out->share = fmin(out->share, share);
+}
+
+/* What is lost is lost; what cannot be seen yet is not. */
+static void settle(const struct work *w, bool blind, struct result *out)
+{
+    if (blind && can_buy(w))
+        out->share = 1;
+    else if (!can_buy(w) || out->share == 0)
+        out->more = 0;
+}
+
+static void score_agreement(const struct work *w, struct result *out)
+{
+    const struct rubric_check *c = w->check;
     out->share = 1;
     out->chance = 0;
     out->consistent = true;
@@ -132,13 +222,8 @@ static void score_agreement(const struct rubric_check *c, struct result *out)
         const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
         if (k == NUM_CHANNELS && out->agreement.tiles == 0)
             continue;
-        double share = score_share(m, i), chance = score_chance(m, i);
         out->consistent = out->consistent && interval_distance(i) == 0;
-        if (share < out->share)
-            out->chance = chance;
-        else if (share == 1 && out->share == 1)
-            out->chance = fmin(1, out->chance + chance);
-        out->share = fmin(out->share, share);
+        judge(w, m, i, out);
     }
     tell(&out->agreement, out->seen, sizeof out->seen);
 }
@@ -149,12 +234,19 @@ static bool compare(const struct work *w, const struct submitted_image *a,
                     struct err *e)
 {
     struct err why;
-    if (difference_measure(a, b, use, w->alpha, &out->agreement, &why))
-        score_agreement(w->check, out);
+    bool blind = out->more > 0;
+    const bool measured = difference_measure(a, b, use, w->alpha, &out->agreement, &why);
+    if (measured)
+        score_agreement(w, out);
     else if (err_is_of_memory(&why))
         return err_set(e, "%s", why.msg);
     else
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
+    if (!measured && out->agreement.skewed) {
+        blind = true;
+        out->more = fmax(out->more, few);
+    }
+    settle(w, blind, out);
     return true;
 }
 
@@ -162,7 +254,8 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_image *p = image_of(w, 0);
     const struct moments *plain = &w->answers->of[0][w->check->images[0]].m;
-    unsigned char *use = usable(w, e);
+    const struct submitted_image *s = student(w, 0), *first = s->num_runs > 0 ? s->run : s;
+    unsigned char *use = usable(w, out, e);
     struct submitted_image b;
     snprintf(
         out->expected, sizeof out->expected,
@@ -178,8 +271,7 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    if (is_copy(student(w, 0), reference(w, 0), p->spp, use) ||
-        is_copy(student(w, 0), plain, p->spp, use)) {
+    if (is_copy(first, reference(w, 0), p->spp, use) || is_copy(first, plain, p->spp, use)) {
         out->share = out->chance = 0;
         snprintf(
             out->seen, sizeof out->seen,
@@ -225,7 +317,7 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
                  "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
-    unsigned char *use = usable(w, e);
+    unsigned char *use = usable(w, out, e);
     struct submitted_image b = {0};
     bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
     ok = ok && compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out, e);
@@ -237,7 +329,7 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
 static bool check_sum(const struct work *w, struct result *out, struct err *e)
 {
     struct submitted_image sum;
-    unsigned char *use = usable(w, e);
+    unsigned char *use = usable(w, out, e);
     bool ok = use != NULL && submitted_image_from(NULL, student(w, 0), &sum, e);
     snprintf(out->expected, sizeof out->expected,
              "%s is the sum of the other %d images, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
@@ -331,7 +423,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
                  "the two files are the same, though one has more samples");
         return true;
     }
-    unsigned char *use = usable(w, e);
+    unsigned char *use = usable(w, out, e);
     struct submitted_image rp, rq;
     struct interval i;
     struct err why;
@@ -347,8 +439,10 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
-        out->share = score_share(&w->check->log_ratio, &i);
-        out->chance = score_chance(&w->check->log_ratio, &i);
+        out->share = 1;
+        out->more = 0; /* clipped pixels are left out of it */
+        judge(w, &w->check->log_ratio, &i, out);
+        settle(w, false, out);
     } else {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
     }
@@ -384,9 +478,7 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
     const struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
     score_pixels(w, rates.odd, rates.pixels, out);
-    double share = score_share(&c->count, &count);
-    out->chance = share < 1 || out->share == 1 ? score_chance(&c->count, &count) : 0;
-    out->share = fmin(out->share, share);
+    judge(w, &c->count, &count, out);
     snprintf(
         out->seen, sizeof out->seen,
         "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",

@@ -35,9 +35,15 @@ bool answer_key_render(const struct rubric *r, int image, bool as_asked, const c
     __attribute__((warn_unused_result));
 
 /* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
- * margin.none away, linear between. An interval that is wide for noise would come near to 0 whatever is wrong, so
- * half its width is judged too: 1 up to margin.none, 0 from twice that; the smaller of the two counts. */
+ * margin.none away, linear between. */
 double score_share(const struct margin *m, const struct interval *i);
+
+/* An interval that is wide for noise comes near to 0 whatever is wrong: where half its width is more than margin.none, the
+ * share says nothing yet. How many times the samples it takes to change that; 0: none, as it is decided. */
+double score_more(const struct margin *m, const struct interval *i);
+
+/* Where no more samples can be had, width costs points: 1 up to margin.none, 0 from twice that. */
+double score_width(const struct margin *m, const struct interval *i);
 
 /* The chance that a fresh run of the same program, with the estimate as its truth, gets another share; 1 where the
  * share lies between 0 and 1. For a program that is within margin.full the chance of less than all is at most alpha
@@ -50,6 +56,9 @@ struct result {
     bool
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
     bool consistent; /* of equal, agree and sum: no interval misses 0 */
+    double
+        more; /* > 0: not decided, it takes about so many times the samples; share is what it may still be */
+    double noise[CHECK_IMAGES]; /* variance that each image of the check adds, in some unit */
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
     char flag[256];     /* for staff only */
@@ -64,6 +73,9 @@ struct submitted_images {
     struct made made[RUBRIC_IMAGES];
     struct submitted_image image[RUBRIC_IMAGES]; /* mean NULL: not there, or not readable */
     char why[RUBRIC_IMAGES][400];                /* why not */
+    bool can_buy;              /* more samples can be had: what is too noisy is left undecided */
+    bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with them */
+    int runs[RUBRIC_IMAGES];   /* made of it, whether they count or not */
 };
 
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which

@@ -333,10 +333,10 @@ static bool take_rates(const struct rubric *r, const struct submission *s, const
 }
 
 bool submission_image(const struct rubric *r, const struct sandbox *s, const struct submission *sub,
-                      int image, const char *stage, const char *work, const char *out_dir,
-                      uint64_t seed, int threads, struct made *made, struct err *e)
+                      const struct rubric_image *p, const char *stage, const char *work,
+                      const char *out_dir, uint64_t seed, int threads, struct made *made,
+                      struct err *e)
 {
-    const struct rubric_image *p = &r->image[image];
     *made = (struct made){.end = SANDBOX_OK};
     if (sub->why[0] != '\0') {
         snprintf(made->why, sizeof made->why, "%.590s", sub->why);

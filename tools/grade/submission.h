@@ -48,12 +48,12 @@ bool submission_build(const struct rubric *r, const struct sandbox *box, const c
                       const char *log, struct submission *s, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The image with that index: found, or made in the sandbox and then moved to out_dir, where its log goes too. An
- * image that is not there is no error: made->why says so. */
+/* One image of the rubric, or one like it with another name and other samples: found, or made in the sandbox and
+ * then moved to out_dir, where its log goes too. An image that is not there is no error: made->why says so. */
 bool submission_image(const struct rubric *r, const struct sandbox *s, const struct submission *sub,
-                      int image, const char *stage, const char *work, const char *out_dir,
-                      uint64_t seed, int threads, struct made *made, struct err *e)
-    __attribute__((warn_unused_result));
+                      const struct rubric_image *p, const char *stage, const char *work,
+                      const char *out_dir, uint64_t seed, int threads, struct made *made,
+                      struct err *e) __attribute__((warn_unused_result));
 
 /* The command of an image in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
  * output by its name in the rubric. False if it is too long. */

@@ -104,7 +104,7 @@ bool submitted_image_read(const char *path, const char *curve, int width, int he
     return ok;
 }
 
-void submitted_image_free(struct submitted_image *s)
+static void free_planes(struct submitted_image *s)
 {
     free(s->mean);
     free(s->tolerance);
@@ -112,11 +112,90 @@ void submitted_image_free(struct submitted_image *s)
     free(s->variance);
     free(s->k3);
     free(s->clipped);
+}
+
+void submitted_image_free(struct submitted_image *s)
+{
+    free_planes(s);
+    for (int k = 0; k < s->num_runs; k++)
+        submitted_image_free(&s->run[k]);
+    free(s->run);
     *s = (struct submitted_image){0};
+}
+
+/* Runs of less than a third of the largest go. */
+static void drop_small(struct submitted_image *s)
+{
+    static const double least = 1.0 / 3;
+    double most = 0;
+    int num = 0;
+    for (int k = 0; k < s->num_runs; k++)
+        most = fmax(most, s->run[k].spp);
+    s->spp = 0;
+    for (int k = 0; k < s->num_runs; k++) {
+        if (s->run[k].spp < least * most) {
+            submitted_image_free(&s->run[k]);
+            continue;
+        }
+        s->spp += s->run[k].spp;
+        s->run[num++] = s->run[k];
+    }
+    s->num_runs = num;
+}
+
+static void average_runs(struct submitted_image *s)
+{
+    size_t n = 3 * (size_t)s->width * (size_t)s->height;
+    memset(s->clipped, 0, n);
+    for (size_t i = 0; i < n; i++) {
+        s->mean[i] = s->tolerance[i] = s->rounding[i] = 0;
+        for (int k = 0; k < s->num_runs; k++) {
+            const struct submitted_image *run = &s->run[k];
+            double w = run->spp / s->spp;
+            s->mean[i] += w * run->mean[i];
+            s->tolerance[i] += w * run->tolerance[i];
+            s->rounding[i] += w * w * run->rounding[i];
+            s->clipped[i] |= run->clipped[i];
+        }
+    }
+}
+
+bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more, struct err *e)
+{
+    struct submitted_image *run = realloc(s->run, ((size_t)s->num_runs + 2) * sizeof *run);
+    if (run == NULL)
+        return err_set(e, "out of memory");
+    s->run = run;
+    if (s->num_runs == 0) { /* what it is becomes the first of its runs */
+        struct submitted_image mean = *s;
+        if (!allocate(&mean, e)) {
+            free_planes(&mean);
+            return false;
+        }
+        s->run = NULL;
+        run[0] = *s;
+        *s = mean;
+        s->num_runs = 1;
+    }
+    s->run[s->num_runs++] = *more;
+    *more = (struct submitted_image){0};
+    drop_small(s);
+    average_runs(s);
+    return true;
+}
+
+bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b)
+{
+    return a->width == b->width && a->height == b->height &&
+           memcmp(a->mean, b->mean, 3 * (size_t)a->width * (size_t)a->height * sizeof *a->mean) ==
+               0;
 }
 
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp)
 {
+    for (int k = 0; k < s->num_runs; k++)
+        submitted_image_expect(&s->run[k], m, s->run[k].spp);
+    spp = s->num_runs > 0 ? s->spp : spp;
     for (int y = 0; y < s->height; y++)
         for (int x = 0; x < s->width; x++)
             for (size_t c = 0; c < 3; c++) {
@@ -143,8 +222,8 @@ void submitted_image_expect(struct submitted_image *s, const struct moments *m, 
 bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                           struct submitted_image *out, struct err *e)
 {
-    *out =
-        (struct submitted_image){.width = like->width, .height = like->height, .clip = like->clip};
+    *out = (struct submitted_image){
+        .width = like->width, .height = like->height, .clip = like->clip, .known = m != NULL};
     if (!allocate(out, e)) {
         submitted_image_free(out);
         return false;

@@ -19,6 +19,10 @@ struct submitted_image {
     unsigned char *clipped; /* 3 per pixel: at the brightest code */
     double clip;            /* the radiance of that code; INFINITY of floats */
     char sha256[65];        /* of the file */
+    bool known; /* variance is that of the mean itself: of references, not of students' images */
+    double spp; /* samples a pixel of all its runs; 0: as many as the rubric asks for */
+    struct submitted_image *run; /* what it is the weighted mean of; NULL: one run */
+    int num_runs;
 };
 
 /* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no image of that size.
@@ -28,16 +32,26 @@ bool submitted_image_read(const char *path, const char *curve, int width, int he
     __attribute__((warn_unused_result));
 void submitted_image_free(struct submitted_image *s);
 
+/* Makes s the mean of its runs and of one more, weighted by their samples (spp of both is set), and takes that over. A run
+ * of less than a third of the samples of the largest is kept, but no part of the mean: it says little, and its noise is
+ * cut off at the clipping point sooner. Fails, and leaves *more to the caller, where memory is short. */
+bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Are they the same values, pixel by pixel? */
+bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b);
+
 /* Sets variance and k3 to those that a render of spp samples by our renderer has, whose moments are m: means over
- * 3 x 3 pixels, as what is rare may have been missed in one. A pixel beyond the clipping point does not vary. */
+ * 3 x 3 pixels, as what is rare may have been missed in one. A pixel beyond the clipping point does not vary. Of an
+ * image of several runs spp is that of each, whatever is given. */
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
-/* An image of the same kind as `like`: what m says, with the variance of its mean; m NULL: black. */
+/* An image of the same kind as `like`: what m says, with the known variance of its mean; m NULL: black. */
 bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                           struct submitted_image *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The caller frees it with submitted_image_free(). */
+/* Without the runs. The caller frees it with submitted_image_free(). */
 bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
                           struct err *e) __attribute__((warn_unused_result));
 

@@ -48,7 +48,7 @@ static bool make_images(const struct grade_job *job, const struct submission *s,
     for (int i = 0; i < r->num_images; i++) {
         const struct rubric_image *p = &r->image[i];
         struct err why = {""};
-        if (!submission_image(r, job->sandbox, s, i, job->stage, work, out,
+        if (!submission_image(r, job->sandbox, s, p, job->stage, work, out,
                               image_seed(job->seed, p->name), job->threads, &h->made[i], e))
             return false;
         if (h->made[i].path[0] == '\0')

@@ -80,7 +80,7 @@ static bool look(const struct grade_diagnosis *d, const struct sandbox *box,
         .catalogue = &d->catalogue, .suite = d->suite, .alpha = alpha};
     const struct path out = fs_path("%s/diagnose", work);
     if (!fs_make_dirs(out.s, e) ||
-        !submission_image(d->rubric, box, s, view, d->stage, work, out.s,
+        !submission_image(d->rubric, box, s, &d->rubric->image[view], d->stage, work, out.s,
                           seed * 1000u + (uint64_t)view, threads, &made, e))
         return false;
     bool ok = made.why[0] == '\0'
