@@ -1,4 +1,4 @@
-#include "diagnose.h"
+#include "bug_fit.h"
 
 #include "tools/compare/compare.h"
 
@@ -8,268 +8,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Student's law instead of the normal one: a cell with a firefly costs a hypothesis a few units, not
- * hundreds [Lange89]. */
-static const double cell_dof = 5;
-/* Facts are sums over whole images: no firefly decides them. */
-static const double fact_dof = 30;
-/* How well an effect is known to be the same at another size. */
-static const double model_error = 0.01;
-static const double fact_error[NUM_FACTS] = {
-    [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
-/* What floats, stored and rendered, are good for. */
-static const double rounding = 1e-5;
-/* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
-static const double amplitude_cost = 6;
-static const double least_amplitude = 0.1, largest_amplitude = 4;
-/* What is left may exceed its mean by so many standard deviations and still be noise. */
-static const double largest_excess = 6;
+/* In images that state an error of their own: what is left is noise, or this share is explained. */
 static const double least_explained = 0.95;
 /* Bugs this many times less likely than the best are still named with it. */
 static const double tie = 20;
 /* A number of samples has to be off by so many standard deviations. */
 static const double samples_z = 7;
 
-/* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
- * than the correct renderer has at as many samples is not believed. */
-static double variance_of(const struct observation *clue, int i, double factor)
-{
-    const struct signature *a = &clue->seen, *c = &clue->view->correct;
-    return fmax(factor * a->var[i], c->var[i] * c->n / a->n) + c->var[i];
-}
-
-static double mean_of(const struct signature *s)
-{
-    double sum = 0;
-    for (int i = 0; i < 3 * s->columns * s->rows; i++)
-        sum += s->mean[i];
-    return sum / (3 * s->columns * s->rows);
-}
-
-struct tally {
-    double log_likelihood;
-    double chi2, chi2_mean, cells; /* of what is left; its mean if that is noise */
-    double left, all;              /* in the same weights: what is left, and without the bug */
-};
-
-static double student(double z2, double var, double dof)
-{
-    return -0.5 * (dof + 1) * log1p(z2 / dof) - 0.5 * log(var);
-}
-
-/* How much noisier a bug makes the mean of a cell than its pixels state. */
-static double inflation(const struct effect *e, const struct signature *seen)
-{
-    double r = e->fact[FACT_PIXELS], s = e->fact[FACT_IMAGE], factor = 1;
-    if (isfinite(r) && r > 0.25)
-        factor *= exp(r);
-    if (isfinite(s) && s > log(10))
-        factor *= fmin(exp(s - fmax(r, 0)), (double)seen->cell * seen->cell);
-    return factor;
-}
-
-static void add_cell(const struct observation *clue, const struct effect *e, double amplitude,
-                     double factor, double scale, int cell, struct tally *t)
-{
-    const struct signature *a = &clue->seen, *c = &clue->view->correct;
-    double log_likelihood = 0, chi2 = 0, chi2_mean = 0;
-    for (int i = 3 * cell; i < 3 * cell + 3; i++) {
-        double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
-        double noise = variance_of(clue, i, factor) +
-                       (e != NULL ? factor * amplitude * amplitude * (double)e->var[i] : 0);
-        double fuzz = pow(rounding * (a->mean[i] + c->mean[i] + scale), 2);
-        double var = noise + fuzz + pow(model_error * effect, 2);
-        double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
-        log_likelihood += student(z2, var, cell_dof) / 3;
-        chi2 += fmin(z2, 100) / 3;
-        chi2_mean += noise / var / 3;
-        t->left += (fmin(z2, 1e4) - noise / var) / 3;
-        t->all += (fmin(d * d / var, 1e4) - noise / var) / 3;
-    }
-    t->log_likelihood += log_likelihood;
-    t->chi2 += chi2;
-    t->chi2_mean += chi2_mean;
-    t->cells++;
-}
-
-/* What a bug makes of S at the size of the image at hand: where all pixels depend on each other, S grows with their number. */
-static double image_fact(const struct effect *e, const struct observation *clue)
-{
-    double s = e->fact[FACT_IMAGE];
-    if (s > log(10))
-        s += 2 * log((double)clue->seen.cell / clue->view->correct.cell);
-    return s;
-}
-
-static void add_facts(const struct observation *clue, const struct effect *e, double amplitude,
-                      struct tally *t)
-{
-    const struct signature *c = &clue->view->correct;
-    for (int f = 0; f < NUM_FACTS; f++) {
-        double fact = c->fact[f], sd = c->fact_sd[f];
-        if (isnan(clue->seen.fact[f]) || isnan(fact))
-            continue;
-        if (e != NULL && isnan(e->fact[f]))
-            continue;
-        if (e != NULL) {
-            double bug = f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f];
-            fact += amplitude * (bug - fact);
-            sd = e->fact_sd[f];
-        }
-        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
-        double z2 = pow(clue->seen.fact[f] - fact, 2) / var;
-        double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
-        t->log_likelihood += student(z2, var, fact_dof);
-        t->chi2 += fmin(z2, 100);
-        t->left += fmin(z2, 1e4) - 1;
-        t->all += fmin(all, 1e4) - 1;
-        t->chi2_mean++;
-        t->cells++;
-    }
-}
-
-/* e NULL: the bug does nothing here, or "correct". factor: inflation() of the bug. */
-static void add_view(const struct observation *clue, const struct effect *e, double amplitude,
-                     double factor, struct tally *t)
-{
-    double scale = mean_of(&clue->view->correct);
-    for (int i = 0; i < clue->seen.columns * clue->seen.rows; i++)
-        add_cell(clue, e, amplitude, factor, scale, i, t);
-    add_facts(clue, e, amplitude, t);
-}
-
-/* The largest over the views at hand: only some of them show how pixels depend on each other. Where a bug makes all renders
- * the same, their average is no surer than one of them. */
-static double inflation_of(const struct catalogue *c, int bug, const struct observation *clue)
-{
-    double factor = 1, repeats = 1;
-    for (int v = 0; v < c->num_views; v++) {
-        const struct effect *e = c->view[v].effect[bug];
-        if (e == NULL)
-            continue;
-        factor = fmax(factor, inflation(e, &clue->seen));
-        if (e->fact[FACT_PIXELS] <= SIGNATURE_SAME)
-            repeats = clue->view->renders;
-    }
-    return factor * repeats;
-}
-
-struct hypotheses {
-    const struct catalogue *c;
-    const struct observation *clue;
-    int num_clues;
-    struct tally *correct; /* per clue */
-};
-
-static void sum_up(struct tally *to, const struct tally *t)
-{
-    to->log_likelihood += t->log_likelihood;
-    to->chi2 += t->chi2;
-    to->chi2_mean += t->chi2_mean;
-    to->cells += t->cells;
-    to->left += t->left;
-    to->all += t->all;
-}
-
-/* share: of the inflation, as an exponent. */
-static struct tally total_with(const struct hypotheses *h, int bug, double amplitude, double share,
-                               double *largest)
-{
-    struct tally sum = {0};
-    *largest = 1;
-    for (int k = 0; k < h->num_clues; k++) {
-        const struct effect *e = h->clue[k].view->effect[bug];
-        double factor = inflation_of(h->c, bug, &h->clue[k]);
-        struct tally t = {0};
-        *largest = fmax(*largest, factor);
-        if (e == NULL && factor == 1)
-            t = h->correct[k];
-        else
-            add_view(&h->clue[k], e, amplitude, pow(factor, share), &t);
-        sum_up(&sum, &t);
-    }
-    return sum;
-}
-
-/* How much a bug adds to the noise of the other views is known from one of them only: none of it, its root or all of it are
- * equally likely beforehand, and the likeliest stands for the mean of the three. What is left is judged with all. */
-static struct tally total(const struct hypotheses *h, int bug, double amplitude)
-{
-    static const double share[] = {0, 0.5};
-    const double choices = 3;
-    double largest, best = -INFINITY;
-    struct tally sum = total_with(h, bug, amplitude, 1, &largest);
-    if (largest == 1)
-        return sum;
-    for (int i = 0; i < 2; i++)
-        best = fmax(best, total_with(h, bug, amplitude, share[i], &largest).log_likelihood);
-    sum.log_likelihood = fmax(best, sum.log_likelihood) - log(choices);
-    return sum;
-}
-
-static double log_likelihood_of(const struct hypotheses *h, int bug, double amplitude)
-{
-    struct tally t = total(h, bug, amplitude);
-    return t.log_likelihood;
-}
-
-/* Least squares with the weights of "correct": where the search for the best amplitude begins. */
-static double first_amplitude(const struct hypotheses *h, int bug)
-{
-    double along = 0, norm = 0;
-    for (int k = 0; k < h->num_clues; k++) {
-        const struct effect *e = h->clue[k].view->effect[bug];
-        const struct signature *a = &h->clue[k].seen, *c = &h->clue[k].view->correct;
-        double tiny = rounding * mean_of(c);
-        for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
-            double effect = (double)e->mean[i];
-            double var = variance_of(&h->clue[k], i, 1) + (double)e->var[i] + tiny * tiny +
-                         pow(model_error * effect, 2);
-            along += effect * (a->mean[i] - c->mean[i]) / var;
-            norm += effect * effect / var;
-        }
-    }
-    return norm > 0 ? fmin(fmax(along / norm, least_amplitude), largest_amplitude) : 1;
-}
-
-/* Golden section for the largest likelihood around a first guess. */
-static double refine_amplitude(const struct hypotheses *h, int bug, double at)
-{
-    const double golden = 0.6180339887498949, reach = 1.5;
-    double lo = fmax(at / reach, least_amplitude), hi = fmin(at * reach, largest_amplitude);
-    for (int i = 0; i < 12; i++) {
-        double x1 = hi - golden * (hi - lo), x2 = lo + golden * (hi - lo);
-        if (log_likelihood_of(h, bug, x1) > log_likelihood_of(h, bug, x2))
-            hi = x2;
-        else
-            lo = x1;
-    }
-    return 0.5 * (lo + hi);
-}
-
-static struct candidate candidate_of(const struct hypotheses *h, int bug, double amplitude)
-{
-    struct tally t = total(h, bug, amplitude), none = {0};
-    for (int k = 0; k < h->num_clues; k++)
-        sum_up(&none, &h->correct[k]);
-    struct candidate out = {.bug = bug, .amplitude = amplitude};
-    out.log_likelihood =
-        t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
-    out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
-    out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
-    return out;
-}
-
 static int by_likelihood(const void *a, const void *b)
 {
     double x = ((const struct candidate *)a)->log_likelihood,
            y = ((const struct candidate *)b)->log_likelihood;
     return (x < y) - (x > y);
-}
-
-static bool is_explanation(const struct candidate *c)
-{
-    return c->excess <= largest_excess || c->explained >= least_explained;
 }
 
 double diagnose_bound(const struct catalogue *c, double alpha)
@@ -361,6 +111,8 @@ static bool gate(const struct observation *clue, int num_clues, double alpha, bo
 
 /* ---- which one? */
 
+enum { LEADERS = 8 }; /* of pairs */
+
 static int excluded(const struct catalogue *c, const struct diagnose_options *opt)
 {
     return opt->without != NULL ? catalogue_bug(c, opt->without) : -1;
@@ -373,41 +125,53 @@ static void keep_likelier(struct candidate *c, const struct candidate *other)
 }
 
 /* Each bug at its full strength, likeliest first. */
-static int rank_full(const struct hypotheses *h, const struct diagnose_options *opt,
+static int rank_full(const struct bug_fit *f, const struct diagnose_options *opt,
                      struct candidate *all)
 {
     int num = 0;
-    for (int b = 0; b < h->c->num_bugs; b++)
-        if (b != excluded(h->c, opt))
-            all[num++] = candidate_of(h, b, 1);
+    for (int b = 0; b < f->c->num_bugs; b++)
+        if (b != excluded(f->c, opt))
+            all[num++] = bug_fit_at(f, b, -1, 1);
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
     return num;
 }
 
 /* Unless the best explains all at full strength, each at the amplitude that fits best, if that is likelier. */
-static void rank_free(const struct hypotheses *h, struct candidate *all, int num)
+static void rank_free(const struct bug_fit *f, struct candidate *all, int num)
 {
     enum { REFINED = 6 };
-    if (num > 0 && all[0].excess <= largest_excess)
+    if (num > 0 && all[0].excess <= bug_fit_largest_excess)
         return;
     for (int i = 0; i < num; i++) {
-        struct candidate free_one = candidate_of(h, all[i].bug, first_amplitude(h, all[i].bug));
+        struct candidate free_one = bug_fit_at(f, all[i].bug, -1, bug_fit_amplitude(f, all[i].bug));
         keep_likelier(&all[i], &free_one);
     }
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
     for (int i = 0; i < num && i < REFINED; i++) {
         struct candidate refined =
-            candidate_of(h, all[i].bug, refine_amplitude(h, all[i].bug, all[i].amplitude));
+            bug_fit_at(f, all[i].bug, -1, bug_fit_refine(f, all[i].bug, all[i].amplitude));
         keep_likelier(&all[i], &refined);
     }
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
 }
 
+/* The likeliest singles, each with every other bug; likeliest first. */
+static int rank_pairs(const struct bug_fit *f, const struct candidate *single, int num,
+                      struct candidate *pair)
+{
+    int pairs = 0;
+    for (int i = 0; i < num && i < LEADERS; i++)
+        for (int k = i + 1; k < num; k++)
+            pair[pairs++] = bug_fit_at(f, single[i].bug, single[k].bug, 1);
+    qsort(pair, (size_t)pairs, sizeof *pair, by_likelihood);
+    return pairs;
+}
+
 /* A bug that is so much likelier than "correct" shows that the renderer is wrong. */
-static bool gate_lead(const struct hypotheses *h, const struct candidate *best, double alpha,
+static bool gate_lead(const struct bug_fit *f, const struct candidate *best, double alpha,
                       struct diagnosis *out)
 {
-    if (best->log_likelihood < diagnose_bound(h->c, alpha))
+    if (best->log_likelihood < diagnose_bound(f->c, alpha))
         return false;
     if (out->gate[0] == '\0')
         snprintf(out->gate, sizeof out->gate,
@@ -416,34 +180,70 @@ static bool gate_lead(const struct hypotheses *h, const struct candidate *best, 
     return true;
 }
 
-static void name(const struct candidate *all, int num, double bound, struct diagnosis *out)
+/* Images that state no error are those of other people's programs: what is told has to explain all of them. */
+static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
+                           const struct candidate *c)
+{
+    static const double least_noise = 0.8, least_gone = 0.9, most_left = 0.5;
+    int clue;
+    bool is_noise = c->excess <= bug_fit_largest_excess;
+    if (!opt->by_likelihood)
+        return is_noise || c->explained >= least_explained;
+    /* Where all lies within the noise of the cells only the directed statistic speaks. */
+    bool is_gone =
+        c->explained >= (is_noise ? least_noise : least_gone) || (is_noise && c->is_faint);
+    return is_gone && bug_fit_is_full(f, c) && bug_fit_worst(f, c, &clue) <= most_left;
+}
+
+/* Where more is left than noise, a likelihood says little: another that leaves less than twice as much comes near. */
+static bool is_near(const struct candidate *best, const struct candidate *other)
+{
+    return best->excess > bug_fit_largest_excess &&
+           1 - other->explained < 2 * (1 - best->explained);
+}
+
+static void name(const struct bug_fit *f, const struct diagnose_options *opt,
+                 const struct candidate *all, int num, double bound, struct diagnosis *out)
 {
     double sum = 0, named = 0;
+    out->num_named = 0;
     out->num_candidates = num < DIAGNOSE_CANDIDATES ? num : DIAGNOSE_CANDIDATES;
     memcpy(out->candidate, all, (size_t)out->num_candidates * sizeof *all);
     out->finding = FINDING_UNKNOWN;
-    if (num == 0 || all[0].log_likelihood < bound || !is_explanation(&all[0]))
+    if (num == 0 || all[0].log_likelihood < bound || !is_explanation(f, opt, &all[0]))
         return;
-    out->finding = FINDING_BUG;
     for (int i = 0; i < num; i++) {
         double relative = exp(all[i].log_likelihood - all[0].log_likelihood);
         sum += relative;
         if (i < out->num_candidates && relative * tie >= 1 && out->num_named == i &&
-            is_explanation(&all[i])) {
+            is_explanation(f, opt, &all[i])) {
             out->num_named++;
             named += relative;
+        } else if (opt->by_likelihood && is_near(&all[0], &all[i])) {
+            out->num_named = 0;
+            return;
         }
     }
+    out->finding = FINDING_BUG;
     out->probability = named / sum;
 }
 
-static bool tally_correct(struct hypotheses *h, struct err *e)
+/* Two at once, where no single one leaves noise; a pair is told beside a single one only if it does. */
+static bool name_pair(const struct bug_fit *f, const struct diagnose_options *opt,
+                      const struct candidate *single, int num, struct diagnosis *out, struct err *e)
 {
-    h->correct = calloc((size_t)h->num_clues, sizeof *h->correct);
-    if (h->correct == NULL)
+    struct diagnosis two = *out;
+    bool is_single = out->num_named > 0;
+    if (is_single && out->candidate[0].excess <= bug_fit_largest_excess)
+        return true;
+    struct candidate *pair = calloc((size_t)num * LEADERS, sizeof *pair);
+    if (pair == NULL)
         return err_set(e, "out of memory");
-    for (int k = 0; k < h->num_clues; k++)
-        add_view(&h->clue[k], NULL, 0, 1, &h->correct[k]);
+    int pairs = rank_pairs(f, single, num, pair);
+    name(f, opt, pair, pairs, single[0].log_likelihood + diagnose_bound(f->c, opt->alpha), &two);
+    if (two.num_named > 0 && (!is_single || two.candidate[0].excess <= bug_fit_largest_excess))
+        *out = two;
+    free(pair);
     return true;
 }
 
@@ -460,20 +260,21 @@ bool diagnose(const struct catalogue *c, const struct observation *clue, int num
 {
     assert(num_clues > 0 && opt->alpha > 0 && opt->alpha < 0.5);
     *out = (struct diagnosis){0};
-    struct hypotheses h = {.c = c, .clue = clue, .num_clues = num_clues};
+    struct bug_fit f = {0};
     bool differs = false, by_verdict = false, ok = true;
     for (int k = 0; ok && k < num_clues; k++)
         ok = check(&clue[k], e);
     struct candidate *all = calloc((size_t)c->num_bugs, sizeof *all);
-    ok = ok && (all != NULL || err_set(e, "out of memory")) && tally_correct(&h, e) &&
+    ok = ok && (all != NULL || err_set(e, "out of memory")) &&
+         bug_fit_start(c, clue, num_clues, opt->clip, &f, e) &&
          (opt->by_likelihood || gate(clue, num_clues, opt->alpha, &differs, out, e));
     for (int k = 0; ok && k < num_clues; k++)
-        out->log_likelihood += h.correct[k].log_likelihood;
-    int num = ok ? rank_full(&h, opt, all) : 0;
+        out->log_likelihood += f.correct[k].log_likelihood;
+    int num = ok ? rank_full(&f, opt, all) : 0;
     if (ok && num > 0) {
         out->largest_lead = all[0].log_likelihood;
         by_verdict = differs;
-        differs = gate_lead(&h, &all[0], opt->alpha, out) || differs;
+        differs = gate_lead(&f, &all[0], opt->alpha, out) || differs;
     }
     if (ok && !differs) {
         out->finding = FINDING_CORRECT;
@@ -481,10 +282,13 @@ bool diagnose(const struct catalogue *c, const struct observation *clue, int num
                  "no difference from the correct renderer in %d view%s", num_clues,
                  num_clues == 1 ? "" : "s");
     } else if (ok) {
-        rank_free(&h, all, num);
-        name(all, num, by_verdict ? log(tie * c->num_bugs) : diagnose_bound(c, opt->alpha), out);
+        if (!opt->by_likelihood)
+            rank_free(&f, all, num);
+        name(&f, opt, all, num, by_verdict ? log(tie * c->num_bugs) : diagnose_bound(c, opt->alpha),
+             out);
+        ok = !opt->pairs || name_pair(&f, opt, all, num, out, e);
     }
-    free(h.correct);
+    bug_fit_end(&f);
     free(all);
     return ok;
 }
@@ -505,7 +309,8 @@ static void strongest(const struct observation *clue, const struct effect *e, do
             for (int j = 0; j < out->rows; j++)
                 for (int i = 3 * ((y + j) * a->columns + x);
                      i < 3 * ((y + j) * a->columns + x + out->columns); i++) {
-                    double var = a->var[i] + c->var[i] + pow(model_error * (double)e->mean[i], 2);
+                    double var =
+                        a->var[i] + c->var[i] + pow(bug_fit_model_error * (double)e->mean[i], 2);
                     double effect = amplitude * (double)e->mean[i];
                     d += a->mean[i] - c->mean[i];
                     mean += c->mean[i];
@@ -526,15 +331,14 @@ struct evidence diagnose_evidence(const struct catalogue *c, const struct observ
     const struct effect *e = clue->view->effect[candidate->bug];
     const struct signature *a = &clue->seen, *correct = &clue->view->correct;
     struct evidence out = {.explained = NAN};
-    struct tally t = {0}, none = {0};
-    add_view(clue, NULL, 0, 1, &none);
-    add_view(clue, e, candidate->amplitude, inflation_of(c, candidate->bug, clue), &t);
+    const struct bug_fit f = {.c = c, .clue = clue, .num_clues = 1};
+    struct tally t = bug_fit_view(&f, 0, candidate), none = bug_fit_view(&f, 0, NULL);
     out.log_lead = t.log_likelihood - none.log_likelihood;
-    if (none.chi2 > none.chi2_mean + largest_excess * sqrt(2 * none.cells))
+    if (none.chi2 > none.chi2_mean + bug_fit_largest_excess * sqrt(2 * none.cells))
         out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
     if (e == NULL || !e->pixels)
         return out;
-    double along = 0, norm = 0, tiny = rounding * mean_of(correct);
+    double along = 0, norm = 0, tiny = bug_fit_rounding * signature_mean(correct);
     for (int i = 0; i < 3 * a->columns * a->rows; i++) {
         double var = a->var[i] + correct->var[i] + (double)e->var[i] + tiny * tiny;
         along += (double)e->mean[i] * (a->mean[i] - correct->mean[i]) / var;

@@ -19,17 +19,21 @@ struct diagnose_options {
         *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
     bool
         by_likelihood; /* no other test says that something is wrong, as for images that state no error: a bug has
-                         * to lead by diagnose_bound() */
+                         * to lead by diagnose_bound(), to explain every view, at its full strength */
+    bool pairs;  /* where no single one explains: two bugs at once, with by_likelihood */
+    double clip; /* radiance at which views are cut off; 0: none */
 };
 
 enum finding { FINDING_CORRECT, FINDING_BUG, FINDING_UNKNOWN };
 
 struct candidate {
-    int bug;
+    int bug, second;       /* second: at the same time; -1: none */
     double amplitude;      /* 1: its full effect; else the factor that fits best */
     double log_likelihood; /* natural logarithm, over that of "correct" */
     double explained;      /* share of the difference from the correct renderer, at most 1 */
     double excess;         /* chi^2 of what is left over its mean, in its standard deviations */
+    bool is_faint;         /* without it chi^2 would be within its noise too */
+    double t, strength;    /* directed statistic over all views; the factor by least squares */
 };
 
 /* How a bug explains one view. */

@@ -77,6 +77,14 @@ bool signature_of(const struct moments *m, int columns, double asked, struct sig
     return true;
 }
 
+double signature_mean(const struct signature *s)
+{
+    double sum = 0;
+    for (int i = 0; i < 3 * s->columns * s->rows; i++)
+        sum += s->mean[i];
+    return sum / (3 * s->columns * s->rows);
+}
+
 struct signature signature_average(const struct signature *s, int num)
 {
     struct signature a = s[0];

@@ -43,6 +43,9 @@ struct signature {
 bool signature_of(const struct moments *m, int columns, double asked, struct signature *out,
                   struct err *e) __attribute__((warn_unused_result));
 
+/* Over cells and channels. */
+double signature_mean(const struct signature *s);
+
 /* The average of num >= 1 independent sights of one shape, as of one longer render; FACT_SAMPLES is
  * averaged, the others are those of the first. */
 struct signature signature_average(const struct signature *s, int num);

@@ -2,6 +2,7 @@
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
+#include "tools/diagnose/bug_fit.h"
 #include "tools/images/tone_curve.h"
 #include "rate_image.h"
 
@@ -217,6 +218,13 @@ static double noise_of(const struct signature *s, const struct signature *correc
     return fmax(1, gsl_stats_median_from_sorted_data(ratio, 1, num));
 }
 
+/* By how much the mean of rounded values may be off: half a bin where all are the same; noise of variance v dithers
+ * it away by exp(-2 pi^2 v / bin^2). */
+static double bias_of_codes(double half_bin, double v)
+{
+    return half_bin > 0 ? half_bin * exp(-M_PI * M_PI * v / (2 * half_bin * half_bin)) : 0;
+}
+
 static bool sight_of_student(const struct rubric *r, int image, const struct submitted_image *s,
                              const struct moments *m, const struct signature *correct,
                              struct signature *out, struct err *e)
@@ -227,10 +235,12 @@ static bool sight_of_student(const struct rubric *r, int image, const struct sub
     double clip = clip_of(r), pixels = (double)out->cell * out->cell;
     fill_cells(r, s, m, clip, out, cells);
     double kappa = noise_of(out, correct, cells);
-    for (int j = 0; j < 3 * out->columns * out->rows; j++)
-        out->var[j] = kappa * correct->var[j] * correct->n / out->n +
-                      cells[j].rounding / (pixels * pixels) + pow(cells[j].tolerance / pixels, 2) +
+    for (int j = 0; j < 3 * out->columns * out->rows; j++) {
+        double noise = kappa * correct->var[j] * correct->n / out->n;
+        out->var[j] = noise + cells[j].rounding / (pixels * pixels) +
+                      pow(bias_of_codes(cells[j].tolerance / pixels, noise * pixels), 2) +
                       (cells[j].clipped ? pow(clip_error * clip, 2) : 0);
+    }
     return true;
 }
 
@@ -272,9 +282,14 @@ static bool look(const struct rubric_bugs *b, const struct rubric *r, const stru
 
 bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                           const struct answer_key *a, const struct submitted_images *h, int set,
-                          double alpha, struct diagnosis *found, int *with, struct err *e)
+                          double alpha, const char *without, struct diagnosis *found, int *with,
+                          struct err *e)
 {
-    const struct diagnose_options opt = {.alpha = alpha, .by_likelihood = true};
+    double clip = clip_of(r);
+    struct diagnose_options opt = {.alpha = alpha,
+                                   .without = without,
+                                   .by_likelihood = true,
+                                   .clip = isfinite(clip) ? clip : 0};
     struct observation *clue = calloc((size_t)r->num_images, sizeof *clue);
     bool ok = clue != NULL || err_set(e, "out of memory");
     double best = -INFINITY;
@@ -297,6 +312,12 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
             *found = other;
             *with = tried;
         }
+    }
+    if (ok && (found->num_named == 0 || found->candidate[0].excess > bug_fit_largest_excess)) {
+        int num;
+        opt.pairs = true;
+        ok = look(b, r, a, h, *with, clue, &num, e) &&
+             (num == 0 || diagnose(&b->catalogue, clue, num, &opt, found, e));
     }
     free(clue);
     return ok;

@@ -96,9 +96,15 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
         [FINDING_CORRECT] = "correct", [FINDING_BUG] = "bug", [FINDING_UNKNOWN] = "unknown"};
     json_t *named = json_array();
     for (int i = 0; i < found->num_named; i++) {
-        const struct bug *b = &c->bug[found->candidate[i].bug];
-        json_array_append_new(
-            named, json_pack("{ss, ss, ss}", "name", b->name, "bug", b->what, "where", b->where));
+        const struct candidate *one = &found->candidate[i];
+        const struct bug *b = &c->bug[one->bug],
+                         *other = one->second >= 0 ? &c->bug[one->second] : NULL;
+        json_t *entry = json_pack("{ss, ss, ss, sf}", "name", b->name, "bug", b->what, "where",
+                                  b->where, "explained", one->explained);
+        if (other != NULL)
+            json_object_update_new(entry, json_pack("{ss, ss, ss}", "and", other->name, "and_bug",
+                                                    other->what, "and_where", other->where));
+        json_array_append_new(named, entry);
     }
     return json_pack("{ss, ss, so}", "finding", names[found->finding], "gate", found->gate, "named",
                      named);
@@ -115,7 +121,7 @@ json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubri
         images += b->view[0][i] >= 0 && h->image[i].mean != NULL;
     if (images == 0)
         return json_null();
-    if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, &found, &with, &e))
+    if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, NULL, &found, &with, &e))
         return json_pack("{ss}", "error", e.msg);
     if (found.finding == FINDING_CORRECT)
         found.finding = FINDING_UNKNOWN;

@@ -1,0 +1,361 @@
+#include "bug_fit.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Student's law instead of the normal one: a cell with a firefly costs a hypothesis a few units, not
+ * hundreds [Lange89]. */
+static const double cell_dof = 5;
+/* Facts are sums over whole images: no firefly decides them. */
+static const double fact_dof = 30;
+/* How well an effect is known to be the same at another size. */
+const double bug_fit_model_error = 0.01;
+static const double fact_error[NUM_FACTS] = {
+    [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
+/* What floats, stored and rendered, are good for. */
+const double bug_fit_rounding = 1e-5;
+/* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
+static const double amplitude_cost = 6;
+static const double least_amplitude = 0.1, largest_amplitude = 4;
+const double bug_fit_largest_excess = 6;
+/* A ratio of two radiances is one where the lower is at least this share of the image's mean. */
+static const double least_light = 1e-3;
+/* Two bugs that add more than so many times the light that is there add up. */
+static const double much_light = 2;
+
+/* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
+ * than the correct renderer has at as many samples is not believed. */
+static double variance_of(const struct observation *clue, int i, double factor)
+{
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
+    return fmax(factor * a->var[i], c->var[i] * c->n / a->n) + c->var[i];
+}
+
+static double student(double z2, double var, double dof)
+{
+    return -0.5 * (dof + 1) * log1p(z2 / dof) - 0.5 * log(var);
+}
+
+/* How much noisier a bug makes the mean of a cell than its pixels state. */
+static double inflation(const struct effect *e, const struct signature *seen)
+{
+    double r = e->fact[FACT_PIXELS], s = e->fact[FACT_IMAGE], factor = 1;
+    if (isfinite(r) && r > 0.25)
+        factor *= exp(r);
+    if (isfinite(s) && s > log(10))
+        factor *= fmin(exp(s - fmax(r, 0)), (double)seen->cell * seen->cell);
+    return factor;
+}
+
+static void add_cell(const struct observation *clue, const struct effect *e, double amplitude,
+                     double factor, double scale, int cell, struct tally *t)
+{
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
+    double log_likelihood = 0, chi2 = 0, chi2_mean = 0;
+    for (int i = 3 * cell; i < 3 * cell + 3; i++) {
+        double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
+        double noise = variance_of(clue, i, factor) +
+                       (e != NULL ? factor * amplitude * amplitude * (double)e->var[i] : 0);
+        double fuzz = pow(bug_fit_rounding * (a->mean[i] + c->mean[i] + scale), 2);
+        double var = noise + fuzz + pow(bug_fit_model_error * effect, 2);
+        double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
+        log_likelihood += student(z2, var, cell_dof) / 3;
+        chi2 += fmin(z2, 100) / 3;
+        chi2_mean += noise / var / 3;
+        t->left += (fmin(z2, 1e4) - noise / var) / 3;
+        t->all += (fmin(d * d / var, 1e4) - noise / var) / 3;
+    }
+    t->log_likelihood += log_likelihood;
+    t->chi2 += chi2;
+    t->chi2_mean += chi2_mean;
+    t->cells++;
+}
+
+/* What a bug makes of S at the size of the image at hand: where all pixels depend on each other, S grows with their number. */
+static double image_fact(const struct effect *e, const struct observation *clue)
+{
+    double s = e->fact[FACT_IMAGE];
+    if (s > log(10))
+        s += 2 * log((double)clue->seen.cell / clue->view->correct.cell);
+    return s;
+}
+
+static void add_facts(const struct observation *clue, const struct effect *e, double amplitude,
+                      struct tally *t)
+{
+    const struct signature *c = &clue->view->correct;
+    for (int f = 0; f < NUM_FACTS; f++) {
+        double fact = c->fact[f], sd = c->fact_sd[f];
+        if (isnan(clue->seen.fact[f]) || isnan(fact))
+            continue;
+        if (e != NULL && isnan(e->fact[f]))
+            continue;
+        if (e != NULL) {
+            double bug = f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f];
+            fact += amplitude * (bug - fact);
+            sd = e->fact_sd[f];
+        }
+        double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
+        double z2 = pow(clue->seen.fact[f] - fact, 2) / var;
+        double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
+        t->log_likelihood += student(z2, var, fact_dof);
+        t->chi2 += fmin(z2, 100);
+        t->left += fmin(z2, 1e4) - 1;
+        t->all += fmin(all, 1e4) - 1;
+        t->chi2_mean++;
+        t->cells++;
+    }
+}
+
+/* e NULL: the bug does nothing here, or "correct". factor: inflation() of the bug. */
+static void add_view(const struct observation *clue, const struct effect *e, double amplitude,
+                     double factor, struct tally *t)
+{
+    double scale = signature_mean(&clue->view->correct);
+    for (int i = 0; i < clue->seen.columns * clue->seen.rows; i++)
+        add_cell(clue, e, amplitude, factor, scale, i, t);
+    add_facts(clue, e, amplitude, t);
+}
+
+static double value_of_two(double c, double a, double b, double least, double clip)
+{
+    if (c <= least || (a > much_light * c && b > much_light * c))
+        return a + b;
+    double both = fmax((c + a) * (c + b) / c, 0);
+    return (clip > 0 ? fmin(both, clip) : both) - c;
+}
+
+const struct effect *bug_fit_effect(const struct view *v, int bug, int second, double clip,
+                                    struct effect *room)
+{
+    const struct effect *a = v->effect[bug], *b = second >= 0 ? v->effect[second] : NULL;
+    const struct signature *c = &v->correct;
+    double least = least_light * signature_mean(c);
+    if (a == NULL || b == NULL)
+        return a != NULL ? a : b;
+    *room = (struct effect){.pixels = a->pixels || b->pixels};
+    for (int i = 0; i < 3 * c->columns * c->rows; i++) {
+        double light = c->mean[i], x = (double)a->mean[i], y = (double)b->mean[i];
+        double both = value_of_two(light, x, y, least, clip);
+        bool is_product = light > least;
+        room->mean[i] = (float)both;
+        room->var[i] = (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
+                               (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1));
+    }
+    for (int f = 0; f < NUM_FACTS; f++) {
+        room->fact[f] = a->fact[f] + b->fact[f] - c->fact[f];
+        room->fact_sd[f] = hypot(a->fact_sd[f], b->fact_sd[f]);
+    }
+    return room;
+}
+
+/* The largest over the views at hand: only some of them show how pixels depend on each other. Where a bug makes all renders
+ * the same, their average is no surer than one of them. */
+static double inflation_of(const struct catalogue *c, int bug, const struct observation *clue)
+{
+    double factor = 1, repeats = 1;
+    for (int v = 0; bug >= 0 && v < c->num_views; v++) {
+        const struct effect *e = c->view[v].effect[bug];
+        if (e == NULL)
+            continue;
+        factor = fmax(factor, inflation(e, &clue->seen));
+        if (e->fact[FACT_PIXELS] <= SIGNATURE_SAME)
+            repeats = clue->view->renders;
+    }
+    return factor * repeats;
+}
+
+static void sum_up(struct tally *to, const struct tally *t)
+{
+    to->log_likelihood += t->log_likelihood;
+    to->chi2 += t->chi2;
+    to->chi2_mean += t->chi2_mean;
+    to->cells += t->cells;
+    to->left += t->left;
+    to->all += t->all;
+}
+
+/* share: of the inflation, as an exponent. */
+static struct tally view_with(const struct bug_fit *f, int clue, const struct candidate *b,
+                              double share, double *largest)
+{
+    struct effect room;
+    struct tally t = {0};
+    const struct effect *e = bug_fit_effect(f->clue[clue].view, b->bug, b->second, f->clip, &room);
+    double factor = fmax(inflation_of(f->c, b->bug, &f->clue[clue]),
+                         inflation_of(f->c, b->second, &f->clue[clue]));
+    *largest = fmax(*largest, factor);
+    if (e == NULL && factor == 1 && f->correct != NULL)
+        return f->correct[clue];
+    add_view(&f->clue[clue], e, b->amplitude, pow(factor, share), &t);
+    return t;
+}
+
+struct tally bug_fit_view(const struct bug_fit *f, int clue, const struct candidate *candidate)
+{
+    double largest = 1;
+    struct tally t = {0};
+    if (candidate != NULL)
+        return view_with(f, clue, candidate, 1, &largest);
+    add_view(&f->clue[clue], NULL, 1, 1, &t);
+    return t;
+}
+
+static struct tally total_with(const struct bug_fit *f, const struct candidate *b, double share,
+                               double *largest)
+{
+    struct tally sum = {0};
+    *largest = 1;
+    for (int k = 0; k < f->num_clues; k++) {
+        struct tally t = view_with(f, k, b, share, largest);
+        sum_up(&sum, &t);
+    }
+    return sum;
+}
+
+/* How much a bug adds to the noise of the other views is known from one of them only: none of it, its root or all of it are
+ * equally likely beforehand, and the likeliest stands for the mean of the three. What is left is judged with all. */
+static struct tally total(const struct bug_fit *f, const struct candidate *b)
+{
+    static const double share[] = {0, 0.5};
+    const double choices = 3;
+    double largest, best = -INFINITY;
+    struct tally sum = total_with(f, b, 1, &largest);
+    if (largest == 1)
+        return sum;
+    for (int i = 0; i < 2; i++)
+        best = fmax(best, total_with(f, b, share[i], &largest).log_likelihood);
+    sum.log_likelihood = fmax(best, sum.log_likelihood) - log(choices);
+    return sum;
+}
+
+static void project_facts(const struct observation *clue, const struct effect *e, double *along,
+                          double *norm)
+{
+    const struct signature *a = &clue->seen, *c = &clue->view->correct;
+    for (int f = 0; f < NUM_FACTS; f++) {
+        double effect = (f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f]) - c->fact[f];
+        double var = pow(a->fact_sd[f], 2) + pow(e->fact_sd[f], 2) + pow(fact_error[f], 2);
+        if (isnan(a->fact[f]) || isnan(effect))
+            continue;
+        *along += effect * (a->fact[f] - c->fact[f]) / var;
+        *norm += effect * effect / var;
+    }
+}
+
+/* Least squares with the weights of "correct": norm^-1/2 is the standard deviation of along/norm. given: a bug that
+ * is there in any case, of whose effect what bug and second add is judged; -1: none. */
+static void project(const struct bug_fit *f, int bug, int second, int given, double *along,
+                    double *norm)
+{
+    *along = *norm = 0;
+    for (int k = 0; k < f->num_clues; k++) {
+        struct effect room;
+        const struct view *v = f->clue[k].view;
+        const struct effect *e = bug_fit_effect(v, bug, second, f->clip, &room),
+                            *base = given >= 0 ? v->effect[given] : NULL;
+        const struct signature *a = &f->clue[k].seen, *c = &v->correct;
+        double tiny = bug_fit_rounding * signature_mean(c);
+        for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
+            double there = base != NULL ? (double)base->mean[i] : 0;
+            double effect = (double)e->mean[i] - there;
+            double var = variance_of(&f->clue[k], i, 1) + (double)e->var[i] + tiny * tiny +
+                         pow(bug_fit_model_error * (double)e->mean[i], 2);
+            *along += effect * (a->mean[i] - c->mean[i] - there) / var;
+            *norm += effect * effect / var;
+        }
+        if (e != NULL && base == NULL)
+            project_facts(&f->clue[k], e, along, norm);
+    }
+}
+
+static bool is_full_strength(double along, double norm)
+{
+    static const double least_t = 8, strength_error = 0.1, deviations = 3;
+    return norm > 0 && along / sqrt(norm) >= least_t &&
+           fabs(along / norm - 1) <= strength_error + deviations / sqrt(norm);
+}
+
+bool bug_fit_is_full(const struct bug_fit *f, const struct candidate *c)
+{
+    double along, norm;
+    bool is_pair = c->second >= 0;
+    project(f, c->bug, c->second, is_pair ? c->bug : -1, &along, &norm);
+    bool full = is_full_strength(along, norm);
+    project(f, c->bug, c->second, is_pair ? c->second : -1, &along, &norm);
+    return full && is_full_strength(along, norm);
+}
+
+double bug_fit_amplitude(const struct bug_fit *f, int bug)
+{
+    double along, norm;
+    project(f, bug, -1, -1, &along, &norm);
+    return norm > 0 ? fmin(fmax(along / norm, least_amplitude), largest_amplitude) : 1;
+}
+
+/* Golden section. */
+double bug_fit_refine(const struct bug_fit *f, int bug, double at)
+{
+    const double golden = 0.6180339887498949, reach = 1.5;
+    double lo = fmax(at / reach, least_amplitude), hi = fmin(at * reach, largest_amplitude);
+    for (int i = 0; i < 12; i++) {
+        struct candidate low = {.bug = bug, .second = -1, .amplitude = hi - golden * (hi - lo)};
+        struct candidate high = {.bug = bug, .second = -1, .amplitude = lo + golden * (hi - lo)};
+        if (total(f, &low).log_likelihood > total(f, &high).log_likelihood)
+            hi = high.amplitude;
+        else
+            lo = low.amplitude;
+    }
+    return 0.5 * (lo + hi);
+}
+
+struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double amplitude)
+{
+    struct candidate out = {.bug = bug, .second = second, .amplitude = amplitude};
+    struct tally t = total(f, &out), none = {0};
+    double along, norm;
+    for (int k = 0; k < f->num_clues; k++)
+        sum_up(&none, &f->correct[k]);
+    project(f, bug, second, -1, &along, &norm);
+    out.log_likelihood =
+        t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
+    out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
+    out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
+    out.is_faint = t.all <= sqrt(2 * t.cells);
+    out.strength = norm > 0 ? along / norm : 0;
+    out.t = norm > 0 ? along / sqrt(norm) : 0;
+    return out;
+}
+
+double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *clue)
+{
+    double worst = 0;
+    *clue = -1;
+    for (int k = 0; k < f->num_clues; k++) {
+        struct tally t = bug_fit_view(f, k, c);
+        bool is_noise = t.chi2 - t.chi2_mean <= bug_fit_largest_excess * sqrt(2 * t.cells);
+        double left = is_noise ? 0 : t.all > 0 ? t.left / t.all : 1;
+        if (left > worst) {
+            worst = left;
+            *clue = k;
+        }
+    }
+    return worst;
+}
+
+bool bug_fit_start(const struct catalogue *c, const struct observation *clue, int num_clues,
+                   double clip, struct bug_fit *out, struct err *e)
+{
+    *out =
+        (struct bug_fit){c, clue, num_clues, clip, calloc((size_t)num_clues, sizeof(struct tally))};
+    if (out->correct == NULL)
+        return err_set(e, "out of memory");
+    for (int k = 0; k < num_clues; k++)
+        out->correct[k] = bug_fit_view(out, k, NULL);
+    return true;
+}
+
+void bug_fit_end(struct bug_fit *f)
+{
+    free(f->correct);
+}
