@@ -636,6 +636,7 @@ expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade
 expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
 expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
 part tests/end_to_end/grading.sh "$build"
+part tests/end_to_end/source.sh "$build"
 part tests/end_to_end/autograder.sh "$build"
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
 

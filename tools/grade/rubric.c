@@ -114,17 +114,33 @@ static void read_limit(struct statement *s)
         take_number(s, "limit build", 1, 1e5, &s->r->build_s);
     else if (strcmp(what, "processes") == 0)
         take_int(s, "limit processes", 1, 4096, &l->processes);
-    else if (strcmp(what, "memory") == 0) {
+    else if (strcmp(what, "memory") == 0 || strcmp(what, "build-memory") == 0) {
         if (take_number(s, "limit memory", 16, 1 << 20, &v))
-            l->memory = (size_t)(v * (1 << 20));
+            *(what[0] == 'm' ? &l->memory : &s->r->build_memory) = (size_t)(v * (1 << 20));
     } else if (strcmp(what, "disk") == 0) {
         if (take_number(s, "limit disk", 1, 1 << 20, &v)) {
             l->disk = (size_t)(v * (1 << 20));
             l->file = l->disk < l->file ? l->disk : l->file;
         }
     } else
-        rubric_mistake(s->m, s->line,
-                       "'limit %s' is none of wall, cpu, build, memory, disk, processes", what);
+        rubric_mistake(
+            s->m, s->line,
+            "'limit %s' is none of wall, cpu, build, memory, build-memory, disk, processes", what);
+}
+
+/* One line of several. */
+static void read_build(struct statement *s)
+{
+    char *build = s->r->build;
+    size_t n = strlen(build), length = strlen(s->rest);
+    if (length == 0)
+        rubric_mistake(s->m, s->line, "'build' needs a text");
+    else if (n + length + 2 > sizeof s->r->build)
+        rubric_mistake(s->m, s->line, "all 'build' lines are longer than %zu characters",
+                       sizeof s->r->build - 2);
+    else
+        snprintf(build + n, sizeof s->r->build - n, "%s%s", n > 0 ? "\n" : "", s->rest);
+    s->rest += length;
 }
 
 static void read_mask(struct statement *s)
@@ -342,7 +358,9 @@ static void read_statement(struct statement *s)
     else if (strcmp(word, "program") == 0)
         take_text(s, word, r->program, sizeof r->program);
     else if (strcmp(word, "build") == 0)
-        take_text(s, word, r->build, sizeof r->build);
+        read_build(s);
+    else if (strcmp(word, "packages") == 0)
+        take_text(s, word, r->packages, sizeof r->packages);
     else if (strcmp(word, "total") == 0)
         take_number(s, word, 0, 1e6, &r->total);
     else if (strcmp(word, "limit") == 0)
@@ -382,7 +400,8 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
                  struct rubric_mistakes *m, struct err *e)
 {
     char line[MAX_LINE];
-    *out = (struct rubric){.limit = sandbox_default, .build_s = 600};
+    *out = (struct rubric){
+        .limit = sandbox_default, .build_s = 600, .build_memory = sandbox_default.memory};
     *m = (struct rubric_mistakes){0};
     const char *slash = strrchr(path, '/');
     snprintf(out->path, sizeof out->path, "%s", path);

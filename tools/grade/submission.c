@@ -9,12 +9,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 enum { MAX_PATH = 4400, MAX_ARGS = 96, TEXT = 8192 };
 
 const char *const submission_kind_name[] = {"images", "program", "source"};
+const char *const submission_state_name[] = {"graded", "not_built", "not_started", "usage"};
+const char submission_not_made[] = "there is no image, see what is said of all of it";
 static const char *const endings[] = {".png", ".exr", ".pfm", ".hdr"};
 enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
 
@@ -169,6 +172,37 @@ static bool find_image(const struct submission *s, const char *name, const char 
     return false;
 }
 
+/* Where the name of a path without slashes at its end begins, and how long it is; of an archive without what tells it. */
+static const char *name_of(const char *path, int *length, bool *archive)
+{
+    static const char *const ends[] = {".zip", ".tar",    ".tgz",     ".tbz",    ".txz",    ".7z",
+                                       ".rar", ".tar.gz", ".tar.bz2", ".tar.xz", ".tar.zst"};
+    int n = (int)strlen(path);
+    while (n > 1 && path[n - 1] == '/')
+        n--;
+    const char *at = path + n;
+    while (at > path && at[-1] != '/')
+        at--;
+    *length = (int)(path + n - at);
+    *archive = false;
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        int k = (int)strlen(ends[i]);
+        if (!*archive && *length > k && strncasecmp(at + *length - k, ends[i], (size_t)k) == 0) {
+            *archive = true;
+            *length -= k;
+        }
+    }
+    return at;
+}
+
+void submission_id(const char *path, char id[128])
+{
+    int n;
+    bool archive;
+    const char *at = name_of(path, &n, &archive);
+    snprintf(id, 128, "%.*s", n, at);
+}
+
 static enum submission_kind kind_of(const struct rubric *r, const struct submission *s,
                                     bool is_directory)
 {
@@ -181,33 +215,6 @@ static enum submission_kind kind_of(const struct rubric *r, const struct submiss
     return r->build[0] != '\0' ? SUBMISSION_SOURCE : SUBMISSION_PROGRAM;
 }
 
-bool submission_build(const struct rubric *r, const struct sandbox *box, const char *work,
-                      const char *log, struct submission *s, struct err *e)
-{
-    if (s->kind != SUBMISSION_SOURCE || s->why[0] != '\0')
-        return true;
-    const struct path out = fs_path("%s/build", work), built = fs_path("%s/tree.tar", out.s);
-    const char *const argv[] = {"sh", "-c", r->build, NULL};
-    struct sandbox_job job = {.argv = argv,
-                              .tree = s->tree,
-                              .keep_tree = true,
-                              .out = out.s,
-                              .log = log,
-                              .limit = r->limit};
-    struct sandbox_result result;
-    job.limit.wall_s = job.limit.cpu_s = r->build_s;
-    if (!sandbox_run(box, &job, &result, e))
-        return false;
-    if (result.end != SANDBOX_OK)
-        snprintf(s->why, sizeof s->why, "building it failed: %s", result.why);
-    else if (access(built.s, R_OK) != 0)
-        snprintf(s->why, sizeof s->why, "what building made is larger than %zu MiB",
-                 r->limit.disk >> 20);
-    else if (rename(built.s, s->tree) != 0 || chmod(s->tree, 0644) != 0)
-        return err_set(e, "%s: %s", s->tree, strerror(errno));
-    return fs_remove_tree(out.s, e);
-}
-
 bool submission_open(const struct rubric *r, const char *path, const char *work,
                      struct submission *out, struct err *e)
 {
@@ -217,19 +224,26 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
     snprintf(out->path, sizeof out->path, "%s", path);
     for (size_t n = strlen(out->path); n > 1 && out->path[n - 1] == '/';)
         out->path[--n] = '\0';
-    snprintf(out->id, sizeof out->id, "%.127s", fs_base(out->path));
+    bool archive;
+    int length;
+    name_of(out->path, &length, &archive);
+    submission_id(out->path, out->id);
     if (stat(out->path, &st) != 0)
         return err_set(e, "%s: %s", path, strerror(errno));
     if (!fs_make_dirs(work, e))
         return false;
     chmod(work, 0755);
-    out->kind = kind_of(r, out, S_ISDIR(st.st_mode));
+    out->packed = S_ISDIR(st.st_mode) ? access(fs_path("%s/%s", out->path, r->program).s, F_OK) != 0
+                                      : archive;
+    out->kind = kind_of(r, out, S_ISDIR(st.st_mode) || archive);
     if ((size_t)snprintf(out->tree, sizeof out->tree, "%s/tree.tar", work) >= sizeof out->tree)
         return err_set(e, "%s: path too long", work);
     snprintf(out->program, sizeof out->program, "./%.150s",
-             S_ISDIR(st.st_mode) ? r->program : out->id);
+             S_ISDIR(st.st_mode) || archive ? r->program : fs_base(out->path));
     if (!sandbox_pack(out->path, out->tree, r->limit.disk, &why)) {
-        snprintf(out->why, sizeof out->why, "%.590s", why.msg);
+        const char *text = strstr(why.msg, ": "); /* without our path */
+        snprintf(out->why, sizeof out->why, "It %.500s", text != NULL ? text + 2 : why.msg);
+        out->state = SUBMISSION_NOT_BUILT;
         return true;
     }
     return sha256_file(out->tree, out->sha256, e);
@@ -249,7 +263,7 @@ static bool run_or_recall(const struct rubric *r, const struct sandbox *box,
                           const struct submission *sub, const struct rubric_image *p,
                           const struct sandbox_job *job, struct sandbox_result *out, struct err *e)
 {
-    char of[1024], scene[300], environment[300];
+    char of[3072], scene[300], environment[300];
     scene_names(p, scene, environment);
     const char *const inputs[] = {scene, environment[0] != '\0' ? environment : NULL, NULL};
     struct path dir;
@@ -281,8 +295,10 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
                                     .keep = keep,
                                     .out = out.s,
                                     .log = log.s,
+                                    .library = sub->library[0] != '\0' ? sub->library : NULL,
                                     .limit = r->limit};
     struct sandbox_result result;
+    char usage[300];
     if (!run_or_recall(r, box, sub, p, &job, &result, e))
         return false;
     made->end = result.end;
@@ -293,7 +309,13 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     snprintf(made->rates, sizeof made->rates, "%s/%s_rate.png", out_dir, p->name);
     bool ok = move_file(out.s, r->output, made->path, &there, e) &&
               move_file(out.s, rates, made->rates, &has_rates, e) && fs_remove_tree(out.s, e);
-    if (result.end != SANDBOX_OK)
+    made->usage = !there && (result.end == SANDBOX_FAILED || result.end == SANDBOX_OK) &&
+                  submission_printed_usage(log.s, usage, sizeof usage);
+    if (made->usage)
+        snprintf(made->why, sizeof made->why, "the program printed its usage text: %s", usage);
+    else if (result.end == SANDBOX_FAILED && (result.status == 126 || result.status == 127))
+        snprintf(made->why, sizeof made->why, "the program does not start: %s", result.why);
+    else if (result.end != SANDBOX_OK)
         snprintf(made->why, sizeof made->why, "the program: %s", result.why);
     else if (!there)
         snprintf(made->why, sizeof made->why, "the program ended well but wrote no %s", r->output);
@@ -338,8 +360,8 @@ bool submission_image(const struct rubric *r, const struct sandbox *s, const str
                       struct err *e)
 {
     *made = (struct made){.end = SANDBOX_OK};
-    if (sub->why[0] != '\0') {
-        snprintf(made->why, sizeof made->why, "%.590s", sub->why);
+    if (sub->state != SUBMISSION_GRADED) {
+        snprintf(made->why, sizeof made->why, "%s", submission_not_made);
         return true;
     }
     if (sub->kind != SUBMISSION_IMAGES)

@@ -9,9 +9,19 @@
 enum submission_kind {
     SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some image of the rubric */
     SUBMISSION_PROGRAM, /* a file, or a directory that needs no building */
-    SUBMISSION_SOURCE   /* a directory, and the rubric has a `build` command */
+    SUBMISSION_SOURCE   /* a directory or an archive, and the rubric has a `build` command */
 };
 extern const char *const submission_kind_name[]; /* "images", "program", "source" */
+
+/* What keeps all of its images from being made. */
+enum submission_state {
+    SUBMISSION_GRADED,      /* nothing */
+    SUBMISSION_NOT_BUILT,   /* it cannot be unpacked or built */
+    SUBMISSION_NOT_STARTED, /* no program, a library is missing, or no run of it makes an image */
+    SUBMISSION_USAGE        /* every run prints the program's usage text */
+};
+extern const char *const submission_state_name[]; /* "graded", "not_built", .. */
+extern const char submission_not_made[];          /* why there is no image where it is said once */
 
 struct submission {
     enum submission_kind kind;
@@ -20,9 +30,12 @@ struct submission {
     char tree[512];    /* of programs: a tar, of the built tree where there is something to build */
     char program[160]; /* as {program} is replaced */
     char sha256[65];   /* of the tar of what was handed in */
-    char why[600];     /* what is wrong with all of it: "" if nothing */
-    const char *runs;  /* where runs are kept (kept_run.h), borrowed; NULL: nowhere */
-    bool runs_again;   /* what is kept is run again all the same */
+    bool packed;       /* an archive, or a directory in which the program has to be looked for */
+    char library[1024]; /* LD_LIBRARY_PATH that it needs; "": none */
+    enum submission_state state;
+    char why[600];    /* what is wrong with all of it, a sentence: "" if nothing */
+    const char *runs; /* where runs are kept (kept_run.h), borrowed; NULL: nowhere */
+    bool runs_again;  /* what is kept is run again all the same */
 };
 
 /* One image as it came out. */
@@ -30,6 +43,7 @@ struct made {
     char path[4400], rates[4400]; /* "": there is none; rates of adaptive sampling: NAME_rate.png */
     char why[600];                /* why there is none */
     enum sandbox_end end;
+    bool usage; /* there is none, and the program printed its usage text */
     double cpu_s, wall_s;
 };
 
@@ -43,10 +57,14 @@ bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
 bool submission_open(const struct rubric *r, const char *path, const char *work,
                      struct submission *out, struct err *e) __attribute__((warn_unused_result));
 
-/* Builds it in the sandbox, if it is to be built; the output goes to `log`. */
-bool submission_build(const struct rubric *r, const struct sandbox *box, const char *work,
-                      const char *log, struct submission *s, struct err *e)
-    __attribute__((warn_unused_result));
+/* The last part of a path without the ending of an archive; "" if that is no name. */
+void submission_id(const char *path, char id[128]);
+
+/* Unpacks it, builds it in the sandbox, if it is to be built, and looks whether the program would start. The build's output goes to
+ * `log`. cache: of ccache (sandbox.h), or NULL; `fill`: it is staff who fill it. */
+bool submission_build(const struct rubric *r, const struct sandbox *box, const char *cache,
+                      bool fill, const char *work, const char *log, struct submission *s,
+                      struct err *e) __attribute__((warn_unused_result));
 
 /* One image of the rubric, or one like it with another name and other samples: found, or made in the sandbox and
  * then moved to out_dir, where its log goes too. An image that is not there is no error: made->why says so. */
@@ -54,6 +72,19 @@ bool submission_image(const struct rubric *r, const struct sandbox *s, const str
                       const struct rubric_image *p, const char *stage, const char *work,
                       const char *out_dir, uint64_t seed, int threads, struct made *made,
                       struct err *e) __attribute__((warn_unused_result));
+
+/* Is it in vain to run the program for that image, as it has not ended on the same scene with hardly more samples, or on three
+ * scenes while it made no image at all? made: of the images before it; *out says so. */
+bool submission_will_hang(const struct rubric *r, const struct made *made, int image,
+                          struct made *out);
+
+/* Did a program that made no image print how it is used? why: gets what it complains of, or the first line of that text. */
+bool submission_printed_usage(const char *log, char *why, size_t size);
+
+/* After all images: where none could be read says so once, in s->state and s->why. why: of each image, which then refers to that, if it
+ * is the same of all. */
+void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
+                         struct submission *s);
 
 /* The command of an image in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
  * output by its name in the rubric. False if it is too long. */

@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { MAX_PATH = 4400 };
 
@@ -41,14 +42,15 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
 }
 
 /* Images are made one after the other, so that a student's time does not depend on how many others there are. */
-static bool make_images(const struct grade_job *job, const struct submission *s, const char *work,
+static bool make_images(const struct grade_job *job, struct submission *s, const char *work,
                         const char *out, struct submitted_images *h, struct err *e)
 {
     const struct rubric *r = job->rubric;
     for (int i = 0; i < r->num_images; i++) {
         const struct rubric_image *p = &r->image[i];
         struct err why = {""};
-        if (!submission_image(r, job->sandbox, s, p, job->stage, work, out,
+        if (!submission_will_hang(r, h->made, i, &h->made[i]) &&
+            !submission_image(r, job->sandbox, s, p, job->stage, work, out,
                               image_seed(job->seed, p->name), job->threads, &h->made[i], e))
             return false;
         if (h->made[i].path[0] == '\0')
@@ -60,6 +62,7 @@ static bool make_images(const struct grade_job *job, const struct submission *s,
             return err_set(e, "%s: %s", p->name, why.msg);
         snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
     }
+    submission_conclude(r, h->made, h->why, s);
     return true;
 }
 
@@ -198,13 +201,16 @@ static json_t *name_bug(const struct grade_job *job, const struct submission *s,
     return better ? by_views : by_images;
 }
 
-static bool grade_made(const struct grade_job *job, const struct submission *s, const char *work,
+static bool grade_made(const struct grade_job *job, struct submission *s, const char *work,
                        const char *out, json_t *grade, struct err *e)
 {
     struct submitted_images *h = calloc(1, sizeof *h);
     int set = 0;
     bool ok = h != NULL || err_set(e, "out of memory");
-    ok = ok && make_images(job, s, work, out, h, e) && add_checks(job, h, grade, &set, e);
+    ok = ok && make_images(job, s, work, out, h, e);
+    json_object_set_new(grade, "state", json_string(submission_state_name[s->state]));
+    json_object_set_new(grade, "wrong", s->why[0] != '\0' ? json_string(s->why) : json_null());
+    ok = ok && add_checks(job, h, grade, &set, e);
     bool lost =
         ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
     json_object_set_new(grade, "diagnosis",
@@ -240,16 +246,18 @@ static bool grade_anew(const struct grade_job *job, const char *path, const char
     const struct path out = fs_path("%s/%s", job->out, s->id);
     const struct path log = fs_path("%s/build.log", out.s);
     if (!fs_remove_tree(out.s, e) || !fs_make_dirs(out.s, e) ||
-        !submission_build(job->rubric, job->sandbox, work, log.s, s, e))
+        !submission_build(job->rubric, job->sandbox, job->build_cache, false, work, log.s, s, e))
         return false;
     json_t *command = command_of(job, path);
     if (command == NULL && job->word != NULL && job->word[0] != NULL)
         return err_set(e, "%s: out of memory", path);
-    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn, ss?}", "assay_grade", 1, "id",
+    *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn}", "assay_grade", 1, "id",
                        s->id, "kind", submission_kind_name[s->kind], "command", command, "version",
                        assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
                        !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
-                       "trouble", "wrong", s->why[0] != '\0' ? s->why : NULL);
+                       "trouble");
+    if (access(log.s, R_OK) == 0)
+        json_object_set_new(*grade, "build_log", json_string(fs_base(log.s)));
     if (*grade != NULL && grade_made(job, s, work, out.s, *grade, e)) {
         appeals_apply(job->appeals, job->rubric, *grade);
         json_t *before = grade_change(old, *grade);
@@ -294,11 +302,11 @@ struct batch {
 
 static json_t *trouble_json(const struct grade_job *job, const char *path, const char *why)
 {
-    const char *slash = strrchr(path, '/');
-    return json_pack("{si, ss, sf, sf, sf, ss, sn, s[], s[], s[]}", "assay_grade", 1, "id",
-                     slash != NULL ? slash + 1 : path, "points", 0.0, "of",
-                     rubric_points(job->rubric), "cpu_s", 0.0, "trouble", why, "wrong", "parts",
-                     "checks", "pictures");
+    char id[128];
+    submission_id(path, id);
+    return json_pack("{si, ss, sf, sf, sf, ss, sn, s[], s[], s[]}", "assay_grade", 1, "id", id,
+                     "points", 0.0, "of", rubric_points(job->rubric), "cpu_s", 0.0, "trouble", why,
+                     "wrong", "parts", "checks", "pictures");
 }
 
 static void *work(void *ctx)
@@ -325,32 +333,19 @@ static void *work(void *ctx)
     }
 }
 
-static const char *id_of(const char *path, size_t *length)
-{
-    *length = strlen(path);
-    while (*length > 1 && path[*length - 1] == '/')
-        --*length;
-    const char *at = path + *length;
-    while (at > path && at[-1] != '/')
-        at--;
-    *length -= (size_t)(at - path);
-    return at;
-}
-
 static bool check_ids(const struct grade_job *job, struct err *e)
 {
+    char id[128], other[128];
     for (int i = 0; i < job->num; i++) {
-        size_t n, m;
-        const char *id = id_of(job->path[i], &n);
-        json_t *text = json_stringn(id, n); /* NULL: no UTF-8 */
+        submission_id(job->path[i], id);
+        json_t *text = json_string(id); /* NULL: no UTF-8 */
         json_decref(text);
-        if (n == 0 || n > 120 || id[0] == '.' || text == NULL)
-            return err_set(e, "%s: '%.*s' is no name for a submission", job->path[i], (int)n, id);
+        if (id[0] == '\0' || strlen(id) > 120 || id[0] == '.' || text == NULL)
+            return err_set(e, "%s: '%s' is no name for a submission", job->path[i], id);
         for (int k = 0; k < i; k++) {
-            const char *other = id_of(job->path[k], &m);
-            if (n == m && memcmp(id, other, n) == 0)
-                return err_set(e, "%s and %s would both be '%.*s'", job->path[k], job->path[i],
-                               (int)n, id);
+            submission_id(job->path[k], other);
+            if (strcmp(id, other) == 0)
+                return err_set(e, "%s and %s would both be '%s'", job->path[k], job->path[i], id);
         }
     }
     return true;

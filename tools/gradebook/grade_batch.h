@@ -13,6 +13,7 @@ struct grade_job {
     const struct answer_key *answers;
     const struct sandbox *sandbox;
     const char *stage;       /* submission_stage() */
+    const char *build_cache; /* that everybody can read (submission_build()); NULL: none */
     const char *out;         /* OUT/ID/grade.json and what else there is of it */
     const char *const *path; /* of the submissions */
     const char *const *word; /* grade_options_words(), for "command" of a grade; NULL: not said */

@@ -1,6 +1,7 @@
 #include "grade_options.h"
 
 #include "renderer/base/cli.h"
+#include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
 #include "grade_batch.h"
@@ -11,6 +12,39 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Between DIR, which may be a private one of staff's, and the copy that runs see. */
+static bool copy_cache(const char *from, const char *to, struct err *e)
+{
+    const struct process p = {
+        .argv = (const char *const[]){"sh", "-c",
+                                      "cp -R -- \"$1/.\" \"$2\" && chmod -R u+w,a+rX \"$2\"", "sh",
+                                      from, to, NULL}};
+    return fs_make_dirs(to, e) && process_run(&p, NULL, e);
+}
+
+/* Builds the starter code as every submission is built, which then need only compile what differs. */
+static bool fill_cache(const struct grade_settings *s, const struct rubric *r,
+                       const struct sandbox *box, struct err *e)
+{
+    const struct path work = fs_path("%s/work", box->dir.path),
+                      cache = fs_path("%s/cache", box->dir.path),
+                      log = fs_path("%s/build.log", s->build_cache);
+    struct submission skeleton;
+    if (!submission_open(r, s->submission[0], work.s, &skeleton, e) ||
+        !fs_make_dirs(s->build_cache, e) ||
+        !submission_build(r, box, cache.s, true, work.s, log.s, &skeleton, e))
+        return false;
+    if (skeleton.kind != SUBMISSION_SOURCE)
+        return err_set(e, "%s: nothing is built of it by %s", s->submission[0], r->path);
+    if (skeleton.state != SUBMISSION_GRADED)
+        return err_set(e, "%s: %s (%s)", s->submission[0], skeleton.why, log.s);
+    if (!copy_cache(cache.s, s->build_cache, e))
+        return false;
+    if (!s->quiet)
+        printf("%s: filled by building %s\n", s->build_cache, s->submission[0]);
+    return true;
+}
 
 static bool print_mistakes(const struct rubric *r, const struct rubric_mistakes *m, struct err *e)
 {
@@ -57,7 +91,8 @@ static bool needs_staff(const json_t *grades)
     json_t *g, *c;
     json_array_foreach(grades, i, g)
     {
-        if (json_is_string(json_object_get(g, "trouble")))
+        if (json_is_string(json_object_get(g, "trouble")) ||
+            json_is_string(json_object_get(g, "wrong")))
             return true;
         json_array_foreach(json_object_get(g, "checks"), k, c)
         {
@@ -90,6 +125,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const char *const *word, const struct sandbox *box, struct err *e)
 {
     char stage[sizeof box->dir.path + 16];
+    const struct path cache = fs_path("%s/cache", box->dir.path);
     struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
@@ -98,6 +134,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                             .answers = answers,
                             .sandbox = box,
                             .stage = stage,
+                            .build_cache = s->build_cache != NULL ? cache.s : NULL,
                             .out = s->out,
                             .path = s->submission,
                             .word = word,
@@ -117,7 +154,8 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     const struct path views = fs_path("%s/views", box->dir.path);
     bool ok = (bugs != NULL || err_set(e, "out of memory")) &&
               (s->appeals == NULL || appeals_read(s->appeals, r, &appeals, e)) &&
-              submission_stage(r, stage, e);
+              submission_stage(r, stage, e) &&
+              (s->build_cache == NULL || copy_cache(s->build_cache, cache.s, e));
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
         job.bugs = bugs;
@@ -171,7 +209,9 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
         int num;
         char **word = grade_options_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");
-        if (ok && fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
+        if (ok && s->fill)
+            code = fill_cache(s, r, &box, e) ? 0 : EXIT_NOT_JUDGED;
+        else if (ok && fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
         free(word);
         sandbox_close(&box);

@@ -25,6 +25,10 @@ static const struct cli_option options[] = {
     {0, "check-rubric", "", "name every mistake of the rubric with its line, and that is all",
      TO(only_check)},
     {0, "prepare", "", "make the references in DIR, and that is all", TO(prepare)},
+    {0, "fill-build-cache", "",
+     "build SUBMISSION, the starter code, into --build-cache, and that is all", TO(fill)},
+    {0, "build-cache", "DIR", "a compiler cache (ccache) for the rubric's `build`, which reads it",
+     TO(build_cache)},
     {'o', "out", "DIR",
      "where grades and pages go (grades); what is there already is not done again", TO(out)},
     {'j', "jobs", "N", "submissions at a time; 0: as many as processors (1)", TO(jobs), 0, 64},
@@ -63,6 +67,8 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
         return err_set(e, "no rubric given (see --help)");
     if ((s->only_check || s->prepare) && s->num > 0)
         return err_set(e, "--%s takes no submissions", s->only_check ? "check-rubric" : "prepare");
+    if (s->fill && (s->build_cache == NULL || s->num != 1))
+        return err_set(e, "--fill-build-cache needs --build-cache DIR and the starter code");
     return s->only_check || s->prepare || s->num > 0 ||
            err_set(e, "no submission given (see --help)");
 }
@@ -104,8 +110,10 @@ void grade_options_help(void)
     cli_print_help(
         "usage: assay grade [options] RUBRIC SUBMISSION...\n"
         "       assay grade --check-rubric RUBRIC\n"
-        "       assay grade --prepare [-o DIR] RUBRIC\n\n"
-        "A submission is a directory of images, a program, or a source tree that the rubric says how to build.\n"
+        "       assay grade --prepare [-o DIR] RUBRIC\n"
+        "       assay grade --fill-build-cache --build-cache DIR RUBRIC STARTER_CODE\n\n"
+        "A submission is a directory of images, a program, or sources, also in an archive (.zip, .tar.gz), that the rubric\n"
+        "says how to build.\n"
         "Programs run in a sandbox, without which nothing is graded.\n",
         options);
     puts(

@@ -7,13 +7,13 @@
 #include <stdint.h>
 
 struct grade_settings {
-    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references, *before,
-        *appeals;            /* NULL: out; none */
+    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references, *build_cache,
+        *before, *appeals;   /* NULL: out; none */
     const char **submission; /* num of them, words of the command */
     int num, jobs, threads;
     uint64_t seed;
     double alpha;
-    bool only_check, prepare, again, unsafe, quiet, slurm, help;
+    bool only_check, prepare, fill, again, unsafe, quiet, slurm, help;
 };
 
 /* at: gets the paths that the options do not give. submission: NULL out of memory, else room for argc + 1, which the caller frees. */

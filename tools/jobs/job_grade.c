@@ -5,7 +5,7 @@
 #include "tools/gradebook/grade_options.h"
 #include "job_kinds.h"
 #include "tools/results/results.h"
-#include "tools/grade/rubric.h"
+#include "tools/grade/submission.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -48,7 +48,8 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct
                  (image->suite->environment[0] == '\0' ||
                   plan_input(p, image->suite->environment, e));
     }
-    ok = ok && beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
+    ok = ok && (s->build_cache == NULL || plan_input(p, s->build_cache, e)) &&
+         beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
          (r->diagnose[0] == '\0' || plan_input(p, s->catalogue, e));
     suite_free(&suite);
     free(r);
@@ -87,23 +88,13 @@ bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct p
     (void)w; /* a job for each submission */
     bool ok = s.submission != NULL || err_set(e, "out of memory");
     ok = ok && grade_options_parse(argc, argv, &s, e);
-    if (ok && (s.help || s.only_check || s.prepare || s.again))
-        ok = err_set(e, "--help, --check-rubric, --prepare and --again cannot be planned");
+    if (ok && (s.help || s.only_check || s.prepare || s.fill || s.again))
+        ok = err_set(
+            e,
+            "--help, --check-rubric, --prepare, --fill-build-cache and --again cannot be planned");
     ok = ok && plan_jobs(&s, argc, argv, p, e);
     free(s.submission);
     return ok;
-}
-
-/* The last part of a path, as grading names what is handed in. */
-static void id_of(const char *path, char id[128])
-{
-    size_t n = strlen(path);
-    while (n > 1 && path[n - 1] == '/')
-        n--;
-    const char *at = path + n;
-    while (at > path && at[-1] != '/')
-        at--;
-    snprintf(id, 128, "%.*s", (int)(path + n - at < 127 ? path + n - at : 127), at);
 }
 
 /* OUT/ID as the job left it, by rename. What a node had trouble with left nothing, and the batch tries it again. */
@@ -111,7 +102,7 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
                   struct err *e)
 {
     char id[128], artefact[PLAN_PATH + 256];
-    id_of(submission, id);
+    submission_id(submission, id);
     job_run_artefact(p, k, NULL, artefact);
     const struct path from = fs_path("%s/%s", artefact, id);
     const struct path to = fs_path("%s/%s", out, id);

@@ -45,6 +45,22 @@ static const char check[] = "check c 4 equal p\n"        /* 9 */
                             " image 0.01 0.05\n"         /* 10 */
                             " tile 0.03 0.1\n";          /* 11 */
 
+TEST(several_lines_of_build_are_one_script)
+{
+    char text[2048];
+    snprintf(text, sizeof text,
+             "%s%s"
+             "build cmake -S . -B build\nbuild make -C build\npackages cmake g++\nlimit build 60\n"
+             "limit build-memory 1000\n",
+             head, check);
+    read_text(text);
+    assert_int_equal(mistakes.num, 0);
+    assert_string_equal(rubric->build, "cmake -S . -B build\nmake -C build");
+    assert_string_equal(rubric->packages, "cmake g++");
+    assert_true(rubric->build_s == 60 && rubric->build_memory == (size_t)1000 << 20);
+    assert_true(rubric->limit.memory == sandbox_default.memory);
+}
+
 /* The text has one mistake, in that line, with these words. */
 static void expect(int line, const char *words, const char *text)
 {
@@ -166,6 +182,8 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\nbugs a\nbugs b", "a second 'bugs'"},
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
+        {1, 2, "rubric a\nlimit build-memory 1", "limit memory"},
+        {1, 2, "rubric a\nbuild", "needs a text"},
         {1, 2, "rubric a\nrubric b", "second"},
         {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
         {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},

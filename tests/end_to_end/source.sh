@@ -1,0 +1,153 @@
+#!/bin/bash
+# tests/end_to_end/source.sh BUILD: submissions of sources, which are built in the sandbox: what may go wrong with each is told once,
+# in grade.json's "state" and "wrong", and by the exit status 2. The program writes the furnace's closed form
+# (reference/scenes/10_furnace_one.md) or fails as its student made it. Prints "ok NAME", "not ok NAME: why" or "skip NAME: why".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/source.sh BUILD}")
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+failures=0
+what=source
+. tests/end_to_end/expect.sh
+
+mkdir "$tmp/class" "$tmp/tree"
+image() { printf 'image %s\n scene %s\n size 64 64\n spp %s\n bounces 1\n reference %s\n' "$@"; }
+check() { printf 'check %s 2 equal %s\n image 0.001 0.01\n tile 0.001 0.01\n' "$1" "$1"; }
+rubric() { # PROGRAM BUILD...: images a and b of one scene, c of another
+    echo "rubric Sources"
+    echo 'command {program} -s {spp} -f {out} {scene}'
+    echo "output out.pfm"
+    echo "program $1"
+    printf 'build %s\n' "${@:2}"
+    printf 'limit %s\n' "wall 4" "disk 64" "build 120" "build-memory 300"
+    image a 10_furnace_one 16 truth
+    image b 10_furnace_one 64 truth
+    image c 12_point_plane 16 "ours 16"
+    echo part 1 Light
+    for i in a b c; do check $i; done
+}
+rubric tiny 'make' >"$tmp/make.rubric"
+rubric build/tiny 'cmake -S . -B build' 'make -C build' >"$tmp/cmake.rubric"
+
+# A program with a library of its own. TINY: what goes wrong at its start.
+cat >"$tmp/tree/tiny.c" <<'END'
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+float level(int channel);
+int main(int argc, char **argv)
+{
+    TINY
+    FILE *f = fopen("out.pfm", "wb");
+    fprintf(f, "PF\n64 64\n-1.0\n");
+    for (int i = 0; i < 64 * 64 * 3; i++) {
+        float v = level(i % 3);
+        fwrite(&v, sizeof v, 1, f);
+    }
+    return fclose(f) != 0 || argc < 2 || argv[0] == NULL;
+}
+END
+cat >"$tmp/tree/level.c" <<'END'
+float level(int channel)
+{
+    static const float light[] = {1.2f * 1.3f, 0.8f * 1.6f, 0.4f * 1.9f};
+    return light[channel];
+}
+END
+cat >"$tmp/tree/Makefile" <<'END'
+TINY = (void)0;
+tiny: tiny.c liblevel.so
+	$(CC) '-DTINY=$(TINY)' -o $@ tiny.c -L. -llevel -Wl,-rpath,'$$ORIGIN'
+	$(AFTER)
+liblevel.so: level.c
+	$(CC) -shared -fPIC -o $@ level.c
+END
+cat >"$tmp/tree/CMakeLists.txt" <<'END'
+cmake_minimum_required(VERSION 3.8)
+project(tiny C)
+add_library(level SHARED level.c)
+add_executable(tiny tiny.c)
+target_compile_definitions(tiny PRIVATE "TINY=")
+target_link_libraries(tiny level)
+END
+student() { # NAME [LINE OF ITS MAKEFILE]
+    cp -R "$tmp/tree" "$tmp/class/$1"
+    [ -z "${2:-}" ] || echo "$2" >>"$tmp/class/$1/Makefile"
+}
+student right
+student not_c && echo 'int x = ;' >>"$tmp/class/not_c/tiny.c"
+student usage 'TINY = fprintf(stderr, "tiny: invalid option\nUsage: tiny [options]\n"); return 1;'
+student crash 'TINY = abort();'
+student hang 'TINY = pause();'
+student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
+student lost 'AFTER = rm liblevel.so'
+student moved 'AFTER = mkdir lib && mv liblevel.so lib'
+student other 'AFTER = mv tiny other'
+student hog 'AFTER = (head -c 1G /dev/zero; sleep 20) | tail -n 1 | wc -c'
+student network 'AFTER = ! grep -v lo: /proc/net/dev | grep :' # lo alone
+student writes 'AFTER = ! (: >$$CCACHE_DIR/x) && ! (: >/cache/x)'
+mkdir "$tmp/class/empty" "$tmp/class/two" && cp -R "$tmp/tree" "$tmp/class/two/a" && cp -R "$tmp/tree" "$tmp/class/two/b"
+# As it comes from a Mac: in a folder, with what another machine built.
+mkdir -p "$tmp/mac/My Homework/build/CMakeFiles" "$tmp/mac/__MACOSX" "$tmp/bomb"
+cp "$tmp/tree"/* "$tmp/mac/My Homework" && : >"$tmp/mac/__MACOSX/._tiny.c"
+echo 'CMAKE_HOME_DIRECTORY:INTERNAL=/Users/ada/hw' >"$tmp/mac/My Homework/build/CMakeCache.txt"
+printf '\xcf\xfa\xed\xfe' >"$tmp/mac/My Homework/build/tiny"
+touch -d '+9 hours' "$tmp/mac/My Homework/build/tiny" "$tmp/mac/My Homework/tiny.c"
+(cd "$tmp/mac" && zip -qr "$tmp/zipped.zip" .) && tar -C "$tmp/mac" -czf "$tmp/packed.tar.gz" . && mkdir "$tmp/inside" && cp "$tmp/zipped.zip" "$tmp/inside"
+head -c 200M /dev/zero >"$tmp/bomb/zeros" && (cd "$tmp/bomb" && zip -q "$tmp/class/bomb.zip" zeros)
+head -c 1000 "$tmp/zipped.zip" >"$tmp/class/short.zip"
+
+grade() { "$build/assay" grade -j 2 -o "$tmp/$1" "${@:2}"; }
+field() { sed -n "s/^ \"$3\": \(.*[^,]\),\{0,1\}$/\1/p" "$tmp/$1/$2/grade.json" | tr -d '"'; }
+said() { # OUT ID STATE PATTERN: of the whole; and no check has a reason of its own
+    local state wrong
+    state=$(field "$1" "$2" state) wrong=$(field "$1" "$2" wrong)
+    tell "$2: $3${4:+, $4}" "$([ "$state" = "$3" ] && grep -q -- "$4" <<<"$wrong" &&
+        { [ "$4" = null ] || ! grep '"seen"' "$tmp/$1/$2/grade.json" | grep -vq 'see what is said of all of it'; } || echo "$state: $wrong $(grep '"seen"' "$tmp/$1/$2/grade.json")")"
+}
+points() { tell "$2: $3 points" "$([ "$(field "$1" "$2" points)" = "$3" ] || echo "$(field "$1" "$2" points); $(grep '"seen"' "$tmp/$1/$2/grade.json")")"; }
+
+if ! grade probe "$tmp/make.rubric" "$tmp/class/right" >"$tmp/out" 2>&1 && grep -q "no sandbox" "$tmp/out"; then
+    echo "skip source: submissions of sources ($(cat "$tmp/out"))"
+    exit 0
+fi
+# "c" is another scene, which no program of ours shows.
+expect "a right program needs nobody" 0 "4.00 of 6" grade right "$tmp/make.rubric" "$tmp/class/right"
+said right right graded null
+points right right 4.0
+expect "what goes wrong is staff's to look at" 2 "the shared library" grade make "$tmp/make.rubric" "$tmp/class"/*
+said make not_c not_built 'It does not build: tiny.c:[0-9:]* error: expected expression'
+said make usage usage 'It prints its usage text for every image: tiny: invalid option'
+said make crash not_started 'No run of it made an image: the program: killed by signal 6'
+said make lost not_started 'It does not start: the shared library liblevel.so is missing'
+said make other not_started 'It does not start: building it made no tiny, but other'
+said make hog not_built 'It does not build: .*300 MiB of memory'
+said make empty not_built 'It does not build: there is no .*akefile in it'
+said make two not_built 'It does not build: more than one folder holds a .*akefile: a b'
+said make bomb not_built 'It does not build: all 64 MiB of its directory are full'
+said make short not_built 'It does not build: short.zip cannot be unpacked'
+for name in moved network writes; do said make $name graded null && points make $name 4.0; done
+said make hangs_once graded null
+points make hangs_once 0.0
+tell "the same scene is not run again" "$(grep -q "not run, as the program did not end on this scene before (image 'a')" "$tmp/make/hangs_once/grade.json" || echo it is)"
+tell "another scene is" "$(grep -q 'mean of the image (blue)' "$tmp/make/hangs_once/grade.json" || grep '"seen"' "$tmp/make/hangs_once/grade.json")"
+tell "hang: no image" "$(field make hang wrong | grep -q "No run of it made an image" || field make hang wrong)"
+tell "the class page says what is wrong" "$(grep -q 'the shared library liblevel.so is missing' "$tmp/make/index.html" || echo it does not)"
+tell "a build's log is kept" "$(grep -q 'expected expression' "$tmp/make/not_c/$(field make not_c build_log)" || echo it is not)"
+expect "archives" 0 "4.00 of 6" grade cmake "$tmp/cmake.rubric" "$tmp/zipped.zip" "$tmp/packed.tar.gz" "$tmp/inside" "$tmp/class/right"
+for name in zipped packed inside right; do points cmake $name 4.0; done
+
+# The compiler cache: filled by staff only, from the starter code.
+if command -v ccache >/dev/null; then
+    cache() { find "$tmp/cache" -type f -name '*[RM]' | sort | xargs sha256sum; }
+    expect "the cache is filled" 0 "filled by building" "$build/assay" grade --fill-build-cache --build-cache "$tmp/cache" "$tmp/make.rubric" "$tmp/tree"
+    cache >"$tmp/before"
+    expect "and used" 0 "4.00 of 6" grade cached --build-cache "$tmp/cache" "$tmp/make.rubric" "$tmp/class/right" "$tmp/class/writes"
+    tell "and not written" "$([ -s "$tmp/before" ] && cache | cmp - "$tmp/before" 2>&1)"
+    points cached writes 4.0
+    expect "a starter code that does not build" 3 "expected expression" "$build/assay" grade --fill-build-cache --build-cache "$tmp/cache2" "$tmp/make.rubric" "$tmp/class/not_c"
+else
+    echo "skip source: the compiler cache: no ccache here"
+fi
+[ $failures -eq 0 ]

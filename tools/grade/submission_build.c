@@ -1,0 +1,216 @@
+#include "submission.h"
+
+#include "renderer/base/fs.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum {
+    UNPACK = 97,
+    NO_PROGRAM = 98,
+    BUILD = 99,
+    /* exit statuses of the scripts */ PROBE_S = 10,
+    FILL_S = 3600,
+    BUILD_PROCESSES = 512
+};
+
+/* Unpacks archives, brings the folder of the sources to the top, so that its name plays no part, and takes away what another
+ * machine has left there: its CMakeCache.txt stops CMake, its objects would be linked. Files of another time zone
+ * may be younger than now, which make(1) takes for built. What is said last is the reason of a failure. The build's objects
+ * stay behind: every run unpacks the tree. */
+static const char build_script[] =
+    "set -u\n"
+    "lift() {\n" /* a folder takes the place of everything */
+    "  mv -- \"$1\" .lifted && find . -mindepth 1 -maxdepth 1 ! -name .lifted -exec rm -rf {} + &&\n"
+    "    find .lifted -mindepth 1 -maxdepth 1 -exec mv -t . -- {} + && rmdir .lifted\n"
+    "}\n"
+    "i=0\n"
+    "while [ $i -lt 8 ]; do\n"
+    "  i=$((i + 1))\n"
+    "  find . \\( -name __MACOSX -o -name .DS_Store -o -name '._*' \\) -prune -exec rm -rf {} +\n"
+    "  [ ! -e \"$PROGRAM\" ] && [ \"$(find . -mindepth 1 -maxdepth 1 -printf .)\" = . ] || break\n"
+    "  one=$(find . -mindepth 1 -maxdepth 1)\n"
+    "  case $one in\n"
+    "    *.[zZ][iI][pP] | *.tar | *.tar.* | *.t[gbx]z | *.7z | *.rar)\n"
+    "      mkdir .new || exit 97\n"
+    "      case $one in\n"
+    "        *.[zZ][iI][pP]) why=$(unzip -q -o \"$one\" -d .new 2>&1); [ $? -le 1 ] ;;\n"
+    "        *) why=$(tar -xf \"$one\" -C .new 2>&1) ;;\n"
+    "      esac || { echo \"${one#./} cannot be unpacked: $(echo \"$why\" | tail -n 1)\"; exit 97; }\n"
+    "      chmod -R u+rwX .new && lift .new || exit 97 ;;\n"
+    "    *) [ -d \"$one\" ] && [ ! -L \"$one\" ] || break\n"
+    "      lift \"$one\" || exit 97 ;;\n"
+    "  esac\n"
+    "done\n"
+    "[ -n \"$BUILD\" ] || { chmod u+x \"$PROGRAM\" 2>/dev/null; exit 0; }\n"
+    "case $BUILD in *cmake*) marker=CMakeLists.txt ;; *make*) marker=[Mm]akefile ;; *) marker= ;; esac\n"
+    "if [ -n \"$marker\" ]; then\n"
+    "  find . -name CMakeCache.txt -printf '%h\\n' | while IFS= read -r dir; do\n"
+    "    if [ -e \"$dir/CMakeLists.txt\" ]; then rm -rf \"$dir/CMakeCache.txt\" \"$dir/CMakeFiles\"; else rm -rf \"$dir\"; fi\n"
+    "  done\n"
+    "  root=$(find . -name \"$marker\" -printf '%d %P\\n' | sort -n |\n"
+    "    awk 'NR == 1 { d = $1 } $1 == d { sub(/^[0-9]+ /, \"\"); sub(/\\/?[^\\/]*$/, \"\"); print }')\n"
+    "  [ -n \"$(find . -name \"$marker\" -print -quit)\" ] || { echo \"there is no $marker in it\"; exit 97; }\n"
+    "  [ \"$(echo \"$root\" | wc -l)\" = 1 ] ||\n"
+    "    { echo \"more than one folder holds a $marker:\" $root; exit 97; }\n"
+    "  [ -z \"$root\" ] || lift \"./$root\" || exit 97\n"
+    "fi\n"
+    "find . -newermt now -exec touch -h {} +\n"
+    "began=$(date +%s)\n"
+    "LC_ALL=C sh -exc \"$BUILD\" || exit 99\n"
+    "if [ ! -f \"$PROGRAM\" ]; then\n"
+    "  echo \"building it made no ${PROGRAM#./}, but\" $(find . -type f -perm -u+x -newermt \"@$began\" \\\n"
+    "    ! -path '*/CMakeFiles/*' -printf '%P\\n' | head -n 5)\n"
+    "  exit 98\n"
+    "fi\n"
+    "find . \\( -name '*.o' -o -name '*.a' -o -name CMakeFiles \\) -prune -exec rm -rf {} +\n"
+    "exit 0\n";
+
+/* Would the program start? Looked at where it will run, without running it: ld.so(8) lists the libraries. One that is not found
+ * is looked for in the submission by its name, so that a program linked elsewhere with a library of its own finds it. */
+static const char probe_script[] =
+    "set -u\n"
+    "fail() { echo \"$1\"; exit 98; }\n"
+    "missing() { LD_TRACE_LOADED_OBJECTS=1 \"$PROGRAM\" 2>&1 | sed -n 's/^[[:space:]]*\\(.*\\) => not found.*/\\1/p'; }\n"
+    "[ -f \"$PROGRAM\" ] || fail \"there is no program ${PROGRAM#./} in it\"\n"
+    "magic=$(head -c 4 \"$PROGRAM\" | od -An -tx1 | tr -d ' ')\n"
+    "case $magic in\n"
+    "  cffaedfe | cafebabe) fail \"${PROGRAM#./} is a program for macOS\" ;;\n"
+    "  4d5a*) fail \"${PROGRAM#./} is a program for Windows\" ;;\n"
+    "  7f454c46) ;;\n"
+    "  *) exit 0 ;;\n"
+    "esac\n"
+    "machine() { od -An -j18 -N2 -tx1 \"$1\"; }\n"
+    "[ \"$(machine \"$PROGRAM\")\" = \"$(machine /bin/sh)\" ] || fail \"${PROGRAM#./} is a program for another processor\"\n"
+    "[ -x \"$PROGRAM\" ] || fail \"${PROGRAM#./} is not executable\"\n"
+    "grep -aq ld-linux \"$PROGRAM\" || exit 0\n" /* linked statically: it would run */
+    "path=\n"
+    "for lib in $(missing); do\n"
+    "  found=$(find . -name \"$lib\" ! -type d -print -quit)\n"
+    "  [ -z \"$found\" ] || path=$path${path:+:}$PWD/${found%/*}\n"
+    "done\n"
+    "[ -z \"$path\" ] || export LD_LIBRARY_PATH=\"$path\"\n"
+    "for lib in $(missing); do fail \"the shared library $lib is missing\"; done\n"
+    "why=$(LD_TRACE_LOADED_OBJECTS=1 \"$PROGRAM\" 2>&1 | grep ' not found (required by' | head -n 1)\n"
+    "[ -z \"$why\" ] || fail \"$why\"\n"
+    "echo \"$path\" >library\n";
+
+/* A line fit for a student: the first error of the build, else the last line. */
+static void reason_in(const char *log, bool first_error, char *out, size_t size)
+{
+    static const char *const words[] = {"rror: ",          "CMake Error",  "undefined reference",
+                                        "No rule to make", "cannot find ", "ut of memory",
+                                        "annot allocate"};
+    char line[400];
+    int more = 0; /* lines of CMake's, which says what and then why */
+    out[0] = '\0';
+    FILE *f = fopen(log, "r");
+    while (f != NULL && fgets(line, sizeof line, f) != NULL) {
+        size_t n = 0;
+        for (const char *c = line + strspn(line, " \t"); *c != '\0' && *c != '\n'; c++)
+            line[n++] = *c >= ' ' && *c <= '~' ? *c : '?';
+        line[n] = '\0';
+        if (n == 0)
+            continue;
+        bool error = false;
+        for (size_t i = 0; first_error && i < sizeof words / sizeof *words; i++)
+            error = error || strstr(line, words[i]) != NULL;
+        size_t used = more > 0 ? strlen(out) : 0;
+        snprintf(out + used, size - used, "%s%s", used > 0 ? " " : "", line);
+        if (more == 1 || (more == 0 && error && strncmp(line, words[1], strlen(words[1])) != 0))
+            break;
+        more = more > 0 ? more - 1 : error ? 1 : 0;
+    }
+    if (f != NULL)
+        fclose(f);
+}
+
+static void fails(struct submission *s, enum submission_state state, const char *what,
+                  const char *why)
+{
+    s->state = state;
+    snprintf(s->why, sizeof s->why, "It %s: %.500s", what, why);
+}
+
+static bool probe(const struct rubric *r, const struct sandbox *box, const char *work,
+                  struct submission *s, struct err *e)
+{
+    char program[sizeof s->program + 16];
+    snprintf(program, sizeof program, "PROGRAM=%s", s->program);
+    const struct path out = fs_path("%s/probe", work), library = fs_path("%s/library", out.s);
+    struct sandbox_job job = {
+        .argv = (const char *const[]){"env", program, "sh", "-c", probe_script, NULL},
+        .tree = s->tree,
+        .keep = (const char *const[]){"library", NULL},
+        .out = out.s,
+        .limit = r->limit};
+    struct sandbox_result result;
+    job.limit.wall_s = job.limit.cpu_s = PROBE_S;
+    if (!sandbox_run(box, &job, &result, e))
+        return false;
+    if (result.end == SANDBOX_FAILED && result.status == NO_PROGRAM)
+        fails(s, SUBMISSION_NOT_STARTED, "does not start",
+              result.why + strcspn(result.why, ":") + strlen(": "));
+    FILE *f = fopen(library.s, "r");
+    if (f != NULL) {
+        if (fgets(s->library, sizeof s->library, f) != NULL)
+            s->library[strcspn(s->library, "\n")] = '\0';
+        fclose(f);
+    }
+    return fs_remove_tree(out.s, e);
+}
+
+static bool build(const struct rubric *r, const struct sandbox *box, const char *cache, bool fill,
+                  const char *work, const char *log, struct submission *s, struct err *e)
+{
+    char program[sizeof s->program + 16], words[sizeof r->build + 16], why[500];
+    snprintf(program, sizeof program, "PROGRAM=%s", s->program);
+    snprintf(words, sizeof words, "BUILD=%s", r->build);
+    const struct path out = fs_path("%s/build", work), built = fs_path("%s/tree.tar", out.s);
+    struct sandbox_job job = {
+        .argv = (const char *const[]){"env", program, words, "sh", "-c", build_script, NULL},
+        .tree = s->tree,
+        .keep_tree = true,
+        .tools = true,
+        .cache = cache,
+        .fill_cache = fill,
+        .out = out.s,
+        .log = log,
+        .limit = r->limit};
+    struct sandbox_result result;
+    job.limit.wall_s = job.limit.cpu_s = fill ? FILL_S : r->build_s;
+    job.limit.memory = r->build_memory;
+    job.limit.processes = BUILD_PROCESSES;
+    if (!sandbox_run(box, &job, &result, e))
+        return false;
+    if (result.end != SANDBOX_OK) {
+        bool told =
+            result.end == SANDBOX_FAILED && result.status >= UNPACK && result.status <= BUILD;
+        reason_in(log, result.status == BUILD, why, sizeof why);
+        result.why[strcspn(result.why, ":")] = '\0'; /* its last words are no reason */
+        bool no_program = told && result.status == NO_PROGRAM;
+        fails(s, no_program ? SUBMISSION_NOT_STARTED : SUBMISSION_NOT_BUILT,
+              no_program ? "does not start" : "does not build", told ? why : result.why);
+    } else if (access(built.s, R_OK) != 0) {
+        snprintf(why, sizeof why, "what was made is larger than %zu MiB", r->limit.disk >> 20);
+        fails(s, SUBMISSION_NOT_BUILT, "does not build", why);
+    } else if (rename(built.s, s->tree) != 0 || chmod(s->tree, 0644) != 0) {
+        return err_set(e, "%s: %s", s->tree, strerror(errno));
+    }
+    return fs_remove_tree(out.s, e);
+}
+
+bool submission_build(const struct rubric *r, const struct sandbox *box, const char *cache,
+                      bool fill, const char *work, const char *log, struct submission *s,
+                      struct err *e)
+{
+    if (s->kind == SUBMISSION_IMAGES || s->state != SUBMISSION_GRADED)
+        return true;
+    if ((s->kind == SUBMISSION_SOURCE || s->packed) && !build(r, box, cache, fill, work, log, s, e))
+        return false;
+    return s->state != SUBMISSION_GRADED || strstr(r->command, "{program}") == NULL ||
+           probe(r, box, work, s, e);
+}

@@ -1,0 +1,95 @@
+#include "submission.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+enum { CHEAPER = 8, HOPELESS = 3 };
+
+/* In proportion to the time that the image takes, more or less. */
+static double work_of(const struct rubric_image *p)
+{
+    return (double)p->width * p->height * p->spp * (1.0 + (double)p->lights * p->bounces);
+}
+
+static bool hung(const struct made *m)
+{
+    return m->end == SANDBOX_WALL || m->end == SANDBOX_CPU;
+}
+
+bool submission_will_hang(const struct rubric *r, const struct made *made, int image,
+                          struct made *out)
+{
+    const struct rubric_image *p = &r->image[image];
+    int scenes = 0;
+    bool any = false;
+    *out = (struct made){.end = SANDBOX_WALL};
+    for (int i = 0; i < image; i++) {
+        const struct rubric_image *q = &r->image[i];
+        any = any || made[i].path[0] != '\0';
+        if (!hung(&made[i]))
+            continue;
+        scenes += made[i].wall_s > 0;
+        if (strcmp(p->scene, q->scene) == 0 && CHEAPER * work_of(p) >= work_of(q)) {
+            snprintf(out->why, sizeof out->why,
+                     "not run, as the program did not end on this scene before (image '%s')",
+                     q->name);
+            return true;
+        }
+    }
+    if (!any && scenes >= HOPELESS)
+        snprintf(out->why, sizeof out->why,
+                 "not run, as the program did not end on any of %d scenes before", scenes);
+    return out->why[0] != '\0';
+}
+
+/* Text of a program, in printable ASCII. */
+static void take_line(const char *line, char *out, size_t size)
+{
+    size_t n = 0;
+    for (; *line != '\0' && *line != '\n' && n + 1 < size; line++)
+        out[n++] = *line >= ' ' && *line <= '~' ? *line : '?';
+    out[n] = '\0';
+}
+
+bool submission_printed_usage(const char *log, char *why, size_t size)
+{
+    char line[512];
+    bool usage = false;
+    why[0] = '\0';
+    FILE *f = fopen(log, "r");
+    for (int i = 0; f != NULL && !usage && i < 200 && fgets(line, sizeof line, f) != NULL; i++) {
+        const char *at = line + strspn(line, " \t");
+        usage = strncasecmp(at, "usage", 5) == 0 && !isalnum((unsigned char)at[5]);
+        /* What getopt(3) complains of says more. */
+        bool complaint = strstr(at, "option") != NULL || strstr(at, "argument") != NULL;
+        if (why[0] == '\0' && (usage || complaint))
+            take_line(at, why, size);
+    }
+    if (f != NULL)
+        fclose(f);
+    return usage;
+}
+
+void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
+                         struct submission *s)
+{
+    bool usage = true, same = true;
+    for (int i = 0; i < r->num_images; i++) {
+        if (why[i][0] == '\0' || made[i].end == SANDBOX_LOST || s->state != SUBMISSION_GRADED)
+            return;
+        usage = usage && made[i].usage;
+        same = same && strcmp(why[i], why[0]) == 0;
+    }
+    if (s->kind != SUBMISSION_IMAGES)
+        s->state = usage ? SUBMISSION_USAGE : SUBMISSION_NOT_STARTED;
+    const char *what = s->kind == SUBMISSION_IMAGES ? "None of its images can be read"
+                       : usage                      ? "It prints its usage text for every image"
+                                                    : "No run of it made an image";
+    const char *text = usage ? strchr(why[0], ':') + 2 : why[0];
+    snprintf(s->why, sizeof s->why, "%s: %s%s%s%.400s", what, same ? "" : "'",
+             same ? "" : r->image[0].name, same ? "" : "': ", text);
+    for (int i = 0; same && i < r->num_images; i++)
+        snprintf(why[i], sizeof why[i], "%s", submission_not_made);
+}
