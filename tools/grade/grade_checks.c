@@ -166,7 +166,7 @@ static bool is_copy(const struct submitted_image *s, const struct moments *m, do
     return num >= 100 && same > 0.98 * num && expected < 0.6 * num;
 }
 
-static void tell(const struct difference *a, char *text, size_t size)
+void grade_checks_tell(const struct difference *a, char *text, size_t size)
 {
     const struct interval *worst = &a->image[0];
     static const char *const names[NUM_CHANNELS] = {"red", "green", "blue", "luminance"};
@@ -225,7 +225,7 @@ static void score_agreement(const struct work *w, struct result *out)
         out->consistent = out->consistent && interval_distance(i) == 0;
         judge(w, m, i, out);
     }
-    tell(&out->agreement, out->seen, sizeof out->seen);
+    grade_checks_tell(&out->agreement, out->seen, sizeof out->seen);
 }
 
 /* A against B; what keeps them from being compared, but for memory, is the student's to mend. */

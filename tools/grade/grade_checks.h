@@ -61,12 +61,16 @@ struct result {
     double noise[CHECK_IMAGES]; /* variance that each image of the check adds, in some unit */
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
+    char carried[512];  /* what was paid before and is taken for granted here (carried.h), or "" */
     char flag[256];     /* for staff only */
     int image;          /* that shows it best: index in the rubric */
     /* Of equal, agree and sum; tiles 0: none. Of exact: relative[] only, the share of each tile's pixels that
      * are wrong, and where most are. */
     struct difference agreement;
 };
+
+/* What the student reads of a difference. */
+void grade_checks_tell(const struct difference *a, char *text, size_t size);
 
 /* One student's images, read. */
 struct submitted_images {

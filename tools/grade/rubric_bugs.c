@@ -24,7 +24,7 @@ bool rubric_bugs_sees(const struct rubric *r, int image)
     for (int i = 0; i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         bool shows = c->kind == CHECK_EQUAL || c->kind == CHECK_EXACT || c->kind == CHECK_RATES ||
-                     c->kind == CHECK_SUM;
+                     c->kind == CHECK_SUM || c->kind == CHECK_AGREE;
         for (int k = 0; shows && k < c->num_images; k++)
             sees |= c->images[k] == image;
     }
@@ -117,7 +117,7 @@ static size_t cell_at(const struct signature *s, size_t p)
     return 3 * (p / width / cell * (size_t)s->columns + p % width / cell);
 }
 
-static double clip_of(const struct rubric *r)
+double rubric_bugs_clip(const struct rubric *r)
 {
     struct curve curve;
     struct err ignored;
@@ -142,7 +142,7 @@ bool rubric_bugs_sight(const struct rubric *r, int image, const struct moments *
 {
     const struct rubric_image *p = &r->image[image];
     bool counts = rubric_bugs_counts(r, image);
-    double clip = clip_of(r), sum = 0, squares = 0, pixels = (double)p->width * p->height;
+    double clip = rubric_bugs_clip(r), sum = 0, squares = 0, pixels = (double)p->width * p->height;
     if (!start(p, out, e))
         return false;
     if (m->width != p->width || m->height != p->height)
@@ -232,7 +232,7 @@ static bool sight_of_student(const struct rubric *r, int image, const struct sub
     struct seen cells[SIGNATURE_VALUES] = {0};
     if (!start(&r->image[image], out, e))
         return false;
-    double clip = clip_of(r), pixels = (double)out->cell * out->cell;
+    double clip = rubric_bugs_clip(r), pixels = (double)out->cell * out->cell;
     fill_cells(r, s, m, clip, out, cells);
     double kappa = noise_of(out, correct, cells);
     for (int j = 0; j < 3 * out->columns * out->rows; j++) {
@@ -260,23 +260,33 @@ static bool count_samples(const struct rubric *r, int image, const struct answer
     return true;
 }
 
+bool rubric_bugs_can_observe(const struct rubric_bugs *b, const struct submitted_images *h, int set,
+                             int image)
+{
+    return b->view[set][image] >= 0 && h->image[image].mean != NULL;
+}
+
+bool rubric_bugs_observe(const struct rubric_bugs *b, const struct rubric *r,
+                         const struct answer_key *a, const struct submitted_images *h, int set,
+                         int image, struct observation *out, struct err *e)
+{
+    const struct view *v = &b->catalogue.view[b->view[set][image]];
+    const struct answer *answer = &a->of[rubric_bugs_set(a, set, image)][image];
+    *out = (struct observation){.view = v, .is_consistent = true};
+    return sight_of_student(r, image, &h->image[image], &answer->m, &v->correct, &out->seen, e) &&
+           (!rubric_bugs_counts(r, image) ||
+            count_samples(r, image, a, &h->made[image], &out->seen, e));
+}
+
 static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answer_key *a,
                  const struct submitted_images *h, int set, struct observation *clue, int *num,
                  struct err *e)
 {
     *num = 0;
-    for (int i = 0; i < r->num_images; i++) {
-        if (b->view[set][i] < 0 || h->image[i].mean == NULL)
-            continue;
-        const struct view *v = &b->catalogue.view[b->view[set][i]];
-        const struct answer *answer = &a->of[rubric_bugs_set(a, set, i)][i];
-        struct observation *out = &clue[(*num)++];
-        *out = (struct observation){.view = v, .is_consistent = true};
-        if (!sight_of_student(r, i, &h->image[i], &answer->m, &v->correct, &out->seen, e))
+    for (int i = 0; i < r->num_images; i++)
+        if (rubric_bugs_can_observe(b, h, set, i) &&
+            !rubric_bugs_observe(b, r, a, h, set, i, &clue[(*num)++], e))
             return false;
-        if (rubric_bugs_counts(r, i) && !count_samples(r, i, a, &h->made[i], &out->seen, e))
-            return false;
-    }
     return true;
 }
 
@@ -285,7 +295,7 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                           double alpha, const char *without, struct diagnosis *found, int *with,
                           struct err *e)
 {
-    double clip = clip_of(r);
+    double clip = rubric_bugs_clip(r);
     struct diagnose_options opt = {.alpha = alpha,
                                    .without = without,
                                    .by_likelihood = true,

@@ -19,7 +19,7 @@ struct rubric_bugs {
 };
 
 /* Whether the image is one of those looked at: with a reference of ours, and of a check that is about what it shows (equal,
- * exact, rates, sum). */
+ * exact, rates, sum, agree). */
 bool rubric_bugs_sees(const struct rubric *r, int image);
 /* Is the number of its samples a fact (a check of rates)? */
 bool rubric_bugs_counts(const struct rubric *r, int image);
@@ -38,6 +38,17 @@ bool rubric_bugs_sight(const struct rubric *r, int image, const struct moments *
 bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e) __attribute__((warn_unused_result));
 void rubric_bugs_close(struct rubric_bugs *b);
+
+/* Radiance of the rubric's brightest code; INFINITY: none. */
+double rubric_bugs_clip(const struct rubric *r);
+
+/* Has the image a view with these deviations, and did the student make it? If so: its cells. */
+bool rubric_bugs_can_observe(const struct rubric_bugs *b, const struct submitted_images *h, int set,
+                             int image);
+bool rubric_bugs_observe(const struct rubric_bugs *b, const struct rubric *r,
+                         const struct answer_key *a, const struct submitted_images *h, int set,
+                         int image, struct observation *out, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* What these images look like, graded with the deviations of `set`; where no bug explains them with those, with any
  * other set. found->finding is FINDING_CORRECT where nothing was seen; *with: the set by which it was found. A right program

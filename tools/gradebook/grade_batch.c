@@ -104,12 +104,13 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
                           const struct result *result)
 {
     return json_pack(
-        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}", "kind",
-        rubric_check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name, "title",
-        c->title, "points", c->points * result->share, "of", c->points, "share", result->share,
-        "chance", result->chance, "judged", result->judged, "expected", result->expected, "seen",
-        result->seen, "hint", c->hint, "where", c->where, "visibility", c->visibility, "accepted",
-        result->accepted, "flag", result->flag, "picture", r->image[result->image].name, "tile",
+        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}",
+        "kind", rubric_check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name,
+        "title", c->title, "points", c->points * result->share, "of", c->points, "share",
+        result->share, "chance", result->chance, "judged", result->judged, "expected",
+        result->expected, "seen", result->seen, "hint", c->hint, "where", c->where, "visibility",
+        c->visibility, "accepted", result->accepted, "carried", result->carried, "flag",
+        result->flag, "picture", r->image[result->image].name, "tile",
         result->agreement.tiles > 0
             ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
             : json_null(),
@@ -130,15 +131,31 @@ static json_t *image_json(const struct rubric_image *p, const struct made *made,
                      s->mean != NULL ? s->sha256 : NULL);
 }
 
-static bool add_checks(const struct grade_job *job, struct submitted_images *h, json_t *grade,
-                       int *set, struct err *e)
+/* A submission that lost points for what it shows; an image that is not of the student's making looks like no bug. */
+static bool find_mistake(const struct grade_job *job, struct submitted_images *h, int *set,
+                         struct result *result, struct mistake *out, struct err *e)
 {
+    bool lost = false, flagged = false;
+    for (int i = 0; i < job->rubric->num_checks; i++) {
+        lost |= result[i].share < 1;
+        flagged |= result[i].flag[0] != '\0';
+    }
+    *out = (struct mistake){.located.image = -1};
+    return !lost || flagged ||
+           mistake_judge(job->rubric, job->answers, job->bugs, h, job->alpha, set, result, out, e);
+}
+
+static bool add_checks(const struct grade_job *job, struct submitted_images *h, json_t *grade,
+                       struct mistake *mistake, struct err *e)
+{
+    int set = 0;
     const struct rubric *r = job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *images = json_array();
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
     struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
     bool ok = (result != NULL || err_set(e, "out of memory")) &&
-              grade_all_checks(r, job->answers, h, job->alpha, result, set, e);
+              grade_all_checks(r, job->answers, h, job->alpha, result, &set, e) &&
+              find_mistake(job, h, &set, result, mistake, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;
@@ -161,34 +178,18 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
     json_object_set_new(grade, "of", json_real(rubric_points(r)));
     json_object_set_new(grade, "chance", json_real(chance));
     json_object_set_new(grade, "cpu_s", json_real(cpu_s));
-    json_object_set_new(grade, "accepted", json_string(r->set[*set].name));
+    json_object_set_new(grade, "accepted", json_string(r->set[set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
     json_object_set_new(grade, "pictures", images);
     return ok;
 }
 
-/* An image that is not of the student's making looks like no bug. */
-static bool is_flagged(const json_t *grade)
-{
-    size_t i;
-    json_t *c;
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
-        if (json_string_length(json_object_get(c, "flag")) > 0)
-            return true;
-    }
-    return false;
-}
-
 /* By the images that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
 static json_t *name_bug(const struct grade_job *job, const struct submission *s,
-                        const struct submitted_images *h, int set, const char *work)
+                        const struct mistake *mistake, const char *work)
 {
-    json_t *by_images =
-        job->bugs != NULL
-            ? grade_diagnose_by_images(job->bugs, job->rubric, job->answers, h, set, job->alpha)
-            : json_null();
+    json_t *by_images = grade_diagnose_by_images(job->bugs, job->rubric, mistake);
     if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
         json_array_size(json_object_get(by_images, "named")) == 1)
         return by_images;
@@ -205,16 +206,19 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
                        const char *out, json_t *grade, struct err *e)
 {
     struct submitted_images *h = calloc(1, sizeof *h);
-    int set = 0;
+    struct mistake mistake;
     bool ok = h != NULL || err_set(e, "out of memory");
     ok = ok && make_images(job, s, work, out, h, e);
     json_object_set_new(grade, "state", json_string(submission_state_name[s->state]));
     json_object_set_new(grade, "wrong", s->why[0] != '\0' ? json_string(s->why) : json_null());
-    ok = ok && add_checks(job, h, grade, &set, e);
-    bool lost =
-        ok && json_real_value(json_object_get(grade, "points")) < rubric_points(job->rubric) - 1e-9;
+    ok = ok && add_checks(job, h, grade, &mistake, e);
     json_object_set_new(grade, "diagnosis",
-                        lost && !is_flagged(grade) ? name_bug(job, s, h, set, work) : json_null());
+                        ok && mistake.judged ? name_bug(job, s, &mistake, work) : json_null());
+    if (ok && mistake.located.text[0] != '\0') {
+        json_object_set_new(grade, "located", json_string(mistake.located.text));
+        json_object_set_new(grade, "located_picture",
+                            json_string(job->rubric->image[mistake.located.image].name));
+    }
     for (int i = 0; h != NULL && i < job->rubric->num_images; i++)
         submitted_image_free(&h->image[i]);
     free(h);

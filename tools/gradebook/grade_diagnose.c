@@ -111,22 +111,12 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
 }
 
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
-                                 const struct answer_key *a, const struct submitted_images *h,
-                                 int set, double alpha)
+                                 const struct mistake *m)
 {
-    struct diagnosis found;
-    struct err e;
-    int with, images = 0;
-    for (int i = 0; i < r->num_images; i++)
-        images += b->view[0][i] >= 0 && h->image[i].mean != NULL;
-    if (images == 0)
-        return json_null();
-    if (!rubric_bugs_diagnose(b, r, a, h, set, alpha, NULL, &found, &with, &e))
-        return json_pack("{ss}", "error", e.msg);
-    if (found.finding == FINDING_CORRECT)
-        found.finding = FINDING_UNKNOWN;
-    json_t *json = finding_json(&b->catalogue, &found);
-    json_object_set_new(json, "with", json_string(r->set[with].name));
+    if (!m->looked)
+        return m->why[0] != '\0' ? json_pack("{ss}", "error", m->why) : json_null();
+    json_t *json = finding_json(&b->catalogue, &m->found);
+    json_object_set_new(json, "with", json_string(r->set[m->with].name));
     return json;
 }
 

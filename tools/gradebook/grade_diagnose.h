@@ -3,7 +3,7 @@
 #ifndef ASSAY_GRADE_DIAGNOSE_H
 #define ASSAY_GRADE_DIAGNOSE_H
 
-#include "tools/grade/rubric_bugs.h"
+#include "tools/grade/mistake.h"
 
 #include <jansson.h>
 
@@ -20,11 +20,10 @@ bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
                          struct err *e) __attribute__((warn_unused_result));
 void grade_diagnose_close(struct grade_diagnosis *d);
 
-/* By the images, graded with the deviations of `set`, in the form of tools/docs/formats/grades.md ("diagnosis");
- * "correct" is never said of images that lost points: "unknown". "with": name of the deviations on top of which the bug was found. JSON null where there is no image. */
+/* By the images that were graded, in the form of tools/docs/formats/grades.md ("diagnosis"). "with": name of the deviations on
+ * top of which the bug was found. JSON null where there is no image. */
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
-                                 const struct answer_key *a, const struct submitted_images *h,
-                                 int set, double alpha);
+                                 const struct mistake *m);
 
 /* The same form, "correct" too, or an "error" where a view could not be made. Chance of accusing a right program: alpha. A
  * new reference; NULL out of memory. May be called from several threads. */

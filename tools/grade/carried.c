@@ -1,0 +1,377 @@
+#include "carried.h"
+
+#include "rate_image.h"
+#include "tools/diagnose/bug_fit.h"
+#include "tools/stats/distributions.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How well an effect of our renderer is that of another program with the same bug. */
+static const double effect_error = 0.03;
+/* What is cut off at the brightest code depends on how a program's noise is distributed: of cells brighter than this
+ * share of it, so much of their radiance may be off, all in one direction. */
+static const double bright = 0.5, clip_error = 0.05;
+
+/* ---- which part pays? */
+
+/* A part of the assignment, as the catalogue and rubrics write it: 3-1 has Parts 1 to 5, 3-2 has 1 to 4. */
+struct place {
+    int project, part; /* part 0: not known */
+};
+
+static struct place place_of_bug(const char *where)
+{
+    static const struct {
+        const char *topic;
+        int part;
+    } topics[] = {
+        {"mirror", 1}, {"glass", 1}, {"microfacet", 2}, {"environment", 3}, {"depth of field", 4}};
+    struct place p = {1, 0};
+    if (sscanf(where, "part %d", &p.part) == 1)
+        return p;
+    p.project = 2;
+    for (size_t i = 0; i < sizeof topics / sizeof *topics; i++)
+        if (strncmp(where, "project 3-2, ", 13) == 0 &&
+            strncmp(where + 13, topics[i].topic, strlen(topics[i].topic)) == 0)
+            p.part = topics[i].part;
+    return p;
+}
+
+static struct place place_of_check(const struct rubric *r, const struct rubric_check *c)
+{
+    struct place p = {strstr(c->where, "3-2") != NULL ? 2 : 1, 0};
+    const char *part = strstr(c->where, "Part ");
+    if (part == NULL || sscanf(part, "Part %d", &p.part) != 1)
+        p.part = atoi(r->part[c->part].number);
+    return p;
+}
+
+int carried_part_of(const struct rubric *r, const struct bug *b)
+{
+    struct place bug = place_of_bug(b->where);
+    for (int i = 0; bug.part > 0 && i < r->num_checks; i++) {
+        struct place check = place_of_check(r, &r->check[i]);
+        if (check.project == bug.project && check.part == bug.part)
+            return r->check[i].part;
+    }
+    return -1;
+}
+
+/* What is being carried on. */
+struct carry {
+    const struct rubric *r;
+    const struct answer_key *a;
+    const struct rubric_bugs *b;
+    struct submitted_images *h;
+    int with, bug[2], paid[2], num; /* bugs, and the parts in which they are paid */
+    double alpha;
+};
+
+static bool loses(const struct rubric *r, const struct result *result, int part)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        if (r->check[i].part == part && result[i].share < 1)
+            return true;
+    return false;
+}
+
+static bool shows(const struct carry *w, int bug, const struct rubric_check *c)
+{
+    for (int k = 0; k < c->num_images; k++) {
+        int view = w->b->view[w->with][c->images[k]];
+        if (view >= 0 && w->b->catalogue.view[view].effect[bug] != NULL)
+            return true;
+    }
+    return false;
+}
+
+/* The earliest part that loses and shows the bug; if none does, that loses. */
+static int earliest(const struct carry *w, int bug, const struct result *result)
+{
+    int first = -1;
+    for (int i = 0; i < w->r->num_checks; i++) {
+        if (result[i].share == 1)
+            continue;
+        if (shows(w, bug, &w->r->check[i]))
+            return w->r->check[i].part;
+        first = first < 0 ? w->r->check[i].part : first;
+    }
+    return first;
+}
+
+/* In its own part, of several that cannot be told apart in the earliest of theirs, if that loses points. */
+static void find_payer(struct carry *w, const struct diagnosis *found, int member,
+                       const struct result *result)
+{
+    const struct candidate *first = &found->candidate[0];
+    int paid = -1;
+    for (int k = 0; k < found->num_named; k++) {
+        const struct candidate *c = &found->candidate[k];
+        if (member == 0 ? c->second != first->second : c->bug != first->bug)
+            continue;
+        int own = carried_part_of(w->r, &w->b->catalogue.bug[member == 0 ? c->bug : c->second]);
+        if (own >= 0 && loses(w->r, result, own) && (paid < 0 || own < paid))
+            paid = own;
+    }
+    w->bug[member] = member == 0 ? first->bug : first->second;
+    w->paid[member] = paid >= 0 ? paid : earliest(w, w->bug[member], result);
+    w->num = member + 1;
+}
+
+/* ---- judged with a bug */
+
+/* A combination of the images of a check, cell by cell: what is seen, and what should be with the bugs. */
+struct cells {
+    int columns, rows, cell;
+    double seen[SIGNATURE_VALUES], expected[SIGNATURE_VALUES], var[SIGNATURE_VALUES];
+    double bias[SIGNATURE_VALUES]; /* by which the difference may be off, all cells the same way */
+    double
+        base[SIGNATURE_VALUES]; /* expected of the first image: what differences are relative to */
+};
+
+/* sign: +1, -1. bugs: bit k for w->bug[k]. */
+static bool add_image(const struct carry *w, int image, int sign, int bugs, struct cells *out,
+                      struct err *e)
+{
+    struct observation *seen = malloc(sizeof *seen);
+    struct effect *room = malloc(sizeof *room);
+    bool ok = (seen != NULL && room != NULL) || err_set(e, "out of memory");
+    ok = ok && rubric_bugs_observe(w->b, w->r, w->a, w->h, w->with, image, seen, e);
+    if (ok) {
+        double clip = rubric_bugs_clip(w->r);
+        int first = bugs & 1 ? w->bug[0] : w->bug[1], second = bugs == 3 ? w->bug[1] : -1;
+        const struct signature *s = &seen->seen, *c = &seen->view->correct;
+        const struct effect *effect =
+            bug_fit_effect(seen->view, first, second, isfinite(clip) ? clip : 0, room);
+        bool is_first = out->columns == 0;
+        out->columns = s->columns;
+        out->rows = s->rows;
+        out->cell = s->cell;
+        for (int i = 0; i < 3 * s->columns * s->rows; i++) {
+            double more = effect != NULL ? (double)effect->mean[i] : 0;
+            out->seen[i] += sign * s->mean[i];
+            out->expected[i] += sign * (c->mean[i] + more);
+            if (fmax(s->mean[i], c->mean[i] + more) > bright * clip)
+                out->bias[i] += clip_error * (c->mean[i] + more);
+            out->var[i] += s->var[i] + c->var[i] + pow(effect_error * more, 2) +
+                           (effect != NULL ? (double)effect->var[i] : 0);
+            if (is_first)
+                out->base[i] = c->mean[i] + more;
+        }
+    }
+    free(seen);
+    free(room);
+    return ok;
+}
+
+/* Sums over a rectangle of cells, of one channel or luminance. */
+struct sums {
+    double difference, var, bias, base;
+};
+
+static struct interval interval_of(const struct sums *s, double base, double z)
+{
+    double value = s->difference / base, half = (z * sqrt(s->var) + s->bias) / base;
+    return (struct interval){value, value - half, value + half, sqrt(s->var) / base};
+}
+
+static struct sums sum_of(const struct cells *s, int x, int y, int side_x, int side_y, int channel)
+{
+    struct sums sum = {0};
+    for (int j = y; j < y + side_y && j < s->rows; j++)
+        for (int i = x; i < x + side_x && i < s->columns; i++)
+            for (int c = 0; c < 3; c++) {
+                int at = 3 * (j * s->columns + i) + c;
+                double weight = channel == CHANNEL_LUMINANCE ? luminance_weight[c] : c == channel;
+                sum.difference += weight * (s->seen[at] - s->expected[at]);
+                sum.base += weight * s->base[at];
+                sum.bias += weight * s->bias[at];
+                sum.var += weight * weight * s->var[at];
+            }
+    return sum;
+}
+
+/* As difference_measure(), of whole cells, whose noise is known: no pixel of a wrong image need be like ours. */
+static bool measure(const struct cells *s, double alpha, struct difference *out, struct err *e)
+{
+    int side = s->cell < RUBRIC_TILE ? RUBRIC_TILE / s->cell : 1;
+    int columns = s->columns / side, rows = s->rows / side, num = columns * rows;
+    double z = stats_normal_quantile(alpha / 2 / (num + NUM_CHANNELS)), worst = -1;
+    *out = (struct difference){.compared = 1, .kappa = 1};
+    if (side * s->cell == RUBRIC_TILE) {
+        out->relative = calloc((size_t)num, sizeof *out->relative);
+        if (out->relative == NULL)
+            return err_set(e, "out of memory");
+    }
+    double dark = 1e-6;
+    for (int c = 0; c < NUM_CHANNELS; c++) {
+        struct sums all = sum_of(s, 0, 0, s->columns, s->rows, c);
+        out->image[c] = interval_of(&all, fmax(all.base, dark), z);
+    }
+    struct sums whole = sum_of(s, 0, 0, s->columns, s->rows, CHANNEL_LUMINANCE);
+    double least = fmax(0.25 * whole.base * side * side / (s->columns * s->rows), dark);
+    for (int t = 0; t < num; t++) {
+        int x = t % columns * side, y = t / columns * side;
+        struct sums tile = sum_of(s, x, y, side, side, CHANNEL_LUMINANCE);
+        struct interval i = interval_of(&tile, fmax(tile.base, least), z);
+        if (out->relative != NULL)
+            out->relative[t] = i.value;
+        if (interval_distance(&i) > worst) {
+            worst = interval_distance(&i);
+            out->tile = i;
+            out->tile_x = x * s->cell;
+            out->tile_y = y * s->cell;
+        }
+    }
+    out->tiles = num;
+    return true;
+}
+
+static void score(const struct rubric_check *c, struct result *out)
+{
+    const struct difference *d = &out->agreement;
+    out->share = score_share(&c->tile, &d->tile);
+    out->chance = score_chance(&c->tile, &d->tile);
+    for (int k = 0; k < NUM_CHANNELS; k++) {
+        out->share = fmin(out->share, score_share(&c->image, &d->image[k]));
+        out->chance = fmin(1, out->chance + score_chance(&c->image, &d->image[k]));
+    }
+    grade_checks_tell(d, out->seen, sizeof out->seen);
+}
+
+/* Of exact: the share of lit cells that are off. */
+static double share_off(const struct cells *s)
+{
+    static const double allowed_sd = 6, codes = 2e-3;
+    int lit = 0, off = 0;
+    for (int i = 0; i < s->columns * s->rows; i++) {
+        bool is_lit = false, is_off = false;
+        for (int k = 3 * i; k < 3 * i + 3; k++) {
+            is_lit |= s->expected[k] > codes || s->seen[k] > codes;
+            is_off |= fabs(s->seen[k] - s->expected[k]) > allowed_sd * sqrt(s->var[k]) + codes;
+        }
+        lit += is_lit;
+        off += is_lit && is_off;
+    }
+    return lit > 0 ? (double)off / lit : 1;
+}
+
+/* As the check itself, but of the number of samples that our renderer with the bugs takes. */
+static bool judge_rates(const struct carry *w, const struct rubric_check *c, int bugs,
+                        struct result *out, struct err *e)
+{
+    int image = c->images[0], first = bugs & 1 ? w->bug[0] : w->bug[1];
+    const struct rubric_image *p = &w->r->image[image];
+    const struct view *v = &w->b->catalogue.view[w->b->view[w->with][image]];
+    const struct moments *own = &w->a->of[w->with][image].as_asked,
+                         *ours = own->width > 0 ? own : &w->a->of[0][image].as_asked;
+    struct effect *room = malloc(sizeof *room);
+    struct rate_image rates;
+    struct err why;
+    if (room == NULL)
+        return err_set(e, "out of memory");
+    const struct effect *effect = bug_fit_effect(v, first, bugs == 3 ? w->bug[1] : -1, 0, room);
+    double more = effect->fact[FACT_SAMPLES] - v->correct.fact[FACT_SAMPLES];
+    free(room);
+    if (!isfinite(more) || w->h->made[image].rates[0] == '\0' ||
+        !rate_image_read(w->h->made[image].rates, p->width, p->height, p->spp, c->batch, ours->n,
+                         &rates, &why))
+        return true; /* which has been said */
+    double value = (1 + rates.more) / exp(more) - 1, odd = rates.odd / fmax(1, rates.pixels),
+           half = stats_normal_quantile(w->alpha / 2) * hypot(rates.sd, effect_error * more);
+    const struct interval count = {value, value - half, value + half, rates.sd},
+                          share = {odd, odd, odd, 0};
+    out->share = fmin(score_share(&c->share, &share), score_share(&c->count, &count));
+    out->chance = score_chance(&c->count, &count);
+    return true;
+}
+
+/* *is_judged: false where this kind, or an image without a view, is left as it is. */
+static bool judge(const struct carry *w, const struct rubric_check *c, int bugs, struct result *out,
+                  bool *is_judged, struct err *e)
+{
+    struct cells *cells = calloc(1, sizeof *cells);
+    bool ok = cells != NULL || err_set(e, "out of memory");
+    *is_judged = c->kind == CHECK_EQUAL || c->kind == CHECK_AGREE || c->kind == CHECK_SUM ||
+                 c->kind == CHECK_EXACT || c->kind == CHECK_RATES;
+    for (int k = 0; k < c->num_images; k++)
+        *is_judged = *is_judged && rubric_bugs_can_observe(w->b, w->h, w->with, c->images[k]);
+    if (ok && *is_judged && c->kind == CHECK_RATES) {
+        free(cells);
+        return judge_rates(w, c, bugs, out, e);
+    }
+    for (int k = 0; ok && *is_judged && k < c->num_images; k++)
+        ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);
+    if (ok && *is_judged && c->kind == CHECK_EXACT) {
+        double off = share_off(cells);
+        const struct interval i = {off, off, off, 0};
+        out->share = score_share(&c->share, &i);
+        out->chance = 0;
+        snprintf(out->seen, sizeof out->seen, "%.2f %% of the cells differ", 100 * off);
+    } else if (ok && *is_judged) {
+        ok = measure(cells, w->alpha, &out->agreement, e);
+        if (ok)
+            score(c, out);
+    }
+    free(cells);
+    return ok;
+}
+
+static void tell(const struct carry *w, int bugs, struct result *out)
+{
+    size_t n = (size_t)snprintf(out->carried, sizeof out->carried,
+                                "held against images with what has been paid before:");
+    for (int k = 0; k < w->num; k++)
+        if (bugs >> k & 1 && n < sizeof out->carried)
+            n +=
+                (size_t)snprintf(out->carried + n, sizeof out->carried - n, "%s %s (Part %s)",
+                                 k > 0 && bugs == 3 ? ";" : "", w->b->catalogue.bug[w->bug[k]].what,
+                                 w->r->part[w->paid[k]].number);
+}
+
+static bool carry_check(const struct carry *w, int check, struct result *result, struct err *e)
+{
+    const struct rubric_check *c = &w->r->check[check];
+    int bugs = 0;
+    bool is_judged = false, is_shown = false;
+    for (int k = 0; k < w->num; k++)
+        if (w->paid[k] != c->part) {
+            bugs |= 1 << k;
+            is_shown |= shows(w, w->bug[k], c);
+        }
+    if (!is_shown || result->share == 1 || !result->judged)
+        return true;
+    struct result other = *result;
+    other.agreement = (struct difference){0};
+    if (!judge(w, c, bugs, &other, &is_judged, e))
+        return false;
+    if (!is_judged || other.share <= result->share) {
+        result_free(&other);
+        return true;
+    }
+    other.more = 0;
+    result_free(result);
+    *result = other;
+    tell(w, bugs, result);
+    return true;
+}
+
+bool carried_by_name(const struct rubric *r, const struct answer_key *a,
+                     const struct rubric_bugs *b, struct submitted_images *h, int with,
+                     const struct diagnosis *found, double alpha, struct result *result,
+                     bool paid[RUBRIC_PARTS], struct err *e)
+{
+    struct carry w = {.r = r, .a = a, .b = b, .h = h, .with = with, .alpha = alpha};
+    find_payer(&w, found, 0, result);
+    if (found->candidate[0].second >= 0)
+        find_payer(&w, found, 1, result);
+    for (int k = 0; k < w.num; k++)
+        paid[w.paid[k]] = true;
+    bool ok = true;
+    for (int i = 0; ok && i < r->num_checks; i++)
+        ok = carry_check(&w, i, &result[i], e);
+    return ok;
+}

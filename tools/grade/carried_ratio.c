@@ -1,0 +1,245 @@
+#include "carried_ratio.h"
+
+#include "rate_image.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Mean luminance where neither of the two is as bright as the brightest code: what shines, and what is cut off, tells
+ * nothing. */
+static double mean_luminance(const struct rubric *r, const double *of, const double *with,
+                             int width, int height, double clip)
+{
+    double sum = 0, num = 0;
+    for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
+        bool bright = rubric_masks(r, width, height, p);
+        double luminance = 0;
+        for (size_t c = 0; c < 3; c++) {
+            bright |= of[3 * p + c] >= clip || (with != NULL && with[3 * p + c] >= clip);
+            luminance += luminance_weight[c] * of[3 * p + c];
+        }
+        sum += bright ? 0 : luminance;
+        num += !bright;
+    }
+    return num > 0 ? sum / num : 0;
+}
+
+/* Correlation of the tiles' luminance with that of the reference; the largest over mirrored images, as a camera may
+ * be wrong in that way. */
+static double likeness(const struct submitted_image *s, const struct moments *m)
+{
+    int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE;
+    double best = -1;
+    double *tiles = calloc(2 * (size_t)columns * (size_t)rows, sizeof *tiles);
+    if (tiles == NULL)
+        return -1;
+    double *theirs = tiles, *ours = tiles + columns * rows;
+    for (int y = 0; y < rows * RUBRIC_TILE; y++)
+        for (int x = 0; x < columns * RUBRIC_TILE; x++)
+            for (int c = 0; c < 3; c++) {
+                int tile = y / RUBRIC_TILE * columns + x / RUBRIC_TILE;
+                size_t i = 3 * ((size_t)y * (size_t)s->width + (size_t)x) + (size_t)c;
+                theirs[tile] += luminance_weight[c] * fmin(s->mean[i], s->clip);
+                ours[tile] += luminance_weight[c] * fmin(m->mean[i], s->clip);
+            }
+    for (int flip = 0; flip < 4; flip++) {
+        double n = columns * rows, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+        for (int t = 0; t < columns * rows; t++) {
+            int x = t % columns, y = t / columns;
+            x = flip & 1 ? columns - 1 - x : x;
+            y = flip & 2 ? rows - 1 - y : y;
+            double u = theirs[y * columns + x], v = ours[t];
+            a += u;
+            b += v;
+            aa += u * u;
+            bb += v * v;
+            ab += u * v;
+        }
+        double spread = (aa - a * a / n) * (bb - b * b / n);
+        best = fmax(best, spread > 0 ? (ab - a * b / n) / sqrt(spread) : -1);
+    }
+    free(tiles);
+    return best;
+}
+
+/* An image that shows no more than the earlier one has the ratio B/P: half way there nothing is left. */
+static struct margin margin_of(const struct margin *given, double expected)
+{
+    static const double telling = 0.1, least = 0.5;
+    struct margin m = *given;
+    if (fabs(log(expected)) > telling)
+        m.none = fmin(m.none, least * fabs(log(expected)));
+    m.full = fmin(m.full, 0.5 * m.none);
+    return m;
+}
+
+static const struct moments *answer_of(const struct answer_key *a, int set, int image)
+{
+    const struct moments *own = &a->of[set][image].m;
+    return own->width > 0 ? own : &a->of[0][image].m;
+}
+
+static void carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
+                        const struct submitted_images *h, const struct rubric_check *c,
+                        struct result *out)
+{
+    static const double least_likeness = 0.5;
+    const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
+    const struct moments *rp = answer_of(a, set, c->images[0]), *rb = answer_of(a, set, c->after);
+    if (p->mean == NULL || b->mean == NULL || strcmp(p->sha256, b->sha256) == 0 ||
+        likeness(p, rp) < least_likeness)
+        return;
+    bool same_size = p->width == b->width && p->height == b->height;
+    double clip = rubric_bugs_clip(r);
+    double theirs =
+               mean_luminance(r, p->mean, same_size ? b->mean : NULL, p->width, p->height, clip),
+           theirs_b =
+               mean_luminance(r, b->mean, same_size ? p->mean : NULL, b->width, b->height, clip),
+           ours =
+               mean_luminance(r, rp->mean, same_size ? rb->mean : NULL, p->width, p->height, clip),
+           ours_b =
+               mean_luminance(r, rb->mean, same_size ? rp->mean : NULL, b->width, b->height, clip);
+    if (!(theirs > 0 && theirs_b > 0 && ours > 0 && ours_b > 0))
+        return;
+    double v = log(theirs / theirs_b) - log(ours / ours_b);
+    const struct interval i = {v, v, v, 0};
+    const struct margin m = margin_of(&c->carried, ours / ours_b);
+    double share = score_share(&m, &i);
+    if (share <= out->share)
+        return;
+    out->share = share;
+    out->chance = 0;
+    snprintf(
+        out->carried, sizeof out->carried,
+        "held against '%s', which lost points before: %.3g times as bright as that, should be %.3g",
+        r->image[c->after].name, theirs / theirs_b, ours / ours_b);
+}
+
+static bool is_there(const struct submitted_images *h, const struct rubric_check *c)
+{
+    for (int k = 0; k < c->num_images; k++)
+        if (h->image[c->images[k]].mean == NULL)
+            return false;
+    return true;
+}
+
+static bool same_view(const struct rubric_image *a, const struct rubric_image *b)
+{
+    return strcmp(a->scene, b->scene) == 0 && strcmp(a->environment, b->environment) == 0 &&
+           a->width == b->width && a->height == b->height;
+}
+
+/* Did a check of an earlier part lose points that looks at this image? of -1: at one of the scene of `like`. */
+static bool was_lost(const struct rubric *r, const struct rubric_check *c, int image,
+                     const struct rubric_image *like, const double *share)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        for (int k = 0; r->check[i].part < c->part && share[i] < 1 && k < r->check[i].num_images;
+             k++) {
+            int seen = r->check[i].images[k];
+            if (seen == image || (image < 0 && same_view(&r->image[seen], like)))
+                return true;
+        }
+    return false;
+}
+
+/* How many samples a wrong image takes differs a little from a right one. */
+static void carry_rates(const struct rubric *r, const struct answer_key *a, int set,
+                        const struct submitted_images *h, const struct rubric_check *c,
+                        struct result *out)
+{
+    const struct rubric_image *p = &r->image[c->images[0]];
+    const struct moments *own = &a->of[set][c->images[0]].as_asked,
+                         *ours = own->width > 0 ? own : &a->of[0][c->images[0]].as_asked;
+    struct rate_image rates;
+    struct err why;
+    if (h->made[c->images[0]].rates[0] == '\0' ||
+        !rate_image_read(h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
+                         ours->n, &rates, &why))
+        return;
+    double v = rates.more > -1 ? log1p(rates.more) : -INFINITY,
+           odd = rates.odd / fmax(1, rates.pixels);
+    const struct interval count = {v, v, v, 0}, share = {odd, odd, odd, 0};
+    const struct margin m = margin_of(&c->carried, rates.mean / (1 + rates.more) / p->spp);
+    double better = fmin(score_share(&m, &count), score_share(&c->share, &share));
+    if (better <= out->share)
+        return;
+    out->share = better;
+    out->chance = 0;
+    snprintf(
+        out->carried, sizeof out->carried,
+        "an earlier part lost points in this scene: the number of samples may be off by %.0f %%",
+        100 * expm1(m.full));
+}
+
+/* Another image of the same light with more samples, whose noise is low: -1: none. */
+static int quieter(const struct rubric *r, const struct submitted_images *h, int image)
+{
+    const struct rubric_image *p = &r->image[image];
+    for (int i = 0; i < r->num_images; i++) {
+        const struct rubric_image *q = &r->image[i];
+        if (h->image[i].mean != NULL && same_view(p, q) && p->bounces == q->bounces &&
+            strcmp(p->options, q->options) == 0 && q->spp >= 4 * p->spp &&
+            q->spp * q->lights >= 4 * p->spp * p->lights)
+            return i;
+    }
+    return -1;
+}
+
+/* Noise is measured against the program's own image, if that is not what it should be. */
+static void carry_noise(const struct rubric *r, const struct answer_key *a,
+                        struct submitted_images *h, const struct rubric_check *c, double alpha,
+                        struct result *out)
+{
+    struct submitted_image *p = &h->image[c->images[0]], *q = &h->image[c->images[1]], own;
+    int other = quieter(r, h, c->images[0]);
+    size_t pixels = (size_t)p->width * (size_t)p->height;
+    struct interval i;
+    struct err why;
+    if (other < 0 || strcmp(p->sha256, q->sha256) == 0)
+        return;
+    submitted_image_expect(&h->image[other], &a->of[0][other].noise, r->image[other].spp);
+    unsigned char *use = malloc(pixels);
+    if (use == NULL || !submitted_image_copy(&h->image[other], &own, &why)) {
+        free(use);
+        return;
+    }
+    own.known = true;
+    for (size_t k = 0; k < pixels; k++)
+        use[k] = !rubric_masks(r, p->width, p->height, k);
+    submitted_image_unclipped(p, use);
+    submitted_image_unclipped(q, use);
+    submitted_image_unclipped(&own, use);
+    if (difference_noise(p, &own, q, &own, use, alpha, &i, &why) &&
+        score_share(&c->log_ratio, &i) > out->share) {
+        out->share = score_share(&c->log_ratio, &i);
+        out->chance = score_chance(&c->log_ratio, &i);
+        out->more = 0;
+        snprintf(out->carried, sizeof out->carried, "against the program's own image '%s'",
+                 r->image[other].name);
+        snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
+                 exp(i.lo), exp(i.hi));
+    }
+    submitted_image_free(&own);
+    free(use);
+}
+
+void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
+                      struct submitted_images *h, double alpha, const double *share,
+                      const bool *paid, struct result *result)
+{
+    for (int i = 0; i < r->num_checks; i++) {
+        const struct rubric_check *c = &r->check[i];
+        const struct rubric_image *p = &r->image[c->images[0]];
+        if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(h, c))
+            continue;
+        if (c->after >= 0 && was_lost(r, c, c->after, NULL, share))
+            carry_ratio(r, a, set, h, c, &result[i]);
+        else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
+            carry_rates(r, a, set, h, c, &result[i]);
+        else if (c->kind == CHECK_NOISE)
+            carry_noise(r, a, h, c, alpha, &result[i]);
+    }
+}

@@ -1,0 +1,18 @@
+/* One mistake is paid once, also without a name: what an earlier part lost points for is no reason to lose them again. */
+#ifndef ASSAY_CARRIED_RATIO_H
+#define ASSAY_CARRIED_RATIO_H
+
+#include "rubric_bugs.h"
+
+/* result: of all checks; those that gain are changed, and `carried` says why. share: what each had against right images. paid: of parts, whose
+ * checks are left alone, as a mistake that has a name is paid there.
+ * `equal` with `after IMAGE`, where a check of an earlier part on that image lost points: R = (P'/P)/(B'/B), P the
+ * image's mean luminance, B that of IMAGE, primes the student's; log R against the margin `carried`. An image that is
+ * the other one again, or does not look like what it should show, carries nothing on.
+ * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin.
+ * `noise`: against another image of the program's own with more samples, instead of the right one. */
+void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
+                      struct submitted_images *h, double alpha, const double *share,
+                      const bool *paid, struct result *result);
+
+#endif
