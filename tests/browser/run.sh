@@ -46,3 +46,19 @@ done
 sed -i "s|\"reason\": \".*\"|\"reason\": \"</script><script>alert(2)</script>\", \"notes\": [\"$evil\"]|" "$tmp/evil.json"
 "$build/assay" report -o "$tmp/evil.html" "$tmp/evil.json" >/dev/null
 for page in evil compared; do look names.mjs "$tmp/$page.html"; done
+
+# A class of seven: the two of tools/docs/guide-course.md, and five in the states that need staff.
+mkdir -p "$tmp/class/ada"
+cp "$build/pathtracer" "$tmp/class/ada/"
+for id in bob cyd dan eve fay gus; do
+    mkdir "$tmp/class/$id"
+    cp "$build/pathtracer" "$tmp/class/$id/ours"
+    printf '#!/bin/sh\nexec ./ours "$@" --only direct\n' >"$tmp/class/$id/pathtracer"
+    chmod +x "$tmp/class/$id/pathtracer"
+done
+grade() { "$build/assay" grade -q --unsafe-no-sandbox -o "$tmp/grades" tools/rubrics/template.rubric "$tmp/class"/*; }
+grade
+node "$here/grades_states.mjs" "$tmp/grades"
+grade
+[ $? = 2 ] && echo "ok grades: staff are needed" || echo "not ok grades: staff are needed: another exit code"
+look grades.mjs "$build/browser/shots" "$tmp/grades"

@@ -1,7 +1,9 @@
-/* The class, for staff: who has what, how points are spread, which bugs are common, whose programs are slow, and what
+/* The class, for staff: whom they have to look at, what changed, who has what, how points are spread, which bugs are common, whose programs are slow, and what
  * looks alike. */
 #include "student_page.h"
 
+#include "grade_change.h"
+#include "grade_needs.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot.h"
 #include "tools/results/results.h"
@@ -38,7 +40,7 @@ static void histogram(FILE *f, const json_t *grades)
 }
 
 /* A path of one part for an href. */
-static void link_to(FILE *f, const char *id)
+static void link_to(FILE *f, const char *id, const char *file, const char *text)
 {
     fputs("<a href=\"", f);
     for (const char *c = id; *c != '\0'; c++)
@@ -46,59 +48,140 @@ static void link_to(FILE *f, const char *id)
             fputc(*c, f);
         else
             fprintf(f, "%%%02X", (unsigned)(unsigned char)*c);
-    html_print(f, "/index.html\">%s</a>", id);
+    html_print(f, "/%s\">%s</a>", file, text);
 }
 
-static void table(FILE *f, const json_t *grades)
+/* Those that need staff first, then those with the fewest points. */
+static int by_urgency(const void *a, const void *b)
+{
+    const json_t *g = *(json_t *const *)a, *h = *(json_t *const *)b;
+    char ignored[8];
+    int needs = grade_needs(h, ignored, sizeof ignored) - grade_needs(g, ignored, sizeof ignored);
+    double x = member_number(g, "points"), y = member_number(h, "points");
+    if (needs != 0)
+        return needs;
+    return x != y ? (x > y) - (x < y) : strcmp(member_or_empty(g, "id"), member_or_empty(h, "id"));
+}
+
+/* What is to be said of one in a word or two. */
+static const char *in_short(const json_t *grade)
+{
+    const char *state = grade_state(grade);
+    return state != NULL ? state : grade_is_provisional(grade) ? "provisional" : "look";
+}
+
+/* The line on top: who needs staff. */
+static void summary(FILE *f, json_t *const *sorted, size_t num)
+{
+    enum { NAMED = 12 };
+    char text[8];
+    size_t needed = 0;
+    while (needed < num && grade_needs(sorted[needed], text, sizeof text))
+        needed++;
+    if (needed > 0)
+        fprintf(f, "<p class=\"error-line\"><b>%zu of %zu need you</b>", needed, num);
+    else
+        fprintf(f, "<p><b>None of %zu needs you</b>", num);
+    for (size_t i = 0; i < needed && i < NAMED; i++) {
+        fputs(i == 0 ? ": " : ", ", f);
+        link_to(f, member_or_empty(sorted[i], "id"), "staff.html",
+                member_or_empty(sorted[i], "id"));
+        html_print(f, " (%s)", in_short(sorted[i]));
+    }
+    if (needed > NAMED)
+        fprintf(f, " and %zu more", needed - NAMED);
+    fputs(".</p>\n", f);
+}
+
+static void bugs_of(FILE *f, const json_t *g)
+{
+    size_t k;
+    json_t *b;
+    json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, b)
+    {
+        const char *and = member_or_empty(b, "and");
+        html_print(f, "%s%s%s%s", k > 0 ? " or " : "", member_text(b, "name"),
+                   and[0] != '\0' ? " and " : "", and);
+    }
+    /* Of other deviations than those it was graded with: staff may want to know. */
+    const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
+    if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0)
+        html_print(f, " on top of %s", with);
+    if (k == 0)
+        html_text(f, member_text(g, "located"));
+}
+
+static void row(FILE *f, const json_t *g, size_t parts)
+{
+    char text[2048];
+    const char *id = member_or_empty(g, "id"), *accepted = member_or_empty(g, "accepted");
+    bool needs = grade_needs(g, text, sizeof text);
+    size_t k;
+    json_t *p;
+    fprintf(f, "<tr%s><th scope=\"row\">", needs ? " class=\"bad\"" : "");
+    link_to(f, id, "staff.html", id);
+    fputs("<br><small>", f);
+    link_to(f, id, "index.html", "student's page");
+    fprintf(f, "</small></th><td class=\"num\">%.2f</td><td class=\"needs\">",
+            member_number(g, "points"));
+    if (needs)
+        html_print(f, "<span class=\"badge error\">%s</span> %s", in_short(g), text);
+    if (accepted[0] != '\0')
+        html_print(f, "%saccepted: %s", needs ? "; " : "", accepted);
+    fputs("</td><td class=\"needs\">", f);
+    bugs_of(f, g);
+    fputs("</td>", f);
+    json_array_foreach(json_object_get(g, "parts"), k, p)
+    {
+        fprintf(f, "<td class=\"num\">%.2f</td>", member_number(p, "points"));
+    }
+    for (k = json_array_size(json_object_get(g, "parts")); k < parts; k++)
+        fputs("<td></td>", f);
+    fputs("</tr>\n", f);
+}
+
+static void table(FILE *f, json_t *const *sorted, size_t num)
 {
     const json_t *parts = NULL;
-    size_t i, k;
-    json_t *g, *p, *c;
-    json_array_foreach(grades, i, g)
-    {
-        if (json_array_size(json_object_get(g, "parts")) > 0)
-            parts = json_object_get(g, "parts");
-    }
-    fputs("<h2>Submissions</h2><table><tr><th>submission</th><th class=\"num\">points</th>", f);
+    size_t k;
+    json_t *p;
+    for (size_t i = 0; i < num; i++)
+        if (json_array_size(json_object_get(sorted[i], "parts")) > json_array_size(parts))
+            parts = json_object_get(sorted[i], "parts");
+    fputs(
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Submissions\"><table><thead><tr>"
+        "<th scope=\"col\">submission</th><th scope=\"col\" class=\"num\">points</th>"
+        "<th scope=\"col\">for you to look at</th><th scope=\"col\">bug</th>",
+        f);
     json_array_foreach(parts, k, p)
     {
-        html_print(f, "<th class=\"num\">%s</th>", member_text(p, "number"));
+        html_print(f, "<th scope=\"col\" class=\"num\">%s</th>", member_text(p, "number"));
     }
-    fputs("<th>bug</th><th>for you to look at</th></tr>\n", f);
-    json_array_foreach(grades, i, g)
-    {
-        fputs("<tr><td>", f);
-        link_to(f, member_or_empty(g, "id"));
-        fprintf(f, "</td><td class=\"num\">%.2f</td>", member_number(g, "points"));
-        json_array_foreach(json_object_get(g, "parts"), k, p)
-        {
-            fprintf(f, "<td class=\"num\">%.2f</td>", member_number(p, "points"));
-        }
-        if (json_array_size(json_object_get(g, "parts")) == 0)
-            fprintf(f, "<td colspan=\"%zu\"></td>", json_array_size(parts));
-        fputs("<td>", f);
-        json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, p)
-        {
-            html_print(f, "%s%s", k > 0 ? " or " : "", member_text(p, "name"));
-        }
-        /* Of other deviations than those it was graded with: staff may want to know. */
-        const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
-        if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0)
-            html_print(f, " on top of %s", with);
-        html_print(f, "</td><td>%s%s", member_text(g, "trouble"), member_text(g, "wrong"));
-        if (member_or_empty(g, "accepted")[0] != '\0')
-            html_print(f, "accepted: %s; ", member_text(g, "accepted"));
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
-            bool judged = json_is_true(json_object_get(c, "judged"));
-            if (member_or_empty(c, "flag")[0] == '\0' && judged)
-                continue;
-            html_print(f, "%s: %s%s", member_text(c, "name"), member_text(c, "flag"),
-                       judged ? "; " : " not judged; ");
-        }
-        fputs("</td></tr>\n", f);
+    fputs("</tr></thead>\n<tbody>\n", f);
+    for (size_t i = 0; i < num; i++)
+        row(f, sorted[i], json_array_size(parts));
+    html_table_close(f);
+}
+
+/* Since the grades before: another rubric, or an appeal. */
+static void changes(FILE *f, json_t *const *sorted, size_t num)
+{
+    size_t changed = 0;
+    for (size_t i = 0; i < num; i++) {
+        char text[1024];
+        grade_change_text(sorted[i], text, sizeof text);
+        if (text[0] == '\0')
+            continue;
+        if (changed++ == 0)
+            fputs("<h2>What changed</h2><ul>\n", f);
+        fputs("<li>", f);
+        link_to(f, member_or_empty(sorted[i], "id"), "staff.html",
+                member_or_empty(sorted[i], "id"));
+        fprintf(f, ": %.2f of %g, ", member_number(sorted[i], "points"),
+                member_number(sorted[i], "of"));
+        html_print(f, "%s</li>\n", text);
     }
-    fputs("</table>\n", f);
+    fputs(changed > 0 ? "</ul>\n" : "", f);
 }
 
 /* A text and how often it was met. */
@@ -219,7 +302,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
         if (group[i] != number)
             continue;
         fputs(members++ > 0 ? ", " : "", f);
-        link_to(f, member_or_empty(g, "id"));
+        link_to(f, member_or_empty(g, "id"), "staff.html", member_or_empty(g, "id"));
     }
     fputs("</li>\n", f);
 }
@@ -248,25 +331,31 @@ static void show_same_noise(FILE *f, const json_t *grades, int *group)
 
 bool class_page(FILE *f, const json_t *grades, struct err *e)
 {
-    struct tally *t = calloc(json_array_size(grades) + 1, sizeof *t);
-    int *group = calloc(json_array_size(grades) + 1, sizeof *group);
-    if (t == NULL || group == NULL) {
-        free(t);
-        free(group);
-        return err_set(e, "out of memory for the page of the class");
+    size_t num = json_array_size(grades), i;
+    json_t *g, **sorted = calloc(num + 1, sizeof(json_t *));
+    struct tally *t = calloc(num + 1, sizeof *t);
+    int *group = calloc(num + 1, sizeof *group);
+    bool ok = (sorted != NULL && t != NULL && group != NULL) ||
+              err_set(e, "out of memory for the page of the class");
+    if (ok) {
+        json_array_foreach(grades, i, g) sorted[i] = g;
+        qsort(sorted, num, sizeof(json_t *), by_urgency);
+        html_page_open(f, "Grades", NULL, 0);
+        html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n",
+                   member_text(json_array_get(grades, 0), "rubric"));
+        summary(f, sorted, num);
+        changes(f, sorted, num);
+        table(f, sorted, num);
+        histogram(f, grades);
+        common_bugs(f, grades, t);
+        slowest(f, grades, t);
+        look_alikes(f, grades);
+        show_same_noise(f, grades, group);
+        fputs("</div>\n", f);
+        html_page_close(f);
     }
-    html_page_open(f, "Grades", NULL, 0);
-    html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n<p>%zu submissions</p>\n",
-               member_text(json_array_get(grades, 0), "rubric"), json_array_size(grades));
-    histogram(f, grades);
-    common_bugs(f, grades, t);
-    slowest(f, grades, t);
-    look_alikes(f, grades);
-    show_same_noise(f, grades, group);
-    table(f, grades);
-    fputs("</div>\n", f);
-    html_page_close(f);
+    free(sorted);
     free(t);
     free(group);
-    return true;
+    return ok;
 }

@@ -6,6 +6,7 @@
 #include "tools/results/results.h"
 #include "grade_batch.h"
 #include "grade_change.h"
+#include "grade_needs.h"
 #include "same_noise.h"
 
 #include <limits.h>
@@ -85,22 +86,17 @@ static void tell(void *ctx, int num, const char *path, const json_t *grade)
     fflush(stdout);
 }
 
-static bool needs_staff(const json_t *grades)
+/* How many do. */
+static size_t need_staff(const json_t *grades)
 {
-    size_t i, k;
-    json_t *g, *c;
+    size_t i, num = 0;
+    json_t *g;
     json_array_foreach(grades, i, g)
     {
-        if (json_is_string(json_object_get(g, "trouble")) ||
-            json_is_string(json_object_get(g, "wrong")))
-            return true;
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
-            if (!json_is_true(json_object_get(c, "judged")))
-                return true;
-        }
+        char text[8];
+        num += grade_needs(g, text, sizeof text);
     }
-    return false;
+    return num;
 }
 
 /* Where it may be a slip of the pen: a class may be graded in pieces. */
@@ -165,9 +161,14 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
         job.diagnosis = &diagnosis;
     }
     ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
-    warn_of_strangers(s->appeals, &appeals, grades);
-    if (ok && grade_write(s->out, grades, e))
-        code = needs_staff(grades) ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
+    if (ok)
+        warn_of_strangers(s->appeals, &appeals, grades);
+    if (ok && grade_write(s->out, r, answers, grades, e)) {
+        size_t need = need_staff(grades);
+        code = need > 0 ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
+        if (need > 0 && !s->quiet)
+            printf("%zu of %d need you: %s/index.html\n", need, s->num, s->out);
+    }
     json_decref(grades);
     appeals_free(&appeals);
     grade_diagnose_close(&diagnosis);

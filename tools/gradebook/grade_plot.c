@@ -1,3 +1,4 @@
+#include "grade_images.h"
 #include "student_page.h"
 
 #include "tools/html/html.h"
@@ -43,43 +44,48 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
                   : "difference: red too bright, blue too dark, full colour from 50 %");
 }
 
-/* One row, each number over that beyond which there are no points. */
+enum { ROW = 34 };
+
+/* One row: what it is about above its bar. */
 static void draw_interval(struct plot *p, const json_t *v, double y)
 {
-    double none = member_number(v, "none"), full = member_number(v, "full") / none,
+    double none = member_number(v, "none"), full = member_number(v, "full"),
            value = member_number(v, "value"), lo = member_number(v, "lo"),
            hi = member_number(v, "hi");
     char text[128];
     snprintf(text, sizeof text, "%.60s %+.1f %% (%+.1f to %+.1f)", member_or_empty(v, "what"),
              100 * value, 100 * lo, 100 * hi);
-    plot_bar(p, "none", -1, y + 0.1, 1, y + 0.9, "no points beyond ±%.3g %%", 100 * none);
-    plot_bar(p, "all", -full, y + 0.1, full, y + 0.9, "all points within ±%.3g %%",
-             100 * full * none);
-    plot_segment(p, "interval", lo / none, y + 0.5, hi / none, y + 0.5);
-    plot_point(p, 0, value / none, y + 0.5, "%s", text);
-    plot_text(p, 2, y + 0.5, 14, 4, "start", "%s", text);
+    plot_bar(p, "none", -100 * none, y + 0.1, 100 * none, y + 0.5, "no points beyond ±%.3g %%",
+             100 * none);
+    plot_bar(p, "all", -100 * full, y + 0.1, 100 * full, y + 0.5, "all points within ±%.3g %%",
+             100 * full);
+    plot_segment(p, "expected", 0, y, 0, y + 0.55);
+    plot_segment(p, "interval", 100 * lo, y + 0.3, 100 * hi, y + 0.3);
+    plot_point(p, 0, 100 * value, y + 0.3, "%s", text);
+    plot_text(p, p->x.lo, y + 0.6, 4, 0, "start", "%s", text);
 }
 
 void grade_plot_intervals(FILE *f, const json_t *check)
 {
     const json_t *list = json_object_get(check, "intervals");
     size_t num = json_array_size(list), i;
+    double most = 0;
     json_t *v;
-    if (num == 0)
+    json_array_foreach(list, i, v) most = fmax(most, 200 * member_number(v, "none"));
+    if (num == 0 || !(most > 0))
         return;
-    struct plot p = plot_sized(f, 360, 20 * (double)num);
+    struct plot p = plot_sized(f, 312, ROW * (double)num);
     p.style = "plot grades";
     p.left = 14;
-    p.right = 260;
+    p.right = 24;
     p.x = (struct plot_axis){
-        .label = "−: too dark, +: too bright; beyond ±1 no points", .lo = -2, .hi = 2, .step = 1};
+        .label = "difference, %: − too dark, + too bright", .lo = -most, .hi = most};
     p.y.hi = (double)num;
-    fputs("<figure>", f);
+    fputs("<figure class=\"numbers\">", f);
     plot_open(&p, "Differences with their intervals, beside the margins");
     json_array_foreach(list, i, v) draw_interval(&p, v, (double)(num - 1 - i));
-    plot_segment(&p, "expected", 0, 0, 0, (double)num);
     plot_close(&p);
-    fputs("<figcaption>by how much, with the noise of your image: all points while a bar touches "
+    fputs("<figcaption>by how much, with the noise of the image: all points while a bar touches "
           "green, none once it has left yellow</figcaption></figure>\n",
           f);
 }

@@ -1,4 +1,5 @@
 #include "grade_batch.h"
+#include "grade_needs.h"
 
 #include "reference/base/json_file.h"
 #include "renderer/base/fs.h"
@@ -30,8 +31,19 @@ static bool is_full(const json_t *check)
 /* What a student reads of a check. */
 static void describe(const json_t *c, char *out, size_t size)
 {
-    size_t n = (size_t)snprintf(out, size, "Expected: %s.\nSeen: %s.",
-                                member_or_empty(c, "expected"), member_or_empty(c, "seen"));
+    size_t n = 0;
+    if (grade_is_provisional(c))
+        n = (size_t)snprintf(
+            out, size,
+            "Provisional: the samples did not suffice to decide this; the points are kept until staff have looked.\n");
+    else if (!is_full(c) && member_number(c, "share") > 0)
+        n = (size_t)snprintf(out, size, "Partial credit: %.2f of %g points.\n",
+                             member_number(c, "points"), member_number(c, "of"));
+    n += (size_t)snprintf(out + n, size - n, "Expected: %s.\nSeen: %s.",
+                          member_or_empty(c, "expected"), member_or_empty(c, "seen"));
+    if (member_or_empty(c, "appeal")[0] != '\0' && n < size)
+        n +=
+            (size_t)snprintf(out + n, size - n, "\nDecided by staff: %s", member_text(c, "appeal"));
     if (member_or_empty(c, "accepted")[0] != '\0' && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
@@ -49,22 +61,41 @@ static void describe(const json_t *c, char *out, size_t size)
 static void describe_whole(const json_t *grade, char *out, size_t size)
 {
     const json_t *diagnosis = json_object_get(grade, "diagnosis");
-    size_t n = (size_t)snprintf(out, size, "%s%s", member_or_empty(grade, "trouble"),
-                                member_or_empty(grade, "wrong")),
+    const char *located = member_or_empty(grade, "located");
+    size_t n = (size_t)snprintf(out, size, "%s%s%s", member_or_empty(grade, "trouble"),
+                                member_or_empty(grade, "wrong"),
+                                grade_is_provisional(grade)
+                                    ? "Some points are provisional, until staff have looked.\n"
+                                    : ""),
            i;
     json_t *b;
-    if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && n < size)
+    if (located[0] != '\0' && n < size)
+        n += (size_t)snprintf(out + n, size - n, "What is wrong shows %s.\n", located);
+    else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && n < size)
         n += (size_t)snprintf(
             out + n, size - n,
             "Different from the right images in a way that no known bug explains.");
     json_array_foreach(json_object_get(diagnosis, "named"), i, b)
     {
+        const char *and = member_or_empty(b, "and_bug");
         if (n < size)
-            n +=
-                (size_t)snprintf(out + n, size - n, "%s%s (%s)",
-                                 i == 0 ? "This looks like: " : "\nor: ", member_or_empty(b, "bug"),
-                                 member_or_empty(b, "where"));
+            n += (size_t)snprintf(
+                out + n, size - n, "%s%s (%s)%s%s%s%s%s",
+                i == 0 ? "This looks like: " : "\nor: ", member_or_empty(b, "bug"),
+                member_or_empty(b, "where"), and[0] != '\0' ? ", and with it " : "", and,
+                and[0] != '\0' ? " (" : "", member_or_empty(b, "and_where"),
+                and[0] != '\0' ? ")" : "");
     }
+}
+
+/* Of all its runs, one after the other. */
+static double execution_time(const json_t *grade)
+{
+    double sum = 0;
+    size_t i;
+    json_t *p;
+    json_array_foreach(json_object_get(grade, "pictures"), i, p) sum += member_number(p, "wall_s");
+    return sum;
 }
 
 /* Fields as documented at gradescope-autograders.readthedocs.io, "specs": points and texts of every check, no
@@ -91,6 +122,7 @@ static json_t *gradescope(const json_t *grade)
     char whole[2048];
     describe_whole(grade, whole, sizeof whole);
     json_object_set_new(root, "output", json_string(whole));
+    json_object_set_new(root, "execution_time", json_real(execution_time(grade)));
     json_object_set_new(root, "output_format", json_string("text"));
     json_object_set_new(root, "test_output_format", json_string("text"));
     json_object_set_new(root, "visibility", json_string("visible"));
@@ -265,37 +297,45 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
 
 static const char *const class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
                                           NULL};
-static const char *const files[] = {"results.json", "index.html", NULL};
+static const char *const pages[] = {"index.html", "staff.html", NULL};
 
-/* One of these into the file `to`. grades: the array, of a class; one grade, of a submission. */
-static bool write_file(const char *dir, const json_t *grades, const char *name, const char *to,
-                       struct err *e)
+/* One of these. grades: the array, of a class; one grade, of a submission. */
+static bool write_file(const char *out, const struct rubric *r, const struct answer_key *a,
+                       const json_t *grades, const char *name, struct err *e)
 {
     struct out_file o;
-    if (strcmp(name, "results.json") == 0)
-        return write_json(to, gradescope(grades), e);
-    if (!fs_make_parent_dirs(to, e) || !out_open(&o, to, e))
+    bool of_class = json_is_array(grades), ok;
+    const struct path to = of_class ? fs_path("%s/%s", out, name)
+                                    : fs_path("%s/%s/%s", out, member_or_empty(grades, "id"), name);
+    if (!fs_make_parent_dirs(to.s, e) || !out_open(&o, to.s, e))
         return false;
-    if (json_is_array(grades) ? write_text(grades, name, o.f, e)
-                              : student_page(o.f, dir, grades, e))
+    if (of_class)
+        ok = write_text(grades, name, o.f, e);
+    else if (strcmp(name, "staff.html") == 0)
+        ok = staff_page(o.f, out, r, a, grades, e);
+    else
+        ok = student_page(o.f, out, grades, e);
+    if (ok)
         return out_commit(&o, e);
     out_abandon(&o);
     return false;
 }
 
-bool grade_write(const char *out, const json_t *grades, struct err *e)
+bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
+                 const json_t *grades, struct err *e)
 {
     size_t i;
     json_t *g;
     bool ok = true;
     json_array_foreach(grades, i, g)
     {
-        for (int k = 0; ok && files[k] != NULL; k++)
-            ok = write_file(out, g, files[k],
-                            fs_path("%s/%s/%s", out, member_or_empty(g, "id"), files[k]).s, e);
+        ok = ok && write_json(fs_path("%s/%s/results.json", out, member_or_empty(g, "id")).s,
+                              gradescope(g), e);
+        for (int k = 0; ok && pages[k] != NULL; k++)
+            ok = write_file(out, r, a, g, pages[k], e);
     }
     ok = ok && json_write(fs_path("%s/grades.json", out).s, grades, e);
     for (int k = 0; ok && class_files[k] != NULL; k++)
-        ok = write_file(out, grades, class_files[k], fs_path("%s/%s", out, class_files[k]).s, e);
+        ok = write_file(out, r, a, grades, class_files[k], e);
     return ok;
 }

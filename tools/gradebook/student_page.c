@@ -1,91 +1,31 @@
-/* A student's page: what was asked, what was seen, where. One file, no script, nothing from elsewhere. Checks that
- * are not visible now are left out: the page may be handed to the student. The reference is not shown, only how the
- * student's image differs from it. */
+/* The page of one submission: in one glance where the points went, then what is wrong, then each check that lost some with what was
+ * asked, what was seen, where; what is right is folded. */
 #include "student_page.h"
 
+#include "grade_change.h"
+#include "grade_images.h"
+#include "grade_needs.h"
+#include "grade_summary.h"
 #include "renderer/base/fs.h"
-#include "renderer/image/tone.h"
-#include "tools/images/image_file.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+struct page {
+    FILE *f;
+    const char *dir;
+    const json_t *grade;
+    bool staff;
+    const struct rubric *rubric; /* of staff's; NULL: none */
+    const struct answer_key *answers;
+};
 
 static void paragraph(FILE *f, const char *label, const char *text, const char *class)
 {
     if (text[0] != '\0')
         html_print(f, "<p class=\"%s\"><b>%s</b> %s</p>\n", class, label, text);
-}
-
-/* Codes as they are, floats by sRGB. */
-static uint8_t *codes(const struct image_file *pic)
-{
-    size_t n = 3 * (size_t)pic->width * (size_t)pic->height;
-    uint8_t *rgb8 = malloc(n);
-    bool coded = pic->info.type == IMAGE_INT8 || pic->info.type == IMAGE_INT16;
-    for (size_t i = 0; rgb8 != NULL && i < n; i++)
-        rgb8[i] = coded ? (uint8_t)lround(255 * (double)pic->rgb[i])
-                        : tone_map(TONE_SRGB, (double)pic->rgb[i]);
-    return rgb8;
-}
-
-static bool write_png(FILE *f, int width, int height, const uint8_t *rgb8, struct err *e)
-{
-    uint8_t *bytes;
-    size_t size;
-    if (!image_encode_png(width, height, rgb8, &bytes, &size, e))
-        return false;
-    fputs("data:image/png;base64,", f);
-    html_base64(f, bytes, size);
-    free(bytes);
-    return true;
-}
-
-/* The tile with its neighbours, enlarged: three by three of them, fewer at the rim. Moves rows of rgb8 to its front. */
-static bool show_crop(FILE *f, const struct image_file *pic, uint8_t *rgb8, const json_t *tile,
-                      struct err *e)
-{
-    if (json_array_size(tile) != 2)
-        return true;
-    int x = (int)json_number_value(json_array_get(tile, 0)) - GRADE_TILE,
-        y = (int)json_number_value(json_array_get(tile, 1)) - GRADE_TILE;
-    int right = x + 3 * GRADE_TILE < pic->width ? x + 3 * GRADE_TILE : pic->width,
-        bottom = y + 3 * GRADE_TILE < pic->height ? y + 3 * GRADE_TILE : pic->height;
-    x = x > 0 ? x : 0;
-    y = y > 0 ? y : 0;
-    int width = right - x, height = bottom - y;
-    if (width <= 0 || height <= 0)
-        return true;
-    for (int row = 0; row < height; row++)
-        memmove(rgb8 + 3 * (size_t)(row * width),
-                rgb8 + 3 * ((size_t)(y + row) * (size_t)pic->width + (size_t)x), 3 * (size_t)width);
-    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", 12 * width);
-    bool ok = write_png(f, width, height, rgb8, e);
-    fprintf(f,
-            "\"><figcaption>of it, pixels %d,%d to %d,%d, around what differs "
-            "most</figcaption></figure>\n",
-            x, y, right - 1, bottom - 1);
-    return ok;
-}
-
-static bool show_image(FILE *f, const char *path, const char *name, const json_t *tile,
-                       struct err *e)
-{
-    struct image_file pic;
-    struct err why;
-    if (!image_file_read(path, &pic, &why)) /* what is wrong with it has been said */
-        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
-    uint8_t *rgb8 = codes(&pic);
-    bool ok = rgb8 != NULL || err_set(e, "out of memory");
-    fprintf(f, "<figure><img width=\"%d\" alt=\"\" src=\"", GRADE_SHOWN);
-    ok = ok && write_png(f, pic.width, pic.height, rgb8, e);
-    html_print(f, "\"><figcaption>%s, yours</figcaption></figure>\n", name);
-    ok = ok && show_crop(f, &pic, rgb8, tile, e);
-    free(rgb8);
-    image_file_free(&pic);
-    return ok;
 }
 
 /* The chance that another run gets other points, of a check or of all of them. */
@@ -103,6 +43,19 @@ static void show_chance(FILE *f, double chance, bool moves, const char *here)
     fputs("</p>\n", f);
 }
 
+static bool is_full(const json_t *check)
+{
+    return member_number(check, "share") >= 1;
+}
+
+/* Does it stand before the fold? */
+static bool stands_out(const struct page *p, const json_t *check)
+{
+    return !is_full(check) || grade_is_provisional(check) || member_text(check, "appeal") != NULL ||
+           (p->staff && (member_or_empty(check, "flag")[0] != '\0' ||
+                         !json_is_true(json_object_get(check, "judged"))));
+}
+
 static const json_t *image_of(const json_t *grade, const char *name)
 {
     size_t i;
@@ -115,92 +68,233 @@ static const json_t *image_of(const json_t *grade, const char *name)
     return NULL;
 }
 
-static bool show_check(FILE *f, const char *dir, const json_t *grade, const json_t *c,
-                       struct err *e)
+/* With the deviations that it was graded with. NULL: there is none to be shown. */
+static const struct moments *reference_of(const struct page *p, const char *name)
 {
-    bool full = member_number(c, "share") >= 1;
-    html_print(f, "<section><h3>%s <span class=\"%s\">%.2f of %g</span></h3>\n",
-               member_text(c, "title"), full ? "full" : "lost", member_number(c, "points"),
-               member_number(c, "of"));
+    const struct rubric *r = p->rubric;
+    for (int i = 0; r != NULL && p->answers != NULL && i < r->num_images; i++) {
+        const struct moments *m = &p->answers->of[0][i].m;
+        if (strcmp(r->image[i].name, name) != 0)
+            continue;
+        for (int k = 1; k < r->num_sets; k++)
+            if (strcmp(r->set[k].name, member_or_empty(p->grade, "accepted")) == 0 &&
+                p->answers->of[k][i].m.width > 0)
+                m = &p->answers->of[k][i].m;
+        return m->width > 0 ? m : NULL;
+    }
+    return NULL;
+}
+
+static bool show_evidence(const struct page *p, const json_t *c, struct err *e)
+{
+    const char *name = member_or_empty(c, "picture"),
+               *curve =
+                   p->rubric != NULL && p->rubric->curve[0] != '\0' ? p->rubric->curve : "srgb";
+    const json_t *image = image_of(p->grade, name);
+    if (!json_is_string(json_object_get(image, "sha256")))
+        return true;
+    const struct path path = fs_path("%s/%s/%s", p->dir, member_or_empty(p->grade, "id"),
+                                     member_or_empty(image, "file"));
+    if (!grade_images(p->f, path.s, name, json_object_get(c, "tile"), reference_of(p, name),
+                      p->staff ? curve : NULL, e))
+        return false;
+    grade_plot_difference(p->f, c, member_number(image, "width"), member_number(image, "height"));
+    grade_plot_intervals(p->f, c);
+    return true;
+}
+
+static bool show_check(const struct page *p, const json_t *c, struct err *e)
+{
+    FILE *f = p->f;
+    double share = member_number(c, "share");
+    bool full = is_full(c), judged = json_is_true(json_object_get(c, "judged"));
+    const char *visibility = member_or_empty(c, "visibility");
+    html_print(f, "<section id=\"check-%s\"><h3>%s <span class=\"%s\">%.2f of %g</span>",
+               member_text(c, "name"), member_text(c, "title"), full ? "full" : "lost",
+               member_number(c, "points"), member_number(c, "of"));
+    if (grade_is_provisional(c))
+        fputs(" <span class=\"badge error\">provisional</span>", f);
+    if (!judged)
+        fputs(" <span class=\"badge error\">not judged</span>", f);
+    if (strcmp(visibility, "visible") != 0)
+        html_print(f, " <span class=\"badge\">%s</span>", visibility);
+    fputs("</h3>\n", f);
+    if (p->staff)
+        paragraph(f, "For you to look at:", member_or_empty(c, "flag"), "error-line");
     paragraph(f, "Expected:", member_or_empty(c, "expected"), "");
     paragraph(f, "Seen:", member_or_empty(c, "seen"), "");
+    paragraph(f, "Decided by staff:", member_or_empty(c, "appeal"), "");
+    if (grade_is_provisional(c))
+        paragraph(
+            f, "Provisional:",
+            "the samples did not suffice to decide it; the points are kept until staff have looked.",
+            "");
     paragraph(f, "Explained by what you were given, no points lost for it:",
               member_or_empty(c, "accepted"), "");
-    double share = member_number(c, "share");
-    show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
-    const json_t *p = image_of(grade, member_or_empty(c, "picture"));
-    bool ok = true;
+    paragraph(f, "Judged as it should be with a mistake that was paid for before:",
+              member_or_empty(c, "carried"), "");
     if (!full) {
         paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
-        paragraph(f, "Where:", member_or_empty(c, "where"), "where");
-        if (json_is_string(json_object_get(p, "sha256"))) {
-            const struct path path =
-                fs_path("%s/%s/%s", dir, member_or_empty(grade, "id"), member_or_empty(p, "file"));
-            ok = show_image(f, path.s, member_or_empty(p, "name"), json_object_get(c, "tile"), e);
-            grade_plot_difference(f, c, member_number(p, "width"), member_number(p, "height"));
-            grade_plot_intervals(f, c);
-        }
+        paragraph(f, "Where:", member_or_empty(c, "where"), "");
     }
+    if (judged && member_text(c, "appeal") == NULL)
+        show_chance(f, member_number(c, "chance"), share > 0 && share < 1, " here");
+    bool ok = !stands_out(p, c) || show_evidence(p, c, e);
     fputs("</section>\n", f);
     return ok;
 }
 
-/* The named bug, or that there is no name. */
-static void show_bug(FILE *f, const json_t *diagnosis)
+/* The checks that stand out, or the others. */
+static bool show_checks(const struct page *p, bool out, struct err *e)
 {
-    const json_t *named = json_object_get(diagnosis, "named");
-    size_t i;
-    json_t *b;
-    const char *finding = member_or_empty(diagnosis, "finding");
-    if (strcmp(finding, "unknown") == 0)
-        fputs(
-            "<p>The images differ from the right ones in a way that no known bug explains: different, cause unknown.</p>\n",
-            f);
-    if (json_array_size(named) == 0)
-        return;
-    fprintf(f, "<p>This looks like %s:</p><ul>\n",
-            json_array_size(named) > 1 ? "one of these bugs" : "a known bug");
-    json_array_foreach(named, i, b)
+    size_t i, num = 0;
+    json_t *c;
+    bool ok = true;
+    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
     {
-        html_print(f, "<li>%s <span class=\"where\">(%s)</span></li>\n", member_text(b, "bug"),
-                   member_text(b, "where"));
+        num += grade_summary_shows(c, p->staff) && stands_out(p, c) == out;
     }
-    fputs("</ul>\n", f);
+    if (num == 0)
+        return true;
+    if (out)
+        fprintf(p->f, "<h2>%s</h2>\n",
+                p->staff ? "Lost, or for you to look at" : "What to look at");
+    else
+        fprintf(p->f, "<h2>What is right</h2><details><summary>%zu with all points</summary>\n",
+                num);
+    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
+    {
+        if (grade_summary_shows(c, p->staff) && stands_out(p, c) == out)
+            ok = ok && show_check(p, c, e);
+    }
+    fputs(out ? "" : "</details>\n", p->f);
+    return ok;
+}
+
+static void show_head(const struct page *p)
+{
+    FILE *f = p->f;
+    const json_t *grade = p->grade;
+    char text[2048];
+    html_print(f, "<p class=\"kicker\">%s</p>\n<h1>%s: %.2f of %g points</h1>\n",
+               member_text(grade, "rubric"), member_text(grade, "id"),
+               member_number(grade, "points"), member_number(grade, "of"));
+    if (p->staff) {
+        fputs(
+            "<p><a href=\"index.html\">What the student reads</a>, <a href=\"../index.html\">the class</a></p>\n",
+            f);
+        if (grade_needs(grade, text, sizeof text))
+            paragraph(f, "For you to look at:", text, "error-line");
+        grade_change_text(grade, text, sizeof text);
+        paragraph(f, "Changed:", text, "");
+        return;
+    }
+    const char *state = grade_state(grade);
+    snprintf(text, sizeof text, "Your submission: %s.",
+             state != NULL ? state : "something is wrong");
+    if (member_text(grade, "trouble") != NULL)
+        paragraph(f, "Could not be graded:", member_or_empty(grade, "trouble"), "error-line");
+    else if (state != NULL || member_text(grade, "wrong") != NULL)
+        html_print(f, "<p class=\"error-line\"><b>%s</b> %s</p>\n", text,
+                   member_text(grade, "wrong"));
+    if (grade_is_provisional(grade))
+        paragraph(
+            f, "Provisional:",
+            "some checks could not be decided; their points are kept until staff have looked.",
+            "error-line");
+    if (json_is_object(json_object_get(grade, "before")))
+        html_print(f, "<p>Graded anew; it had %.2f of %g.</p>\n",
+                   member_number(json_object_get(grade, "before"), "points"),
+                   member_number(json_object_get(grade, "before"), "of"));
+    if (member_text(grade, "trouble") == NULL && state == NULL &&
+        strcmp(member_or_empty(grade, "kind"), "images") != 0)
+        show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
+}
+
+static void fact(FILE *f, const char *what, const char *value)
+{
+    if (value[0] != '\0')
+        html_print(f, "<div><dt>%s</dt><dd>%s</dd></div>\n", what, value);
+}
+
+static void show_runs(const struct page *p)
+{
+    size_t i;
+    json_t *image;
+    html_table_open(p->f, NULL, "Images", "image|>runs|>CPU, s|>wall, s|size|ended|said");
+    json_array_foreach(json_object_get(p->grade, "pictures"), i, image)
+    {
+        const char *end = member_or_empty(image, "end"), *why = member_or_empty(image, "why");
+        bool ran = member_number(image, "wall_s") > 0;
+        html_row_open(p->f, strcmp(end, "ok") != 0 || why[0] != '\0', member_text(image, "name"));
+        fprintf(p->f,
+                "<td class=\"num\">%.0f</td><td class=\"num\">%.2f</td><td class=\"num\">%.2f</td>",
+                json_is_number(json_object_get(image, "runs")) ? member_number(image, "runs") : 1.0,
+                member_number(image, "cpu_s"), member_number(image, "wall_s"));
+        html_print(p->f, "<td>%.0f × %.0f</td><td>%s</td><td class=\"error-cell\">%s",
+                   member_number(image, "width"), member_number(image, "height"), end, why);
+        if (ran)
+            html_print(p->f, " <a href=\"%s.log\">%s.log</a>", member_text(image, "name"),
+                       member_text(image, "name"));
+        fputs("</td></tr>\n", p->f);
+    }
+    html_table_close(p->f);
+}
+
+/* How it was graded. */
+static void show_facts(const struct page *p)
+{
+    const json_t *grade = p->grade;
+    FILE *f = p->f;
+    fputs("<h2>How it was graded</h2>\n<dl class=\"facts\">\n", f);
+    fact(f, "kind", member_or_empty(grade, "kind"));
+    fact(f, "CPU time", html_duration(member_number(grade, "cpu_s")).s);
+    fact(f, "accepted", member_or_empty(grade, "accepted"));
+    fact(f, "bug on top of", member_or_empty(json_object_get(grade, "diagnosis"), "with"));
+    fact(f, "why a bug was looked for",
+         member_or_empty(json_object_get(grade, "diagnosis"), "gate"));
+    fact(f, "bug not looked for", member_or_empty(json_object_get(grade, "diagnosis"), "error"));
+    fact(f, "sandbox", json_is_false(json_object_get(grade, "sandbox")) ? "none" : "yes");
+    fact(f, "seed", html_number(member_number(grade, "seed")).s);
+    fact(f, "other points in another run, chance", html_number(member_number(grade, "chance")).s);
+    fact(f, "version", member_or_empty(grade, "version"));
+    fputs("</dl>\n", f);
+    if (member_text(grade, "command") != NULL)
+        html_print(f, "<pre><code>%s</code></pre>\n", member_text(grade, "command"));
+    if (json_array_size(json_object_get(grade, "pictures")) > 0)
+        show_runs(p);
+}
+
+static bool page(const struct page *p, struct err *e)
+{
+    size_t i;
+    json_t *c;
+    bool left_out = false;
+    html_page_open(p->f, member_or_empty(p->grade, "id"), NULL, 0);
+    fputs("<div class=\"grade\">\n", p->f);
+    show_head(p);
+    grade_summary_build_log(p->f, p->dir, p->grade);
+    grade_summary_bug(p->f, p->grade);
+    grade_summary_parts(p->f, p->grade, p->staff);
+    bool ok = show_checks(p, true, e) && show_checks(p, false, e);
+    json_array_foreach(json_object_get(p->grade, "checks"), i, c) left_out |=
+        !grade_summary_shows(c, p->staff);
+    if (left_out)
+        fputs("<p>Some checks are not shown yet.</p>\n", p->f);
+    if (p->staff)
+        show_facts(p);
+    fputs("</div>\n", p->f);
+    html_page_close(p->f);
+    return ok;
 }
 
 bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
 {
-    size_t i;
-    json_t *p, *c;
-    bool ok = true, left_out = false;
-    html_page_open(f, member_or_empty(grade, "id"), NULL, 0);
-    html_print(f, "<div class=\"grade\">\n<h1>%s: %.2f of %g points</h1>\n<p>%s</p>\n",
-               member_text(grade, "id"), member_number(grade, "points"), member_number(grade, "of"),
-               member_text(grade, "rubric"));
-    if (member_or_empty(grade, "trouble")[0] == '\0' &&
-        strcmp(member_or_empty(grade, "kind"), "images") != 0)
-        show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
-    paragraph(f, "Could not be graded:", member_or_empty(grade, "trouble"), "lost");
-    paragraph(f, "All of it:", member_or_empty(grade, "wrong"), "lost");
-    show_bug(f, json_object_get(grade, "diagnosis"));
-    fputs("<table>\n", f);
-    json_array_foreach(json_object_get(grade, "parts"), i, p)
-    {
-        html_print(f, "<tr><td>%s</td><td>%s</td><td class=\"num\">%.2f</td><td>of %g</td></tr>\n",
-                   member_text(p, "number"), member_text(p, "title"), member_number(p, "points"),
-                   member_number(p, "of"));
-    }
-    fputs("</table>\n", f);
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
-        if (strcmp(member_or_empty(c, "visibility"), "visible") == 0)
-            ok = ok && show_check(f, dir, grade, c, e);
-        else
-            left_out = true;
-    }
-    if (left_out)
-        fputs("<p>Some checks are not shown yet.</p>\n", f);
-    fputs("</div>\n", f);
-    html_page_close(f);
-    return ok;
+    return page(&(struct page){.f = f, .dir = dir, .grade = grade}, e);
+}
+
+bool staff_page(FILE *f, const char *dir, const struct rubric *r, const struct answer_key *a,
+                const json_t *grade, struct err *e)
+{
+    return page(&(struct page){f, dir, grade, true, r, a}, e);
 }

@@ -469,7 +469,7 @@ TEST(grades_are_as_their_page_says)
     struct err e;
     json_t *grades = json_pack("[o]", load_block("grades.md", 0));
     MUST(fs_make_dirs(test_path("grades/bob"), &e));
-    MUST(grade_write(test_path("grades"), grades, &e));
+    MUST(grade_write(test_path("grades"), NULL, NULL, grades, &e));
     json_decref(grades);
     json_t *gradescope = json_load_file(test_path("grades/bob/results.json"), 0, NULL);
     const json_t *test = json_array_get(json_object_get(gradescope, "tests"), 0);

@@ -149,14 +149,16 @@ static json_t *a_class(void)
     json_t *checks = json_array(), *grades = json_array();
     json_array_append_new(checks, a_check("falloff", 4.123456, 6, "visible"));
     json_array_append_new(checks, a_check("secret", 2, 2, "after_published"));
+    json_object_set_new(json_array_get(checks, 1), "provisional", json_true());
     json_array_append_new(
         grades,
-        json_pack("{ss, ss, sf, sf, sf, sn, sn, ss, so, s[{ss, ss, sf, sf}], s[], "
+        json_pack("{ss, ss, sf, sf, sf, sn, sn, ss, so, s[{ss, ss, sf, sf}], s[{sf}, {sf}], "
                   "s{ss, s[{ss, ss, ss}]}}",
                   "id", "ada", "rubric", "Light", "points", 6.123456, "of", 8.0, "cpu_s", 3.5,
                   "trouble", "wrong", "accepted", "", "checks", checks, "parts", "number", "3",
-                  "title", "Light", "points", 6.12, "of", 8.0, "pictures", "diagnosis", "finding",
-                  "bug", "named", "name", "x", "bug", "light falls \"as\" 1/r", "where", "Part 3"));
+                  "title", "Light", "points", 6.12, "of", 8.0, "pictures", "wall_s", 1.25, "wall_s",
+                  0.5, "diagnosis", "finding", "bug", "named", "name", "x", "bug",
+                  "light falls \"as\" 1/r", "where", "Part 3"));
     json_array_append_new(
         grades, json_pack("{ss, ss, sf, sf, sf, sn, ss, ss, s[o], s[], s[], sn}", "id", "bob",
                           "rubric", "Light", "points", 0.0, "of", 8.0, "cpu_s", 0.0, "trouble",
@@ -167,6 +169,13 @@ static json_t *a_class(void)
                                             "cpu_s", 0.0, "trouble", "no space left on device",
                                             "wrong", "checks", "parts", "pictures"));
     return grades;
+}
+
+/* The output of a test. */
+static const char *output_of(const json_t *root, size_t i)
+{
+    return json_string_value(
+        json_object_get(json_array_get(json_object_get(root, "tests"), i), "output"));
 }
 
 static json_t *results_of(const char *id)
@@ -192,7 +201,7 @@ static void every_file_has_documented_fields_only(void **state)
         snprintf(path, sizeof path, "%s/%s", dir, ids[i]);
         assert_int_equal(mkdir(path, 0700), 0);
     }
-    if (!grade_write(dir, grades, &e))
+    if (!grade_write(dir, NULL, NULL, grades, &e))
         fail_msg("%s", e.msg);
     json_decref(grades);
     for (int i = 0; i < 3; i++) {
@@ -216,6 +225,13 @@ static void every_file_has_documented_fields_only(void **state)
     assert_string_equal(json_string_value(json_object_get(json_array_get(tests, 0), "status")),
                         "failed");
     assert_non_null(strstr(json_string_value(json_object_get(root, "output")), "as\" 1/r"));
+    assert_true(json_number_value(json_object_get(root, "execution_time")) == 1.75);
+    /* Some of the points; all of them, for now. */
+    assert_non_null(strstr(output_of(root, 0), "Partial credit: 4.12 of 6 points."));
+    assert_null(strstr(output_of(root, 0), "Provisional"));
+    assert_null(strstr(output_of(root, 1), "Partial"));
+    assert_non_null(strstr(output_of(root, 1), "Provisional: "));
+    assert_non_null(strstr(json_string_value(json_object_get(root, "output")), "provisional"));
     json_decref(root);
     root = results_of("cyd");
     assert_true(json_number_value(json_object_get(root, "score")) == 0);

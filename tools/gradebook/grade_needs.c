@@ -1,0 +1,84 @@
+#include "grade_needs.h"
+
+#include "reference/base/json_node.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *name, *words;
+} states[] = {
+    {"not_built", "not built"}, {"not_started", "did not start"}, {"usage", "printed its usage"}};
+
+static bool made_an_image(const json_t *grade)
+{
+    const json_t *images = json_object_get(grade, "pictures");
+    size_t i;
+    json_t *p;
+    json_array_foreach(images, i, p)
+    {
+        if (json_is_string(json_object_get(p, "sha256")))
+            return true;
+    }
+    return json_array_size(images) == 0;
+}
+
+const char *grade_state(const json_t *grade)
+{
+    if (member_text(grade, "trouble") != NULL)
+        return "not graded";
+    for (size_t i = 0; i < sizeof states / sizeof *states; i++)
+        if (strcmp(member_or_empty(grade, "state"), states[i].name) == 0)
+            return states[i].words;
+    return made_an_image(grade) ? NULL : "no image";
+}
+
+bool grade_is_provisional(const json_t *object)
+{
+    size_t i;
+    json_t *c;
+    json_array_foreach(json_object_get(object, "checks"), i, c)
+    {
+        if (grade_is_provisional(c))
+            return true;
+    }
+    return json_array_size(json_object_get(object, "checks")) == 0 &&
+           json_is_true(json_object_get(object, "provisional"));
+}
+
+/* Appends it after what is there. */
+static void say(char *text, size_t size, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+static void say(char *text, size_t size, const char *format, ...)
+{
+    size_t n = strlen(text);
+    va_list values;
+    va_start(values, format);
+    n += (size_t)snprintf(text + n, size - n, "%s", n > 0 ? "; " : "");
+    if (n < size)
+        vsnprintf(text + n, size - n, format, values);
+    va_end(values);
+}
+
+bool grade_needs(const json_t *grade, char *text, size_t size)
+{
+    const char *state = grade_state(grade),
+               *why = member_text(grade, member_text(grade, "trouble") ? "trouble" : "wrong");
+    size_t i;
+    json_t *c;
+    text[0] = '\0';
+    if (state != NULL || why != NULL)
+        say(text, size, "%s", why != NULL ? why : state);
+    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    {
+        const char *name = member_or_empty(c, "name"), *flag = member_or_empty(c, "flag");
+        if (flag[0] != '\0')
+            say(text, size, "%s: %s", name, flag);
+        if (!json_is_true(json_object_get(c, "judged")))
+            say(text, size, "%s: not judged", name);
+        if (grade_is_provisional(c))
+            say(text, size, "%s: provisional", name);
+    }
+    return text[0] != '\0';
+}
