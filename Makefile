@@ -7,7 +7,7 @@ PREFIX ?= /usr/local
 LIVE   ?=
 ONLY   ?=
 ALPHA  ?= 1e-3
-RUBRIC ?= tools/rubrics/cs184.rubric
+RUBRIC ?= tools/rubrics/cs184-3-1.rubric
 V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 

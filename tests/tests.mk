@@ -185,7 +185,7 @@ bvh-table: $(BUILD)/pathtracer
 #: make grade-show  grade a class of fifty, write tests/studies/grading/
 grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
 	tests/studies/grading/grade_show.sh $(BUILD)
-#: make rubric-bugs what known bugs do to the images of a rubric (RUBRIC=tools/rubrics/cs184.rubric)
+#: make rubric-bugs what known bugs do to the images of a rubric (RUBRIC=tools/rubrics/cs184-3-1.rubric)
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)
 	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRIC)

@@ -561,7 +561,7 @@ expect "bench: no such part" 3 "usage" "$build/tests/bench" --nonsense
 
 # Grading: one right program among hostile ones; each costs its author the check, none of them the run.
 expect "grade: help" 0 "unsafe-no-sandbox" "$san_assay" grade --help
-expect "grade: the rubric of the course" 0 "137 points" "$san_assay" grade --check-rubric tools/rubrics/cs184.rubric
+expect "grade: the rubric of the course" 0 "100 points" "$san_assay" grade --check-rubric tools/rubrics/cs184-3-1.rubric
 sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubrics/template.rubric >"$tmp/wrong.rubric"
 expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"

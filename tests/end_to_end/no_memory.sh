@@ -145,7 +145,7 @@ sed 's/size 64 64/size 32 32/' "$root/tests/end_to_end/quick.rubric" >quick.rubr
 grade=("$assay" grade --unsafe-no-sandbox --suite "$scenes" --golden "$tmp/in/store" --catalogue "$root/golden/diagnose" --pathtracer "$plain")
 most=8
 no_memory "grade" "${grade[@]}" -o grades "$tmp/in/quick.rubric" "$tmp/in/subs/1" "$tmp/in/subs/2"
-no_memory "grade: rubric" "${grade[@]}" --check-rubric "$root/tools/rubrics/cs184.rubric"
+no_memory "grade: rubric" "${grade[@]}" --check-rubric "$root/tools/rubrics/cs184-3-1.rubric"
 
 jobs=("$assay" plan --plan plan --parts 2 pathtracer -q -t 1 -r 8 32 -s 2 -f x.exr "$point")
 no_memory "plan" "${jobs[@]}"

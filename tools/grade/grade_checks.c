@@ -487,6 +487,48 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
+/* What a run may take longer or shorter than another of the same work. */
+static double timing_error(const struct made *m)
+{
+    return 0.01 + 0.05 * m->cpu_s;
+}
+
+/* CPU time of P less Q over that of R less S, two scenes with many and few samples: reading the scene and building the
+ * hierarchy cancel. Judged at the end of the interval that is best for the program. */
+static bool check_growth(const struct work *w, struct result *out, struct err *e)
+{
+    const struct rubric_check *c = w->check;
+    const struct made *made[4];
+    for (int k = 0; k < 4; k++)
+        made[k] = &w->h->made[c->images[k]];
+    if (!check_equal(w, out, e))
+        return false;
+    double equal = out->share;
+    out->share = out->chance = 0;
+    snprintf(out->expected, sizeof out->expected,
+             "the samples of %s take at most %.3g times as long as those of %s",
+             image_of(w, 0)->name, exp(c->log_ratio.full), image_of(w, 2)->name);
+    if (made[0]->cpu_s <= 0) {
+        snprintf(out->seen, sizeof out->seen, "no program ran that could be timed");
+        return true;
+    }
+    if (equal <= 0) {
+        snprintf(out->seen, sizeof out->seen, "%s is not an image of its scene",
+                 image_of(w, 0)->name);
+        return true;
+    }
+    double large = made[0]->cpu_s - made[1]->cpu_s, small = made[2]->cpu_s - made[3]->cpu_s,
+           large_error = timing_error(made[0]) + timing_error(made[1]),
+           small_error = timing_error(made[2]) + timing_error(made[3]);
+    double least = log(fmax(large - large_error, 1e-6) / (fmax(small, 0) + small_error));
+    const struct interval i = {least, least, least, 0};
+    out->share = least <= 0 ? 1 : score_share(&c->log_ratio, &i);
+    snprintf(out->seen, sizeof out->seen,
+             "%.3g s of CPU time against %.3g s (+- %.2g and %.2g): at least %.3g times as long",
+             large, small, large_error, small_error, exp(least));
+    return true;
+}
+
 /* The noise that an image should have. */
 static void expect_noise(const struct work *w)
 {
@@ -501,8 +543,9 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
                                                 struct err *) = {
-        [CHECK_EQUAL] = check_equal, [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
-        [CHECK_EXACT] = check_exact, [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates};
+        [CHECK_EQUAL] = check_equal,  [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
+        [CHECK_EXACT] = check_exact,  [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates,
+        [CHECK_GROWTH] = check_growth};
     const struct work w = {r, check, a, set, h, alpha};
     *out = (struct result){.judged = true, .image = check->images[0]};
     for (int k = 0; k < check->num_images; k++) {

@@ -226,7 +226,8 @@ static void read_check(struct statement *s)
     c->kind = (enum check_kind)k;
     if (k == NUM_CHECK_KINDS)
         rubric_mistake(s->m, s->line,
-                       "'%s' is no kind of check: equal, agree, sum, exact, noise or rates", kind);
+                       "'%s' is no kind of check: equal, agree, sum, exact, noise, rates or growth",
+                       kind);
     while (s->rest[0] != '\0') {
         int i;
         if (!take_image(s, &i))

@@ -24,6 +24,7 @@ enum check_kind {
     CHECK_EXACT,
     CHECK_NOISE,
     CHECK_RATES,
+    CHECK_GROWTH,
     NUM_CHECK_KINDS
 };
 extern const char *const rubric_check_kind_name[NUM_CHECK_KINDS];

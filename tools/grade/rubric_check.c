@@ -12,8 +12,8 @@
 
 const char *const rubric_reference_names[] = {"none", "truth",
                                               ENGINES_WITH_GOLDENS(ENGINE_WORD) "ours"};
-const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",
-                                                             "exact", "noise", "rates"};
+const char *const rubric_check_kind_name[NUM_CHECK_KINDS] = {"equal", "agree", "sum",   "exact",
+                                                             "noise", "rates", "growth"};
 
 void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
 {
@@ -195,6 +195,7 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
         [CHECK_EXACT] = {1, 1, false, true, false, false, true},
         [CHECK_NOISE] = {2, 2, false, false, true, false, true},
         [CHECK_RATES] = {1, 1, false, true, false, true, false},
+        [CHECK_GROWTH] = {4, 4, true, false, true, false, true},
     };
     static const char *const visibilities[] = {"hidden", "after_due_date", "after_published",
                                                "visible", NULL};
@@ -231,8 +232,6 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
             rubric_mistake(m, c->line, "check '%s': '%s' and '%s' have different sizes", c->name,
                            first->name, p->name);
     }
-    if (c->points == 0)
-        rubric_mistake(m, c->line, "check '%s' is worth nothing", c->name);
     set_default(c->visibility, sizeof c->visibility, "visible");
     if (!is_word(c->visibility, visibilities))
         rubric_mistake(

@@ -19,7 +19,7 @@ bugs=(
 [ -n "$few" ] && bugs=(cosine_missing light_pdf_unnormalised)
 work=$build/grade-show
 subs=$work/submissions
-rubric=$work/rubric/cs184.rubric
+rubric=$work/rubric/cs184-3-1.rubric
 rm -rf "$subs" "$work/rubric"
 mkdir -p "$subs" "$work/rubric" "$work/told"
 stale=()
@@ -30,7 +30,7 @@ done
 [ ${#stale[@]} -eq 0 ] || tests/mutants/mutants.sh --build-only "$build" "${stale[@]}" || exit 1
 cp -R tools/rubrics/*.dae tools/rubrics/*.exr tools/rubrics/cs184-bugs "$work/rubric"
 # As the course's program would: lights are sampled alone. Bugs are named by the 8-bit images alone.
-sed "s/^command {program} /&--direct light /" tools/rubrics/cs184.rubric >"$rubric"
+sed "s/^command {program} /&--direct light /" tools/rubrics/cs184-3-1.rubric >"$rubric"
 
 # sub NAME WHAT: a program from stdin, described for the table
 sub() {
@@ -70,7 +70,7 @@ for w in "64 48" "128 96"; do
 done
 sub other_scene "always writes a right picture of another scene" <<<'for a; do case $last in -r) size=$a ;; esac; last=$a; done; exec cp other_$size.png out.png'
 for w in "64 48" "128 96"; do
-    "$build/pathtracer" -q -r $w -s 256 -m 5 -f "$subs/other_scene/other_${w% *}.png" tools/rubrics/torus.dae >/dev/null || exit 1
+    "$build/pathtracer" -q -r $w -s 256 -m 5 -f "$subs/other_scene/other_${w% *}.png" tools/rubrics/many.dae >/dev/null || exit 1
 done
 
 # Images instead of a program: all right ones, and the references themselves, by our seed for those (tools/grade/answer_key.c).
@@ -113,7 +113,7 @@ mkdir -p tests/studies/grading
 # A class of fifty, graded
 
 Each submission is a renderer with a known bug of tests/mutants, or one of those that try something else. \`make grade-show\` builds them,
-grades them by tools/rubrics/cs184.rubric (137 points; \`assay grade -j2\`) and writes this page. Bold: less than all of the part's points.
+grades them by tools/rubrics/cs184-3-1.rubric (100 points; \`assay grade -j2\`) and writes this page. Bold: less than all of the part's points.
 "In its part": whether points were lost in the part of the assignment in which the bug was made. "Named": what the student is told it looks like, by these 8-bit
 pictures alone. The batch took $took.
 

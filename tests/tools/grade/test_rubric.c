@@ -141,13 +141,14 @@ TEST(images_below_a_check)
 
 TEST(the_shipped_ones_are_right)
 {
-    static const char *const paths[] = {"tools/rubrics/cs184.rubric",
-                                        "tools/rubrics/template.rubric",
-                                        "tools/rubrics/deviations.rubric"};
-    static const double points[] = {137, 10, 10};
-    static const int sets[] = {4, 1, 8};
+    static const char *const paths[] = {
+        "tools/rubrics/cs184-3-1.rubric", "tools/rubrics/cs184-3-1-before-2024.rubric",
+        "tools/rubrics/cs184-3-2.rubric", "tools/rubrics/template.rubric",
+        "tools/rubrics/deviations.rubric"};
+    static const double points[] = {100, 100, 100, 10, 10};
+    static const int sets[] = {2, 2, 4, 1, 8};
     struct err e;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 5; i++) {
         assert_true(rubric_read(paths[i], &suite, rubric, &mistakes, &e));
         if (mistakes.num > 0)
             fail_msg("%s:%d: %s", paths[i], mistakes.at[0].line, mistakes.at[0].text);
@@ -205,7 +206,7 @@ TEST(each_mistake_is_named_with_its_line)
         {9, 9, "check c 4 equal q", "no image 'q'"},
         {9, 9, "check c four equal p", "points"},
         {9, 9, "check c 4 equals p", "'equals'"},
-        {9, 9, "check c 0 equal p", "worth nothing"},
+        {9, 9, "check c 4 growth p p p p\n image 1 2\n tile 1 2", "needs 'ratio'"},
         {9, 9, "check c 4 equal p p", "takes 1"},
         {10, 10, " image 0.05 0.01", "must be less"},
         {10, 10, " image 0.01", "'image' needs a number"},

@@ -60,7 +60,7 @@ static int set_up(void **state)
     rubric = calloc(1, sizeof *rubric);
     answers = calloc(1, sizeof *answers);
     if (rubric == NULL || answers == NULL || !suite_load("reference/scenes", &suite, &e) ||
-        !rubric_read("tools/rubrics/cs184.rubric", &suite, rubric, &mistakes, &e) ||
+        !rubric_read("tools/rubrics/cs184-3-1.rubric", &suite, rubric, &mistakes, &e) ||
         mistakes.num > 0 || !catalogue_read("tools/rubrics/cs184-bugs", &bugs.catalogue, &e))
         return -1;
     for (int k = 0; k < rubric->num_sets; k++)
