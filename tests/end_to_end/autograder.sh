@@ -18,6 +18,8 @@ ln -s "$build/assay" "$build/pathtracer" "$tmp/build"
 cat >"$tmp/rubric/quick.rubric" <<'EOF'
 rubric Quick
 curve srgb
+packages no-such-package
+build make
 command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}
 total 8
 image point
@@ -37,12 +39,14 @@ mkdir -p "$AUTOGRADER_ROOT/submission"
 check "it unpacks" unzip -q "$tmp/a.zip" -d "$AUTOGRADER_ROOT/source"
 cd "$AUTOGRADER_ROOT" || exit 1
 check "setup.sh and run_autograder can be run" test -x source/setup.sh -a -x source/run_autograder
+check "setup.sh installs what the rubric's build needs" grep -q 'gcc no-such-package$' source/packages
 check "setup.sh has all it builds from" make -n -C source/assay BUILD="$tmp/none" all
 ln -s "$tmp/build" source/build
 score() { # SUBMISSION NAME SCORE
     rm -rf submission/* results
-    cp "$1" submission/pathtracer
-    chmod 755 submission/pathtracer
+    cp "$1" submission/ours
+    chmod 755 submission/ours
+    printf 'pathtracer: ours\n\tcp ours pathtracer\n' >submission/Makefile
     check "$2" source/run_autograder
     check "$2: Gradescope's fields" "$fields" results/results.json
     check "$2: $3 points" grep -q "\"score\": $3" results/results.json

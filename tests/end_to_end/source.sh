@@ -84,7 +84,7 @@ student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
 student lost 'AFTER = rm liblevel.so'
 student moved 'AFTER = mkdir lib && mv liblevel.so lib'
 student other 'AFTER = mv tiny other'
-student hog 'AFTER = (head -c 1G /dev/zero; sleep 20) | tail -n 1 | wc -c'
+student hog 'AFTER = for i in 1 2 3 4; do (head -c 100M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait'
 student network 'AFTER = ! grep -v lo: /proc/net/dev | grep :' # lo alone
 student writes 'AFTER = ! (: >$$CCACHE_DIR/x) && ! (: >/cache/x)'
 mkdir "$tmp/class/empty" "$tmp/class/two" && cp -R "$tmp/tree" "$tmp/class/two/a" && cp -R "$tmp/tree" "$tmp/class/two/b"

@@ -1,7 +1,7 @@
 #!/bin/bash
 # tools/autograder/pack.sh BUILD RUBRIC OUT.zip COMMIT PACKAGE...: an autograder for Gradescope. The zip holds setup.sh and
 # run_autograder, our sources (built where they run: the libraries differ), the files beside the rubric, its catalogue of bugs,
-# and its references, which are rendered here, once.
+# its references, which are rendered here, once, and the starter code $SKELETON, if that is set, to fill the compiler cache from.
 set -eu
 build=$(realpath "$1") rubric=$2 out=$3 commit=$4
 shift 4
@@ -17,7 +17,8 @@ bugs=$(awk '$1 == "bugs" { print $2 }' "$rubric")
 [ -z "$bugs" ] || cp -R "$(dirname "$rubric")/$bugs" "$tmp/zip/rubric"
 basename "$rubric" >"$tmp/zip/rubric_name"
 echo "$commit" >"$tmp/zip/commit"
-echo "$@" >"$tmp/zip/packages"
+echo "$@" $(awk '$1 == "packages" { $1 = ""; sub(/ #.*/, ""); print }' "$rubric") >"$tmp/zip/packages"
+[ -z "${SKELETON:-}" ] || (mkdir "$tmp/zip/skeleton" && cp -R "$SKELETON" "$tmp/zip/skeleton")
 "$build/assay" grade --prepare -o "$build/autograder" "$rubric"
 cp -R "$build/autograder/.references" "$tmp/zip/references"
 rm -f "$tmp/zip/references"/*.log
