@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 static const double least_kappa = 0.05, overlap = 4, runs_shared = 1.5, channels_alike = 3,
-                    floor_fraction = 0.25;
+                    floor_fraction = 0.25, missed = 0.25;
 /* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
 static const double unknown_dof = 30;
 static const double least_used = 0.25; /* of a tile, of the image */
@@ -139,6 +139,7 @@ static struct noise noise_in(const struct pair *p, struct rect r)
 /* Sums over a region, one channel. */
 struct sums {
     double d, b, v, k3, tolerance, used;
+    double v2, ours; /* where v is measured: of its squares; by our samples */
 };
 
 static double weighted(const double *x, int channel)
@@ -159,9 +160,17 @@ static double weighted_root(const double *x, int channel, double power)
     return copysign(pow(fabs(sum), power), sum);
 }
 
+/* From run to run in both, or in A against a reference. */
+static bool is_measured(const struct pair *p)
+{
+    return p->a->runs_dof > 0 && (p->b->known || p->b->runs_dof > 0);
+}
+
 static void add_pixel(const struct pair *p, size_t i, int channel, double kappa, struct sums *s)
 {
+    bool measured = is_measured(p);
     double v[3], k3[3], tolerance[3], of_b = p->b->known ? 1 : kappa;
+    kappa = measured ? 1 : kappa;
     for (size_t c = 0; c < 3; c++) {
         size_t k = 3 * i + c;
         v[c] = kappa * p->a->variance[k] + of_b * p->b->variance[k] + p->a->rounding[k] +
@@ -172,7 +181,16 @@ static void add_pixel(const struct pair *p, size_t i, int channel, double kappa,
     s->used++;
     s->b += weighted(p->b->mean + 3 * i, channel);
     s->d += weighted(p->a->mean + 3 * i, channel) - weighted(p->b->mean + 3 * i, channel);
-    s->v += weighted_root(v, channel, 2);
+    if (measured) {
+        double own = p->a->measured[4 * i + (size_t)channel],
+               other = p->b->known ? weighted_root(p->b->variance + 3 * i, channel, 2)
+                                   : p->b->measured[4 * i + (size_t)channel];
+        s->v += own + other;
+        s->ours += weighted_root(v, channel, 2);
+        s->v2 += own * own + (p->b->known ? 0 : other * other);
+    } else {
+        s->v += weighted_root(v, channel, 2);
+    }
     s->k3 += weighted_root(k3, channel, 3);
     s->tolerance += weighted(tolerance, channel);
 }
@@ -186,6 +204,8 @@ static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, 
             if (p->use[i])
                 add_pixel(p, i, channel, kappa, &s);
         }
+    if (s.ours > 0) /* as skewed as ours would be */
+        s.k3 *= pow(s.v / s.ours, 1.5);
     return s;
 }
 
@@ -202,6 +222,13 @@ static bool interval_from(const struct sums *s, double unit, double dof, double 
     double half = x * sd + s->tolerance;
     *out = (struct interval){s->d / unit, (s->d - half) / unit, (s->d + half) / unit, sd / unit};
     return factor < 1;
+}
+
+/* Degrees of freedom of v: E[v^2] = s^4 (1 + 2/d) of one with d. */
+static double measured_dof(const struct pair *p, const struct sums *s)
+{
+    double d = fmin(p->a->runs_dof, p->b->known ? INFINITY : p->b->runs_dof);
+    return s->v2 > 0 ? fmax(3, (d + 2) * s->v * s->v / s->v2) : 1e6;
 }
 
 static struct rect around(const struct submitted_image *s, struct rect r)
@@ -223,6 +250,11 @@ static void measure_tile(const struct pair *p, struct rect r, const struct noise
     if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
         noise = *whole;
     struct sums s = sum_pixels(p, r, CHANNEL_LUMINANCE, noise.kappa);
+    if (is_measured(p)) { /* what is rare may have been missed in one tile */
+        struct sums wide = sum_pixels(p, around(p->a, r), CHANNEL_LUMINANCE, noise.kappa);
+        noise.dof = measured_dof(p, &s);
+        s.v = fmax(s.v, missed * wide.v * s.b / fmax(wide.b, 1e-30));
+    }
     struct interval interval;
     *relative = NAN;
     if (s.used < least_used * r.width * r.height ||
@@ -263,7 +295,9 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
     alpha /= NUM_CHANNELS + columns * rows;
     for (int c = 0; c < NUM_CHANNELS; c++) {
         struct sums s = sum_pixels(&p, whole, c, noise.kappa);
-        if (!interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &out->image[c]))
+        if (!interval_from(&s, fmax(s.b, floor * s.used),
+                           is_measured(&p) ? measured_dof(&p, &s) : noise.dof, alpha,
+                           &out->image[c]))
             return !(out->skewed = true) ||
                    err_set(e, "rare bright pixels keep it from being judged");
     }

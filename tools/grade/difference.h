@@ -35,7 +35,9 @@ struct difference {
  * one for the image, and for a tile that of the 3 x 3 tiles around it if that is larger and known well enough (30 degrees of freedom); at least 0.05. Var(kappa)
  * from the residuals, times 4 for r that overlap (noise_estimate.h) and 3 for channels that one lamp makes alike, gives
  * degrees of freedom of Student's t. Errors as fine as a pixel count as noise, and make the interval wide. Where A has
- * several runs and B is a reference, r is the difference of two runs at one pixel, in which no error of both is.
+ * several runs and B is a reference, r is the difference of two runs at one pixel, in which no error of both is; and where A
+ * has, and B is a reference or has too, intervals need no kappa: variances are those measured pixel by pixel
+ * from run to run, at least a quarter of those around a tile, by what light it has of theirs.
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
  * a tile (tools/docs/background/verdict.md, "EQUIVALENT").
  *

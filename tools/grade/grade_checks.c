@@ -98,7 +98,7 @@ static double least_samples(const struct work *w, int k)
     return least;
 }
 
-/* kappa of image k, and the variance that it adds to a sum of pixels. */
+/* kappa of image k, 1 where its noise is measured from run to run, and the variance that it adds to a sum of pixels. */
 static bool measure_noise(const struct work *w, int k, const unsigned char *use, double *kappa,
                           double *noise, struct err *e)
 {
@@ -106,10 +106,11 @@ static bool measure_noise(const struct work *w, int k, const unsigned char *use,
     const struct submitted_image *s = student(w, k);
     if (!submitted_image_from(expected_noise(w, k), s, &right, e))
         return false;
-    *kappa = difference_kappa(s, &right, use);
+    *kappa = s->runs_dof > 0 ? 1 : difference_kappa(s, &right, use);
     *noise = 0;
     for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
-        *noise += use[i / 3] ? *kappa * s->variance[i] : 0;
+        if (use[i / 3])
+            *noise += s->runs_dof > 0 ? s->measured[i / 3 * 4 + i % 3] : *kappa * s->variance[i];
     submitted_image_free(&right);
     return true;
 }
@@ -127,15 +128,15 @@ static unsigned char *usable(const struct work *w, struct result *out, struct er
         use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; ok && k < w->check->num_images; k++)
         ok = submitted_image_comparable(student(w, k), expected_noise(w, k), least_samples(w, k),
-                                        use, e);
+                                        false, use, e);
     for (int k = 0; ok && k < w->check->num_images; k++)
         ok = measure_noise(w, k, use, &kappa[k], &out->noise[k], e);
     if (ok)
         memcpy(quiet, use, pixels);
     for (int k = 0; ok && k < w->check->num_images; k++)
-        if (kappa[k] > louder)
+        if (kappa[k] > louder || student(w, k)->num_runs > 1)
             ok = submitted_image_comparable(student(w, k), expected_noise(w, k),
-                                            least_samples(w, k) / kappa[k], quiet, e);
+                                            least_samples(w, k) / kappa[k], true, quiet, e);
     for (size_t p = 0; ok && p < pixels; p++)
         left += quiet[p];
     if (ok && (double)left >= fewest * (double)pixels)
@@ -296,6 +297,9 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
         out->mean[i] += a.mean[i] - b.mean[i];
         out->variance[i] += a.variance[i] + b.variance[i];
+        out->measured[i / 3 * 4 + i % 3] += a.variance[i] + b.variance[i];
+        if (i % 3 == 1) /* green is most of luminance */
+            out->measured[i / 3 * 4 + 3] += a.variance[i] + b.variance[i];
     }
     if (ok)
         submitted_image_free(&b);

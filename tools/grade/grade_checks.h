@@ -80,6 +80,7 @@ struct submitted_images {
     bool can_buy;              /* more samples can be had: what is too noisy is left undecided */
     bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with them */
     int runs[RUBRIC_IMAGES];   /* made of it, whether they count or not */
+    double bought_s;           /* CPU time of further runs */
 };
 
 /* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which

@@ -143,6 +143,14 @@ static void read_build(struct statement *s)
     s->rest += length;
 }
 
+static void read_budget(struct statement *s)
+{
+    if (strcmp(take_word(s), "cpu") == 0)
+        take_number(s, "budget cpu", 0, 1e6, &s->r->budget_s);
+    else
+        rubric_mistake(s->m, s->line, "'budget' is of cpu");
+}
+
 static void read_mask(struct statement *s)
 {
     if (s->r->mask[2] > 0)
@@ -366,6 +374,8 @@ static void read_statement(struct statement *s)
         take_number(s, word, 0, 1e6, &r->total);
     else if (strcmp(word, "limit") == 0)
         read_limit(s);
+    else if (strcmp(word, "budget") == 0)
+        read_budget(s);
     else if (strcmp(word, "mask") == 0)
         read_mask(s);
     else if (strcmp(word, "accept") == 0 && s->image == NULL && s->check == NULL)
@@ -401,8 +411,10 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
                  struct rubric_mistakes *m, struct err *e)
 {
     char line[MAX_LINE];
-    *out = (struct rubric){
-        .limit = sandbox_default, .build_s = 600, .build_memory = sandbox_default.memory};
+    *out = (struct rubric){.limit = sandbox_default,
+                           .build_s = 600,
+                           .build_memory = sandbox_default.memory,
+                           .budget_s = 180};
     *m = (struct rubric_mistakes){0};
     const char *slash = strrchr(path, '/');
     snprintf(out->path, sizeof out->path, "%s", path);

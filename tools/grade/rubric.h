@@ -93,6 +93,7 @@ struct rubric {
     char packages[1024]; /* of Debian, for `build` */
     struct sandbox_limits limit;
     double build_s, total;
+    double budget_s;     /* CPU time of further runs of one submission */
     size_t build_memory; /* bytes */
     int mask[4];         /* x y width height, from the bottom left; width 0: none */
     struct accepted accept[RUBRIC_ACCEPTED];

@@ -1,6 +1,7 @@
 #include "submitted_image.h"
 
 #include "renderer/base/sha256.h"
+#include "tools/compare/pyramid.h"
 #include "tools/images/tone_curve.h"
 #include "tools/images/image_file.h"
 
@@ -33,8 +34,9 @@ static bool allocate(struct submitted_image *s, struct err *e)
     s->variance = calloc(n, sizeof *s->variance);
     s->k3 = calloc(n, sizeof *s->k3);
     s->clipped = calloc(n, 1);
+    s->measured = calloc(n / 3 * 4, sizeof *s->measured);
     return (s->variance != NULL && s->k3 != NULL && s->mean != NULL && s->tolerance != NULL &&
-            s->rounding != NULL && s->clipped != NULL) ||
+            s->rounding != NULL && s->clipped != NULL && s->measured != NULL) ||
            err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
 }
 
@@ -112,6 +114,7 @@ static void free_planes(struct submitted_image *s)
     free(s->variance);
     free(s->k3);
     free(s->clipped);
+    free(s->measured);
 }
 
 void submitted_image_free(struct submitted_image *s)
@@ -143,6 +146,27 @@ static void drop_small(struct submitted_image *s)
     s->num_runs = num;
 }
 
+static double luminance_of(const double *px)
+{
+    return luminance_weight[0] * px[0] + luminance_weight[1] * px[1] + luminance_weight[2] * px[2];
+}
+
+/* From the scatter of the runs around their weighted mean: sum of w (x - mean)^2 over (runs - 1). */
+static void measure_runs(struct submitted_image *s)
+{
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    s->runs_dof = s->num_runs - 1;
+    memset(s->measured, 0, 4 * pixels * sizeof *s->measured);
+    for (int k = 0; k < s->num_runs && s->num_runs > 1; k++)
+        for (size_t p = 0; p < pixels; p++) {
+            const double *x = s->run[k].mean + 3 * p, *mean = s->mean + 3 * p;
+            double w = s->run[k].spp / s->spp / s->runs_dof;
+            for (size_t c = 0; c < 3; c++)
+                s->measured[4 * p + c] += w * pow(x[c] - mean[c], 2);
+            s->measured[4 * p + 3] += w * pow(luminance_of(x) - luminance_of(mean), 2);
+        }
+}
+
 static void average_runs(struct submitted_image *s)
 {
     size_t n = 3 * (size_t)s->width * (size_t)s->height;
@@ -158,6 +182,7 @@ static void average_runs(struct submitted_image *s)
             s->clipped[i] |= run->clipped[i];
         }
     }
+    measure_runs(s);
 }
 
 bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more, struct err *e)
@@ -222,8 +247,11 @@ void submitted_image_expect(struct submitted_image *s, const struct moments *m, 
 bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                           struct submitted_image *out, struct err *e)
 {
-    *out = (struct submitted_image){
-        .width = like->width, .height = like->height, .clip = like->clip, .known = m != NULL};
+    *out = (struct submitted_image){.width = like->width,
+                                    .height = like->height,
+                                    .clip = like->clip,
+                                    .known = m != NULL,
+                                    .runs_dof = m != NULL ? 0 : INFINITY};
     if (!allocate(out, e)) {
         submitted_image_free(out);
         return false;
@@ -260,6 +288,9 @@ void submitted_image_add(struct submitted_image *dst, const struct submitted_ima
         dst->k3[i] += src->k3[i];
         dst->clipped[i] |= src->clipped[i];
     }
+    dst->runs_dof = fmin(dst->runs_dof, src->runs_dof);
+    for (size_t i = 0; i < 4 * (size_t)dst->width * (size_t)dst->height; i++)
+        dst->measured[i] += src->measured[i];
 }
 
 double submitted_image_expected_sd(const struct moments *reference, size_t i, double spp)
@@ -308,10 +339,27 @@ static void drop_loudest(const struct submitted_image *s, const struct moments *
             use[p] = 0;
 }
 
+/* As measured in the pixels around, of the run that has fewest samples. */
+static double measured_sd(const struct submitted_image *s, size_t i)
+{
+    double sum = 0, num = 0, least = INFINITY;
+    int x = (int)(i / 3 % (size_t)s->width), y = (int)(i / 3 / (size_t)s->width);
+    for (int k = 0; k < s->num_runs; k++)
+        least = fmin(least, s->run[k].spp);
+    for (int k = 0; k < 9; k++) {
+        int u = x - 1 + k % 3, v = y - 1 + k / 3;
+        if (u < 0 || v < 0 || u >= s->width || v >= s->height)
+            continue;
+        sum += s->measured[4 * ((size_t)v * (size_t)s->width + (size_t)u) + i % 3];
+        num++;
+    }
+    return sqrt(sum / num * s->spp / least);
+}
+
 enum mark { MARK_NONE, MARK_CLIPPED, MARK_UNKNOWN };
 
 bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
-                                double spp, unsigned char *use, struct err *e)
+                                double spp, bool measured, unsigned char *use, struct err *e)
 {
     size_t pixels = (size_t)s->width * (size_t)s->height;
     unsigned char *mark = calloc(pixels, 1);
@@ -323,7 +371,10 @@ bool submitted_image_comparable(const struct submitted_image *s, const struct mo
     }
     for (size_t i = 0; i < 3 * pixels; i++) {
         double far = m->mean[i] - s->clip;
-        if (fabs(far) < clip_sd * submitted_image_expected_sd(m, i, spp) + s->tolerance[i])
+        double sd = submitted_image_expected_sd(m, i, spp);
+        if (measured && s->num_runs > 1 && isfinite(far))
+            sd = fmax(sd, measured_sd(s, i));
+        if (fabs(far) < clip_sd * sd + s->tolerance[i])
             mark[i / 3] = MARK_UNKNOWN;
         else if (far > 0 && mark[i / 3] == MARK_NONE)
             mark[i / 3] = MARK_CLIPPED;

@@ -21,6 +21,8 @@ struct submitted_image {
     char sha256[65];        /* of the file */
     bool known; /* variance is that of the mean itself: of references, not of students' images */
     double spp; /* samples a pixel of all its runs; 0: as many as the rubric asks for */
+    double *measured; /* 4 per pixel, R G B luminance: variance of the mean from run to run */
+    double runs_dof;  /* of each of them; 0: there was one run, nothing is measured */
     struct submitted_image *run; /* what it is the weighted mean of; NULL: one run */
     int num_runs;
 };
@@ -51,18 +53,18 @@ bool submitted_image_from(const struct moments *m, const struct submitted_image 
                           struct submitted_image *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Without the runs. The caller frees it with submitted_image_free(). */
+/* Without the runs, but with what they measured. The caller frees it with submitted_image_free(). */
 bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
                           struct err *e) __attribute__((warn_unused_result));
 
-/* dst += src, clipped where either is. */
+/* dst += src, clipped where either is, measured where both are; one made of nothing, black, is. */
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 
 /* What can be compared with a render of spp samples a pixel, told by the moments of one of ours: use[p] becomes 0
- * within 5 standard errors of the clipping point, and beside such pixels and beside clipped ones, whose variance says
+ * within 5 standard errors of the clipping point (measured: those of its smallest run too, from run to run), and beside such pixels and beside clipped ones, whose variance says
  * nothing of their neighbours', and where the variance is more than 20 times the mean of the image. use: one per pixel, set by the caller to not 0. */
 bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
-                                double spp, unsigned char *use, struct err *e)
+                                double spp, bool measured, unsigned char *use, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The same without knowing better: not 0 but where s is clipped, and beside it. */

@@ -1,4 +1,6 @@
 #include "grade_batch.h"
+
+#include "collect_images.h"
 #include "grade_change.h"
 
 #include "reference/base/json_file.h"
@@ -17,15 +19,6 @@
 
 enum { MAX_PATH = 4400 };
 
-/* Seeds of images differ, or their noise would be the same; and they do not depend on what other images a rubric has [FNV-1a]. */
-static uint64_t image_seed(uint64_t seed, const char *name)
-{
-    uint64_t hash = 14695981039346656037u ^ seed;
-    for (; *name != '\0'; name++)
-        hash = (hash ^ (unsigned char)*name) * 1099511628211u;
-    return hash % 1000000007u;
-}
-
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
@@ -38,31 +31,6 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
     snprintf(text, sizeof text, "%s %s %s %s %s %llu %.17g %d", assay_version, rubric, bugs,
              appeals, s->sha256, (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
     sha256_text(text, key);
-    return true;
-}
-
-/* Images are made one after the other, so that a student's time does not depend on how many others there are. */
-static bool make_images(const struct grade_job *job, struct submission *s, const char *work,
-                        const char *out, struct submitted_images *h, struct err *e)
-{
-    const struct rubric *r = job->rubric;
-    for (int i = 0; i < r->num_images; i++) {
-        const struct rubric_image *p = &r->image[i];
-        struct err why = {""};
-        if (!submission_will_hang(r, h->made, i, &h->made[i]) &&
-            !submission_image(r, job->sandbox, s, p, job->stage, work, out,
-                              image_seed(job->seed, p->name), job->threads, &h->made[i], e))
-            return false;
-        if (h->made[i].path[0] == '\0')
-            err_set(&why, "%s", h->made[i].why);
-        else if (submitted_image_read(h->made[i].path, r->curve, p->width, p->height, &h->image[i],
-                                      &why))
-            why.msg[0] = '\0';
-        else if (err_is_of_memory(&why)) /* which is our trouble */
-            return err_set(e, "%s: %s", p->name, why.msg);
-        snprintf(h->why[i], sizeof h->why[i], "%.390s", why.msg);
-    }
-    submission_conclude(r, h->made, h->why, s);
     return true;
 }
 
@@ -104,13 +72,13 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
                           const struct result *result)
 {
     return json_pack(
-        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}",
+        "{ss, ss, ss, ss, sf, sf, sf, sf, sb, sb, ss, ss, ss, ss, ss, ss, ss, ss, ss, so, so, so}",
         "kind", rubric_check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name,
         "title", c->title, "points", c->points * result->share, "of", c->points, "share",
-        result->share, "chance", result->chance, "judged", result->judged, "expected",
-        result->expected, "seen", result->seen, "hint", c->hint, "where", c->where, "visibility",
-        c->visibility, "accepted", result->accepted, "carried", result->carried, "flag",
-        result->flag, "picture", r->image[result->image].name, "tile",
+        result->share, "chance", result->chance, "judged", result->judged, "provisional",
+        result->more > 0, "expected", result->expected, "seen", result->seen, "hint", c->hint,
+        "where", c->where, "visibility", c->visibility, "accepted", result->accepted, "carried",
+        result->carried, "flag", result->flag, "picture", r->image[result->image].name, "tile",
         result->agreement.tiles > 0
             ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
             : json_null(),
@@ -118,17 +86,28 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
         intervals_of(&result->agreement, c));
 }
 
-static json_t *image_json(const struct rubric_image *p, const struct made *made,
-                          const struct submitted_image *s, const char *why)
+static json_t *image_json(const struct rubric *r, const struct submitted_images *h, int i)
 {
+    const struct rubric_image *p = &r->image[i];
+    const struct made *made = &h->made[i];
     const char *slash = strrchr(made->path, '/');
-    return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, ss?}", "name", p->name, "file",
+    return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, si, ss?}", "name", p->name, "file",
                      made->path[0] == '\0' ? NULL
                      : slash != NULL       ? slash + 1
                                            : made->path,
-                     "why", why, "end", sandbox_end_name[made->end], "cpu_s", made->cpu_s, "wall_s",
-                     made->wall_s, "width", p->width, "height", p->height, "sha256",
-                     s->mean != NULL ? s->sha256 : NULL);
+                     "why", h->why[i], "end", sandbox_end_name[made->end], "cpu_s", made->cpu_s,
+                     "wall_s", made->wall_s, "width", p->width, "height", p->height, "runs",
+                     h->runs[i], "sha256", h->image[i].mean != NULL ? h->image[i].sha256 : NULL);
+}
+
+/* Staff are told how far from a decision it is. */
+static void tell_provisional(struct result *result)
+{
+    size_t n = strlen(result->seen);
+    if (result->more > 0)
+        snprintf(result->seen + n, sizeof result->seen - n,
+                 "; too noisy to be decided: it takes about %.2g times the samples",
+                 ceil(10 * result->more) / 10);
 }
 
 /* A submission that lost points for what it shows; an image that is not of the student's making looks like no bug. */
@@ -145,18 +124,21 @@ static bool find_mistake(const struct grade_job *job, struct submitted_images *h
            mistake_judge(job->rubric, job->answers, job->bugs, h, job->alpha, set, result, out, e);
 }
 
-static bool add_checks(const struct grade_job *job, struct submitted_images *h, json_t *grade,
+static bool add_checks(const struct collect *c, struct submitted_images *h, json_t *grade,
                        struct mistake *mistake, struct err *e)
 {
     int set = 0;
-    const struct rubric *r = job->rubric;
+    bool provisional = false;
+    const struct rubric *r = c->job->rubric;
     json_t *checks = json_array(), *parts = json_array(), *images = json_array();
     double part[RUBRIC_PARTS] = {0}, of[RUBRIC_PARTS] = {0}, points = 0, chance = 0, cpu_s = 0;
     struct result *result = calloc(RUBRIC_CHECKS, sizeof *result);
     bool ok = (result != NULL || err_set(e, "out of memory")) &&
-              grade_all_checks(r, job->answers, h, job->alpha, result, &set, e) &&
-              find_mistake(job, h, &set, result, mistake, e);
+              collect_until_decided(c, h, result, &set, e) &&
+              find_mistake(c->job, h, &set, result, mistake, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
+        tell_provisional(&result[i]);
+        provisional |= result[i].more > 0;
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;
         of[r->check[i].part] += r->check[i].points;
@@ -170,14 +152,14 @@ static bool add_checks(const struct grade_job *job, struct submitted_images *h, 
                               json_pack("{ss, ss, sf, sf}", "number", r->part[i].number, "title",
                                         r->part[i].title, "points", part[i], "of", of[i]));
     for (int i = 0; i < r->num_images; i++) {
-        json_array_append_new(images,
-                              image_json(&r->image[i], &h->made[i], &h->image[i], h->why[i]));
+        json_array_append_new(images, image_json(r, h, i));
         cpu_s += h->made[i].cpu_s;
     }
     json_object_set_new(grade, "points", json_real(points));
     json_object_set_new(grade, "of", json_real(rubric_points(r)));
     json_object_set_new(grade, "chance", json_real(chance));
-    json_object_set_new(grade, "cpu_s", json_real(cpu_s));
+    json_object_set_new(grade, "cpu_s", json_real(cpu_s + h->bought_s));
+    json_object_set_new(grade, "provisional", json_boolean(provisional));
     json_object_set_new(grade, "accepted", json_string(r->set[set].name));
     json_object_set_new(grade, "parts", parts);
     json_object_set_new(grade, "checks", checks);
@@ -208,10 +190,11 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
     struct submitted_images *h = calloc(1, sizeof *h);
     struct mistake mistake;
     bool ok = h != NULL || err_set(e, "out of memory");
-    ok = ok && make_images(job, s, work, out, h, e);
+    const struct collect c = {job, s, work, out};
+    ok = ok && collect_images(&c, h, e);
     json_object_set_new(grade, "state", json_string(submission_state_name[s->state]));
     json_object_set_new(grade, "wrong", s->why[0] != '\0' ? json_string(s->why) : json_null());
-    ok = ok && add_checks(job, h, grade, &mistake, e);
+    ok = ok && add_checks(&c, h, grade, &mistake, e);
     json_object_set_new(grade, "diagnosis",
                         ok && mistake.judged ? name_bug(job, s, &mistake, work) : json_null());
     if (ok && mistake.located.text[0] != '\0') {

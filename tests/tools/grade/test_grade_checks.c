@@ -171,6 +171,39 @@ static struct result equal(const struct bug *bug, double spp, double alpha)
     return check(CHECK_EQUAL, 1, &bug, &spp, NULL, alpha);
 }
 
+/* A program whose images have these bugs, asked for further runs until the check is decided, each of 1.5 times the samples of
+ * the last; *runs: how many it took. noise: variance over ours. */
+static struct result buy(const struct bug *bug, double noise, int *runs)
+{
+    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
+    struct submitted_images *h = calloc(1, sizeof *h);
+    struct answer_key *a = calloc(1, sizeof *a);
+    struct bug noisy = *bug;
+    struct result out;
+    struct err e;
+    assert_true(h != NULL && a != NULL);
+    noisy.noise /= noise;
+    a->of[0][0].m = a->of[0][0].noise = reference;
+    h->can_buy = true;
+    h->image[0] = submit_render(&noisy, SPP);
+    double spp = h->image[0].spp = SPP;
+    for (*runs = 1;; ++*runs) {
+        MUST(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+        if (out.more == 0 || *runs == 20)
+            break;
+        result_free(&out);
+        spp *= 1.5;
+        struct submitted_image more = submit_render(&noisy, spp);
+        more.spp = spp;
+        MUST(submitted_image_add_run(&h->image[0], &more, &e));
+    }
+    submitted_image_free(&h->image[0]);
+    free(r);
+    free(h);
+    free(a);
+    return out;
+}
+
 /* By hand: distance 0 inside, linear between, the width of the interval counted. */
 TEST(points_follow_the_interval)
 {
@@ -295,6 +328,95 @@ TEST(noise_is_not_bias)
     struct result r = equal(&b, SPP, 1e-5);
     assert_true(r.share < 1);
     result_free(&r);
+}
+
+/* Points follow bias: variance 0.1 to 100 times ours costs nothing and hides nothing. H0: a right program loses points with at most
+ * 1e-5 a check; 48 programs, none may (chance of one below 5e-4). Control: 2.5 times the margin off, or a dark square, all
+ * lost; no more runs for programs as noisy as ours. */
+TEST(points_follow_bias_not_variance)
+{
+    static const double noise[] = {0.1, 1, 10, 100};
+    const struct bug bright = {.scale = 1.125, .square = 1, .noise = 1},
+                     dark = {.scale = 1, .square = 0.4, .noise = 1};
+    for (size_t i = 0; i < COUNT(noise); i++) {
+        int runs, most = 0;
+        for (int k = 0; k < 12; k++) {
+            struct result r = buy(&none, noise[i], &runs);
+            if (r.share < 1 || r.more > 0)
+                fail_msg("variance x %g, %d runs: %g of the points, %s", noise[i], runs, r.share,
+                         r.seen);
+            most = runs > most ? runs : most;
+            result_free(&r);
+        }
+        printf("variance x %g: at most %d runs\n", noise[i], most);
+        assert_true(noise[i] > 1 || most == 1);
+        for (int k = 0; k < 2; k++) {
+            struct result r = buy(k == 0 ? &bright : &dark, noise[i], &runs);
+            if (r.share > 0 || r.more > 0)
+                fail_msg("variance x %g, bug %d: %g left after %d runs: %s", noise[i], k, r.share,
+                         runs, r.seen);
+            result_free(&r);
+        }
+    }
+}
+
+/* Run b of 2 S samples whose first S are those of run a have correlation sqrt(1/2); H0: independent runs are said to be correlated
+ * beyond 6 standard deviations, which none of 100 may be. The same image off by a tenth: bias that is not as
+ * fine as a pixel is no correlation. */
+TEST(runs_that_share_samples_are_seen)
+{
+    static uint8_t rgb8[2][3 * PIXELS];
+    static unsigned char use[PIXELS];
+    memset(use, 1, sizeof use);
+    for (int k = 0; k < 110; k++) {
+        const bool shared = k >= 100;
+        double scale = k % 2 == 0 ? 1 : 0.9;
+        for (size_t p = 0; p < PIXELS; p++) {
+            double a = gsl_ran_gamma(rng, SPP, 1.0 / SPP), b = gsl_ran_gamma(rng, SPP, 1.0 / SPP),
+                   c = gsl_ran_gamma(rng, SPP, 1.0 / SPP);
+            for (size_t i = 3 * p; i < 3 * p + 3; i++) {
+                double v = scale * truth(p, i - 3 * p);
+                rgb8[0][i] = tone_map(TONE_CGL, v * a);
+                rgb8[1][i] = tone_map(TONE_CGL, v * (shared ? (a + b) / 2 : (b + c) / 2));
+            }
+        }
+        struct submitted_image one = submit(rgb8[0]), two = submit(rgb8[1]), right;
+        struct err e;
+        MUST(submitted_image_from(&reference, &one, &right, &e));
+        submitted_image_expect(&one, &reference, SPP);
+        submitted_image_expect(&two, &reference, 2 * SPP);
+        assert_true(difference_correlated(&one, &two, &right, use) == shared);
+        assert_true(submitted_image_same(&one, &one) && !submitted_image_same(&one, &two));
+        submitted_image_free(&one);
+        submitted_image_free(&two);
+        submitted_image_free(&right);
+    }
+}
+
+/* By hand: codes of 1, 2 and 4 times S samples; the mean is weighted, and so small a run as S of 4 S is no part of it. */
+TEST(runs_are_weighted_by_their_samples)
+{
+    static const double value[] = {0.1, 0.2, 0.3}, spp[] = {1, 2, 4};
+    struct submitted_image run[3];
+    struct err e;
+    for (int k = 0; k < 3; k++) {
+        static uint8_t rgb8[3 * PIXELS];
+        memset(rgb8, tone_map(TONE_CGL, value[k]), sizeof rgb8);
+        run[k] = submit(rgb8);
+        run[k].spp = spp[k];
+    }
+    double first = run[0].mean[0], second = run[1].mean[0], third = run[2].mean[0];
+    MUST(submitted_image_add_run(&run[0], &run[1], &e));
+    double mean = (first + 2 * second) / 3;
+    assert_true(run[0].spp == 3 && fabs(run[0].mean[7] - mean) < 1e-12);
+    /* One degree of freedom: (1/3)(x1 - mean)^2 + (2/3)(x2 - mean)^2. */
+    assert_true(run[0].runs_dof == 1 &&
+                fabs(run[0].measured[5] - (pow(first - mean, 2) + 2 * pow(second - mean, 2)) / 3) <
+                    1e-12);
+    MUST(submitted_image_add_run(&run[0], &run[2], &e));
+    assert_true(run[0].num_runs == 2 && run[0].spp == 6 &&
+                fabs(run[0].mean[7] - (second + 2 * third) / 3) < 1e-12);
+    submitted_image_free(&run[0]);
 }
 
 TEST(bugs_cost_points)

@@ -1,0 +1,273 @@
+#include "collect_images.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double step = 1.35; /* between the samples of two runs, at least */
+enum { MOST_RUNS = 12, MOST_ADAPTIVE = 6 };
+
+/* Seeds of images differ, or their noise would be the same; and they do not depend on what other images a rubric has [FNV-1a]. */
+static uint64_t image_seed(uint64_t seed, const char *name)
+{
+    uint64_t hash = 14695981039346656037u ^ seed;
+    for (; *name != '\0'; name++)
+        hash = (hash ^ (unsigned char)*name) * 1099511628211u;
+    return hash % 1000000007u;
+}
+
+/* `why` says why there is none. Fails only for our own trouble. */
+static bool make_image(const struct collect *c, const struct rubric_image *p, struct made *made,
+                       struct submitted_image *image, char why[400], struct err *e)
+{
+    const struct grade_job *job = c->job;
+    struct err wrong = {""};
+    if (made->why[0] == '\0' &&
+        !submission_image(job->rubric, job->sandbox, c->submission, p, job->stage, c->work, c->out,
+                          image_seed(job->seed, p->name), job->threads, made, e))
+        return false;
+    if (made->path[0] == '\0')
+        err_set(&wrong, "%s", made->why);
+    else if (submitted_image_read(made->path, job->rubric->curve, p->width, p->height, image,
+                                  &wrong))
+        wrong.msg[0] = '\0';
+    else if (err_is_of_memory(&wrong)) /* which is our trouble */
+        return err_set(e, "%s: %s", p->name, wrong.msg);
+    image->spp = p->spp;
+    snprintf(why, 400, "%.390s", wrong.msg);
+    return true;
+}
+
+bool collect_images(const struct collect *c, struct submitted_images *h, struct err *e)
+{
+    const struct rubric *r = c->job->rubric;
+    h->can_buy = c->submission->kind != SUBMISSION_IMAGES && c->submission->why[0] == '\0';
+    for (int i = 0; i < r->num_images; i++) {
+        h->runs[i] = 1;
+        submission_will_hang(r, h->made, i, &h->made[i]);
+        if (!make_image(c, &r->image[i], &h->made[i], &h->image[i], h->why[i], e))
+            return false;
+    }
+    submission_conclude(r, h->made, h->why, c->submission);
+    return true;
+}
+
+/* What has been bought. */
+struct purchases {
+    double left_s;
+    double tried[RUBRIC_IMAGES][MOST_RUNS]; /* samples of the runs of an image */
+    int num[RUBRIC_IMAGES];
+    bool stuck[RUBRIC_IMAGES]; /* no more is to be had of it */
+};
+
+/* The first number of an option in the words of an image; 0: it has none. */
+static double option_of(const struct rubric_image *p, const char *option)
+{
+    char words[300], with_spaces[16];
+    snprintf(words, sizeof words, " %s", p->options);
+    snprintf(with_spaces, sizeof with_spaces, " %s ", option);
+    const char *at = strstr(words, with_spaces);
+    return at != NULL ? strtod(at + strlen(with_spaces), NULL) : 0;
+}
+
+/* Does it stop by itself (`-a BATCH TOLERANCE`)? Then its noise is what the tolerance says, and runs count alike. */
+static bool is_adaptive(const struct rubric_image *p)
+{
+    double batch = option_of(p, "-a");
+    return batch > 0 && batch <= p->spp;
+}
+
+static bool was_tried(const double *tried, int num, double spp)
+{
+    for (int k = 0; k < num; k++)
+        if (fmax(spp / tried[k], tried[k] / spp) < step - 0.15)
+            return true;
+    return false;
+}
+
+/* Samples of the next run of an image that needs `more` times those it has; 0: none is to be had. A square where the rubric
+ * asks for one: programs that stratify a pixel count on it. */
+static int next_samples(const struct collect *c, const struct purchases *b,
+                        const struct submitted_images *h, int image, double more)
+{
+    const struct rubric_image *p = &c->job->rubric->image[image];
+    const struct sandbox_limits *limit = &c->job->rubric->limit;
+    const struct made *made = &h->made[image];
+    double base = p->spp, has = h->image[image].spp, batch = option_of(p, "-a"), largest = base;
+    double wanted = (more - 1) * has * 1.2, most = 64 * base;
+    int root = (int)lround(sqrt(base)), num = h->runs[image], best = 0;
+    if (num >= (is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS) || base < 2)
+        return 0;
+    for (int k = 0; k < num; k++)
+        largest = fmax(largest, b->tried[image][k]);
+    most = fmin(most, 2.9 * largest); /* so that two runs are left to measure noise */
+    most = fmin(most, 0.5 * base * limit->cpu_s / fmax(0.02, made->cpu_s));
+    most = fmin(most, 0.5 * base * limit->wall_s / fmax(0.02, made->wall_s));
+    if (is_adaptive(p))
+        wanted = base;
+    else if (batch > base)
+        most = fmin(most, batch - 1);
+    for (double spp = fmax(largest / 2.9, 2); spp <= most; spp *= 1.1) {
+        double try = root >= 2 && root * root == p->spp ? pow(ceil(sqrt(spp)), 2) : ceil(spp);
+        if (try > most || was_tried(b->tried[image], num, try))
+            continue;
+        best = (int)try;
+        if (try >= wanted)
+            break;
+    }
+    return best;
+}
+
+static double cost_of(const struct submitted_images *h, const struct rubric_image *p, int image,
+                      int spp)
+{
+    return fmax(0.02, h->made[image].cpu_s) * (is_adaptive(p) ? 1.5 : (double)spp / p->spp);
+}
+
+/* The image of an undecided check that adds most noise, and by how much it has to have more samples. */
+static int noisiest(const struct rubric_check *c, const struct result *result,
+                    const struct purchases *b, double *more)
+{
+    int most = -1;
+    double sum = 0;
+    for (int k = 0; k < c->num_images; k++) {
+        sum += result->noise[k];
+        if (!b->stuck[c->images[k]] && (most < 0 || result->noise[k] > result->noise[most]))
+            most = k;
+    }
+    if (most < 0)
+        return -1;
+    double share = sum > 0 ? result->noise[most] / sum : 1, rest = 1 / result->more - (1 - share);
+    *more = rest > share / 8 ? share / rest : 8;
+    if (b->num[c->images[most]] == 1) /* kappa is a guess where programs differ; two runs measure */
+        *more = fmin(*more, 2.5);
+    return c->images[most];
+}
+
+/* The cheapest image that mends an undecided check. -1: none is left, or none that can be paid. */
+static int cheapest(const struct collect *c, const struct submitted_images *h,
+                    const struct result *result, struct purchases *b, int *spp)
+{
+    const struct rubric *r = c->job->rubric;
+    int best = -1;
+    double least = b->left_s;
+    for (int i = 0; i < r->num_checks; i++) {
+        double more;
+        int image = result[i].more > 0 ? noisiest(&r->check[i], &result[i], b, &more) : -1;
+        if (image < 0)
+            continue;
+        int samples = next_samples(c, b, h, image, more);
+        double cost = cost_of(h, &r->image[image], image, samples);
+        if (samples == 0) {
+            b->stuck[image] = true;
+        } else if (cost <= least) {
+            least = cost;
+            best = image;
+            *spp = samples;
+        }
+    }
+    return best;
+}
+
+/* Noise that samples do not mend: as much of it with more of them. */
+static bool has_fallen(const struct submitted_image *s, const struct submitted_image *more,
+                       const struct submitted_image *right, const unsigned char *use, double alpha)
+{
+    struct interval i;
+    struct err no_noise;
+    double samples = log(more->spp / s->spp), sign = samples > 0 ? 1 : -1;
+    if (fabs(samples) < log(1.1) ||
+        !difference_noise(more, right, s, right, use, alpha, &i, &no_noise))
+        return true;
+    return (sign > 0 ? i.lo : -i.hi) <= 0 || sign * i.value < fabs(samples) / 2;
+}
+
+/* Takes over one more run of an image, or finds that it is none. */
+static bool take_run(const struct collect *c, struct submitted_images *h, int image,
+                     struct submitted_image *more, bool *stuck, struct err *e)
+{
+    const struct rubric_image *p = &c->job->rubric->image[image];
+    const struct moments *m = &c->job->answers->of[0][image].noise;
+    struct submitted_image *s = &h->image[image], right;
+    struct submitted_image *last = s->num_runs > 0 ? &s->run[s->num_runs - 1] : s;
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    if (submitted_image_same(last, more)) {
+        *stuck = true;
+        h->fixed[image] = !is_adaptive(p);
+        submitted_image_free(more);
+        return true;
+    }
+    unsigned char *use = malloc(pixels);
+    if (use == NULL)
+        return err_set(e, "out of memory for %zu pixels", pixels);
+    memset(use, 1, pixels);
+    submitted_image_expect(s, m, p->spp);
+    submitted_image_expect(more, m, more->spp);
+    bool ok = submitted_image_comparable(s, m, fmin(last->spp, more->spp), false, use, e) &&
+              submitted_image_from(m, s, &right, e);
+    if (ok) {
+        h->fixed[image] = !is_adaptive(p) && !has_fallen(last, more, &right, use, c->job->alpha);
+        *stuck = h->fixed[image];
+        bool alone = difference_correlated(last, more, &right, use);
+        submitted_image_free(&right);
+        if (!alone) {
+            ok = submitted_image_add_run(s, more, e);
+        } else if (more->spp > s->spp) {
+            submitted_image_free(s);
+            *s = *more;
+            *more = (struct submitted_image){0};
+        }
+    }
+    free(use);
+    submitted_image_free(more);
+    return ok;
+}
+
+static bool buy(const struct collect *c, struct submitted_images *h, int image, int spp,
+                struct purchases *b, struct err *e)
+{
+    struct rubric_image as = c->job->rubric->image[image];
+    struct submitted_image more = {0};
+    struct made made = {0};
+    char why[400];
+    const int run = h->runs[image]++;
+    snprintf(as.name, sizeof as.name, "%.34s-%d", c->job->rubric->image[image].name, run + 1);
+    as.spp = spp;
+    b->tried[image][run] = spp;
+    b->num[image] = run + 1;
+    if (!make_image(c, &as, &made, &more, why, e))
+        return false;
+    b->left_s -= made.cpu_s;
+    h->bought_s += made.cpu_s;
+    if (more.mean == NULL) {
+        b->stuck[image] = true;
+        return true;
+    }
+    if (is_adaptive(&as))
+        more.spp = c->job->rubric->image[image].spp;
+    return take_run(c, h, image, &more, &b->stuck[image], e);
+}
+
+bool collect_until_decided(const struct collect *c, struct submitted_images *h, struct result *out,
+                           int *set, struct err *e)
+{
+    const struct rubric *r = c->job->rubric;
+    struct purchases *b = calloc(1, sizeof *b);
+    bool ok = b != NULL || err_set(e, "out of memory");
+    if (ok)
+        b->left_s = r->budget_s;
+    for (int i = 0; ok && i < r->num_images; i++)
+        b->tried[i][b->num[i]++] = r->image[i].spp;
+    for (int image = 0, spp = 0; ok && image >= 0;) {
+        ok = grade_all_checks(r, c->job->answers, h, c->job->alpha, out, set, e);
+        image = ok ? cheapest(c, h, out, b, &spp) : -1;
+        if (image < 0)
+            break;
+        for (int i = 0; i < r->num_checks; i++)
+            result_free(&out[i]);
+        ok = buy(c, h, image, spp, b, e);
+    }
+    free(b);
+    return ok;
+}
