@@ -138,6 +138,12 @@ tell "a build's log is kept" "$(grep -q 'expected expression' "$tmp/make/not_c/$
 expect "archives" 0 "4.00 of 6" grade cmake "$tmp/cmake.rubric" "$tmp/zipped.zip" "$tmp/packed.tar.gz" "$tmp/inside" "$tmp/class/right"
 for name in zipped packed inside right; do points cmake $name 4.0; done
 
+# Who hands in a program and no sources has built it.
+cp -R "$tmp/tree" "$tmp/made" && make -sC "$tmp/made" && mkdir "$tmp/built" && cp "$tmp/made"/{tiny,liblevel.so} "$tmp/built"
+(cd "$tmp/built" && zip -q "$tmp/prebuilt.zip" tiny liblevel.so)
+expect "programs" 0 "4.00 of 6" grade programs "$tmp/cmake.rubric" "$tmp/built" "$tmp/prebuilt.zip"
+for name in built prebuilt; do points programs $name 4.0; done
+
 # The compiler cache: filled by staff only, from the starter code.
 if command -v ccache >/dev/null; then
     cache() { find "$tmp/cache" -type f -name '*[RM]' | sort | xargs sha256sum; }

@@ -203,16 +203,29 @@ void submission_id(const char *path, char id[128])
     snprintf(id, 128, "%.*s", n, at);
 }
 
-static enum submission_kind kind_of(const struct rubric *r, const struct submission *s,
-                                    bool is_directory)
+static bool has(const struct submission *s, const char *name)
+{
+    return access(fs_path("%s/%s", s->path, name).s, F_OK) == 0;
+}
+
+/* Also sets s->program. Who hands in a program and no sources has built it. */
+static enum submission_kind kind_of(const struct rubric *r, struct submission *s, bool is_directory,
+                                    bool is_archive)
 {
     char path[MAX_PATH];
-    if (!is_directory)
-        return SUBMISSION_PROGRAM;
-    for (int i = 0; i < r->num_images; i++)
+    snprintf(s->program, sizeof s->program, "./%.150s",
+             is_directory || is_archive ? r->program : fs_base(s->path));
+    for (int i = 0; is_directory && i < r->num_images; i++)
         if (find_image(s, r->image[i].name, NULL, path, sizeof path))
             return SUBMISSION_IMAGES;
-    return r->build[0] != '\0' ? SUBMISSION_SOURCE : SUBMISSION_PROGRAM;
+    if (r->build[0] == '\0' || !(is_directory || is_archive))
+        return SUBMISSION_PROGRAM;
+    if (is_archive || has(s, "CMakeLists.txt") || has(s, "Makefile") ||
+        (!has(s, r->program) && !has(s, fs_base(r->program))))
+        return SUBMISSION_SOURCE;
+    if (!has(s, r->program))
+        snprintf(s->program, sizeof s->program, "./%.150s", fs_base(r->program));
+    return SUBMISSION_PROGRAM;
 }
 
 bool submission_open(const struct rubric *r, const char *path, const char *work,
@@ -233,13 +246,10 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
     if (!fs_make_dirs(work, e))
         return false;
     chmod(work, 0755);
-    out->packed = S_ISDIR(st.st_mode) ? access(fs_path("%s/%s", out->path, r->program).s, F_OK) != 0
-                                      : archive;
-    out->kind = kind_of(r, out, S_ISDIR(st.st_mode) || archive);
+    out->kind = kind_of(r, out, S_ISDIR(st.st_mode), archive);
+    out->packed = S_ISDIR(st.st_mode) ? !has(out, out->program) : archive;
     if ((size_t)snprintf(out->tree, sizeof out->tree, "%s/tree.tar", work) >= sizeof out->tree)
         return err_set(e, "%s: path too long", work);
-    snprintf(out->program, sizeof out->program, "./%.150s",
-             S_ISDIR(st.st_mode) || archive ? r->program : fs_base(out->path));
     if (!sandbox_pack(out->path, out->tree, r->limit.disk, &why)) {
         const char *text = strstr(why.msg, ": "); /* without our path */
         snprintf(out->why, sizeof out->why, "It %.500s", text != NULL ? text + 2 : why.msg);
@@ -269,7 +279,8 @@ static bool run_or_recall(const struct rubric *r, const struct sandbox *box,
     struct path dir;
     if (sub->runs == NULL)
         return sandbox_run(box, job, out, e);
-    snprintf(of, sizeof of, "%s %s %s %s", sub->id, sub->sha256, r->build, fs_base(job->log));
+    snprintf(of, sizeof of, "%s %s %s %s", sub->id, sub->sha256,
+             sub->kind == SUBMISSION_SOURCE ? r->build : "", fs_base(job->log));
     return kept_run_path(sub->runs, of, box, job, inputs, &dir, e) &&
            ((!sub->runs_again && kept_run_read(dir.s, job, out)) ||
             (sandbox_run(box, job, out, e) && kept_run_write(dir.s, job, out, e)));
