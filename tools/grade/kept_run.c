@@ -32,14 +32,18 @@ bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
     return true;
 }
 
-/* Files that are there. */
+/* If it is there. */
+static bool copy_one(const char *name, const char *from, const char *to, struct err *e)
+{
+    const struct path a = fs_path("%s/%s", from, name);
+    return access(a.s, R_OK) != 0 || fs_copy(a.s, fs_path("%s/%s", to, name).s, e);
+}
+
 static bool copy_all(const struct sandbox_job *job, const char *from, const char *to, struct err *e)
 {
-    bool ok = true;
-    for (const char *const *name = job->keep; ok && *name != NULL; name++) {
-        const struct path a = fs_path("%s/%s", from, *name);
-        ok = access(a.s, R_OK) != 0 || fs_copy(a.s, fs_path("%s/%s", to, *name).s, e);
-    }
+    bool ok = !job->keep_tree || copy_one("tree.tar", from, to, e);
+    for (const char *const *name = job->keep; ok && name != NULL && *name != NULL; name++)
+        ok = copy_one(*name, from, to, e);
     return ok;
 }
 

@@ -1,6 +1,5 @@
 #include "submission.h"
 
-#include "kept_run.h"
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
@@ -268,24 +267,6 @@ static bool move_file(const char *from_dir, const char *name, const char *to, bo
     return !*moved || fs_copy(from, to, e);
 }
 
-/* One run, or what it was before, if that is kept. */
-static bool run_or_recall(const struct rubric *r, const struct sandbox *box,
-                          const struct submission *sub, const struct rubric_image *p,
-                          const struct sandbox_job *job, struct sandbox_result *out, struct err *e)
-{
-    char of[3072], scene[300], environment[300];
-    scene_names(p, scene, environment);
-    const char *const inputs[] = {scene, environment[0] != '\0' ? environment : NULL, NULL};
-    struct path dir;
-    if (sub->runs == NULL)
-        return sandbox_run(box, job, out, e);
-    snprintf(of, sizeof of, "%s %s %s %s", sub->id, sub->sha256,
-             sub->kind == SUBMISSION_SOURCE ? r->build : "", fs_base(job->log));
-    return kept_run_path(sub->runs, of, box, job, inputs, &dir, e) &&
-           ((!sub->runs_again && kept_run_read(dir.s, job, out)) ||
-            (sandbox_run(box, job, out, e) && kept_run_write(dir.s, job, out, e)));
-}
-
 static bool run_program(const struct rubric *r, const struct sandbox *box,
                         const struct submission *sub, const struct rubric_image *p,
                         const char *stage, const char *work, const char *out_dir, uint64_t seed,
@@ -309,8 +290,10 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
                                     .library = sub->library[0] != '\0' ? sub->library : NULL,
                                     .limit = r->limit};
     struct sandbox_result result;
-    char usage[300];
-    if (!run_or_recall(r, box, sub, p, &job, &result, e))
+    char usage[300], scene[300], environment[300];
+    scene_names(p, scene, environment);
+    const char *const inputs[] = {scene, environment[0] != '\0' ? environment : NULL, NULL};
+    if (!submission_run(r, box, sub, &job, inputs, &result, e))
         return false;
     made->end = result.end;
     made->cpu_s = result.cpu_s;

@@ -60,6 +60,11 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
 /* The last part of a path without the ending of an archive; "" if that is no name. */
 void submission_id(const char *path, char id[128]);
 
+/* A run of it, or what it was before, if that is kept (kept_run.h). inputs: the files in job->scene that it reads. */
+bool submission_run(const struct rubric *r, const struct sandbox *box, const struct submission *s,
+                    const struct sandbox_job *job, const char *const *inputs,
+                    struct sandbox_result *out, struct err *e) __attribute__((warn_unused_result));
+
 /* Unpacks it, builds it in the sandbox, if it is to be built, and looks whether the program would start. The build's output goes to
  * `log`. cache: of ccache (sandbox.h), or NULL; `fill`: it is staff who fill it. */
 bool submission_build(const struct rubric *r, const struct sandbox *box, const char *cache,
