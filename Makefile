@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
-  nettle-dev zlib1g-dev libdeflate-dev bubblewrap
+  nettle-dev zlib1g-dev libdeflate-dev bubblewrap unzip
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1

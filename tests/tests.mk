@@ -1,7 +1,7 @@
 # What tests the programs, measures them and looks at them. Lines that begin with "#: " are a part of `make help`.
 
 SECONDS_EACH ?= 60
-DEPS_TEST := libcmocka-dev zip unzip clang libxml2-utils libembree-dev patch openimageio-tools chromium \
+DEPS_TEST := libcmocka-dev zip ccache clang libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_SLURM := slurm-wlm munge

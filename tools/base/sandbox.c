@@ -137,7 +137,7 @@ static void add_environment(struct line *l, const struct sandbox *s, const struc
         const char *name = variable[i][0], *value = variable[i][1];
         if (value == NULL || (cache == NULL && strncmp(name, "CCACHE", 6) == 0))
             continue;
-        const char *before = i == 0 && cache != NULL ? "/usr/lib/ccache:" : "";
+        const char *before = i == 0 && cache != NULL ? "/usr/lib/ccache:/usr/lib64/ccache:" : "";
         if (s->unsafe) {
             add_text(l, "%s=%s%s", name, before, value);
             continue;

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 enum {
+    NO_UNZIP = 96,
     UNPACK = 97,
     NO_PROGRAM = 98,
     BUILD = 99,
@@ -38,7 +39,8 @@ static const char build_script[] =
     "    *.[zZ][iI][pP] | *.tar | *.tar.* | *.t[gbx]z | *.7z | *.rar)\n"
     "      mkdir .new || exit 97\n"
     "      case $one in\n"
-    "        *.[zZ][iI][pP]) why=$(unzip -q -o \"$one\" -d .new 2>&1); [ $? -le 1 ] ;;\n"
+    "        *.[zZ][iI][pP]) command -v unzip >/dev/null || exit 96\n"
+    "          why=$(unzip -q -o \"$one\" -d .new 2>&1); [ $? -le 1 ] ;;\n"
     "        *) why=$(tar -xf \"$one\" -C .new 2>&1) ;;\n"
     "      esac || { echo \"${one#./} cannot be unpacked: $(echo \"$why\" | tail -n 1)\"; exit 97; }\n"
     "      chmod -R u+rwX .new && lift .new || exit 97 ;;\n"
@@ -79,6 +81,7 @@ static const char build_script[] =
  * is looked for in the submission by its name, so that a program linked elsewhere with a library of its own finds it. */
 static const char probe_script[] =
     "set -u\n"
+    "rm -rf assay-library\n"
     "fail() { echo \"$1\"; exit 98; }\n"
     "missing() { LD_TRACE_LOADED_OBJECTS=1 \"$PROGRAM\" 2>&1 | sed -n 's/^[[:space:]]*\\(.*\\) => not found.*/\\1/p'; }\n"
     "[ -f \"$PROGRAM\" ] || fail \"there is no program ${PROGRAM#./} in it\"\n"
@@ -102,7 +105,7 @@ static const char probe_script[] =
     "for lib in $(missing); do fail \"the shared library $lib is missing\"; done\n"
     "why=$(LD_TRACE_LOADED_OBJECTS=1 \"$PROGRAM\" 2>&1 | grep ' not found (required by' | head -n 1)\n"
     "[ -z \"$why\" ] || fail \"$why\"\n"
-    "echo \"$path\" >library\n";
+    "echo \"$path\" >assay-library\n";
 
 /* A line fit for a student: the first error of the build, else the last line. */
 static void reason_in(const char *log, bool first_error, char *out, size_t size)
@@ -161,11 +164,11 @@ static bool probe(const struct rubric *r, const struct sandbox *box, const char 
 {
     char program[sizeof s->program + 16];
     snprintf(program, sizeof program, "PROGRAM=%s", s->program);
-    const struct path out = fs_path("%s/probe", work), library = fs_path("%s/library", out.s);
+    const struct path out = fs_path("%s/probe", work), library = fs_path("%s/assay-library", out.s);
     struct sandbox_job job = {
         .argv = (const char *const[]){"env", program, "sh", "-c", probe_script, NULL},
         .tree = s->tree,
-        .keep = (const char *const[]){"library", NULL},
+        .keep = (const char *const[]){"assay-library", NULL},
         .out = out.s,
         .limit = r->limit};
     struct sandbox_result result;
@@ -207,6 +210,8 @@ static bool build(const struct rubric *r, const struct sandbox *box, const char 
     job.limit.processes = BUILD_PROCESSES;
     if (!submission_run(r, box, s, &job, (const char *const[]){NULL}, &result, e))
         return false;
+    if (result.end == SANDBOX_FAILED && result.status == NO_UNZIP)
+        return err_set(e, "%s: there is no unzip on this machine", s->path);
     if (result.end != SANDBOX_OK) {
         bool told =
             result.end == SANDBOX_FAILED && result.status >= UNPACK && result.status <= BUILD;

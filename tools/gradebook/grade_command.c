@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* Between DIR, which may be a private one of staff's, and the copy that runs see. */
 static bool copy_cache(const char *from, const char *to, struct err *e)
@@ -40,6 +41,11 @@ static bool fill_cache(const struct grade_settings *s, const struct rubric *r,
         return err_set(e, "%s: nothing is built of it by %s", s->submission[0], r->path);
     if (skeleton.state != SUBMISSION_GRADED)
         return err_set(e, "%s: %s (%s)", s->submission[0], skeleton.why, log.s);
+    if (rmdir(cache.s) == 0)
+        return err_set(
+            e,
+            "%s: the build left nothing in the cache: is ccache installed, and are objects compiled with -c?",
+            r->path);
     if (!copy_cache(cache.s, s->build_cache, e))
         return false;
     if (!s->quiet)
