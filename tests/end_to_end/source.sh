@@ -121,10 +121,10 @@ points right right 4.0
 find "$tmp/right/.runs" -name run.json | sort >"$tmp/runs" && touch "$tmp/then"
 sed 's/tile 0.001 0.01/tile 0.002 0.01/' "$tmp/make.rubric" >"$tmp/other.rubric"
 expect "by other margins" 0 "4.00 of 6" grade right "$tmp/other.rubric" "$tmp/class/right"
-tell "it is neither built nor run again" "$([ "$(wc -l <"$tmp/runs")" = 4 ] || cat "$tmp/runs"; find "$tmp/right/.runs" -name run.json -newer "$tmp/then")"
+tell "it is neither built nor run again" "$([ "$(wc -l <"$tmp/runs")" -ge 4 ] || cat "$tmp/runs"; find "$tmp/right/.runs" -name run.json -newer "$tmp/then")"
 sed 's/^build make/& MORE=1/' "$tmp/make.rubric" >"$tmp/other.rubric"
 expect "by another build" 0 "4.00 of 6" grade right "$tmp/other.rubric" "$tmp/class/right"
-tell "it is (control)" "$([ "$(find "$tmp/right/.runs" -name run.json -newer "$tmp/then" | wc -l)" = 4 ] || echo it is not)"
+tell "it is (control)" "$([ "$(find "$tmp/right/.runs" -name run.json -newer "$tmp/then" | wc -l)" = "$(wc -l <"$tmp/runs")" ] || echo it is not)"
 expect "what goes wrong is staff's to look at" 2 "the shared library" grade make "$tmp/make.rubric" "$tmp/class"/*
 said make not_c not_built 'It does not build: tiny.c:[0-9:]* error: expected expression'
 said make usage usage 'It prints its usage text for every image: tiny: invalid option'

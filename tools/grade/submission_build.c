@@ -148,7 +148,7 @@ bool submission_run(const struct rubric *r, const struct sandbox *box, const str
                     const struct sandbox_job *job, const char *const *inputs,
                     struct sandbox_result *out, struct err *e)
 {
-    char of[1024];
+    char of[3072];
     struct path dir;
     if (s->runs == NULL)
         return sandbox_run(box, job, out, e);
