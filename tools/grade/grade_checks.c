@@ -508,7 +508,8 @@ static bool check_growth(const struct work *w, struct result *out, struct err *e
     if (!check_equal(w, out, e))
         return false;
     double equal = out->share;
-    out->share = out->chance = 0;
+    out->share = out->chance = out->more = 0;
+    out->consistent = false;
     snprintf(out->expected, sizeof out->expected,
              "the samples of %s take at most %.3g times as long as those of %s",
              image_of(w, 0)->name, exp(c->log_ratio.full), image_of(w, 2)->name);
@@ -517,8 +518,7 @@ static bool check_growth(const struct work *w, struct result *out, struct err *e
         return true;
     }
     if (equal <= 0) {
-        snprintf(out->seen, sizeof out->seen, "%s is not an image of its scene",
-                 image_of(w, 0)->name);
+        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 0)->name);
         return true;
     }
     double large = made[0]->cpu_s - made[1]->cpu_s, small = made[2]->cpu_s - made[3]->cpu_s,

@@ -131,8 +131,9 @@ static struct rubric *a_rubric(enum check_kind kind, int images)
     return r;
 }
 
-/* The rubric's one check on these images, which it frees, as it does the rubric. */
-static struct result run_check(struct rubric *r, const struct submitted_image *images, double alpha)
+/* The rubric's one check on these images, which it frees, as it does the rubric. cpu_s: of each run; NULL: none ran. */
+static struct result run_check_timed(struct rubric *r, const struct submitted_image *images,
+                                     const double *cpu_s, double alpha)
 {
     struct submitted_images *h = calloc(1, sizeof *h);
     struct answer_key *a = calloc(1, sizeof *a);
@@ -141,6 +142,7 @@ static struct result run_check(struct rubric *r, const struct submitted_image *i
     assert_true(h != NULL && a != NULL);
     for (int i = 0; i < r->num_images; i++) {
         h->image[i] = images[i];
+        h->made[i].cpu_s = cpu_s != NULL ? cpu_s[i] : 0;
         a->of[0][i].m = a->of[0][i].noise = reference;
     }
     MUST(grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e));
@@ -150,6 +152,11 @@ static struct result run_check(struct rubric *r, const struct submitted_image *i
     free(h);
     free(a);
     return out;
+}
+
+static struct result run_check(struct rubric *r, const struct submitted_image *images, double alpha)
+{
+    return run_check_timed(r, images, NULL, alpha);
 }
 
 /* One check on images with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
@@ -613,6 +620,39 @@ TEST(rates_are_whole_batches_or_not)
 }
 
 /* Files that are no images, and one that says it is large: the header alone is read. */
+/* 64 times the triangles, 0.1 s and 2 s to read them: logarithms of 6 and 12, or all of them for every ray. */
+TEST(growth_is_that_of_samples_alone)
+{
+    static const struct {
+        double cpu_s[4];
+        struct bug bug;
+        double least, most;
+        const char *seen;
+    } cases[] = {
+        {{2.6, 2.01, 0.4, 0.105}, {.scale = 1, .square = 1, .noise = 1}, 1, 1, "times as long"},
+        {{21, 2.3, 0.4, 0.105}, {.scale = 1, .square = 1, .noise = 1}, 0, 0, "times as long"},
+        {{7.0, 2.0, 0.4, 0.105}, {.scale = 1, .square = 1, .noise = 1}, 0.3, 0.95, "times as long"},
+        /* So fast that only noise is measured; either sign of it. */
+        {{0.02, 0.03, 0.03, 0.02}, {.scale = 1, .square = 1, .noise = 1}, 1, 1, "times as long"},
+        {{0.03, 0.02, 0.02, 0.03}, {.scale = 1, .square = 1, .noise = 1}, 1, 1, "times as long"},
+        {{0}, {.scale = 1, .square = 1, .noise = 1}, 0, 0, "no program ran"},
+        {{0.02, 0.01, 0.02, 0.01}, {.scale = 0, .square = 1, .noise = 1}, 0, 0, "no image of"},
+        {{0.02, 0.01, 0.02, 0.01}, {.scale = 1, .white = true, .noise = 1}, 0, 0, "no image of"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        struct rubric *r = a_rubric(CHECK_GROWTH, 4);
+        struct submitted_image image[4];
+        r->check[0].log_ratio = (struct margin){2.1, 3.2, true};
+        for (int k = 0; k < 4; k++)
+            image[k] = submit_render(&cases[i].bug, SPP);
+        struct result out = run_check_timed(r, image, cases[i].cpu_s, 1e-5);
+        if (out.share < cases[i].least || out.share > cases[i].most || out.more > 0 ||
+            strstr(out.seen, cases[i].seen) == NULL)
+            fail_msg("case %zu: %g of the points: %s", i, out.share, out.seen);
+        result_free(&out);
+    }
+}
+
 TEST(bad_images_get_a_line)
 {
     static const unsigned char bomb[] = {
