@@ -16,12 +16,13 @@
 #include <unistd.h>
 
 /* Between DIR, which may be a private one of staff's, and the copy that runs see. */
-static bool copy_cache(const char *from, const char *to, struct err *e)
+static bool copy_cache(const char *from, const char *to, const char *mode, struct err *e)
 {
     const struct process p = {
-        .argv = (const char *const[]){"sh", "-c",
-                                      "cp -R -- \"$1/.\" \"$2\" && chmod -R u+w,a+rX \"$2\"", "sh",
-                                      from, to, NULL}};
+        .argv = (const char *const[]){
+            "sh", "-c",
+            "cp -R -- \"$1/.\" \"$2\" && rm -f \"$2/build.log\" && chmod -R \"$3\" \"$2\"", "sh",
+            from, to, mode, NULL}};
     return fs_make_dirs(to, e) && process_run(&p, NULL, e);
 }
 
@@ -34,7 +35,7 @@ static bool fill_cache(const struct grade_settings *s, const struct rubric *r,
                       log = fs_path("%s/build.log", s->build_cache);
     struct submission skeleton;
     if (!submission_open(r, s->submission[0], work.s, &skeleton, e) ||
-        !fs_make_dirs(s->build_cache, e) ||
+        !fs_make_dirs(s->build_cache, e) || !copy_cache(s->build_cache, cache.s, "a+rwX", e) ||
         !submission_build(r, box, cache.s, true, work.s, log.s, &skeleton, e))
         return false;
     if (skeleton.kind != SUBMISSION_SOURCE)
@@ -46,7 +47,7 @@ static bool fill_cache(const struct grade_settings *s, const struct rubric *r,
             e,
             "%s: the build left nothing in the cache: is ccache installed, and are objects compiled with -c?",
             r->path);
-    if (!copy_cache(cache.s, s->build_cache, e))
+    if (!copy_cache(cache.s, s->build_cache, "u+w,a+rX", e))
         return false;
     if (!s->quiet)
         printf("%s: filled by building %s\n", s->build_cache, s->submission[0]);
@@ -157,7 +158,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     bool ok = (bugs != NULL || err_set(e, "out of memory")) &&
               (s->appeals == NULL || appeals_read(s->appeals, r, &appeals, e)) &&
               submission_stage(r, stage, e) &&
-              (s->build_cache == NULL || copy_cache(s->build_cache, cache.s, e));
+              (s->build_cache == NULL || copy_cache(s->build_cache, cache.s, "u+w,a+rX", e));
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
         job.bugs = bugs;
