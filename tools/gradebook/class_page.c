@@ -99,9 +99,9 @@ static void bugs_of(FILE *f, const json_t *g)
     json_t *b;
     json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, b)
     {
-        const char *and = member_or_empty(b, "and");
-        html_print(f, "%s%s%s%s", k > 0 ? " or " : "", member_text(b, "name"),
-                   and[0] != '\0' ? " and " : "", and);
+        const char *and = member_or_empty(b, "and_bug");
+        html_print(f, "%s%s%s%s", k > 0 ? "; or " : "", member_text(b, "bug"),
+                   and[0] != '\0' ? ", and " : "", and);
     }
     /* Of other deviations than those it was graded with: staff may want to know. */
     const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");

@@ -61,7 +61,10 @@ static void draw_interval(struct plot *p, const json_t *v, double y)
              100 * full);
     plot_segment(p, "expected", 0, y, 0, y + 0.55);
     plot_segment(p, "interval", 100 * lo, y + 0.3, 100 * hi, y + 0.3);
-    plot_point(p, 0, 100 * value, y + 0.3, "%s", text);
+    if (fabs(100 * value) > p->x.hi)
+        plot_arrow(p, value > 0, y + 0.3, "%s", text);
+    else
+        plot_point(p, 0, 100 * value, y + 0.3, "%s", text);
     plot_text(p, p->x.lo, y + 0.6, 4, 0, "start", "%s", text);
 }
 

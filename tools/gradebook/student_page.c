@@ -85,21 +85,30 @@ static const struct moments *reference_of(const struct page *p, const char *name
     return NULL;
 }
 
-static bool show_evidence(const struct page *p, const json_t *c, struct err *e)
+/* An image, for staff beside its reference; nothing where there is none. */
+static bool show_image(const struct page *p, const char *name, const json_t *tile, struct err *e)
 {
-    const char *name = member_or_empty(c, "picture"),
-               *curve =
-                   p->rubric != NULL && p->rubric->curve[0] != '\0' ? p->rubric->curve : "srgb";
+    const char *curve =
+        p->rubric != NULL && p->rubric->curve[0] != '\0' ? p->rubric->curve : "srgb";
     const json_t *image = image_of(p->grade, name);
-    if (!json_is_string(json_object_get(image, "sha256")))
-        return true;
     const struct path path = fs_path("%s/%s/%s", p->dir, member_or_empty(p->grade, "id"),
                                      member_or_empty(image, "file"));
-    if (!grade_images(p->f, path.s, name, json_object_get(c, "tile"), reference_of(p, name),
-                      p->staff ? curve : NULL, e))
+    return !json_is_string(json_object_get(image, "sha256")) ||
+           grade_images(p->f, path.s, name, tile, reference_of(p, name), p->staff ? curve : NULL,
+                        e);
+}
+
+static bool show_evidence(const struct page *p, const json_t *c, struct err *e)
+{
+    const char *name = member_or_empty(c, "picture");
+    const json_t *image = image_of(p->grade, name);
+    if (!show_image(p, name, json_object_get(c, "tile"), e))
         return false;
-    grade_plot_difference(p->f, c, member_number(image, "width"), member_number(image, "height"));
-    grade_plot_intervals(p->f, c);
+    if (json_is_string(json_object_get(image, "sha256"))) {
+        grade_plot_difference(p->f, c, member_number(image, "width"),
+                              member_number(image, "height"));
+        grade_plot_intervals(p->f, c);
+    }
     return true;
 }
 
@@ -131,8 +140,7 @@ static bool show_check(const struct page *p, const json_t *c, struct err *e)
             "");
     paragraph(f, "Explained by what you were given, no points lost for it:",
               member_or_empty(c, "accepted"), "");
-    paragraph(f, "Judged as it should be with a mistake that was paid for before:",
-              member_or_empty(c, "carried"), "");
+    paragraph(f, "Paid once:", member_or_empty(c, "carried"), "");
     if (!full) {
         paragraph(f, "Hint:", member_or_empty(c, "hint"), "");
         paragraph(f, "Where:", member_or_empty(c, "where"), "");
@@ -251,8 +259,8 @@ static void show_facts(const struct page *p)
     fact(f, "CPU time", html_duration(member_number(grade, "cpu_s")).s);
     fact(f, "accepted", member_or_empty(grade, "accepted"));
     fact(f, "bug on top of", member_or_empty(json_object_get(grade, "diagnosis"), "with"));
-    fact(f, "why a bug was looked for",
-         member_or_empty(json_object_get(grade, "diagnosis"), "gate"));
+    if (json_array_size(json_object_get(json_object_get(grade, "diagnosis"), "named")) == 0)
+        fact(f, "bug", member_or_empty(json_object_get(grade, "diagnosis"), "gate"));
     fact(f, "bug not looked for", member_or_empty(json_object_get(grade, "diagnosis"), "error"));
     fact(f, "sandbox", json_is_false(json_object_get(grade, "sandbox")) ? "none" : "yes");
     fact(f, "seed", html_number(member_number(grade, "seed")).s);
@@ -275,8 +283,9 @@ static bool page(const struct page *p, struct err *e)
     show_head(p);
     grade_summary_build_log(p->f, p->dir, p->grade);
     grade_summary_bug(p->f, p->grade);
+    bool ok = show_image(p, member_or_empty(p->grade, "located_picture"), NULL, e);
     grade_summary_parts(p->f, p->grade, p->staff);
-    bool ok = show_checks(p, true, e) && show_checks(p, false, e);
+    ok = ok && show_checks(p, true, e) && show_checks(p, false, e);
     json_array_foreach(json_object_get(p->grade, "checks"), i, c) left_out |=
         !grade_summary_shows(c, p->staff);
     if (left_out)
