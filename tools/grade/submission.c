@@ -16,7 +16,6 @@ enum { MAX_PATH = 4400, MAX_ARGS = 96, TEXT = 8192 };
 
 const char *const submission_kind_name[] = {"images", "program", "source"};
 const char *const submission_state_name[] = {"graded", "not_built", "not_started", "usage"};
-const char submission_not_made[] = "there is no image, see what is said of all of it";
 static const char *const endings[] = {".png", ".exr", ".pfm", ".hdr"};
 enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
 

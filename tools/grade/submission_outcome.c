@@ -5,6 +5,8 @@
 #include <string.h>
 #include <strings.h>
 
+const char submission_not_made[] = "there is no image, see what is said of all of it";
+
 enum { CHEAPER = 8, HOPELESS = 3 };
 
 /* In proportion to the time that the image takes, more or less. */

@@ -1,4 +1,4 @@
-#include "grade_summary.h"
+#include "student_page.h"
 
 #include "reference/base/json_node.h"
 #include "renderer/base/fs.h"

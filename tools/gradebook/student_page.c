@@ -5,7 +5,6 @@
 #include "grade_change.h"
 #include "grade_images.h"
 #include "grade_needs.h"
-#include "grade_summary.h"
 #include "renderer/base/fs.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"

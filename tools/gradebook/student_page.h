@@ -16,6 +16,18 @@ bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
 bool staff_page(FILE *f, const char *dir, const struct rubric *r, const struct answer_key *a,
                 const json_t *grade, struct err *e) __attribute__((warn_unused_result));
 
+/* What a page says first. May a check be seen now? Staff see all. */
+bool grade_summary_shows(const json_t *check, bool staff);
+
+/* The named bug with what it is called where, or where what is wrong shows; nothing where nothing is. */
+void grade_summary_bug(FILE *f, const json_t *grade);
+
+/* A bar for each part, as long as it is worth, and links (#check-NAME) to the checks that lost points. */
+void grade_summary_parts(FILE *f, const json_t *grade, bool staff);
+
+/* The last lines of dir/ID/build_log; unfolded where it could not be built. */
+void grade_summary_build_log(FILE *f, const char *dir, const json_t *grade);
+
 /* A check's tiles. Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. Of `exact`: the share of
  * pixels that differ. width, height: of the image. */
 void grade_plot_difference(FILE *f, const json_t *check, double width, double height);
