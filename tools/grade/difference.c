@@ -269,6 +269,7 @@ static void measure_tile(const struct pair *p, struct rect r, const struct noise
         return;
     *furthest = distance;
     out->tile = interval;
+    out->blur[NUM_CHANNELS] = s.tolerance / fmax(s.b, floor * s.used);
     out->tile_x = r.x;
     out->tile_y = r.y;
 }
@@ -300,6 +301,7 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
                            &out->image[c]))
             return !(out->skewed = true) ||
                    err_set(e, "rare bright pixels keep it from being judged");
+        out->blur[c] = s.tolerance / fmax(s.b, floor * s.used);
     }
     out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);
     if (out->relative == NULL)
@@ -323,6 +325,21 @@ double difference_kappa(const struct submitted_image *a, const struct submitted_
 {
     const struct pair p = {a, reference, use};
     return noise_in(&p, (struct rect){0, 0, a->width, a->height}).kappa;
+}
+
+void difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
+                       const unsigned char *use, double *kappa, double *sd)
+{
+    const struct pair p = {a, reference, use};
+    int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
+    struct noise whole = noise_in(&p, (struct rect){0, 0, a->width, a->height});
+    *sd = sqrt(2 / whole.dof);
+    for (int t = 0; t < columns * rows; t++) {
+        const struct rect r = {t % columns * RUBRIC_TILE, t / columns * RUBRIC_TILE, RUBRIC_TILE,
+                               RUBRIC_TILE};
+        struct noise local = noise_in(&p, around(a, r));
+        kappa[t] = local.known && local.dof >= unknown_dof ? local.kappa : whole.kappa;
+    }
 }
 
 bool difference_correlated(const struct submitted_image *a, const struct submitted_image *b,

@@ -17,13 +17,15 @@ double interval_half(const struct interval *i);
 struct difference {
     struct interval
         image[NUM_CHANNELS]; /* relative difference of the means of R, G, B, luminance */
-    struct interval tile;    /* of the tile furthest from agreeing, luminance */
-    int tile_x, tile_y;      /* pixels */
-    int tiles;               /* that could be judged */
-    double compared;         /* share of the pixels */
-    double kappa;            /* noise variance over that of our renderer */
-    bool skewed;             /* where it fails: more samples would mend it */
-    double *relative;        /* per tile, difference in luminance; NAN where not judged */
+    double blur[NUM_CHANNELS +
+                1];       /* of these, and of `tile`: the part of half the width that is no noise */
+    struct interval tile; /* of the tile furthest from agreeing, luminance */
+    int tile_x, tile_y;   /* pixels */
+    int tiles;            /* that could be judged */
+    double compared;      /* share of the pixels */
+    double kappa;         /* noise variance over that of our renderer */
+    bool skewed;          /* where it fails: more samples would mend it */
+    double *relative;     /* per tile, difference in luminance; NAN where not judged */
 };
 
 /* A against B over the pixels with use[p] != 0; means elsewhere are not looked at.
@@ -53,6 +55,11 @@ void difference_free(struct difference *a);
 /* kappa of the image. */
 double difference_kappa(const struct submitted_image *a, const struct submitted_image *reference,
                         const unsigned char *use);
+
+/* The same of each tile and what is around it, or of the image where that says too little; *sd: of the logarithm of that
+ * of the image. kappa: by rows. */
+void difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
+                       const unsigned char *use, double *kappa, double *sd);
 
 /* Do the errors of two runs, in second differences, go together more than those of independent runs, by 6 standard
  * deviations? (Products of independent errors: variance 1/n, times 4 for overlap and 3 for channels alike; what the noise of

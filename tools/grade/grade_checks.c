@@ -1,6 +1,7 @@
 #include "grade_checks.h"
 
 #include "rate_image.h"
+#include "stopping_rule.h"
 #include "tools/stats/distributions.h"
 
 #include <math.h>
@@ -18,9 +19,9 @@ double score_width(const struct margin *m, const struct interval *i)
     return fmin(1, fmax(0, 2 - interval_half(i) / m->none));
 }
 
-double score_more(const struct margin *m, const struct interval *i)
+double score_more(const struct margin *m, const struct interval *i, double blur)
 {
-    double wide = interval_half(i) / m->none;
+    double wide = (interval_half(i) - blur) / m->none;
     return wide > 1 && score_share(m, i) > 0 ? wide * wide : 0;
 }
 
@@ -106,13 +107,24 @@ static bool measure_noise(const struct work *w, int k, const unsigned char *use,
     const struct submitted_image *s = student(w, k);
     if (!submitted_image_from(expected_noise(w, k), s, &right, e))
         return false;
-    *kappa = s->runs_dof > 0 ? 1 : difference_kappa(s, &right, use);
+    *kappa = s->num_runs > 1 ? 1 : difference_kappa(s, &right, use);
     *noise = 0;
     for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
         if (use[i / 3])
-            *noise += s->runs_dof > 0 ? s->measured[i / 3 * 4 + i % 3] : *kappa * s->variance[i];
+            *noise += s->num_runs > 1 ? s->measured[i / 3 * 4 + i % 3] : *kappa * s->variance[i];
     submitted_image_free(&right);
     return true;
+}
+
+/* Where some images of a check have several runs, those of the others are taken to vary as kappa says. */
+static void model_noise(const struct work *w, const double *kappa)
+{
+    bool any = false;
+    for (int k = 0; k < w->check->num_images; k++)
+        any = any || student(w, k)->num_runs > 1;
+    for (int k = 0; k < w->check->num_images; k++)
+        if (student(w, k)->num_runs <= 1)
+            submitted_image_model(&w->h->image[w->check->images[k]], any ? kappa[k] : 0);
 }
 
 /* Pixels that can be compared. What is noisier than our renders reaches the clipping point from further away; where
@@ -131,6 +143,8 @@ static unsigned char *usable(const struct work *w, struct result *out, struct er
                                         false, use, e);
     for (int k = 0; ok && k < w->check->num_images; k++)
         ok = measure_noise(w, k, use, &kappa[k], &out->noise[k], e);
+    if (ok)
+        model_noise(w, kappa);
     if (ok)
         memcpy(quiet, use, pixels);
     for (int k = 0; ok && k < w->check->num_images; k++)
@@ -186,11 +200,11 @@ void grade_checks_tell(const struct difference *a, char *text, size_t size)
 
 /* One more interval that decides: the smallest share counts. */
 static void judge(const struct work *w, const struct margin *m, const struct interval *i,
-                  struct result *out)
+                  double blur, struct result *out)
 {
     double share = score_share(m, i), chance = score_chance(m, i), width = score_width(m, i);
     if (can_buy(w)) {
-        out->more = fmax(out->more, score_more(m, i));
+        out->more = fmax(out->more, score_more(m, i, blur));
     } else if (width < share) {
         share = width;
         chance = width > 0;
@@ -224,7 +238,7 @@ static void score_agreement(const struct work *w, struct result *out)
         if (k == NUM_CHANNELS && out->agreement.tiles == 0)
             continue;
         out->consistent = out->consistent && interval_distance(i) == 0;
-        judge(w, m, i, out);
+        judge(w, m, i, out->agreement.blur[k], out);
     }
     grade_checks_tell(&out->agreement, out->seen, sizeof out->seen);
 }
@@ -251,6 +265,41 @@ static bool compare(const struct work *w, const struct submitted_image *a,
     return true;
 }
 
+/* What the rule of stopping may do to this program: the range for an adaptive image with as much noise as the student's. */
+static bool stopping_of(const struct work *w, const unsigned char *use, struct stopping *out,
+                        struct err *e)
+{
+    struct submitted_image right;
+    if (!submitted_image_from(expected_noise(w, 0), student(w, 0), &right, e))
+        return false;
+    bool ok = stopping_rule_range(image_of(w, 0), student(w, 0), &right, expected_noise(w, 0), use,
+                                  out, e);
+    submitted_image_free(&right);
+    return ok;
+}
+
+/* The rule of stopping is biased, which is not the student's fault: against what it does to noise like his. */
+static bool compare_stopped(const struct work *w, struct submitted_image *right,
+                            const unsigned char *use, double blind, struct result *out,
+                            struct err *e)
+{
+    struct stopping rule;
+    int columns = right->width / RUBRIC_TILE;
+    if (!stopping_of(w, use, &rule, e))
+        return false;
+    for (size_t i = 0; i < 3 * (size_t)right->width * (size_t)right->height; i++) {
+        int x = (int)(i / 3) % right->width, y = (int)(i / 3) / right->width;
+        int t = y / RUBRIC_TILE * columns + x / RUBRIC_TILE;
+        right->tolerance[i] += (rule.high[t] - rule.low[t]) / 2 * right->mean[i];
+        right->mean[i] *= 1 + (rule.high[t] + rule.low[t]) / 2;
+    }
+    stopping_rule_free(&rule);
+    difference_free(&out->agreement);
+    out->share = out->chance = 0;
+    out->more = blind;
+    return compare(w, student(w, 0), right, use, out, e);
+}
+
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_image *p = image_of(w, 0);
@@ -266,7 +315,10 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    const bool ok = compare(w, student(w, 0), &b, use, out, e);
+    double blind = out->more;
+    bool ok = compare(w, student(w, 0), &b, use, out, e);
+    if (ok && out->share < 1 && rubric_is_adaptive(p))
+        ok = compare_stopped(w, &b, use, blind, out, e);
     submitted_image_free(&b);
     if (!ok) {
         free(use);
@@ -445,7 +497,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
                  exp(i.lo), exp(i.hi));
         out->share = 1;
         out->more = 0; /* clipped pixels are left out of it */
-        judge(w, &w->check->log_ratio, &i, out);
+        judge(w, &w->check->log_ratio, &i, 0, out);
         settle(w, false, out);
     } else {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
@@ -454,6 +506,23 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     submitted_image_free(&rq);
     free(use);
     return true;
+}
+
+/* By what the rule gives for a program with as much noise: `ours` is the mean of our counts. */
+static bool widen_count(const struct work *w, double ours, struct interval *count,
+                        struct result *out, struct err *e)
+{
+    struct stopping rule;
+    unsigned char *use = usable(w, out, e);
+    bool ok = use != NULL && stopping_of(w, use, &rule, e);
+    if (ok) {
+        count->lo -= fmax(0, rule.most / ours - 1);
+        count->hi -= fmin(0, rule.least / ours - 1);
+        stopping_rule_free(&rule);
+    }
+    free(use);
+    out->more = 0;
+    return ok;
 }
 
 static bool check_rates(const struct work *w, struct result *out, struct err *e)
@@ -480,9 +549,15 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
         return true;
     }
     double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
-    const struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    if (score_share(&c->count, &count) < 1 && rubric_is_adaptive(image_of(w, 0)) &&
+        !widen_count(w, rates.mean / (1 + rates.more), &count, out, e))
+        return false;
     score_pixels(w, rates.odd, rates.pixels, out);
-    judge(w, &c->count, &count, out);
+    if (score_share(&c->count, &count) <= out->share) {
+        out->share = score_share(&c->count, &count);
+        out->chance = score_chance(&c->count, &count);
+    }
     snprintf(
         out->seen, sizeof out->seen,
         "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",
@@ -533,12 +608,36 @@ static bool check_growth(const struct work *w, struct result *out, struct err *e
     return true;
 }
 
-/* The noise that an image should have. */
-static void expect_noise(const struct work *w)
+/* A program that stops by itself has the noise of the samples that it says it took. */
+static void scale_noise(struct submitted_image *s, const double *count, double spp)
 {
-    for (int k = 0; k < w->check->num_images; k++)
-        submitted_image_expect(&w->h->image[w->check->images[k]], expected_noise(w, k),
-                               image_of(w, k)->spp);
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        s->variance[i] *= spp / count[i / 3];
+        s->k3[i] *= pow(spp / count[i / 3], 2);
+    }
+    for (int k = 0; k < s->num_runs; k++)
+        scale_noise(&s->run[k], count, spp);
+}
+
+/* The noise that an image should have. */
+static bool expect_noise(const struct work *w, struct err *e)
+{
+    for (int k = 0; k < w->check->num_images; k++) {
+        const struct rubric_image *p = image_of(w, k);
+        struct submitted_image *s = &w->h->image[w->check->images[k]];
+        const struct made *made = &w->h->made[w->check->images[k]];
+        struct err no_rates;
+        submitted_image_expect(s, expected_noise(w, k), p->spp);
+        if (made->rates[0] == '\0' || !rubric_is_adaptive(p))
+            continue;
+        double *count = calloc((size_t)s->width * (size_t)s->height, sizeof *count);
+        if (count == NULL)
+            return err_set(e, "out of memory");
+        if (rate_image_counts(made->rates, s->width, s->height, p->spp, count, &no_rates))
+            scale_noise(s, count, p->spp);
+        free(count);
+    }
+    return true;
 }
 
 bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
@@ -561,8 +660,7 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
         out->judged = h->made[i].end != SANDBOX_LOST;
         return true;
     }
-    expect_noise(&w);
-    return kinds[check->kind](&w, out, e);
+    return expect_noise(&w, e) && kinds[check->kind](&w, out, e);
 }
 
 void result_free(struct result *r)

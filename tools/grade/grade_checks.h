@@ -39,8 +39,9 @@ bool answer_key_render(const struct rubric *r, int image, bool as_asked, const c
 double score_share(const struct margin *m, const struct interval *i);
 
 /* An interval that is wide for noise comes near to 0 whatever is wrong: where half its width is more than margin.none, the
- * share says nothing yet. How many times the samples it takes to change that; 0: none, as it is decided. */
-double score_more(const struct margin *m, const struct interval *i);
+ * share says nothing yet. How many times the samples it takes to change that; 0: none, as it is decided. blur: the part of
+ * half its width that samples do not mend. */
+double score_more(const struct margin *m, const struct interval *i, double blur);
 
 /* Where no more samples can be had, width costs points: 1 up to margin.none, 0 from twice that. */
 double score_width(const struct margin *m, const struct interval *i);

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 
 /* A step of one batch moves one of the colours by 510 batch/most codes. */
-enum { MOST_BATCHES = 64, ALLOWED = 2 };
+enum { MOST_BATCHES = 64 };
+static const double codes_of_all = 510, rounding = 2;
 
 static double distance(const float *px, const uint8_t code[3])
 {
@@ -17,22 +18,46 @@ static double distance(const float *px, const uint8_t code[3])
     return d;
 }
 
-bool rate_image_read(const char *path, int width, int height, int most, int batch,
-                     const double *expected, struct rate_image *out, struct err *e)
+static bool read_file(const char *path, int width, int height, struct image_file *out,
+                      struct err *e)
 {
-    struct image_file pic;
     struct image_info info;
-    double ours = 0, squares = 0;
-    *out = (struct rate_image){0};
-    if (most / batch > MOST_BATCHES)
-        return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
     if (!image_inspect(path, &info, e))
         return false;
     if (info.width != width || info.height != height)
         return err_set(e, "it is %d x %d pixels, not %d x %d", info.width, info.height, width,
                        height);
-    if (!image_file_read_inspected(path, &info, &pic, e))
+    return image_file_read_inspected(path, &info, out, e);
+}
+
+bool rate_image_counts(const char *path, int width, int height, int most, double *count,
+                       struct err *e)
+{
+    struct image_file pic;
+    if (!read_file(path, width, height, &pic, e))
         return false;
+    for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
+        const float *px = pic.rgb + 3 * p;
+        double rate = px[0] > px[2] ? (1 + (double)px[0]) / 2 : (1 - (double)px[2]) / 2;
+        count[p] = fmax(1, rate * most);
+    }
+    image_file_free(&pic);
+    return true;
+}
+
+bool rate_image_read(const char *path, int width, int height, int most, int batch,
+                     const double *expected, struct rate_image *out, struct err *e)
+{
+    struct image_file pic;
+    double ours = 0, squares = 0;
+    *out = (struct rate_image){0};
+    if (most / batch > MOST_BATCHES)
+        return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
+    if (!read_file(path, width, height, &pic, e))
+        return false;
+    /* Whether the sample after which it stopped is counted is not said; but a batch has to be told from the next. */
+    double allowed =
+        fmin(rounding + codes_of_all / most, fmax(rounding, codes_of_all * batch / most / 4));
     for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
         int nearest = 0;
         double least = INFINITY;
@@ -47,7 +72,7 @@ bool rate_image_read(const char *path, int width, int height, int most, int batc
             }
         }
         out->pixels++;
-        out->odd += least > ALLOWED;
+        out->odd += least > allowed;
         out->early += nearest < most;
         out->mean += nearest;
         ours += expected[p];

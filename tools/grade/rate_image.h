@@ -5,10 +5,11 @@
 #include "renderer/base/err.h"
 
 struct rate_image {
-    double pixels, odd; /* odd: of a colour that no multiple of the batch has, to 2 codes */
-    double early;       /* that did not take all samples */
-    double mean;        /* samples a pixel */
-    double more, sd;    /* mean over that of `expected`, less 1, and its standard deviation */
+    double pixels,
+        odd; /* odd: of a colour that no multiple of the batch has, to one sample and 2 codes */
+    double early;    /* that did not take all samples */
+    double mean;     /* samples a pixel */
+    double more, sd; /* mean over that of `expected`, less 1, and its standard deviation */
 };
 
 /* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
@@ -16,5 +17,9 @@ struct rate_image {
 bool rate_image_read(const char *path, int width, int height, int most, int batch,
                      const double *expected, struct rate_image *out, struct err *e)
     __attribute__((warn_unused_result));
+
+/* Samples of each pixel by its colour alone, 1 at least. */
+bool rate_image_counts(const char *path, int width, int height, int most, double *count,
+                       struct err *e) __attribute__((warn_unused_result));
 
 #endif

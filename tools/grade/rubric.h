@@ -121,6 +121,12 @@ struct rubric_mistakes {
 bool rubric_read(const char *path, const struct suite *suite, struct rubric *out,
                  struct rubric_mistakes *m, struct err *e) __attribute__((warn_unused_result));
 
+/* The number after an option of an image, or the k-th further one: `-a BATCH TOLERANCE`; 0: it has none. */
+double rubric_option(const struct rubric_image *p, const char *option, int k);
+
+/* Does a pixel stop by itself (`-a BATCH TOLERANCE` with a batch of at most spp)? */
+bool rubric_is_adaptive(const struct rubric_image *p);
+
 double rubric_points(const struct rubric *r);
 
 /* Is pixel number `pixel`, by rows from the top, one that no check looks at? */

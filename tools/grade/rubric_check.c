@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -26,6 +27,24 @@ void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...
         err_hide_controls(m->at[m->num].text);
     }
     m->num++;
+}
+
+double rubric_option(const struct rubric_image *p, const char *option, int k)
+{
+    char words[300], with_spaces[16];
+    snprintf(words, sizeof words, " %s", p->options);
+    snprintf(with_spaces, sizeof with_spaces, " %s ", option);
+    char *at = strstr(words, with_spaces);
+    double v = 0;
+    for (at = at != NULL ? at + strlen(with_spaces) : NULL; at != NULL && k >= 0; k--)
+        v = strtod(at, &at);
+    return v;
+}
+
+bool rubric_is_adaptive(const struct rubric_image *p)
+{
+    double batch = rubric_option(p, "-a", 0);
+    return batch > 0 && batch <= p->spp;
 }
 
 double rubric_points(const struct rubric *r)

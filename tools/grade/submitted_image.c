@@ -278,6 +278,20 @@ bool submitted_image_copy(const struct submitted_image *s, struct submitted_imag
     return true;
 }
 
+void submitted_image_model(struct submitted_image *s, double kappa)
+{
+    static const double known_dof = 30;
+    s->runs_dof = kappa > 0 ? known_dof : 0;
+    for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
+        double *v = s->measured + 4 * p, sd = 0;
+        for (size_t c = 0; c < 3; c++) {
+            v[c] = kappa * s->variance[3 * p + c] + s->rounding[3 * p + c];
+            sd += luminance_weight[c] * sqrt(v[c]); /* for any correlation of the channels */
+        }
+        v[3] = sd * sd;
+    }
+}
+
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src)
 {
     for (size_t i = 0; i < 3 * (size_t)dst->width * (size_t)dst->height; i++) {

@@ -57,6 +57,9 @@ bool submitted_image_from(const struct moments *m, const struct submitted_image 
 bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
                           struct err *e) __attribute__((warn_unused_result));
 
+/* `measured` of an image of one run: kappa times its expected variance, and its rounding; kappa 0: nothing is measured. */
+void submitted_image_model(struct submitted_image *s, double kappa);
+
 /* dst += src, clipped where either is, measured where both are; one made of nothing, black, is. */
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 

@@ -61,23 +61,6 @@ struct purchases {
     bool stuck[RUBRIC_IMAGES]; /* no more is to be had of it */
 };
 
-/* The first number of an option in the words of an image; 0: it has none. */
-static double option_of(const struct rubric_image *p, const char *option)
-{
-    char words[300], with_spaces[16];
-    snprintf(words, sizeof words, " %s", p->options);
-    snprintf(with_spaces, sizeof with_spaces, " %s ", option);
-    const char *at = strstr(words, with_spaces);
-    return at != NULL ? strtod(at + strlen(with_spaces), NULL) : 0;
-}
-
-/* Does it stop by itself (`-a BATCH TOLERANCE`)? Then its noise is what the tolerance says, and runs count alike. */
-static bool is_adaptive(const struct rubric_image *p)
-{
-    double batch = option_of(p, "-a");
-    return batch > 0 && batch <= p->spp;
-}
-
 static bool was_tried(const double *tried, int num, double spp)
 {
     for (int k = 0; k < num; k++)
@@ -94,17 +77,18 @@ static int next_samples(const struct collect *c, const struct purchases *b,
     const struct rubric_image *p = &c->job->rubric->image[image];
     const struct sandbox_limits *limit = &c->job->rubric->limit;
     const struct made *made = &h->made[image];
-    double base = p->spp, has = h->image[image].spp, batch = option_of(p, "-a"), largest = base;
+    double base = p->spp, has = h->image[image].spp, batch = rubric_option(p, "-a", 0),
+           largest = base;
     double wanted = (more - 1) * has * 1.2, most = 64 * base;
     int root = (int)lround(sqrt(base)), num = h->runs[image], best = 0;
-    if (num >= (is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS) || base < 2)
+    if (num >= (rubric_is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS) || base < 2)
         return 0;
     for (int k = 0; k < num; k++)
         largest = fmax(largest, b->tried[image][k]);
     most = fmin(most, 2.9 * largest); /* so that two runs are left to measure noise */
     most = fmin(most, 0.5 * base * limit->cpu_s / fmax(0.02, made->cpu_s));
     most = fmin(most, 0.5 * base * limit->wall_s / fmax(0.02, made->wall_s));
-    if (is_adaptive(p))
+    if (rubric_is_adaptive(p))
         wanted = base;
     else if (batch > base)
         most = fmin(most, batch - 1);
@@ -122,7 +106,7 @@ static int next_samples(const struct collect *c, const struct purchases *b,
 static double cost_of(const struct submitted_images *h, const struct rubric_image *p, int image,
                       int spp)
 {
-    return fmax(0.02, h->made[image].cpu_s) * (is_adaptive(p) ? 1.5 : (double)spp / p->spp);
+    return fmax(0.02, h->made[image].cpu_s) * (rubric_is_adaptive(p) ? 1.5 : (double)spp / p->spp);
 }
 
 /* The image of an undecided check that adds most noise, and by how much it has to have more samples. */
@@ -180,7 +164,9 @@ static bool has_fallen(const struct submitted_image *s, const struct submitted_i
     if (fabs(samples) < log(1.1) ||
         !difference_noise(more, right, s, right, use, alpha, &i, &no_noise))
         return true;
-    return (sign > 0 ? i.lo : -i.hi) <= 0 || sign * i.value < fabs(samples) / 2;
+    /* Clipping takes noise away from the smaller run; of true noise that does not fall the ratio is all of `samples`. */
+    return (sign > 0 ? i.lo : -i.hi) < 0.25 * fabs(samples) ||
+           sign * i.value < 0.75 * fabs(samples);
 }
 
 /* Takes over one more run of an image, or finds that it is none. */
@@ -194,7 +180,7 @@ static bool take_run(const struct collect *c, struct submitted_images *h, int im
     size_t pixels = (size_t)s->width * (size_t)s->height;
     if (submitted_image_same(last, more)) {
         *stuck = true;
-        h->fixed[image] = !is_adaptive(p);
+        h->fixed[image] = !rubric_is_adaptive(p);
         submitted_image_free(more);
         return true;
     }
@@ -207,7 +193,8 @@ static bool take_run(const struct collect *c, struct submitted_images *h, int im
     bool ok = submitted_image_comparable(s, m, fmin(last->spp, more->spp), false, use, e) &&
               submitted_image_from(m, s, &right, e);
     if (ok) {
-        h->fixed[image] = !is_adaptive(p) && !has_fallen(last, more, &right, use, c->job->alpha);
+        h->fixed[image] =
+            !rubric_is_adaptive(p) && !has_fallen(last, more, &right, use, c->job->alpha);
         *stuck = h->fixed[image];
         bool alone = difference_correlated(last, more, &right, use);
         submitted_image_free(&right);
@@ -244,7 +231,7 @@ static bool buy(const struct collect *c, struct submitted_images *h, int image, 
         b->stuck[image] = true;
         return true;
     }
-    if (is_adaptive(&as))
+    if (rubric_is_adaptive(&as))
         more.spp = c->job->rubric->image[image].spp;
     return take_run(c, h, image, &more, &b->stuck[image], e);
 }

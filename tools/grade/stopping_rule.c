@@ -1,0 +1,150 @@
+#include "stopping_rule.h"
+
+#include <gsl/gsl_randist.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { REPEATS = 8, SHAPES = 3 };
+
+/* A sample is c, or c + a with probability p; p 1: no fluctuation, as if mean and variance were known. */
+struct shape {
+    double p, c, a;
+};
+
+static struct shape shape_of(int kind, double mean, double variance)
+{
+    double p = mean * mean / (mean * mean + variance) / (kind == 2 ? 3 : 1);
+    if (kind == 0 || !(mean > 0))
+        return (struct shape){.p = 1};
+    double a = sqrt(variance / (p * (1 - p)));
+    return (struct shape){p, mean - p * a, a};
+}
+
+static bool stops(double n, double mean, double variance, double tolerance)
+{
+    return 1.96 * sqrt(fmax(0, variance) / n) <= tolerance * mean;
+}
+
+/* Samples after which one pixel stops; *bias: its mean then, less that of all `most` samples of the same run. */
+static double run_pixel(const gsl_rng *rng, struct shape s, double mean, double variance, int batch,
+                        double tolerance, int most, double *bias)
+{
+    double hits = 0, stopped = 0, at_stop = 0;
+    *bias = 0;
+    for (double n = batch; n < most && stopped == 0; n += batch) {
+        double found = mean, spread = variance;
+        if (s.p < 1) {
+            hits += gsl_ran_binomial(rng, s.p, (unsigned)batch);
+            found = s.c + s.a * hits / n;
+            spread = s.a * s.a * hits * (1 - hits / n) / (n - 1);
+        }
+        if (stops(n, found, spread, tolerance)) {
+            stopped = n;
+            at_stop = found;
+        }
+    }
+    if (stopped == 0)
+        return most;
+    if (s.p < 1) {
+        hits += gsl_ran_binomial(rng, s.p, (unsigned)(most - stopped));
+        *bias = at_stop - (s.c + s.a * hits / most);
+    }
+    return stopped;
+}
+
+/* What is simulated, and of which pixel. */
+struct simulation {
+    const gsl_rng *rng;
+    const struct rubric_image *image;
+    const struct moments *m;
+    double batch, tolerance;
+};
+
+/* Luminance of a sample: for any correlation of the channels the variance is at most this (pyramid.h). */
+static void sample_of(const struct moments *m, size_t pixel, double *mean, double *variance)
+{
+    double sd = 0, n = m->n[pixel];
+    *mean = 0;
+    for (size_t c = 0; c < 3; c++) {
+        size_t i = 3 * pixel + c;
+        *mean += luminance_weight[c] * m->mean[i];
+        sd += luminance_weight[c] * (n > 1 ? sqrt(m->m2[i] / (n - 1) * fmax(1, m->spp)) : 0);
+    }
+    *variance = sd * sd;
+}
+
+/* One tile with one shape and kappa: samples of all its pixels; *bias: relative. */
+static double run_tile(const struct simulation *s, struct rect r, int kind, double kappa,
+                       double *bias)
+{
+    double taken = 0, light = 0, off = 0;
+    for (int y = r.y; y < r.y + r.height; y++)
+        for (int x = r.x; x < r.x + r.width; x++) {
+            double mean, variance, b;
+            int repeats = kind == 0 ? 1 : REPEATS;
+            sample_of(s->m, (size_t)y * (size_t)s->m->width + (size_t)x, &mean, &variance);
+            const struct shape shape = shape_of(kind, mean, kappa * variance);
+            for (int k = 0; k < repeats; k++) {
+                taken += run_pixel(s->rng, shape, mean, kappa * variance, (int)s->batch,
+                                   s->tolerance, s->image->spp, &b) /
+                         repeats;
+                off += b / repeats;
+            }
+            light += mean;
+        }
+    *bias = light > 0 ? off / light : 0;
+    return taken;
+}
+
+static void run_all(const struct simulation *s, const double *kappa, double factor, int kind,
+                    struct stopping *out)
+{
+    int columns = s->image->width / RUBRIC_TILE, tiles = columns * (s->image->height / RUBRIC_TILE);
+    double taken = 0;
+    for (int t = 0; t < tiles; t++) {
+        double bias;
+        const struct rect r = {t % columns * RUBRIC_TILE, t / columns * RUBRIC_TILE, RUBRIC_TILE,
+                               RUBRIC_TILE};
+        taken += run_tile(s, r, kind, kappa[t] * factor, &bias);
+        out->low[t] = fmin(out->low[t], bias);
+        out->high[t] = fmax(out->high[t], bias);
+    }
+    taken /= (double)s->image->width * s->image->height;
+    out->least = fmin(out->least, taken);
+    out->most = fmax(out->most, taken);
+}
+
+bool stopping_rule_range(const struct rubric_image *p, const struct submitted_image *s,
+                         const struct submitted_image *right, const struct moments *m,
+                         const unsigned char *use, struct stopping *out, struct err *e)
+{
+    static const double uncertain = 3.3; /* standard deviations of ln kappa */
+    size_t tiles = (size_t)(p->width / RUBRIC_TILE) * (size_t)(p->height / RUBRIC_TILE);
+    double *kappa = calloc(tiles, sizeof *kappa), sd;
+    gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
+    *out = (struct stopping){.least = INFINITY};
+    out->low = calloc(tiles, sizeof *out->low);
+    out->high = calloc(tiles, sizeof *out->high);
+    bool ok = (kappa != NULL && rng != NULL && out->low != NULL && out->high != NULL) ||
+              err_set(e, "out of memory");
+    if (ok) {
+        const struct simulation sim = {rng, p, m, rubric_option(p, "-a", 0),
+                                       rubric_option(p, "-a", 1)};
+        difference_kappas(s, right, use, kappa, &sd);
+        for (int kind = 0; kind < SHAPES; kind++)
+            for (int end = -1; end <= 1; end += 2)
+                run_all(&sim, kappa, exp(end * uncertain * sd), kind, out);
+    } else {
+        stopping_rule_free(out);
+    }
+    gsl_rng_free(rng);
+    free(kappa);
+    return ok;
+}
+
+void stopping_rule_free(struct stopping *s)
+{
+    free(s->low);
+    free(s->high);
+    *s = (struct stopping){0};
+}
