@@ -151,7 +151,7 @@ static void table(FILE *f, json_t *const *sorted, size_t num)
     fputs(
         "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Submissions\"><table><thead><tr>"
         "<th scope=\"col\">submission</th><th scope=\"col\" class=\"num\">points</th>"
-        "<th scope=\"col\">for you to look at</th><th scope=\"col\">bug</th>",
+        "<th scope=\"col\">for you to look at</th><th scope=\"col\">what is wrong</th>",
         f);
     json_array_foreach(parts, k, p)
     {

@@ -280,7 +280,9 @@ static bool page(const struct page *p, struct err *e)
     html_page_open(p->f, member_or_empty(p->grade, "id"), NULL, 0);
     fputs("<div class=\"grade\">\n", p->f);
     show_head(p);
-    grade_summary_build_log(p->f, p->dir, p->grade);
+    bool built = strcmp(member_or_empty(p->grade, "state"), "not_built") != 0;
+    if (!built)
+        grade_summary_build_log(p->f, p->dir, p->grade);
     grade_summary_bug(p->f, p->grade);
     bool ok = show_image(p, member_or_empty(p->grade, "located_picture"), NULL, e);
     grade_summary_parts(p->f, p->grade, p->staff);
@@ -291,6 +293,8 @@ static bool page(const struct page *p, struct err *e)
         fputs("<p>Some checks are not shown yet.</p>\n", p->f);
     if (p->staff)
         show_facts(p);
+    if (built)
+        grade_summary_build_log(p->f, p->dir, p->grade);
     fputs("</div>\n", p->f);
     html_page_close(p->f);
     return ok;
