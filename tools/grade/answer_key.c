@@ -84,9 +84,11 @@ static bool render_ours(const struct rubric *r, const struct rubric_image *p, co
     const struct path path = fs_path("%s/%s.exr", opt->cache, key);
     if (access(path.s, R_OK) == 0 && moments_read(path.s, out, NULL, e))
         return true;
-    const struct path made = fs_path("%s/new.exr", opt->cache);
+    char name[32]; /* of this process: others may fill the same cache */
+    snprintf(name, sizeof name, "new-%ld.exr", (long)getpid());
+    const struct path made = fs_path("%s/%s", opt->cache, name);
     const struct path log = fs_path("%s/%s.log", opt->cache, p->name);
-    if (!command_of(r, p, words, opt, "new.exr", text, argv, e))
+    if (!command_of(r, p, words, opt, name, text, argv, e))
         return false;
     const struct process process = {
         .argv = argv, .cwd = opt->cache, .log = log.s, .timeout_s = opt->timeout_s};
