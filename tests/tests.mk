@@ -185,10 +185,11 @@ bvh-table: $(BUILD)/pathtracer
 #: make grade-show  grade a class of fifty, write tests/studies/grading/
 grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
 	tests/studies/grading/grade_show.sh $(BUILD)
-#: make rubric-bugs what known bugs do to the images of a rubric (RUBRIC=tools/rubrics/cs184-3-1.rubric)
+#: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="FILES"
+rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-*.rubric)
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)
-	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRIC)
+	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRICS)
 
 # For tests/mutants/mutants.sh.
 print-compile:

@@ -202,6 +202,13 @@ static bool is_near(const struct candidate *best, const struct candidate *other)
            1 - other->explained < 2 * (1 - best->explained);
 }
 
+/* In logarithms. Bugs that leave noise are told apart by what the model knows of variances, to this share of the lead. */
+static double tie_of(const struct diagnose_options *opt, const struct candidate *best)
+{
+    static const double variance_error = 0.005;
+    return fmax(log(tie), opt->by_likelihood ? variance_error * best->log_likelihood : 0);
+}
+
 static void name(const struct bug_fit *f, const struct diagnose_options *opt,
                  const struct candidate *all, int num, double bound, struct diagnosis *out)
 {
@@ -215,7 +222,8 @@ static void name(const struct bug_fit *f, const struct diagnose_options *opt,
     for (int i = 0; i < num; i++) {
         double relative = exp(all[i].log_likelihood - all[0].log_likelihood);
         sum += relative;
-        if (i < out->num_candidates && relative * tie >= 1 && out->num_named == i &&
+        if (i < out->num_candidates && out->num_named == i &&
+            all[0].log_likelihood - all[i].log_likelihood <= tie_of(opt, &all[0]) &&
             is_explanation(f, opt, &all[i])) {
             out->num_named++;
             named += relative;
@@ -245,6 +253,20 @@ static bool name_pair(const struct bug_fit *f, const struct diagnose_options *op
         *out = two;
     free(pair);
     return true;
+}
+
+/* What is explained, and what remains. */
+static void tell_rest(struct diagnosis *out)
+{
+    const struct candidate *c = &out->candidate[0];
+    if (out->num_named == 0)
+        snprintf(out->gate, sizeof out->gate, "no known bug, nor two of them, explains the images");
+    else if (c->excess <= bug_fit_largest_excess)
+        snprintf(out->gate, sizeof out->gate, "what remains of the difference is noise");
+    else
+        snprintf(out->gate, sizeof out->gate,
+                 "%.1f %% of the difference is explained, what remains is more than noise",
+                 100 * c->explained);
 }
 
 static bool check(const struct observation *clue, struct err *e)
@@ -287,6 +309,8 @@ bool diagnose(const struct catalogue *c, const struct observation *clue, int num
         name(&f, opt, all, num, by_verdict ? log(tie * c->num_bugs) : diagnose_bound(c, opt->alpha),
              out);
         ok = !opt->pairs || name_pair(&f, opt, all, num, out, e);
+        if (opt->by_likelihood)
+            tell_rest(out);
     }
     bug_fit_end(&f);
     free(all);

@@ -14,6 +14,8 @@ static const double effect_error = 0.03;
 /* What is cut off at the brightest code depends on how a program's noise is distributed: of cells brighter than this
  * share of it, so much of their radiance may be off, all in one direction. */
 static const double bright = 0.5, clip_error = 0.05;
+/* What a bug makes darker than this share of the right image is measured against that share. */
+static const double dark = 0.1;
 
 /* ---- which part pays? */
 
@@ -141,7 +143,7 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
     bool ok = (seen != NULL && room != NULL) || err_set(e, "out of memory");
     ok = ok && rubric_bugs_observe(w->b, w->r, w->a, w->h, w->with, image, seen, e);
     if (ok) {
-        double clip = rubric_bugs_clip(w->r);
+        double clip = rubric_sight_clip(w->r);
         int first = bugs & 1 ? w->bug[0] : w->bug[1], second = bugs == 3 ? w->bug[1] : -1;
         const struct signature *s = &seen->seen, *c = &seen->view->correct;
         const struct effect *effect =
@@ -159,7 +161,7 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
             out->var[i] += s->var[i] + c->var[i] + pow(effect_error * more, 2) +
                            (effect != NULL ? (double)effect->var[i] : 0);
             if (is_first)
-                out->base[i] = c->mean[i] + more;
+                out->base[i] = fmax(c->mean[i] + more, dark * c->mean[i]);
         }
     }
     free(seen);
@@ -206,13 +208,13 @@ static bool measure(const struct cells *s, double alpha, struct difference *out,
         if (out->relative == NULL)
             return err_set(e, "out of memory");
     }
-    double dark = 1e-6;
+    const double black = 1e-6;
     for (int c = 0; c < NUM_CHANNELS; c++) {
         struct sums all = sum_of(s, 0, 0, s->columns, s->rows, c);
-        out->image[c] = interval_of(&all, fmax(all.base, dark), z);
+        out->image[c] = interval_of(&all, fmax(all.base, black), z);
     }
     struct sums whole = sum_of(s, 0, 0, s->columns, s->rows, CHANNEL_LUMINANCE);
-    double least = fmax(0.25 * whole.base * side * side / (s->columns * s->rows), dark);
+    double least = fmax(0.25 * whole.base * side * side / (s->columns * s->rows), black);
     for (int t = 0; t < num; t++) {
         int x = t % columns * side, y = t / columns * side;
         struct sums tile = sum_of(s, x, y, side, side, CHANNEL_LUMINANCE);
@@ -296,14 +298,15 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
     struct cells *cells = calloc(1, sizeof *cells);
     bool ok = cells != NULL || err_set(e, "out of memory");
     *is_judged = c->kind == CHECK_EQUAL || c->kind == CHECK_AGREE || c->kind == CHECK_SUM ||
-                 c->kind == CHECK_EXACT || c->kind == CHECK_RATES;
-    for (int k = 0; k < c->num_images; k++)
+                 c->kind == CHECK_EXACT || c->kind == CHECK_RATES || c->kind == CHECK_GROWTH;
+    const int images = c->kind == CHECK_GROWTH ? 1 : c->num_images;
+    for (int k = 0; k < images; k++)
         *is_judged = *is_judged && rubric_bugs_can_observe(w->b, w->h, w->with, c->images[k]);
     if (ok && *is_judged && c->kind == CHECK_RATES) {
         free(cells);
         return judge_rates(w, c, bugs, out, e);
     }
-    for (int k = 0; ok && *is_judged && k < c->num_images; k++)
+    for (int k = 0; ok && *is_judged && k < images; k++)
         ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);
     if (ok && *is_judged && c->kind == CHECK_EXACT) {
         double off = share_off(cells);
@@ -315,6 +318,8 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
         ok = measure(cells, w->alpha, &out->agreement, e);
         if (ok)
             score(c, out);
+        if (ok && c->kind == CHECK_GROWTH && out->share > 0)
+            grade_checks_growth(w->r, c, w->h, out);
     }
     free(cells);
     return ok;

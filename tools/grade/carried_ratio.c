@@ -7,23 +7,25 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Mean luminance where neither of the two is as bright as the brightest code: what shines, and what is cut off, tells
- * nothing. */
-static double mean_luminance(const struct rubric *r, const double *of, const double *with,
-                             int width, int height, double clip)
+/* Mean luminance of a over that of b, by one mask: what shines, and what is cut off, tells nothing. */
+static double ratio_of(const struct rubric *r, const double *a, const double *b, int width,
+                       int height, const unsigned char *use)
 {
-    double sum = 0, num = 0;
-    for (size_t p = 0; p < (size_t)width * (size_t)height; p++) {
-        bool bright = rubric_masks(r, width, height, p);
-        double luminance = 0;
-        for (size_t c = 0; c < 3; c++) {
-            bright |= of[3 * p + c] >= clip || (with != NULL && with[3 * p + c] >= clip);
-            luminance += luminance_weight[c] * of[3 * p + c];
+    double sum_a = 0, sum_b = 0;
+    for (size_t p = 0; p < (size_t)width * (size_t)height; p++)
+        for (size_t c = 0; use[p] && !rubric_masks(r, width, height, p) && c < 3; c++) {
+            sum_a += luminance_weight[c] * a[3 * p + c];
+            sum_b += luminance_weight[c] * b[3 * p + c];
         }
-        sum += bright ? 0 : luminance;
-        num += !bright;
-    }
-    return num > 0 ? sum / num : 0;
+    return sum_b > 0 ? sum_a / sum_b : 0;
+}
+
+/* use[p] = 0 where the image is as bright as the brightest code. */
+static void leave_bright(const double *mean, size_t pixels, double clip, unsigned char *use)
+{
+    for (size_t i = 0; i < 3 * pixels; i++)
+        if (mean[i] >= clip)
+            use[i / 3] = 0;
 }
 
 /* Correlation of the tiles' luminance with that of the reference; the largest over mirrored images, as a camera may
@@ -64,6 +66,29 @@ static double likeness(const struct submitted_image *s, const struct moments *m)
     return best;
 }
 
+static const struct moments *answer_of(const struct answer_key *a, int set, int image)
+{
+    const struct moments *own = &a->of[set][image].m;
+    return own->width > 0 ? own : &a->of[0][image].m;
+}
+
+static const double least_likeness = 0.5;
+
+/* Only that it draws the scene matters for its times. */
+static void carry_growth(const struct rubric *r, const struct answer_key *a, int set,
+                         const struct submitted_images *h, const struct rubric_check *c,
+                         struct result *out)
+{
+    struct result other = *out;
+    if (likeness(&h->image[c->images[0]], answer_of(a, set, c->images[0])) < least_likeness)
+        return;
+    grade_checks_growth(r, c, h, &other);
+    if (other.share <= out->share)
+        return;
+    *out = other;
+    snprintf(out->carried, sizeof out->carried, "timed as it is: it shows the scene");
+}
+
 /* An image that shows no more than the earlier one has the ratio B/P: half way there nothing is left. */
 static struct margin margin_of(const struct margin *given, double expected)
 {
@@ -75,37 +100,40 @@ static struct margin margin_of(const struct margin *given, double expected)
     return m;
 }
 
-static const struct moments *answer_of(const struct answer_key *a, int set, int image)
-{
-    const struct moments *own = &a->of[set][image].m;
-    return own->width > 0 ? own : &a->of[0][image].m;
-}
-
 static void carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
                         const struct submitted_images *h, const struct rubric_check *c,
                         struct result *out)
 {
-    static const double least_likeness = 0.5;
     const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
     const struct moments *rp = answer_of(a, set, c->images[0]), *rb = answer_of(a, set, c->after);
-    if (p->mean == NULL || b->mean == NULL || strcmp(p->sha256, b->sha256) == 0 ||
-        likeness(p, rp) < least_likeness)
+    if (b->mean == NULL || p->width != b->width || p->height != b->height ||
+        strcmp(p->sha256, b->sha256) == 0 || likeness(p, rp) < least_likeness)
         return;
-    bool same_size = p->width == b->width && p->height == b->height;
-    double clip = rubric_bugs_clip(r);
-    double theirs =
-               mean_luminance(r, p->mean, same_size ? b->mean : NULL, p->width, p->height, clip),
-           theirs_b =
-               mean_luminance(r, b->mean, same_size ? p->mean : NULL, b->width, b->height, clip),
-           ours =
-               mean_luminance(r, rp->mean, same_size ? rb->mean : NULL, p->width, p->height, clip),
-           ours_b =
-               mean_luminance(r, rb->mean, same_size ? rp->mean : NULL, b->width, b->height, clip);
-    if (!(theirs > 0 && theirs_b > 0 && ours > 0 && ours_b > 0))
+    const size_t pixels = (size_t)p->width * (size_t)p->height;
+    const double clip = rubric_sight_clip(r);
+    unsigned char *use = malloc(2 * pixels), *own = use + pixels;
+    if (use == NULL)
         return;
-    double v = log(theirs / theirs_b) - log(ours / ours_b);
+    /* What is cut off lies elsewhere where the camera is wrong, and in more places where all is too bright. */
+    memset(use, 1, 2 * pixels);
+    leave_bright(p->mean, pixels, clip, own);
+    leave_bright(b->mean, pixels, clip, own);
+    leave_bright(rp->mean, pixels, clip, use);
+    leave_bright(rb->mean, pixels, clip, use);
+    double right = ratio_of(r, rp->mean, rb->mean, p->width, p->height, use),
+           theirs = ratio_of(r, p->mean, b->mean, p->width, p->height, own);
+    double v = log(theirs / right);
+    for (size_t k = 0; k < pixels; k++)
+        use[k] = use[k] && own[k];
+    double other = log(ratio_of(r, p->mean, b->mean, p->width, p->height, use) /
+                       ratio_of(r, rp->mean, rb->mean, p->width, p->height, use));
+    free(use);
+    if (isnan(v) || fabs(other) < fabs(v))
+        v = other;
+    if (!isfinite(v))
+        return;
     const struct interval i = {v, v, v, 0};
-    const struct margin m = margin_of(&c->carried, ours / ours_b);
+    const struct margin m = margin_of(&c->carried, right);
     double share = score_share(&m, &i);
     if (share <= out->share)
         return;
@@ -114,7 +142,7 @@ static void carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     snprintf(
         out->carried, sizeof out->carried,
         "held against '%s', which lost points before: %.3g times as bright as that, should be %.3g",
-        r->image[c->after].name, theirs / theirs_b, ours / ours_b);
+        r->image[c->after].name, right * exp(v), right);
 }
 
 static bool is_there(const struct submitted_images *h, const struct rubric_check *c)
@@ -239,6 +267,8 @@ void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int se
             carry_ratio(r, a, set, h, c, &result[i]);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
             carry_rates(r, a, set, h, c, &result[i]);
+        else if (c->kind == CHECK_GROWTH)
+            carry_growth(r, a, set, h, c, &result[i]);
         else if (c->kind == CHECK_NOISE)
             carry_noise(r, a, h, c, alpha, &result[i]);
     }

@@ -26,11 +26,11 @@ static bool grade_with(const struct rubric *r, const struct answer_key *a, int s
     return true;
 }
 
-/* An image that is wrong against our own reference and, as far as can be seen, right against another. */
+/* An image that is wrong against our own reference and right against another, as far as it matters. */
 static bool is_explained(const struct rubric_check *c, double plain, const struct result *with)
 {
-    return plain < 1 && ((c->kind == CHECK_EQUAL && with->consistent) ||
-                         (c->kind == CHECK_EXACT && with->share == 1));
+    return plain < 1 && with->share == 1 && with->more == 0 &&
+           (c->kind == CHECK_EQUAL || c->kind == CHECK_EXACT);
 }
 
 static bool explains(const struct rubric *r, const double *plain, const struct result *with)

@@ -230,14 +230,12 @@ static void score_agreement(const struct work *w, struct result *out)
     const struct rubric_check *c = w->check;
     out->share = 1;
     out->chance = 0;
-    out->consistent = true;
     for (int k = 0; k <= NUM_CHANNELS; k++) {
         const struct interval *i =
             k < NUM_CHANNELS ? &out->agreement.image[k] : &out->agreement.tile;
         const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
         if (k == NUM_CHANNELS && out->agreement.tiles == 0)
             continue;
-        out->consistent = out->consistent && interval_distance(i) == 0;
         judge(w, m, i, out->agreement.blur[k], out);
     }
     grade_checks_tell(&out->agreement, out->seen, sizeof out->seen);
@@ -572,29 +570,19 @@ static double timing_error(const struct made *m)
     return 0.01 + 0.05 * m->cpu_s;
 }
 
-/* CPU time of P less Q over that of R less S, two scenes with many and few samples: reading the scene and building the
- * hierarchy cancel. Judged at the end of the interval that is best for the program. */
-static bool check_growth(const struct work *w, struct result *out, struct err *e)
+void grade_checks_growth(const struct rubric *r, const struct rubric_check *c,
+                         const struct submitted_images *h, struct result *out)
 {
-    const struct rubric_check *c = w->check;
     const struct made *made[4];
     for (int k = 0; k < 4; k++)
-        made[k] = &w->h->made[c->images[k]];
-    if (!check_equal(w, out, e))
-        return false;
-    double equal = out->share;
+        made[k] = &h->made[c->images[k]];
     out->share = out->chance = out->more = 0;
-    out->consistent = false;
     snprintf(out->expected, sizeof out->expected,
              "the samples of %s take at most %.3g times as long as those of %s",
-             image_of(w, 0)->name, exp(c->log_ratio.full), image_of(w, 2)->name);
+             r->image[c->images[0]].name, exp(c->log_ratio.full), r->image[c->images[2]].name);
     if (made[0]->cpu_s <= 0) {
         snprintf(out->seen, sizeof out->seen, "no program ran that could be timed");
-        return true;
-    }
-    if (equal <= 0) {
-        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 0)->name);
-        return true;
+        return;
     }
     double large = made[0]->cpu_s - made[1]->cpu_s, small = made[2]->cpu_s - made[3]->cpu_s,
            large_error = timing_error(made[0]) + timing_error(made[1]),
@@ -605,6 +593,18 @@ static bool check_growth(const struct work *w, struct result *out, struct err *e
     snprintf(out->seen, sizeof out->seen,
              "%.3g s of CPU time against %.3g s (+- %.2g and %.2g): at least %.3g times as long",
              large, small, large_error, small_error, exp(least));
+}
+
+static bool check_growth(const struct work *w, struct result *out, struct err *e)
+{
+    if (!check_equal(w, out, e))
+        return false;
+    bool is_wrong = out->share <= 0;
+    grade_checks_growth(w->r, w->check, w->h, out);
+    if (is_wrong && w->h->made[w->check->images[0]].cpu_s > 0) {
+        out->share = 0;
+        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 0)->name);
+    }
     return true;
 }
 

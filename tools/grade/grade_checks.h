@@ -56,7 +56,6 @@ struct result {
     double chance; /* score_chance() of what decided */
     bool
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
-    bool consistent; /* of equal, agree and sum: no interval misses 0 */
     double
         more; /* > 0: not decided, it takes about so many times the samples; share is what it may still be */
     double noise[CHECK_IMAGES]; /* variance that each image of the check adds, in some unit */
@@ -90,8 +89,13 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
                       const struct answer_key *a, int set, struct submitted_images *h, double alpha,
                       struct result *out, struct err *e) __attribute__((warn_unused_result));
 
+/* The times of a check of growth, whatever its images show: CPU time of P less Q over that of R less S, two scenes with many
+ * and few samples, so that reading the scene and building the hierarchy cancel. Judged at the end of the interval that is best for the program. */
+void grade_checks_growth(const struct rubric *r, const struct rubric_check *c,
+                         const struct submitted_images *h, struct result *out);
+
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
- * another brings 1 % of all points more and some image that is wrong without it is consistent with it: a bug that
+ * another brings 1 % of all points more and some image that is wrong without it is right with it, and not for its noise: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
 bool grade_all_checks(const struct rubric *r, const struct answer_key *a,

@@ -20,12 +20,10 @@ static bool is_hemisphere(const struct rubric_image *p, const char *scene)
     return has_word(p->options, "-H");
 }
 
-/* `-a N TOLERANCE` with a batch that can end. */
 static bool is_adaptive(const struct rubric_image *p, const char *scene)
 {
     (void)scene;
-    const char *at = strstr(p->options, "-a ");
-    return at != NULL && atoi(at + 3) < p->spp;
+    return rubric_is_adaptive(p);
 }
 
 static bool is_lens(const struct rubric_image *p, const char *scene)

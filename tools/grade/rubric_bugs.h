@@ -1,17 +1,13 @@
 /* Known bugs on a rubric's own images: a catalogue (catalogue.h) beside the rubric, made by tests/studies/grading/make_rubric_bugs.c. By it
  * a submission of any kind, 8-bit images alone too, is told which bug its images look like; nothing more is rendered.
  *
- * A view is an image, alone or with a set of accepted deviations that changes it: "box", "box@light_pdf". Cells are those of
- * signature.h. What they hold is what an 8-bit image of the rubric's curve and of as many samples as are asked for shows on
- * average: E[min(X, clip)] of each pixel, X normal with the mean and the variance of a render of ours, clip the radiance of
- * the brightest code. Decoded codes are the middle of their bin; half a bin, by which a flat cell may be off, is added to the standard
- * deviation of a student's cell, so rounding and clipping are part of every likelihood. The variance of an effect also holds the
- * noise that the bug adds to one image. Images of adaptive sampling have FACT_SAMPLES, by the rate image. */
+ * A view is an image, alone or with a set of accepted deviations that changes it. Cells are those of
+ * rubric_sight.h; the variance of an effect also holds the noise that the bug adds to one image. */
 #ifndef ASSAY_RUBRIC_BUGS_H
 #define ASSAY_RUBRIC_BUGS_H
 
 #include "tools/diagnose/diagnose.h"
-#include "grade_checks.h"
+#include "rubric_sight.h"
 
 struct rubric_bugs {
     struct catalogue catalogue;
@@ -21,26 +17,17 @@ struct rubric_bugs {
 /* Whether the image is one of those looked at: with a reference of ours, and of a check that is about what it shows (equal,
  * exact, rates, sum, agree). */
 bool rubric_bugs_sees(const struct rubric *r, int image);
-/* Is the number of its samples a fact (a check of rates)? */
-bool rubric_bugs_counts(const struct rubric *r, int image);
 /* The first set of deviations whose reference is, bit by bit, that of `set`. */
 int rubric_bugs_set(const struct answer_key *a, int set, int image);
-/* Name of a view and a hash of all that decides its correct image. */
-bool rubric_bugs_key(const struct rubric *r, int image, int set, char name[128], char key[65],
-                     struct err *e) __attribute__((warn_unused_result));
+/* A hash of all that decides its correct image; its view has its name. */
+bool rubric_bugs_key(const struct rubric *r, int image, char key[65], struct err *e)
+    __attribute__((warn_unused_result));
 
-/* Cells of a render of ours as above: mean, variance of the mean, n = samples in a cell (of counting images: as if
- * all had been taken), FACT_SAMPLES of counting images. Fails on a size that is not of whole cells. */
-bool rubric_bugs_sight(const struct rubric *r, int image, const struct moments *m,
-                       struct signature *out, struct err *e) __attribute__((warn_unused_result));
-
-/* Reads r->bugs. Fails if a view is missing or has been made of another image. The caller closes it. */
+/* Reads r->bugs, and makes the views with deviations: there a bug changes the light of a cell by the factor by which it changes
+ * that of the right image. Fails if a view is missing or has been made of another image. The caller closes it. */
 bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e) __attribute__((warn_unused_result));
 void rubric_bugs_close(struct rubric_bugs *b);
-
-/* Radiance of the rubric's brightest code; INFINITY: none. */
-double rubric_bugs_clip(const struct rubric *r);
 
 /* Has the image a view with these deviations, and did the student make it? If so: its cells. */
 bool rubric_bugs_can_observe(const struct rubric_bugs *b, const struct submitted_images *h, int set,

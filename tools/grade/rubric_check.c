@@ -196,6 +196,10 @@ static void check_carried(const struct rubric *r, struct rubric_check *c, struct
     else if (!is_of_earlier_part(r, c, c->after))
         rubric_mistake(m, c->line, "check '%s': 'after %s' is in no check of an earlier part",
                        c->name, r->image[c->after].name);
+    else if (r->image[c->after].width != r->image[c->images[0]].width ||
+             r->image[c->after].height != r->image[c->images[0]].height)
+        rubric_mistake(m, c->line, "check '%s': 'after %s' has another size", c->name,
+                       r->image[c->after].name);
     else if (r->image[c->after].reference == REFERENCE_NONE)
         rubric_mistake(m, c->line, "check '%s': 'after %s' has no reference", c->name,
                        r->image[c->after].name);

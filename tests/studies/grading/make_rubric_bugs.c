@@ -1,12 +1,12 @@
-/* make_rubric_bugs BUILD PATCHES RUBRIC: writes the catalogue of known bugs that the rubric's line `bugs` names, beside the rubric
- * (tools/grade/rubric_bugs.h). Every bug of PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only),
+/* make_rubric_bugs BUILD PATCHES RUBRIC...: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
+ * (tools/grade/rubric_bugs.h): one for all, as they have images in common. Every bug of PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only),
  * the correct renderer is BUILD/pathtracer.
  *
  * The correct images are the references. Of each view, each bug and the correct renderer make BATCHES images of a
  * quarter of the samples asked for, with the same seeds, so that what a bug does not touch has no noise in the
- * difference; with all samples where their number is a fact. The effect is the mean of the differences; its variance that of
+ * difference; one image with all samples where their number is a fact. The effect is the mean of the differences; its variance that of
  * independent images times the level at which the batches scatter, and what one image with the bug has more noise than
- * one without. A bug that changes no pixel of an image of one sample has no effect on it, nor on it with deviations; an
+ * one without. A bug that changes no pixel of an image of one sample (of four, where their number is a fact and the bug not in adaptive sampling itself) has no effect on it; an
  * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
@@ -19,17 +19,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 4 };
+enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 4, MOST_RUBRICS = 8 };
+
+struct course {
+    struct rubric rubric;
+    struct answer_key answers;
+};
+
+/* Of a view. */
+struct source {
+    const struct course *course;
+    int image;
+    struct signature batch[BATCHES]; /* the correct renderer's */
+    struct moments few;              /* likewise, few_of() samples a pixel */
+};
 
 struct maker {
     char build[PATH_MAX];
     struct suite suite;
-    struct rubric *rubric;
-    struct answer_key *answers;
+    struct course *course[MOST_RUBRICS];
+    int num;
     struct catalogue made;
-    int image[RUBRIC_SETS * RUBRIC_IMAGES], set[RUBRIC_SETS * RUBRIC_IMAGES]; /* of a view */
-    struct signature (*batch)[BATCHES]; /* of a view: the correct renderer's */
-    struct moments *one; /* likewise, one sample a pixel; of views without deviations */
+    struct source *of; /* as many as views */
 };
 
 /* Where a program's images are kept; hash tells its versions apart. */
@@ -45,33 +56,42 @@ static bool open_cache(const struct maker *m, const char *name, const char *hash
                                    .cache = cache,
                                    .threads = 1,
                                    .timeout_s = 3600};
-    return fs_make_dirs(cache, e) && submission_stage(m->rubric, stage, e);
+    bool ok = fs_make_dirs(cache, e);
+    for (int i = 0; ok && i < m->num; i++)
+        ok = submission_stage(&m->course[i]->rubric, stage, e);
+    return ok;
 }
 
-static bool render(const struct maker *m, int view, int batch, const struct answer_options *opt,
+static bool render(const struct source *of, int batch, const struct answer_options *opt,
                    struct signature *out, struct err *e)
 {
-    const struct rubric *r = m->rubric;
-    int image = m->image[view], spp = r->image[image].spp;
-    bool counts = rubric_bugs_counts(r, image);
-    char words[1024];
+    const struct rubric *r = &of->course->rubric;
+    int spp = r->image[of->image].spp;
+    bool counts = rubric_sight_counts(r, of->image);
+    char words[64];
     struct moments made;
-    snprintf(words, sizeof words, "--seed %d %s", SEED + batch, r->set[m->set[view]].words);
+    snprintf(words, sizeof words, "--seed %d", SEED + batch);
     spp = counts || spp / 4 < LEAST_SPP ? spp : spp / 4;
-    if (!answer_key_render(r, image, counts, words, spp, opt, &made, e))
+    if (!answer_key_render(r, of->image, counts, words, spp, opt, &made, e))
         return false;
-    bool ok = rubric_bugs_sight(r, image, &made, out, e);
+    bool ok = rubric_sight_of_render(r, of->image, &made, out, e);
     moments_free(&made);
     return ok;
 }
 
-/* One sample a pixel, by the bug: as by the correct renderer? */
-static bool is_same(const struct maker *m, int view, const struct answer_options *bug, bool *same,
+/* A few, where samples that depend on each other would show in their number. */
+static int few_of(const struct source *of)
+{
+    return rubric_sight_counts(&of->course->rubric, of->image) ? 4 : 1;
+}
+
+/* Few samples a pixel, by the bug: as by the correct renderer? */
+static bool is_same(const struct source *of, const struct answer_options *bug, bool *same,
                     struct err *e)
 {
     struct moments a;
-    const struct moments *b = &m->one[view];
-    if (!answer_key_render(m->rubric, m->image[view], false, "", 1, bug, &a, e))
+    const struct moments *b = &of->few;
+    if (!answer_key_render(&of->course->rubric, of->image, false, "", few_of(of), bug, &a, e))
         return false;
     *same = a.width == b->width && a.height == b->height &&
             memcmp(a.mean, b->mean, 3 * (size_t)a.width * (size_t)a.height * sizeof *a.mean) == 0;
@@ -85,15 +105,19 @@ static double of_one(const struct rubric *r, int image, const struct signature *
     return s->var[i] * s->n / ((double)r->image[image].spp * s->cell * s->cell);
 }
 
-static void set_effect(const struct maker *m, int view, const struct signature *bug,
-                       struct effect *out)
+static void set_effect(const struct source *of, const struct signature *bug, struct effect *out)
 {
-    const struct signature *correct = m->batch[view], a = signature_average(bug, BATCHES);
+    const struct rubric *r = &of->course->rubric;
+    const struct signature a =
+        signature_average(bug, rubric_sight_counts(r, of->image) ? 1 : BATCHES);
     double more[SIGNATURE_VALUES] = {0};
     for (int i = 0; i < 3 * a.columns * a.rows; i++)
-        more[i] = fmax(0, of_one(m->rubric, m->image[view], &bug[0], i) -
-                              of_one(m->rubric, m->image[view], &correct[0], i));
-    bug_effect(bug, correct, BATCHES, 0, more, &a, out);
+        more[i] =
+            fmax(0, of_one(r, of->image, &bug[0], i) - of_one(r, of->image, &of->batch[0], i));
+    if (rubric_sight_counts(r, of->image))
+        bug_effect(bug, of->batch, 1, 1, more, bug, out);
+    else
+        bug_effect(bug, of->batch, BATCHES, 0, more, &a, out);
 }
 
 static bool is_needed(const struct effect *e, const struct signature *correct)
@@ -107,24 +131,20 @@ static bool make_view(struct maker *m, int view, int b, const struct answer_opti
 {
     struct signature s[BATCHES];
     struct view *v = &m->made.view[view];
-    const struct view *plain = &m->made.view[0];
-    bool same = false, counts = rubric_bugs_counts(m->rubric, m->image[view]);
-    for (int k = 0; k < view; k++)
-        if (m->image[k] == m->image[view] && m->set[k] == 0)
-            plain = &m->made.view[k];
-    if (m->set[view] > 0 && plain->effect[b] == NULL)
-        return true;
-    if (m->set[view] == 0 && !counts && !is_same(m, view, bug, &same, e))
+    const struct source *of = &m->of[view];
+    bool same = false, counts = rubric_sight_counts(&of->course->rubric, of->image),
+         adaptive = strncmp(m->made.bug[b].where, "part 5", 6) == 0;
+    if (!(counts && adaptive) && !is_same(of, bug, &same, e))
         return false;
     if (same)
         return true;
-    for (int k = 0; k < BATCHES; k++)
-        if (!render(m, view, k, bug, &s[k], e))
+    for (int k = 0; k < (counts ? 1 : BATCHES); k++)
+        if (!render(of, k, bug, &s[k], e))
             return false;
     struct effect *effect = calloc(1, sizeof *effect);
     if (effect == NULL)
         return err_set(e, "out of memory");
-    set_effect(m, view, s, effect);
+    set_effect(of, s, effect);
     if (is_needed(effect, &v->correct))
         v->effect[b] = effect;
     else
@@ -153,55 +173,63 @@ static bool make_bug(void *ctx, int b, struct err *e)
 }
 
 /* What is right: the reference; of adaptive sampling, whose mean it is not, the batches. */
-static bool make_correct(struct maker *m, int view, const struct answer_options *ours,
+static bool make_correct(struct source *of, const struct answer_options *ours, struct view *v,
                          struct err *e)
 {
-    struct view *v = &m->made.view[view];
-    int image = m->image[view];
+    const struct rubric *r = &of->course->rubric;
     for (int k = 0; k < BATCHES; k++)
-        if (!render(m, view, k, ours, &m->batch[view][k], e))
+        if (!render(of, k, ours, &of->batch[k], e))
             return false;
-    if (m->set[view] == 0 &&
-        !answer_key_render(m->rubric, image, false, "", 1, ours, &m->one[view], e))
+    if (!answer_key_render(r, of->image, false, "", few_of(of), ours, &of->few, e))
         return false;
-    if (!rubric_bugs_counts(m->rubric, image))
-        return rubric_bugs_sight(m->rubric, image, &m->answers->of[m->set[view]][image].m,
-                                 &v->correct, e);
-    v->correct = signature_average(m->batch[view], BATCHES);
+    if (!rubric_sight_counts(r, of->image))
+        return rubric_sight_of_render(r, of->image, &of->course->answers.of[0][of->image].m,
+                                      &v->correct, e);
+    v->correct = signature_average(of->batch, BATCHES);
     return true;
+}
+
+static bool add_view(struct maker *m, const struct course *course, int image,
+                     const struct answer_options *ours, struct err *e)
+{
+    const struct rubric_image *p = &course->rubric.image[image];
+    struct view *v = &m->made.view[m->made.num_views];
+    struct source *of = &m->of[m->made.num_views];
+    *v = (struct view){.width = p->width,
+                       .height = p->height,
+                       .spp = p->spp > 2 ? p->spp : 3,
+                       .renders = 1,
+                       .fixed_spp = true,
+                       .seed = SEED};
+    *of = (struct source){.course = course, .image = image};
+    snprintf(v->name, sizeof v->name, "%s", p->name);
+    if (!rubric_bugs_key(&course->rubric, image, v->scene_sha256, e))
+        return false;
+    const struct view *other = catalogue_view(&m->made, p->name);
+    if (other != NULL)
+        return strcmp(other->scene_sha256, v->scene_sha256) == 0 ||
+               err_set(e, "%s:%d: another rubric has another image '%s'", course->rubric.path,
+                       p->line, p->name);
+    v->effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *));
+    m->made.num_views++;
+    return v->effect != NULL ? make_correct(of, ours, v, e) : err_set(e, "out of memory");
 }
 
 static bool add_views(struct maker *m, const struct answer_options *ours, struct err *e)
 {
-    const struct rubric *r = m->rubric;
-    size_t most = (size_t)r->num_sets * (size_t)r->num_images;
+    const size_t most = MOST_RUBRICS * RUBRIC_IMAGES;
     m->made.view = calloc(most, sizeof *m->made.view);
-    m->batch = calloc(most, sizeof *m->batch);
-    m->one = calloc(most, sizeof *m->one);
-    if (m->made.view == NULL || m->batch == NULL || m->one == NULL)
+    m->of = calloc(most, sizeof *m->of);
+    if (m->made.view == NULL || m->of == NULL)
         return err_set(e, "out of memory");
-    for (int k = 0; k < r->num_sets; k++)
-        for (int i = 0; i < r->num_images; i++) {
-            if (!rubric_bugs_sees(r, i) || rubric_bugs_set(m->answers, k, i) != k ||
-                (k > 0 && r->set[k].words[0] == '\0'))
-                continue;
-            int at = m->made.num_views++;
-            struct view *v = &m->made.view[at];
-            *v = (struct view){.width = r->image[i].width,
-                               .height = r->image[i].height,
-                               .spp = r->image[i].spp > 2 ? r->image[i].spp : 3,
-                               .renders = 1,
-                               .fixed_spp = true,
-                               .seed = SEED,
-                               .effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *))};
-            m->image[at] = i;
-            m->set[at] = k;
-            if (v->effect == NULL)
-                return err_set(e, "out of memory");
-            if (!rubric_bugs_key(r, i, k, v->name, v->scene_sha256, e) ||
-                !make_correct(m, at, ours, e))
+    for (int k = 0; k < m->num; k++) {
+        struct course *course = m->course[k];
+        if (!answer_key_make(&course->rubric, ours, &course->answers, e))
+            return false;
+        for (int i = 0; i < course->rubric.num_images; i++)
+            if (rubric_bugs_sees(&course->rubric, i) && !add_view(m, course, i, ours, e))
                 return false;
-        }
+    }
     return true;
 }
 
@@ -209,50 +237,57 @@ static bool make(struct maker *m, const char *patches, struct err *e)
 {
     char cache[PATH_MAX], ours[PATH_MAX], out[2 * PATH_MAX];
     struct answer_options opt;
+    const struct rubric *r = &m->course[0]->rubric;
     snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
     if (!bug_list(patches, &m->made, e) ||
-        !open_cache(m, "correct", "references", ours, cache, &opt, e) ||
-        !answer_key_make(m->rubric, &opt, m->answers, e) || !add_views(m, &opt, e))
+        !open_cache(m, "correct", "references", ours, cache, &opt, e) || !add_views(m, &opt, e))
         return false;
-    snprintf(out, sizeof out, "%s/%s", m->rubric->dir, m->rubric->bugs);
+    snprintf(out, sizeof out, "%s/%s", r->dir, r->bugs);
     return work_run_all(m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
+}
+
+/* That the directory of the catalogue is not there is a mistake: it is made before. */
+static bool read_course(struct maker *m, const char *path, struct err *e)
+{
+    struct rubric_mistakes mistakes = {0};
+    char dir[2 * PATH_MAX];
+    struct course *c = calloc(1, sizeof *c);
+    if (c == NULL)
+        return err_set(e, "out of memory");
+    m->course[m->num++] = c;
+    if (!rubric_read(path, &m->suite, &c->rubric, &mistakes, e))
+        return false;
+    if (c->rubric.bugs[0] == '\0')
+        return err_set(e, "%s: no line 'bugs DIR'", path);
+    snprintf(dir, sizeof dir, "%s/%s", c->rubric.dir, c->rubric.bugs);
+    if (!fs_make_dirs(dir, e) || !rubric_read(path, &m->suite, &c->rubric, &mistakes, e))
+        return false;
+    return mistakes.num == 0 ||
+           err_set(e, "%s:%d: %s", path, mistakes.at[0].line, mistakes.at[0].text);
 }
 
 int main(int argc, char **argv)
 {
     struct err e = {""};
-    struct rubric_mistakes mistakes = {0};
     static struct maker m;
-    if (argc != 4) {
-        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC\n");
+    if (argc < 4 || argc > 3 + MOST_RUBRICS) {
+        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC...\n");
         return 3;
     }
-    m.rubric = calloc(1, sizeof *m.rubric);
-    m.answers = calloc(1, sizeof *m.answers);
-    char dir[2 * PATH_MAX];
-    bool ok = m.rubric != NULL && m.answers != NULL && realpath(argv[1], m.build) != NULL &&
-              suite_load("reference/scenes", &m.suite, &e) &&
-              rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
-    if (ok && m.rubric->bugs[0] != '\0') { /* that it is not there is a mistake */
-        snprintf(dir, sizeof dir, "%s/%s", m.rubric->dir, m.rubric->bugs);
-        ok = fs_make_dirs(dir, &e) && rubric_read(argv[3], &m.suite, m.rubric, &mistakes, &e);
-    }
-    if (ok && mistakes.num > 0)
-        ok = err_set(&e, "%s:%d: %s", argv[3], mistakes.at[0].line, mistakes.at[0].text);
-    if (ok && m.rubric->bugs[0] == '\0')
-        ok = err_set(&e, "%s: no line 'bugs DIR'", argv[3]);
+    bool ok = realpath(argv[1], m.build) != NULL && suite_load("reference/scenes", &m.suite, &e);
+    for (int i = 3; ok && i < argc; i++)
+        ok = read_course(&m, argv[i], &e);
     ok = ok && make(&m, argv[2], &e);
     if (!ok)
         fprintf(stderr, "make_rubric_bugs: %s\n", e.msg);
-    for (int v = 0; m.one != NULL && v < m.made.num_views; v++)
-        moments_free(&m.one[v]);
+    for (int v = 0; m.of != NULL && v < m.made.num_views; v++)
+        moments_free(&m.of[v].few);
     catalogue_free(&m.made);
-    if (m.answers != NULL)
-        answer_key_free(m.answers);
+    for (int k = 0; k < m.num; k++) {
+        answer_key_free(&m.course[k]->answers);
+        free(m.course[k]);
+    }
     suite_free(&m.suite);
-    free(m.one);
-    free(m.batch);
-    free(m.answers);
-    free(m.rubric);
+    free(m.of);
     return ok ? 0 : 3;
 }

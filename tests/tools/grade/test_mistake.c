@@ -1,0 +1,299 @@
+/* One mistake is paid once: images made of the catalogue's effects, graded as submissions are. Checks of images that the
+ * catalogue has not, and those that right images of flat cells do not pass, are left out. */
+
+#include "tools/grade/carried.h"
+#include "tools/grade/mistake.h"
+#include "tests/support/bug_images.h"
+#include "tests/support/test.h"
+
+static struct bug_images of;
+
+static bool is_made(const struct rubric_check *c)
+{
+    bool all = c->kind == CHECK_EQUAL || c->kind == CHECK_EXACT || c->kind == CHECK_AGREE ||
+               c->kind == CHECK_SUM;
+    for (int k = 0; k < c->num_images; k++)
+        all = all && of.bugs.view[0][c->images[k]] >= 0;
+    return all;
+}
+
+static void keep(bool (*is_kept)(const struct rubric_check *))
+{
+    int num = 0;
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        if (is_kept(&of.rubric->check[i]))
+            of.rubric->check[num++] = of.rubric->check[i];
+    of.rubric->num_checks = num;
+}
+
+static struct submitted_images *right;
+
+static bool is_passed(const struct rubric_check *c)
+{
+    struct result result;
+    struct err e;
+    MUST(grade_checks_run(of.rubric, c, of.answers, 0, right, 1e-5, &result, &e));
+    bool passed = result.share == 1;
+    result_free(&result);
+    return passed;
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    if (!bug_images_start(&of, "tools/rubrics/cs184-3-1.rubric"))
+        return -1;
+    keep(is_made);
+    right = bug_images_hand_in(&of, 0, -1, -1, 1);
+    keep(is_passed);
+    bug_images_take_back(&of, right);
+    return of.rubric->num_checks >= 14 ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    bug_images_end(&of);
+    return 0;
+}
+
+struct outcome {
+    double plain[RUBRIC_CHECKS], share[RUBRIC_CHECKS]; /* against right images; in the end */
+    struct mistake mistake;
+};
+
+static struct outcome grade(struct submitted_images *h)
+{
+    static struct result result[RUBRIC_CHECKS];
+    struct outcome v;
+    struct err e;
+    int set;
+    MUST(grade_all_checks(of.rubric, of.answers, h, 1e-5, result, &set, &e));
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        v.plain[i] = result[i].share;
+    MUST(mistake_judge(of.rubric, of.answers, &of.bugs, h, 1e-5, &set, result, &v.mistake, &e));
+    for (int i = 0; i < of.rubric->num_checks; i++) {
+        v.share[i] = result[i].share;
+        if (v.share[i] > v.plain[i] && result[i].carried[0] == '\0')
+            fail_msg("%s has more points and does not say why", of.rubric->check[i].name);
+        result_free(&result[i]);
+    }
+    return v;
+}
+
+static struct outcome grade_bugs(int bug, int second)
+{
+    struct submitted_images *h = bug_images_hand_in(&of, 0, bug, second, 1);
+    struct outcome v = grade(h);
+    bug_images_take_back(&of, h);
+    return v;
+}
+
+/* A bug as if it were not known: what it does is taken out of the catalogue, and put back. */
+static void forget(int bug, struct effect **kept)
+{
+    struct catalogue *c = &of.bugs.catalogue;
+    for (int v = 0; v < c->num_views; v++) {
+        kept[v] = c->view[v].effect[bug];
+        c->view[v].effect[bug] = NULL;
+    }
+}
+
+static void remember(int bug, struct effect **kept)
+{
+    for (int v = 0; v < of.bugs.catalogue.num_views; v++)
+        of.bugs.catalogue.view[v].effect[bug] = kept[v];
+}
+
+static bool lost(const struct outcome *v, const char *part, bool in_the_end)
+{
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        if (strcmp(of.rubric->part[of.rubric->check[i].part].number, part) == 0 &&
+            (in_the_end ? v->share : v->plain)[i] < 1)
+            return true;
+    return false;
+}
+
+static const char *const parts[] = {"1", "2", "3", "4", "5"};
+
+/* Points are lost in these parts and in no other. */
+static void only(const struct outcome *v, const char *bug, const char *first, const char *second)
+{
+    for (size_t p = 0; p < COUNT(parts); p++) {
+        bool expected = strcmp(parts[p], first) == 0 || strcmp(parts[p], second) == 0;
+        if (lost(v, parts[p], true) != expected)
+            fail_msg("%s: Part %s %s points", bug, parts[p], expected ? "keeps" : "loses");
+    }
+}
+
+/* By a bug alone, the part that pays and at least another that loses points too if nothing is carried on. */
+static const struct {
+    const char *bug, *part, *other;
+} known[] = {
+    {"upside_down", "1", "3"},        {"pixels_minus_one", "1", "2"},
+    {"sphere_far_hit", "1", "3"},     {"bvh_leaf_loses_last", "2", "3"},
+    {"cosine_missing", "3", "4"},     {"diffuse_without_pi", "3", "4"},
+    {"light_area_doubled", "3", "5"}, {"light_pdf_no_cosine", "3", "4"},
+    {"indirect_missing", "4", "5"},   {"roulette_squared", "4", "5"},
+};
+
+TEST(a_bug_costs_points_in_its_own_part)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(known); i++) {
+        struct outcome v = grade_bugs(bug_images_number(&of, known[i].bug), -1);
+        if (!lost(&v, known[i].other, false))
+            fail_msg("%s: Part %s would keep its points anyway", known[i].bug, known[i].other);
+        if (v.mistake.found.num_named == 0)
+            fail_msg("%s has no name", known[i].bug);
+        only(&v, known[i].bug, known[i].part, known[i].part);
+    }
+}
+
+TEST(two_bugs_cost_points_in_both_parts)
+{
+    static const char *const pairs[][4] = {{"cosine_missing", "3", "indirect_missing", "4"},
+                                           {"upside_down", "1", "light_area_doubled", "3"},
+                                           {"diffuse_without_pi", "3", "roulette_squared", "4"}};
+    (void)state;
+    for (size_t i = 0; i < COUNT(pairs); i++) {
+        struct outcome v =
+            grade_bugs(bug_images_number(&of, pairs[i][0]), bug_images_number(&of, pairs[i][2]));
+        only(&v, pairs[i][0], pairs[i][1], pairs[i][3]);
+    }
+}
+
+/* As if the bugs were not known. second -1: none. */
+static struct outcome grade_unknown(int bug, int second)
+{
+    struct effect *kept[2][256];
+    assert_true(of.bugs.catalogue.num_views < 256);
+    struct submitted_images *h = bug_images_hand_in(&of, 0, bug, second, 1);
+    forget(bug, kept[0]);
+    if (second >= 0)
+        forget(second, kept[1]);
+    struct outcome v = grade(h);
+    remember(bug, kept[0]);
+    if (second >= 0)
+        remember(second, kept[1]);
+    bug_images_take_back(&of, h);
+    assert_int_equal(v.mistake.found.num_named, 0);
+    return v;
+}
+
+static double share_of(const struct outcome *v, const char *check)
+{
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        if (strcmp(of.rubric->check[i].name, check) == 0)
+            return v->share[i];
+    fail_msg("no check '%s'", check);
+    return 0;
+}
+
+/* What makes all light brighter by the same factor, and no known bug: 4 and 5 are held against what 3 has shown. */
+TEST(a_mistake_without_a_name_is_paid_once)
+{
+    struct outcome v = grade_unknown(bug_images_number(&of, "light_area_doubled"), -1);
+    (void)state;
+    assert_true(share_of(&v, "shadow_rays") == 0);
+    assert_true(share_of(&v, "five_bounces") == 1);
+    assert_true(share_of(&v, "adaptive") == 1);
+}
+
+/* The same, and Part 4 is not there at all. */
+TEST(what_is_missing_is_not_carried_on)
+{
+    struct outcome v = grade_unknown(bug_images_number(&of, "light_area_doubled"),
+                                     bug_images_number(&of, "indirect_missing"));
+    (void)state;
+    assert_true(share_of(&v, "five_bounces") == 0);
+    assert_true(share_of(&v, "second_bounce") == 0);
+}
+
+TEST(a_mistake_without_a_name_is_located)
+{
+    static const struct {
+        const char *bug, *text;
+    } cases[] = {{"hemisphere_without_weight", "only by uniform directions (-H)"},
+                 {"indirect_albedo_squared", "only in light that bounced off a surface first"},
+                 {"upside_down", "in every image"}};
+    (void)state;
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        struct outcome v = grade_unknown(bug_images_number(&of, cases[i].bug), -1);
+        if (strstr(v.mistake.located.text, cases[i].text) == NULL)
+            fail_msg("%s: '%s'", cases[i].bug, v.mistake.located.text);
+    }
+}
+
+/* All images of one level, or one image for all: nothing but what that image shows rightly. */
+static struct submitted_images *hand_in_same(int like, uint8_t level)
+{
+    static uint8_t rgb8[3 * 128 * 96];
+    struct submitted_images *h = bug_images_hand_in(&of, 0, -1, -1, 1);
+    const char *path = test_path("same.png");
+    struct err e;
+    for (int i = 0; i < of.rubric->num_images; i++) {
+        const struct rubric_image *p = &of.rubric->image[i];
+        if (h->image[i].mean == NULL || i == like)
+            continue;
+        submitted_image_free(&h->image[i]);
+        if (like >= 0) {
+            MUST(submitted_image_copy(&h->image[like], &h->image[i], &e));
+            memcpy(h->image[i].sha256, h->image[like].sha256, sizeof h->image[i].sha256);
+            continue;
+        }
+        memset(rgb8, level, sizeof rgb8);
+        MUST(image_write_png(path, p->width, p->height, rgb8, &e));
+        MUST(submitted_image_read(path, of.rubric->curve, p->width, p->height, &h->image[i], &e));
+    }
+    return h;
+}
+
+TEST(an_image_of_nothing_is_not_carried_on)
+{
+    (void)state;
+    for (int level = 0; level < 255; level += 120) {
+        struct submitted_images *h = hand_in_same(-1, (uint8_t)level);
+        struct outcome v = grade(h);
+        bug_images_take_back(&of, h);
+        for (int i = 0; i < of.rubric->num_checks; i++)
+            if (v.share[i] > v.plain[i])
+                fail_msg("level %d: %s", level, of.rubric->check[i].name);
+    }
+}
+
+TEST(one_image_for_all_is_not_carried_on)
+{
+    int like = 0;
+    (void)state;
+    while (strcmp(of.rubric->image[like].name, "box") != 0)
+        like++;
+    struct submitted_images *h = hand_in_same(like, 0);
+    struct outcome v = grade(h);
+    bug_images_take_back(&of, h);
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        if (v.share[i] > v.plain[i])
+            fail_msg("%s", of.rubric->check[i].name);
+}
+
+/* Where a bug stands is told by the words of the patch and of the rubric. */
+TEST(bugs_have_their_parts)
+{
+    static const struct {
+        const char *where, *part;
+    } cases[] = {{"part 3, direct light: cos(theta)", "3"}, {"part 1, rays: generate_ray", "1"}};
+    (void)state;
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        struct bug bug = {0};
+        snprintf(bug.where, sizeof bug.where, "%s", cases[i].where);
+        int part = carried_part_of(of.rubric, &bug);
+        assert_true(part >= 0);
+        assert_string_equal(of.rubric->part[part].number, cases[i].part);
+    }
+    struct bug other = {.where = "project 3-2, glass: Fresnel"};
+    assert_int_equal(carried_part_of(of.rubric, &other), -1);
+    other = (struct bug){.where = "starter code, image files"};
+    assert_int_equal(carried_part_of(of.rubric, &other), -1);
+}
+
+TEST_GROUP(set_up, tear_down)
