@@ -67,6 +67,17 @@ check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
 check "graded again" again --again
 check "of other runs (control)" test "$(times "$tmp/two")" != "$before"
 
+# A scene beside the rubric that has changed since: rendered anew, with another reference.
+cp tools/rubrics/shapes.dae "$tmp/shapes.dae"
+printf '%s\n' "rubric Shapes" "command {program} -q -s {spp} -m {bounces} -r {width} {height} -f {out} {scene}" "image shapes" "scene shapes.dae" \
+    "size 16 16" "spp 4" "bounces 1" "reference ours 64" "part 1 Rays" "check shapes 1 exact shapes" "share 0.1 0.5" >"$tmp/shapes.rubric"
+shapes() { "$build/assay" grade -q -o "$tmp/shapes" "$tmp/shapes.rubric" "$tmp/submissions/ada" && grep '"sha256"' "$tmp/shapes/ada/grade.json"; }
+image=$(shapes)
+check "the same scene, the same image" test "$(shapes)" = "$image"
+sed -i 's/<radius>0.42</<radius>0.2</' "$tmp/shapes.dae"
+check "another scene, another image" test "$(shapes)" != "$image"
+check "and all points" grep -q '"points": 1.0' "$tmp/shapes/ada/grade.json"
+
 check "another seed" grade -o "$tmp/other" --seed 2
 check "other numbers (control)" test "$(sums "$tmp/other")" != "$(sums "$tmp/two")"
 [ $failures -eq 0 ]

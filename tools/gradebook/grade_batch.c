@@ -9,6 +9,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
+#include "tools/base/hash_tree.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -22,14 +23,15 @@ enum { MAX_PATH = 4400 };
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
-    char rubric[65], bugs[65] = "", appeals[65], path[MAX_PATH], text[1024];
+    char rubric[65], scenes[65], bugs[65] = "", appeals[65], path[MAX_PATH], text[1024];
     snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
-    if (!sha256_file(job->rubric->path, rubric, e) ||
+    if (!sha256_file(job->rubric->path, rubric, e) || !hash_tree(job->stage, NULL, scenes, e) ||
         (job->bugs != NULL && !sha256_file(path, bugs, e)))
         return false;
     appeals_key(job->appeals, s->id, appeals);
-    snprintf(text, sizeof text, "%s %s %s %s %s %llu %.17g %d", assay_version, rubric, bugs,
-             appeals, s->sha256, (unsigned long long)job->seed, job->alpha, job->sandbox->unsafe);
+    snprintf(text, sizeof text, "%s %s %s %s %s %s %llu %.17g %d", assay_version, rubric, scenes,
+             bugs, appeals, s->sha256, (unsigned long long)job->seed, job->alpha,
+             job->sandbox->unsafe);
     sha256_text(text, key);
     return true;
 }
