@@ -1,5 +1,5 @@
 /* What the assignment's starter code does wrong, done on purpose: references by which a program that was built on it is
- * graded (tools/grade/rubric.h, `accept`). Nothing else may ask for it. */
+ * graded (tools/submission/rubric.h, `accept`). Nothing else may ask for it. */
 #ifndef ASSAY_CS184_DEVIATIONS_H
 #define ASSAY_CS184_DEVIATIONS_H
 

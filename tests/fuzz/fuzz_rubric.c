@@ -1,5 +1,5 @@
 /* The rubric of a course: what is wrong with it is listed, a line each, in order. */
-#include "tools/grade/rubric.h"
+#include "tools/submission/rubric.h"
 #include "fuzz.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 #include "difference.h"
 
-#include "rubric.h"
+#include "tools/submission/rubric.h"
 #include "tools/stats/distributions.h"
 
 #include <math.h>

@@ -3,7 +3,7 @@
 #define ASSAY_GRADE_CHECKS_H
 
 #include "difference.h"
-#include "submission.h"
+#include "tools/submission/submission.h"
 
 /* What the images of a rubric should be; made once for all submissions. */
 struct answer {

@@ -3,7 +3,7 @@
 #define ASSAY_STOPPING_RULE_H
 
 #include "difference.h"
-#include "rubric.h"
+#include "tools/submission/rubric.h"
 
 /* The rule: after every `batch` samples of a pixel stop if 1.96 sqrt(var/n) <= tolerance mean. It is biased: a pixel whose first
  * batch is black by chance stays black. By how much, and after how many samples it stops, depends on mean, variance and shape of the

@@ -4,7 +4,7 @@
 #ifndef ASSAY_APPEALS_H
 #define ASSAY_APPEALS_H
 
-#include "tools/grade/rubric.h"
+#include "tools/submission/rubric.h"
 
 #include <jansson.h>
 

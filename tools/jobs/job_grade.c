@@ -5,7 +5,7 @@
 #include "tools/gradebook/grade_options.h"
 #include "job_kinds.h"
 #include "tools/results/results.h"
-#include "tools/grade/submission.h"
+#include "tools/submission/submission.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@
 #include "reference/suite/features.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/version.h"
-#include "tools/grade/rubric.h"
+#include "tools/submission/rubric.h"
 #include "tools/gradebook/grade_batch.h"
 #include "tools/jobs/plan.h"
 #include "tools/results/results.h"

@@ -1,7 +1,7 @@
 /* Rubrics: what is read, and that every mistake is named with its line. Each text below has one mistake (or those
  * that are listed), put in by hand. */
 
-#include "tools/grade/rubric.h"
+#include "tools/submission/rubric.h"
 #include "tests/support/test.h"
 
 static struct suite suite;

@@ -1,5 +1,5 @@
 /* What is told of submissions without running them; tests/end_to_end/source.sh has those that are built and run. */
-#include "tools/grade/submission.h"
+#include "tools/submission/submission.h"
 #include "tests/support/test.h"
 
 TEST(a_name_is_that_of_the_folder_or_of_the_archive)
