@@ -3,7 +3,7 @@
 
 #include "tools/grade/carried.h"
 #include "tools/grade/mistake.h"
-#include "tests/support/bug_images.h"
+#include "bug_images.h"
 #include "tests/support/test.h"
 
 static struct bug_images of;

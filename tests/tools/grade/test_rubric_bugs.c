@@ -1,6 +1,6 @@
 /* Bugs named by 8-bit images alone, with the catalogue that ships, on images made of what it says. */
 
-#include "tests/support/bug_images.h"
+#include "bug_images.h"
 #include "tests/support/test.h"
 
 static struct bug_images of;

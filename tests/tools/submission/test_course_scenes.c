@@ -1,7 +1,7 @@
-/* Every scene of tools/rubrics/ against the rules of the course's starter code (tests/support/course_scene.h). Each rule has
+/* Every scene of tools/rubrics/ against the rules of the course's starter code (course_scene.h). Each rule has
  * a control: a scene that breaks it, made from a shipped one by replacing some of its text. */
 
-#include "tests/support/course_scene.h"
+#include "course_scene.h"
 #include "tests/support/test.h"
 
 #include <dirent.h>

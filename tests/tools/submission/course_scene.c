@@ -1,5 +1,5 @@
 #include "course_scene.h"
-#include "test.h"
+#include "tests/support/test.h"
 
 #include <libxml/parser.h>
 #include <math.h>

@@ -2,7 +2,7 @@
 
 #include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
-#include "test.h"
+#include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
 
