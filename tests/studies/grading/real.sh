@@ -64,7 +64,7 @@ program() {
 one() { # NAME SUBMISSION PART...
     program "$@" || return 1
     local started=$SECONDS
-    "$assay" grade -q -o "$out/grades" --references "$out/references" "tools/rubrics/$(field "$2" 3)" "$out/programs/$1" </dev/null >"$out/log.$1" 2>&1
+    "$assay" grade -q -o "$out/grades" --references "${REFERENCES:-$out/references}" "tools/rubrics/$(field "$2" 3)" "$out/programs/$1" </dev/null >"$out/log.$1" 2>&1
     case $? in
     0 | 2) rm -f "$out/log.$1" ;;
     *) echo "$1: $(head -1 "$out/log.$1")" >&2 && return 1 ;;
