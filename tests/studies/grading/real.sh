@@ -41,7 +41,7 @@ tree() {
         echo "$1 does not build: see $tree.log" >&2
         return 1
     fi
-    touch "$tree/mended"
+    cp "$tree/build/pathtracer" "$tree/mended"
 }
 
 # program NAME SUBMISSION PART...: OUT/programs/NAME, of the edits of PART...
@@ -55,6 +55,9 @@ program() {
     if [ -n "$ok" ] && ! make -C "$out/trees/$base/build" </dev/null >"$out/trees/$base.log" 2>&1; then
         ok=
         echo "$name does not build: see $out/trees/$base.log" >&2
+    elif [ -n "$ok" ] && [ -n "$(edits "$1")" ] && cmp -s "$out/trees/$base/build/pathtracer" "$out/trees/$base/mended"; then
+        ok=
+        echo "$name is the same program as without its edits" >&2
     fi
     [ -n "$ok" ] && mkdir -p "$to" "$out/edits" && cp "$out/trees/$base/build/pathtracer" "$to" && { [ ! -e "$out/trees/$base/libs/x64_linux/libpt31.so" ] || cp "$out/trees/$base/libs/x64_linux/libpt31.so" "$to"; } && strip "$to/pathtracer" && mv "$out/edits.$base" "$out/edits/$name"
     undo "$out/trees/$base"
