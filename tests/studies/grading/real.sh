@@ -87,4 +87,7 @@ if [ "${1:-}" != --table ]; then
         done
     done <"$table"
 fi
-perl "$here/real_table.pl" "$table" "$out/grades" >"$out/table.md.new" && mv "$out/table.md.new" "$out/table.md"
+perl "$here/real_table.pl" "$table" "$out/grades" >"$out/table.md.$$"
+status=$?
+mv "$out/table.md.$$" "$out/table.md"
+exit $status
