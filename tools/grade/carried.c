@@ -154,6 +154,8 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
         out->cell = s->cell;
         for (int i = 0; i < 3 * s->columns * s->rows; i++) {
             double more = effect != NULL ? (double)effect->mean[i] : 0;
+            if (s->var[i] >= rubric_sight_masked)
+                continue; /* as expected, as far as is known */
             out->seen[i] += sign * s->mean[i];
             out->expected[i] += sign * (c->mean[i] + more);
             if (fmax(s->mean[i], c->mean[i] + more) > bright * clip)

@@ -9,6 +9,7 @@
 #include <gsl/gsl_statistics_double.h>
 #include <math.h>
 
+const double rubric_sight_masked = 1e6;
 /* How well the mean of noise that is cut off is known where a program is noisier than ours: of the clipping point. */
 static const double clip_error = 0.02;
 
@@ -116,10 +117,9 @@ bool rubric_sight_of_render(const struct rubric *r, int image, const struct mome
 /* What a cell of it says. */
 struct seen {
     double sum, square, rounding, tolerance; /* of the differences from the reference */
-    bool clipped;
+    bool clipped, masked;
 };
 
-/* Pixels that are masked are taken to be right. */
 static void fill_cells(const struct rubric *r, const struct submitted_image *s,
                        const struct moments *m, double clip, struct signature *out,
                        struct seen *cells)
@@ -128,7 +128,8 @@ static void fill_cells(const struct rubric *r, const struct submitted_image *s,
         for (size_t c = 0; c < 3; c++) {
             size_t k = 3 * i + c, j = cell_at(out, i) + c;
             double right = fmin(m->mean[k], clip);
-            double value = rubric_masks(r, s->width, s->height, i) ? right : fmin(s->mean[k], clip);
+            double value = fmin(s->mean[k], clip);
+            cells[j].masked |= rubric_masks(r, s->width, s->height, i);
             out->mean[j] += value / (out->cell * out->cell);
             cells[j].sum += value - right;
             cells[j].square += pow(value - right, 2);
@@ -148,7 +149,7 @@ static double noise_of(const struct signature *s, const struct signature *correc
         double ours = correct->var[j] * correct->n / s->n * pixels,
                rounding = cells[j].rounding / pixels;
         double scatter = (cells[j].square - cells[j].sum * cells[j].sum / pixels) / (pixels - 1);
-        if (ours > 2 * rounding && ours > 0)
+        if (ours > 2 * rounding && ours > 0 && !cells[j].masked)
             ratio[num++] = (scatter - rounding) / ours;
     }
     if (num < 10)
@@ -199,6 +200,10 @@ bool rubric_sight_of_student(const struct rubric *r, int image, const struct sub
         out->var[j] = noise + cells[j].rounding / (pixels * pixels) +
                       pow(bias_of_codes(cells[j].tolerance / pixels, noise * pixels), 2) +
                       (cells[j].clipped ? pow(clip_error * clip, 2) : 0);
+        if (cells[j].masked) {
+            out->mean[j] = correct->mean[j];
+            out->var[j] = rubric_sight_masked;
+        }
     }
     return !rubric_sight_counts(r, image) ||
            count_samples(r, image, right, &h->made[image], kappa, out, e);

@@ -22,6 +22,9 @@ bool rubric_sight_of_render(const struct rubric *r, int image, const struct mome
                             struct signature *out, struct err *e)
     __attribute__((warn_unused_result));
 
+/* The variance of a student's cell that has a masked pixel: it says nothing. */
+extern const double rubric_sight_masked;
+
 /* Of a student's image, which is there. right: the reference, as_asked of counting images; correct: its cells. A program that
  * is noisier than ours (median of the cells) has that variance, and is less sure of FACT_SAMPLES. */
 bool rubric_sight_of_student(const struct rubric *r, int image, const struct submitted_images *h,

@@ -72,6 +72,29 @@ TEST(bugs_have_their_names)
     }
 }
 
+/* A rubric whose images have a mask: what it hides is no evidence. */
+TEST(masked_images_have_names)
+{
+    static const char *const known[] = {"upside_down", "sky_upside_down", "metal_without_shadowing",
+                                        "mirror_back", "lens_square"};
+    struct bug_images masked;
+    (void)state;
+    assert_true(bug_images_start(&masked, "tools/rubrics/cs184-3-2.rubric"));
+    assert_true(masked.rubric->mask[2] > 0);
+    for (size_t i = 0; i < COUNT(known); i++) {
+        int bug = bug_images_number(&masked, known[i]), with;
+        struct submitted_images *h = bug_images_hand_in(&masked, 0, bug, -1, 1);
+        struct diagnosis found;
+        struct err e;
+        MUST(rubric_bugs_diagnose(&masked.bugs, masked.rubric, masked.answers, h, 0, 1e-5, NULL,
+                                  &found, &with, &e));
+        bug_images_take_back(&masked, h);
+        if (found.num_named != 1 || found.candidate[0].bug != bug)
+            fail_msg("%s: %d named", known[i], found.num_named);
+    }
+    bug_images_end(&masked);
+}
+
 /* Two of different parts, in either order. */
 TEST(two_bugs_have_both_names)
 {
