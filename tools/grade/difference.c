@@ -139,7 +139,7 @@ static struct noise noise_in(const struct pair *p, struct rect r)
 /* Sums over a region, one channel. */
 struct sums {
     double d, b, v, k3, tolerance, used;
-    double v2, ours; /* where v is measured: of its squares; by our samples */
+    double v2; /* where v is measured: of its squares */
 };
 
 static double weighted(const double *x, int channel)
@@ -186,7 +186,6 @@ static void add_pixel(const struct pair *p, size_t i, int channel, double kappa,
                other = p->b->known ? weighted_root(p->b->variance + 3 * i, channel, 2)
                                    : p->b->measured[4 * i + (size_t)channel];
         s->v += own + other;
-        s->ours += weighted_root(v, channel, 2);
         s->v2 += own * own + (p->b->known ? 0 : other * other);
     } else {
         s->v += weighted_root(v, channel, 2);
@@ -204,8 +203,6 @@ static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, 
             if (p->use[i])
                 add_pixel(p, i, channel, kappa, &s);
         }
-    if (s.ours > 0) /* as skewed as ours would be */
-        s.k3 *= pow(s.v / s.ours, 1.5);
     return s;
 }
 

@@ -117,7 +117,7 @@ static bool measure_noise(const struct work *w, int k, const unsigned char *use,
 }
 
 /* Where some images of a check have several runs, those of the others are taken to vary as kappa says. */
-static void model_noise(const struct work *w, const double *kappa)
+static void model_noise(const struct work *w, const unsigned char *use, const double *kappa)
 {
     bool any = false;
     for (int k = 0; k < w->check->num_images; k++)
@@ -125,6 +125,8 @@ static void model_noise(const struct work *w, const double *kappa)
     for (int k = 0; k < w->check->num_images; k++)
         if (student(w, k)->num_runs <= 1)
             submitted_image_model(&w->h->image[w->check->images[k]], any ? kappa[k] : 0);
+    for (int k = 0; any && k < w->check->num_images; k++)
+        submitted_image_scale_skewness(&w->h->image[w->check->images[k]], use);
 }
 
 /* Pixels that can be compared. What is noisier than our renders reaches the clipping point from further away; where
@@ -144,7 +146,7 @@ static unsigned char *usable(const struct work *w, struct result *out, struct er
     for (int k = 0; ok && k < w->check->num_images; k++)
         ok = measure_noise(w, k, use, &kappa[k], &out->noise[k], e);
     if (ok)
-        model_noise(w, kappa);
+        model_noise(w, use, kappa);
     if (ok)
         memcpy(quiet, use, pixels);
     for (int k = 0; ok && k < w->check->num_images; k++)
@@ -241,6 +243,22 @@ static void score_agreement(const struct work *w, struct result *out)
     grade_checks_tell(&out->agreement, out->seen, sizeof out->seen);
 }
 
+static bool is_brighter(const struct rubric_check *c, const struct difference *a)
+{
+    bool any = a->tiles > 0 && a->tile.lo > c->tile.none;
+    for (int k = 0; k < NUM_CHANNELS; k++)
+        any = any || a->image[k].lo > c->image.none;
+    return any;
+}
+
+static double skewness_of(const struct submitted_image *s, const unsigned char *use)
+{
+    double k3 = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
+        k3 += use[i / 3] ? fabs(s->k3[i]) : 0;
+    return k3;
+}
+
 /* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
 static bool compare(const struct work *w, const struct submitted_image *a,
                     const struct submitted_image *b, const unsigned char *use, struct result *out,
@@ -249,15 +267,19 @@ static bool compare(const struct work *w, const struct submitted_image *a,
     struct err why;
     bool blind = out->more > 0;
     const bool measured = difference_measure(a, b, use, w->alpha, &out->agreement, &why);
-    if (measured)
+    if (measured) {
         score_agreement(w, out);
-    else if (err_is_of_memory(&why))
+        blind =
+            blind && !is_brighter(w->check, &out->agreement); /* clipping makes nothing brighter */
+    } else if (err_is_of_memory(&why))
         return err_set(e, "%s", why.msg);
     else
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
     if (!measured && out->agreement.skewed) {
         blind = true;
         out->more = fmax(out->more, few);
+        for (int k = 0; k < w->check->num_images; k++)
+            out->noise[k] = skewness_of(student(w, k), use);
     }
     settle(w, blind, out);
     return true;
@@ -466,6 +488,23 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
+/* Does green go with that of its reference, from pixel to pixel, beyond 5 standard deviations? */
+static bool is_of_scene(const struct submitted_image *s, const struct submitted_image *right,
+                        const unsigned char *use)
+{
+    double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+    for (size_t i = 1; i < 3 * (size_t)s->width * (size_t)s->height; i += 3)
+        if (use[i / 3]) {
+            n++;
+            a += s->mean[i];
+            b += right->mean[i];
+            aa += s->mean[i] * s->mean[i];
+            bb += right->mean[i] * right->mean[i];
+            ab += s->mean[i] * right->mean[i];
+        }
+    return n > 0 && ab - a * b / n > 5 * sqrt((aa - a * a / n) * (bb - b * b / n) / n);
+}
+
 static bool check_noise(const struct work *w, struct result *out, struct err *e)
 {
     const struct submitted_image *p = student(w, 0), *q = student(w, 1);
@@ -490,7 +529,10 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+    if (!is_of_scene(q, &rq, use)) {
+        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 1)->name);
+        out->more = 0;
+    } else if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
         out->share = 1;

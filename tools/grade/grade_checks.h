@@ -58,7 +58,8 @@ struct result {
         judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
     double
         more; /* > 0: not decided, it takes about so many times the samples; share is what it may still be */
-    double noise[CHECK_IMAGES]; /* variance that each image of the check adds, in some unit */
+    double noise
+        [CHECK_IMAGES]; /* variance that each image of the check adds, in some unit; or skewness, where that keeps it undecided */
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
     char carried[512];  /* what was paid before and is taken for granted here (carried.h), or "" */

@@ -4,6 +4,7 @@
 #include "tools/compare/pyramid.h"
 #include "tools/images/tone_curve.h"
 #include "tools/images/image_file.h"
+#include "tools/submission/rubric.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -290,6 +291,30 @@ void submitted_image_model(struct submitted_image *s, double kappa)
         }
         v[3] = sd * sd;
     }
+}
+
+static void scale_tile(struct submitted_image *s, int x0, int y0, const unsigned char *use)
+{
+    double measured = 0, ours = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < RUBRIC_TILE * RUBRIC_TILE; k++) {
+            int x = x0 + k % RUBRIC_TILE, y = y0 + k / RUBRIC_TILE;
+            size_t p = (size_t)y * (size_t)s->width + (size_t)x;
+            for (size_t i = 3 * p; i < 3 * p + 3 && x < s->width && y < s->height; i++)
+                if (pass == 1) {
+                    s->k3[i] *= ours > 0 ? pow(measured / ours, 1.5) : 1;
+                } else if (use[p]) {
+                    measured += s->measured[4 * p + i % 3];
+                    ours += s->variance[i] + s->rounding[i];
+                }
+        }
+}
+
+void submitted_image_scale_skewness(struct submitted_image *s, const unsigned char *use)
+{
+    for (int y = 0; y < s->height; y += RUBRIC_TILE)
+        for (int x = 0; x < s->width; x += RUBRIC_TILE)
+            scale_tile(s, x, y, use);
 }
 
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src)

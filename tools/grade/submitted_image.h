@@ -60,6 +60,9 @@ bool submitted_image_copy(const struct submitted_image *s, struct submitted_imag
 /* `measured` of an image of one run: kappa times its expected variance, and its rounding; kappa 0: nothing is measured. */
 void submitted_image_model(struct submitted_image *s, double kappa);
 
+/* Scales k3, expected of our samples, to the noise that is measured in each tile: as skewed as ours. */
+void submitted_image_scale_skewness(struct submitted_image *s, const unsigned char *use);
+
 /* dst += src, clipped where either is, measured where both are; one made of nothing, black, is. */
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 

@@ -58,6 +58,7 @@ struct purchases {
     double left_s;
     double tried[RUBRIC_IMAGES][MOST_RUNS]; /* samples of the runs of an image */
     int num[RUBRIC_IMAGES];
+    struct submitted_image first[RUBRIC_IMAGES], last[RUBRIC_IMAGES]; /* of its runs */
     bool stuck[RUBRIC_IMAGES]; /* no more is to be had of it */
 };
 
@@ -154,53 +155,106 @@ static int cheapest(const struct collect *c, const struct submitted_images *h,
     return best;
 }
 
-/* Noise that samples do not mend: as much of it with more of them. */
-static bool has_fallen(const struct submitted_image *s, const struct submitted_image *more,
-                       const struct submitted_image *right, const unsigned char *use, double alpha)
+/* Share of the values at the brightest code where none should be. */
+static double clipped_share(const struct submitted_image *s, const unsigned char *use)
 {
-    struct interval i;
-    struct err no_noise;
-    double samples = log(more->spp / s->spp), sign = samples > 0 ? 1 : -1;
-    if (fabs(samples) < log(1.1) ||
-        !difference_noise(more, right, s, right, use, alpha, &i, &no_noise))
-        return true;
-    /* Clipping takes noise away from the smaller run; of true noise that does not fall the ratio is all of `samples`. */
-    return (sign > 0 ? i.lo : -i.hi) < 0.25 * fabs(samples) ||
-           sign * i.value < 0.75 * fabs(samples);
+    double clipped = 0, num = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        num += use[i / 3];
+        clipped += use[i / 3] && s->clipped[i];
+    }
+    return num > 0 ? clipped / num : 1;
+}
+
+/* Would a render of ours have more noise than a file's codes hide? */
+static bool should_vary(const struct submitted_image *s, const unsigned char *use)
+{
+    double noise = 0, rounding = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        noise += use[i / 3] ? s->variance[i] : 0;
+        rounding += use[i / 3] ? s->rounding[i] : 0;
+    }
+    return noise > rounding;
+}
+
+/* Mean square of a - b, and the standard deviation of its logarithm; channels that one lamp makes alike count once. */
+static double mean_square(const struct submitted_image *a, const struct submitted_image *b,
+                          const unsigned char *use, double *sd)
+{
+    double sum = 0, squares = 0, num = 0;
+    for (size_t i = 0; i < 3 * (size_t)a->width * (size_t)a->height; i++)
+        if (use[i / 3]) {
+            double d2 = pow(a->mean[i] - b->mean[i], 2);
+            sum += d2;
+            squares += d2 * d2;
+            num++;
+        }
+    *sd = sum > 0 ? sqrt(3 * fmax(0, squares - sum * sum / num)) / sum : INFINITY;
+    return sum / num;
+}
+
+/* Of three runs, which have one bias: the squares of their differences should be as 1/s0 + 1/s1 and 1/s1 + 1/s2. False: they
+ * do not fall by half of that (in logarithms). Clipping takes noise away from smaller runs: where there is much of
+ * it, nothing is known. */
+static bool has_fallen(const struct submitted_image *const *run, const unsigned char *use)
+{
+    static const double few = 0.005, sure = 4.4; /* standard deviations: 1e-5 */
+    double sd[2], d0 = mean_square(run[0], run[1], use, &sd[0]),
+                  d1 = mean_square(run[1], run[2], use, &sd[1]);
+    double expected =
+        log((1 / run[1]->spp + 1 / run[2]->spp) / (1 / run[0]->spp + 1 / run[1]->spp));
+    for (int k = 0; k < 3; k++)
+        if (clipped_share(run[k], use) > few)
+            return true;
+    return !(expected < 0) || log(d1 / d0) - sure * hypot(sd[0], sd[1]) < expected / 2;
+}
+
+/* The first run, and the one before the next. */
+static bool keep_copies(const struct submitted_image *s, const struct submitted_image *more,
+                        struct submitted_image *first, struct submitted_image *last, struct err *e)
+{
+    if (first->mean == NULL && !submitted_image_copy(s, first, e))
+        return false;
+    first->spp = first->spp > 0 ? first->spp : s->spp;
+    submitted_image_free(last);
+    bool ok = submitted_image_copy(more, last, e);
+    last->spp = more->spp;
+    return ok;
+}
+
+/* What is fit to tell noise by: right is ours. */
+static bool prepare(struct submitted_image *s, struct submitted_image *more,
+                    const struct moments *m, unsigned char *use, struct submitted_image *right,
+                    struct err *e)
+{
+    memset(use, 1, (size_t)s->width * (size_t)s->height);
+    submitted_image_expect(s, m, s->spp);
+    submitted_image_expect(more, m, more->spp);
+    return submitted_image_comparable(s, m, fmin(s->spp, more->spp), false, use, e) &&
+           submitted_image_from(m, s, right, e);
 }
 
 /* Takes over one more run of an image, or finds that it is none. */
 static bool take_run(const struct collect *c, struct submitted_images *h, int image,
-                     struct submitted_image *more, bool *stuck, struct err *e)
+                     struct submitted_image *more, struct purchases *b, struct err *e)
 {
-    const struct rubric_image *p = &c->job->rubric->image[image];
-    const struct moments *m = &c->job->answers->of[0][image].noise;
-    struct submitted_image *s = &h->image[image], right;
-    struct submitted_image *last = s->num_runs > 0 ? &s->run[s->num_runs - 1] : s;
-    size_t pixels = (size_t)s->width * (size_t)s->height;
-    if (submitted_image_same(last, more)) {
-        *stuck = true;
-        h->fixed[image] = !rubric_is_adaptive(p);
-        submitted_image_free(more);
-        return true;
-    }
-    unsigned char *use = malloc(pixels);
-    if (use == NULL)
-        return err_set(e, "out of memory for %zu pixels", pixels);
-    memset(use, 1, pixels);
-    submitted_image_expect(s, m, p->spp);
-    submitted_image_expect(more, m, more->spp);
-    bool ok = submitted_image_comparable(s, m, fmin(last->spp, more->spp), false, use, e) &&
-              submitted_image_from(m, s, &right, e);
+    struct submitted_image *s = &h->image[image], right, *first = &b->first[image];
+    const struct submitted_image *last = s->num_runs > 0 ? &s->run[s->num_runs - 1] : s;
+    const struct submitted_image *const runs[] = {first, &b->last[image], more};
+    const bool same = submitted_image_same(last, more), third = first->mean != NULL;
+    unsigned char *use = malloc((size_t)s->width * (size_t)s->height);
+    bool ok = (use != NULL || err_set(e, "out of memory")) &&
+              prepare(s, more, &c->job->answers->of[0][image].noise, use, &right, e);
     if (ok) {
-        h->fixed[image] =
-            !rubric_is_adaptive(p) && !has_fallen(last, more, &right, use, c->job->alpha);
-        *stuck = h->fixed[image];
-        bool alone = difference_correlated(last, more, &right, use);
+        bool alone = same || difference_correlated(last, more, &right, use);
+        bool fallen = same ? !should_vary(s, use) : !third || alone || has_fallen(runs, use);
+        h->fixed[image] = !fallen && !rubric_is_adaptive(&c->job->rubric->image[image]);
+        b->stuck[image] = same || h->fixed[image];
         submitted_image_free(&right);
-        if (!alone) {
+        ok = keep_copies(s, more, first, &b->last[image], e);
+        if (ok && !alone) {
             ok = submitted_image_add_run(s, more, e);
-        } else if (more->spp > s->spp) {
+        } else if (ok && !same && more->spp > s->spp) {
             submitted_image_free(s);
             *s = *more;
             *more = (struct submitted_image){0};
@@ -233,7 +287,7 @@ static bool buy(const struct collect *c, struct submitted_images *h, int image, 
     }
     if (rubric_is_adaptive(&as))
         more.spp = c->job->rubric->image[image].spp;
-    return take_run(c, h, image, &more, &b->stuck[image], e);
+    return take_run(c, h, image, &more, b, e);
 }
 
 bool collect_until_decided(const struct collect *c, struct submitted_images *h, struct result *out,
@@ -254,6 +308,10 @@ bool collect_until_decided(const struct collect *c, struct submitted_images *h, 
         for (int i = 0; i < r->num_checks; i++)
             result_free(&out[i]);
         ok = buy(c, h, image, spp, b, e);
+    }
+    for (int i = 0; b != NULL && i < r->num_images; i++) {
+        submitted_image_free(&b->first[i]);
+        submitted_image_free(&b->last[i]);
     }
     free(b);
     return ok;
