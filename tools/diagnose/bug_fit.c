@@ -321,7 +321,6 @@ struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double
         t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
     out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
     out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
-    out.is_faint = t.all <= sqrt(2 * t.cells);
     out.strength = norm > 0 ? along / norm : 0;
     out.t = norm > 0 ? along / sqrt(norm) : 0;
     return out;

@@ -189,9 +189,7 @@ static bool is_explanation(const struct bug_fit *f, const struct diagnose_option
     bool is_noise = c->excess <= bug_fit_largest_excess;
     if (!opt->by_likelihood)
         return is_noise || c->explained >= least_explained;
-    /* Where all lies within the noise of the cells only the directed statistic speaks. */
-    bool is_gone =
-        c->explained >= (is_noise ? least_noise : least_gone) || (is_noise && c->is_faint);
+    bool is_gone = c->explained >= (is_noise ? least_noise : least_gone);
     return is_gone && bug_fit_is_full(f, c) && bug_fit_worst(f, c, &clue) <= most_left;
 }
 

@@ -32,7 +32,6 @@ struct candidate {
     double log_likelihood; /* natural logarithm, over that of "correct" */
     double explained;      /* share of the difference from the correct renderer, at most 1 */
     double excess;         /* chi^2 of what is left over its mean, in its standard deviations */
-    bool is_faint;         /* without it chi^2 would be within its noise too */
     double t, strength;    /* directed statistic over all views; the factor by least squares */
 };
 

@@ -111,6 +111,7 @@ static char *read_scene(const struct rubric *r, const struct rubric_image *p)
 
 enum state { NOT_KNOWN, RIGHT, WRONG };
 
+/* That an adaptive image is right says little: the rule of stopping is biased. */
 static void find_states(const struct rubric *r, const struct submitted_images *h,
                         const double *share, enum state *state)
 {
@@ -121,7 +122,7 @@ static void find_states(const struct rubric *r, const struct submitted_images *h
             continue;
         if (share[i] < 1)
             state[image] = WRONG;
-        else if (state[image] == NOT_KNOWN)
+        else if (!rubric_is_adaptive(&r->image[image]) && state[image] == NOT_KNOWN)
             state[image] = RIGHT;
     }
 }
