@@ -240,7 +240,7 @@ static bool name_pair(const struct bug_fit *f, const struct diagnose_options *op
 {
     struct diagnosis two = *out;
     bool is_single = out->num_named > 0;
-    if (is_single && out->candidate[0].excess <= bug_fit_largest_excess)
+    if (num == 0 || (is_single && out->candidate[0].excess <= bug_fit_largest_excess))
         return true;
     struct candidate *pair = calloc((size_t)num * LEADERS, sizeof *pair);
     if (pair == NULL)

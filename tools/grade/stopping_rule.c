@@ -31,7 +31,8 @@ static double run_pixel(const gsl_rng *rng, struct shape s, double mean, double 
 {
     double hits = 0, stopped = 0, at_stop = 0;
     *bias = 0;
-    for (double n = batch; n < most && stopped == 0; n += batch) {
+    for (int taken = batch; taken < most && stopped == 0; taken += batch) {
+        double n = taken;
         double found = mean, spread = variance;
         if (s.p < 1) {
             hits += gsl_ran_binomial(rng, s.p, (unsigned)batch);

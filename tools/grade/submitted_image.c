@@ -201,9 +201,10 @@ bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *
         s->run = NULL;
         run[0] = *s;
         *s = mean;
+        s->run = run;
         s->num_runs = 1;
     }
-    s->run[s->num_runs++] = *more;
+    run[s->num_runs++] = *more;
     *more = (struct submitted_image){0};
     drop_small(s);
     average_runs(s);

@@ -93,8 +93,10 @@ static int next_samples(const struct collect *c, const struct purchases *b,
         wanted = base;
     else if (batch > base)
         most = fmin(most, batch - 1);
-    for (double spp = fmax(largest / 2.9, 2); spp <= most; spp *= 1.1) {
+    double spp = fmax(largest / 2.9, 2);
+    while (spp <= most) {
         double try = root >= 2 && root * root == p->spp ? pow(ceil(sqrt(spp)), 2) : ceil(spp);
+        spp *= 1.1;
         if (try > most || was_tried(b->tried[image], num, try))
             continue;
         best = (int)try;
