@@ -184,12 +184,13 @@ static bool gate_lead(const struct bug_fit *f, const struct candidate *best, dou
 static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
                            const struct candidate *c)
 {
-    static const double least_noise = 0.8, least_gone = 0.9, most_left = 0.5;
+    static const double least_noise = 0.8, least_gone = 0.99, most_left = 0.5;
     int clue;
     bool is_noise = c->excess <= bug_fit_largest_excess;
     if (!opt->by_likelihood)
         return is_noise || c->explained >= least_explained;
-    bool is_gone = c->explained >= (is_noise ? least_noise : least_gone);
+    bool is_gone =
+        c->explained >= (is_noise ? least_noise : least_gone) && (is_noise || c->second < 0);
     return is_gone && bug_fit_is_full(f, c) && bug_fit_worst(f, c, &clue) <= most_left;
 }
 
