@@ -240,7 +240,8 @@ static void carry_noise(const struct rubric *r, const struct answer_key *a,
     submitted_image_unclipped(p, use);
     submitted_image_unclipped(q, use);
     submitted_image_unclipped(&own, use);
-    if (difference_noise(p, &own, q, &own, use, alpha, &i, &why) &&
+    if (difference_related(q, &own, use) &&
+        difference_noise(p, &own, q, &own, use, alpha, &i, &why) &&
         score_share(&c->log_ratio, &i) > out->share) {
         out->share = score_share(&c->log_ratio, &i);
         out->chance = score_chance(&c->log_ratio, &i);

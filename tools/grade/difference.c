@@ -362,6 +362,22 @@ bool difference_correlated(const struct submitted_image *a, const struct submitt
     return num >= FEWEST && ab > certain * sqrt(overlap * channels_alike / num * aa * bb);
 }
 
+bool difference_related(const struct submitted_image *s, const struct submitted_image *right,
+                        const unsigned char *use)
+{
+    double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+    for (size_t i = 1; i < 3 * (size_t)s->width * (size_t)s->height; i += 3)
+        if (use[i / 3]) {
+            n++;
+            a += s->mean[i];
+            b += right->mean[i];
+            aa += s->mean[i] * s->mean[i];
+            bb += right->mean[i] * right->mean[i];
+            ab += s->mean[i] * right->mean[i];
+        }
+    return n > 0 && ab - a * b / n > 5 * sqrt((aa - a * a / n) * (bb - b * b / n) / n);
+}
+
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
                       const struct submitted_image *q, const struct submitted_image *reference_q,
                       const unsigned char *use, double alpha, struct interval *out, struct err *e)

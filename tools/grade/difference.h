@@ -68,6 +68,10 @@ bool difference_correlated(const struct submitted_image *a, const struct submitt
                            const struct submitted_image *reference, const unsigned char *use)
     __attribute__((warn_unused_result));
 
+/* Does green of an image go with that of another one of its scene, from pixel to pixel, beyond 5 standard deviations? */
+bool difference_related(const struct submitted_image *s, const struct submitted_image *right,
+                        const unsigned char *use);
+
 /* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
  * that of ours does. Fails where there is no noise in one of them. */
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,

@@ -488,23 +488,6 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
-/* Does green go with that of its reference, from pixel to pixel, beyond 5 standard deviations? */
-static bool is_of_scene(const struct submitted_image *s, const struct submitted_image *right,
-                        const unsigned char *use)
-{
-    double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-    for (size_t i = 1; i < 3 * (size_t)s->width * (size_t)s->height; i += 3)
-        if (use[i / 3]) {
-            n++;
-            a += s->mean[i];
-            b += right->mean[i];
-            aa += s->mean[i] * s->mean[i];
-            bb += right->mean[i] * right->mean[i];
-            ab += s->mean[i] * right->mean[i];
-        }
-    return n > 0 && ab - a * b / n > 5 * sqrt((aa - a * a / n) * (bb - b * b / n) / n);
-}
-
 static bool check_noise(const struct work *w, struct result *out, struct err *e)
 {
     const struct submitted_image *p = student(w, 0), *q = student(w, 1);
@@ -529,7 +512,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         free(use);
         return false;
     }
-    if (!is_of_scene(q, &rq, use)) {
+    if (!difference_related(q, &rq, use)) {
         snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 1)->name);
         out->more = 0;
     } else if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
