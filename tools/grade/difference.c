@@ -206,7 +206,8 @@ static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, 
     return s;
 }
 
-/* False: too skewed. `alpha` two-sided; divided by what skewness may do to the tail of a sum whose variance is known
+/* False: too skewed for that; then by the bound of a sum with tails no longer than exponential, sd (sqrt(2 t) + g/2 t) with
+ * t = ln(2/alpha) (Bernstein). `alpha` two-sided; divided by what skewness may do to the tail of a sum whose variance is known
  * from elsewhere, exp(g x^3/6) (Cramer), at most e. */
 static bool interval_from(const struct sums *s, double unit, double dof, double alpha,
                           struct interval *out)
@@ -216,6 +217,9 @@ static bool interval_from(const struct sums *s, double unit, double dof, double 
         x = stats_t_quantile(alpha / 2 * exp(-factor), dof);
         factor = fmin(1, fabs(s->k3) / (s->v * sd) * x * x * x / 6);
     }
+    double g = sd > 0 ? fabs(s->k3) / (s->v * sd) : 0, t = log(2 / alpha);
+    if (!(factor < 1))
+        x = fmax(x, sqrt(2 * t)) + g / 2 * t;
     double half = x * sd + s->tolerance;
     *out = (struct interval){s->d / unit, (s->d - half) / unit, (s->d + half) / unit, sd / unit};
     return factor < 1;
@@ -296,8 +300,7 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
         if (!interval_from(&s, fmax(s.b, floor * s.used),
                            is_measured(&p) ? measured_dof(&p, &s) : noise.dof, alpha,
                            &out->image[c]))
-            return !(out->skewed = true) ||
-                   err_set(e, "rare bright pixels keep it from being judged");
+            out->skewed = true;
         out->blur[c] = s.tolerance / fmax(s.b, floor * s.used);
     }
     out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);

@@ -24,7 +24,7 @@ struct difference {
     int tiles;            /* that could be judged */
     double compared;      /* share of the pixels */
     double kappa;         /* noise variance over that of our renderer */
-    bool skewed;          /* where it fails: more samples would mend it */
+    bool skewed;          /* rare bright pixels make an interval of the image wide */
     double *relative;     /* per tile, difference in luminance; NAN where not judged */
 };
 
@@ -41,7 +41,7 @@ struct difference {
  * has, and B is a reference or has too, intervals need no kappa: variances are those measured pixel by pixel
  * from run to run, at least a quarter of those around a tile, by what light it has of theirs.
  * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
- * a tile (tools/docs/background/verdict.md, "EQUIVALENT").
+ * a tile (tools/docs/background/verdict.md, "EQUIVALENT"), and an image's interval is that of tails no longer than exponential.
  *
  * Differences are relative to B's mean in the same place, but to no less than a quarter of the image's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails

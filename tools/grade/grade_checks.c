@@ -275,12 +275,8 @@ static bool compare(const struct work *w, const struct submitted_image *a,
         return err_set(e, "%s", why.msg);
     else
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
-    if (!measured && out->agreement.skewed) {
-        blind = true;
-        out->more = fmax(out->more, few);
-        for (int k = 0; k < w->check->num_images; k++)
-            out->noise[k] = skewness_of(student(w, k), use);
-    }
+    for (int k = 0; measured && out->agreement.skewed && k < w->check->num_images; k++)
+        out->noise[k] = skewness_of(student(w, k), use);
     settle(w, blind, out);
     return true;
 }
