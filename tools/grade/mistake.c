@@ -61,6 +61,10 @@ bool mistake_judge(const struct rubric *r, const struct answer_key *a,
         if (!carried_by_name(r, a, bugs, h, out->with, &out->found, alpha, result, paid, e))
             return false;
     } else {
+        /* The checks have shown that something is wrong: that no bug is likelier than none does not make it right. */
+        if (out->looked && out->found.finding == FINDING_CORRECT)
+            snprintf(out->found.gate, sizeof out->found.gate,
+                     "no known bug, nor two of them, explains the images");
         out->found.finding = FINDING_UNKNOWN;
         out->located = located_by(r, h, share);
     }
