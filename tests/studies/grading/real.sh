@@ -48,8 +48,8 @@ tree() {
 program() {
     local name=$1 base=$2 to=$out/programs/$1 part ok=1
     shift 2
-    for part in "$base" "$@"; do edits "$part"; done >"$out/edits.$base"
-    cmp -s "$out/edits.$base" "$out/edits/$name" && return 0
+    for part in "$base" "$@"; do edits "$part"; done >"$out/edits.$$"
+    cmp -s "$out/edits.$$" "$out/edits/$name" && rm "$out/edits.$$" && return 0
     tree "$base" || return 1
     for part; do apply "$out/trees/$base" "$part" || ok=; done
     if [ -n "$ok" ] && ! make -C "$out/trees/$base/build" </dev/null >"$out/trees/$base.log" 2>&1; then
@@ -59,7 +59,7 @@ program() {
         ok=
         echo "$name is the same program as without its edits" >&2
     fi
-    [ -n "$ok" ] && mkdir -p "$to" "$out/edits" && cp "$out/trees/$base/build/pathtracer" "$to" && { [ ! -e "$out/trees/$base/libs/x64_linux/libpt31.so" ] || cp "$out/trees/$base/libs/x64_linux/libpt31.so" "$to"; } && strip "$to/pathtracer" && mv "$out/edits.$base" "$out/edits/$name"
+    [ -n "$ok" ] && mkdir -p "$to" "$out/edits" && cp "$out/trees/$base/build/pathtracer" "$to" && { [ ! -e "$out/trees/$base/libs/x64_linux/libpt31.so" ] || cp "$out/trees/$base/libs/x64_linux/libpt31.so" "$to"; } && strip "$to/pathtracer" && mv "$out/edits.$$" "$out/edits/$name"
     undo "$out/trees/$base"
     [ -n "$ok" ]
 }
