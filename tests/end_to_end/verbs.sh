@@ -113,7 +113,7 @@ sub no_rates '[ "${a[i]}" = -a ] && unset "a[i]" "a[i+1]" "a[i+2]"'
 mkdir "$tmp/subs/broken"
 echo 'echo no compiler; exit 1' >"$tmp/subs/broken/make.sh"
 if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer" >"$tmp/out" 2>&1; then
-    expect "grade: rates, a build, a deviation" 0 "right" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/counts.rubric" "$tmp/subs"/*
+    expect "grade: rates, a build, a deviation" 2 "right" "$assay" grade -j 2 -o "$tmp/grades" "$tmp/counts.rubric" "$tmp/subs"/*
     points() { awk -F, -v id="\"$1\"" '$1 == id { print $2 }' "$tmp/grades/grades.csv"; }
     for good in right starter; do
         right "grade: $good has all points" test "$(points $good)" = 10.00
@@ -122,7 +122,7 @@ if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer"
         right "grade: $bad has those of the light alone" test "$(points $bad)" = 6.00
     done
     right "grade: what cannot be built has none" test "$(points broken)" = 0.00
-    expect "grade: why it cannot be built" 0 "building it failed: .*no compiler" cat "$tmp/grades/broken/results.json"
+    expect "grade: why it cannot be built" 0 "It does not build: no compiler" cat "$tmp/grades/broken/results.json"
     expect "grade: why batches are wrong" 0 "pixels stand for no multiple of 32" cat "$tmp/grades/batches/results.json"
     expect "grade: no rate image" 0 "there is no rate image" cat "$tmp/grades/no_rates/results.json"
     expect "grade: the deviation is named" 0 "light_pdf" cat "$tmp/grades/starter/results.json"

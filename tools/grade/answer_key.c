@@ -7,6 +7,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/version.h"
 
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -70,6 +71,26 @@ static void scene_files(const struct rubric *r, const struct rubric_image *p, ch
         snprintf(environment, MAX_PATH, "%s/%s", r->dir, p->environment);
 }
 
+/* Into `path`, whole or not at all. */
+static bool make_render(const struct rubric *r, const struct rubric_image *p, const char *words,
+                        const struct answer_options *opt, const char *path, struct err *e)
+{
+    char text[TEXT];
+    const char *argv[MAX_ARGS];
+    const struct path made = fs_path("%s/new.exr", opt->cache);
+    const struct path log = fs_path("%s/%s.log", opt->cache, p->name);
+    if (!command_of(r, p, words, opt, "new.exr", text, argv, e))
+        return false;
+    const struct process process = {
+        .argv = argv, .cwd = opt->cache, .log = log.s, .timeout_s = opt->timeout_s};
+    if (!process_run(&process, NULL, e))
+        return err_prefix(e, "reference of '%s'", p->name);
+    if (rename(made.s, path) != 0)
+        return err_set(e, "%s: cannot rename", made.s);
+    unlink(log.s);
+    return true;
+}
+
 /* words: besides those of the image; "" none. */
 static bool render_ours(const struct rubric *r, const struct rubric_image *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
@@ -84,20 +105,17 @@ static bool render_ours(const struct rubric *r, const struct rubric_image *p, co
     const struct path path = fs_path("%s/%s.exr", opt->cache, key);
     if (access(path.s, R_OK) == 0 && moments_read(path.s, out, NULL, e))
         return true;
-    char name[32]; /* of this process: others may fill the same cache */
-    snprintf(name, sizeof name, "new-%ld.exr", (long)getpid());
-    const struct path made = fs_path("%s/%s", opt->cache, name);
-    const struct path log = fs_path("%s/%s.log", opt->cache, p->name);
-    if (!command_of(r, p, words, opt, name, text, argv, e))
-        return false;
-    const struct process process = {
-        .argv = argv, .cwd = opt->cache, .log = log.s, .timeout_s = opt->timeout_s};
-    if (!process_run(&process, NULL, e))
-        return err_prefix(e, "reference of '%s'", p->name);
-    if (rename(made.s, path.s) != 0)
-        return err_set(e, "%s: cannot rename", made.s);
-    unlink(log.s);
-    return moments_read(path.s, out, NULL, e);
+    const struct path lock = fs_path("%s/.lock", opt->cache); /* others may fill the same cache */
+    int fd = open(lock.s, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (fd < 0 || lockf(fd, F_LOCK, 0) != 0) {
+        if (fd >= 0)
+            close(fd);
+        return err_set(e, "%s: cannot be locked", lock.s);
+    }
+    bool ok = (access(path.s, R_OK) == 0 && moments_read(path.s, out, NULL, e)) ||
+              (make_render(r, p, words, opt, path.s, e) && moments_read(path.s, out, NULL, e));
+    close(fd);
+    return ok;
 }
 
 static bool reference_of(const struct rubric *r, const struct rubric_image *p,

@@ -49,7 +49,8 @@ static const char build_script[] =
     "  esac\n"
     "done\n"
     "[ -n \"$BUILD\" ] || { chmod u+x \"$PROGRAM\" 2>/dev/null; exit 0; }\n"
-    "case $BUILD in *cmake*) marker=CMakeLists.txt ;; *make*) marker=[Mm]akefile ;; *) marker= ;; esac\n"
+    "case \" $(echo \"$BUILD\" | tr '\\n;&|()' '      ') \" in\n" /* as a word: not make.sh */
+    "  *' cmake '*) marker=CMakeLists.txt ;; *' make '*) marker=[Mm]akefile ;; *) marker= ;; esac\n"
     "if [ -n \"$marker\" ]; then\n"
     "  find . -name CMakeCache.txt -printf '%h\\n' | while IFS= read -r dir; do\n"
     "    if [ -e \"$dir/CMakeLists.txt\" ]; then rm -rf \"$dir/CMakeCache.txt\" \"$dir/CMakeFiles\"; else rm -rf \"$dir\"; fi\n"
