@@ -111,9 +111,10 @@ static void carry_ratio(const struct rubric *r, const struct answer_key *a, int 
         return;
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     const double clip = rubric_sight_clip(r);
-    unsigned char *use = malloc(2 * pixels), *own = use + pixels;
+    unsigned char *use = malloc(2 * pixels);
     if (use == NULL)
         return;
+    unsigned char *own = use + pixels;
     /* What is cut off lies elsewhere where the camera is wrong, and in more places where all is too bright. */
     memset(use, 1, 2 * pixels);
     leave_bright(p->mean, pixels, clip, own);
@@ -264,7 +265,7 @@ void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int se
         const struct rubric_image *p = &r->image[c->images[0]];
         if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(h, c))
             continue;
-        if (c->after >= 0 && was_lost(r, c, c->after, NULL, share))
+        if (c->after >= 0 && was_lost(r, c, c->after, p, share))
             carry_ratio(r, a, set, h, c, &result[i]);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
             carry_rates(r, a, set, h, c, &result[i]);

@@ -36,7 +36,9 @@ double rubric_option(const struct rubric_image *p, const char *option, int k)
     snprintf(with_spaces, sizeof with_spaces, " %s ", option);
     char *at = strstr(words, with_spaces);
     double v = 0;
-    for (at = at != NULL ? at + strlen(with_spaces) : NULL; at != NULL && k >= 0; k--)
+    if (at == NULL)
+        return 0;
+    for (at += strlen(with_spaces); k >= 0; k--)
         v = strtod(at, &at);
     return v;
 }
