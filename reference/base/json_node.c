@@ -103,3 +103,15 @@ double member_end(const json_t *object, const char *name, size_t end)
 {
     return json_number_value(json_array_get(json_object_get(object, name), end));
 }
+
+const json_t *member_named(const json_t *array, const char *name)
+{
+    size_t i;
+    json_t *object;
+    json_array_foreach(array, i, object)
+    {
+        if (strcmp(member_or_empty(object, "name"), name) == 0)
+            return object;
+    }
+    return NULL;
+}

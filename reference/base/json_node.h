@@ -38,6 +38,8 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
 const char *member_text(const json_t *object, const char *name);
 const char *member_or_empty(const json_t *object, const char *name);
 double member_number(const json_t *object, const char *name);
+/* The first object of an array whose "name" is this; NULL: none. */
+const json_t *member_named(const json_t *array, const char *name);
 /* Of an interval: its lower (0) or upper (1) end. */
 double member_end(const json_t *object, const char *name, size_t end);
 

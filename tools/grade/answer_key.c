@@ -243,3 +243,15 @@ void answer_key_free(struct answer_key *a)
             moments_free(&a->of[k][i].as_asked);
         }
 }
+
+const struct moments *answer_key_image(const struct answer_key *a, int set, int image)
+{
+    const struct moments *own = &a->of[set][image].m, *plain = &a->of[0][image].m;
+    return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
+}
+
+const struct moments *answer_key_counts(const struct answer_key *a, int set, int image)
+{
+    const struct moments *own = &a->of[set][image].as_asked;
+    return own->width > 0 ? own : &a->of[0][image].as_asked;
+}

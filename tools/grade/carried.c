@@ -270,8 +270,7 @@ static bool judge_rates(const struct carry *w, const struct rubric_check *c, int
     int image = c->images[0], first = bugs & 1 ? w->bug[0] : w->bug[1];
     const struct rubric_image *p = &w->r->image[image];
     const struct view *v = &w->b->catalogue.view[w->b->view[w->with][image]];
-    const struct moments *own = &w->a->of[w->with][image].as_asked,
-                         *ours = own->width > 0 ? own : &w->a->of[0][image].as_asked;
+    const struct moments *ours = answer_key_counts(w->a, w->with, image);
     struct effect *room = malloc(sizeof *room);
     struct rate_image rates;
     struct err why;

@@ -66,12 +66,6 @@ static double likeness(const struct submitted_image *s, const struct moments *m)
     return best;
 }
 
-static const struct moments *answer_of(const struct answer_key *a, int set, int image)
-{
-    const struct moments *own = &a->of[set][image].m;
-    return own->width > 0 ? own : &a->of[0][image].m;
-}
-
 static const double least_likeness = 0.5;
 
 /* Only that it draws the scene matters for its times. */
@@ -80,7 +74,7 @@ static void carry_growth(const struct rubric *r, const struct answer_key *a, int
                          struct result *out)
 {
     struct result other = *out;
-    if (likeness(&h->image[c->images[0]], answer_of(a, set, c->images[0])) < least_likeness)
+    if (likeness(&h->image[c->images[0]], answer_key_image(a, set, c->images[0])) < least_likeness)
         return;
     grade_checks_growth(r, c, h, &other);
     if (other.share <= out->share)
@@ -105,7 +99,8 @@ static void carry_ratio(const struct rubric *r, const struct answer_key *a, int 
                         struct result *out)
 {
     const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
-    const struct moments *rp = answer_of(a, set, c->images[0]), *rb = answer_of(a, set, c->after);
+    const struct moments *rp = answer_key_image(a, set, c->images[0]),
+                         *rb = answer_key_image(a, set, c->after);
     if (b->mean == NULL || p->width != b->width || p->height != b->height ||
         strcmp(p->sha256, b->sha256) == 0 || likeness(p, rp) < least_likeness)
         return;
@@ -180,8 +175,7 @@ static void carry_rates(const struct rubric *r, const struct answer_key *a, int 
                         struct result *out)
 {
     const struct rubric_image *p = &r->image[c->images[0]];
-    const struct moments *own = &a->of[set][c->images[0]].as_asked,
-                         *ours = own->width > 0 ? own : &a->of[0][c->images[0]].as_asked;
+    const struct moments *ours = answer_key_counts(a, set, c->images[0]);
     struct rate_image rates;
     struct err why;
     if (h->made[c->images[0]].rates[0] == '\0' ||

@@ -61,9 +61,7 @@ static const struct submitted_image *student(const struct work *w, int k)
 /* NULL: the rubric gives none. */
 static const struct moments *reference(const struct work *w, int k)
 {
-    const struct moments *own = &w->answers->of[w->set][w->check->images[k]].m,
-                         *plain = &w->answers->of[0][w->check->images[k]].m;
-    return own->width > 0 ? own : plain->width > 0 ? plain : NULL;
+    return answer_key_image(w->answers, w->set, w->check->images[k]);
 }
 
 static const struct moments *expected_noise(const struct work *w, int k)
@@ -548,8 +546,7 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
     const struct made *made = &w->h->made[c->images[0]];
-    const struct moments *own = &w->answers->of[w->set][c->images[0]].as_asked,
-                         *ours = own->width > 0 ? own : &w->answers->of[0][c->images[0]].as_asked;
+    const struct moments *ours = answer_key_counts(w->answers, w->set, c->images[0]);
     struct rate_image rates;
     struct err why;
     snprintf(

@@ -28,6 +28,11 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                      struct answer_key *out, struct err *e) __attribute__((warn_unused_result));
 void answer_key_free(struct answer_key *a);
 
+/* With the deviations of `set`, where these change it: the image as it should be (NULL: the rubric gives none), and how many
+ * samples each of its pixels takes. */
+const struct moments *answer_key_image(const struct answer_key *a, int set, int image);
+const struct moments *answer_key_counts(const struct answer_key *a, int set, int image);
+
 /* One image by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
  * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
 bool answer_key_render(const struct rubric *r, int image, bool as_asked, const char *words, int spp,

@@ -10,14 +10,7 @@ static const double told = 0.005; /* a point is written with two decimals */
 
 static const json_t *find(const json_t *grade, const char *name)
 {
-    size_t i;
-    json_t *c;
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
-        if (strcmp(member_or_empty(c, "name"), name) == 0)
-            return c;
-    }
-    return NULL;
+    return member_named(json_object_get(grade, "checks"), name);
 }
 
 static json_t *points_of(const json_t *check)

@@ -130,7 +130,6 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
 {
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
     const struct rubric_image *p = &r->image[i];
-    const struct moments *own = &a->of[set_of(r, grade)][i].m, *plain = &a->of[0][i].m;
     struct submitted_image s;
     struct err why;
     char path[4600];
@@ -140,7 +139,7 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
         return true;
     if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
-    bool ok = same_noise_of(&s, own->width > 0 ? own : plain, p->spp, noise, e);
+    bool ok = same_noise_of(&s, answer_key_image(a, set_of(r, grade), i), p->spp, noise, e);
     submitted_image_free(&s);
     return ok;
 }

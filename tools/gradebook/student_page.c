@@ -57,14 +57,7 @@ static bool stands_out(const struct page *p, const json_t *check)
 
 static const json_t *image_of(const json_t *grade, const char *name)
 {
-    size_t i;
-    json_t *p;
-    json_array_foreach(json_object_get(grade, "pictures"), i, p)
-    {
-        if (strcmp(member_or_empty(p, "name"), name) == 0)
-            return p;
-    }
-    return NULL;
+    return member_named(json_object_get(grade, "pictures"), name);
 }
 
 /* With the deviations that it was graded with. NULL: there is none to be shown. */
