@@ -47,7 +47,7 @@ struct suite_scene {
     int width, height;
     int depth; /* -m: largest number of bounces */
     int spp;   /* of our render */
-    int tile;  /* side of a reporting tile, pixels; divides width and height */
+    int tile;  /* side of a reporting tile, pixels */
     enum verdict expect;
     struct suite_variant variant[MAX_VARIANTS];
     int num_variants;

@@ -248,9 +248,6 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
         !json_get_int(&n, "tile", 1, 16384, &s->tile, e) ||
         !json_get_text(&n, "expect", expect, sizeof expect, e))
         return false;
-    if (s->width % s->tile != 0 || s->height % s->tile != 0)
-        return err_set(e, "%s: tile %d does not divide %d x %d pixels", file, s->tile, s->width,
-                       s->height);
     enum verdict wanted = must_differ ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT;
     if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
         return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,

@@ -55,8 +55,7 @@ static const struct cli_option options[] = {
      "the same for the variance of one sample or replicate; 0:\n"
      "variances are not judged (0)",
      TO(job.opt.margin_variance), 0, 100},
-    {0, "tile", "N", "side of a reporting tile, pixels (16, or the whole image)", TO(job.opt.tile),
-     1, 65536},
+    {0, "tile", "N", "side of a reporting tile, pixels (16)", TO(job.opt.tile), 1, 65536},
     {0, "again", "A2 B2",
      "the same renders with fresh seeds: DIFFERENT only if they\n"
      "confirm what A and B show, each stage at the root of alpha",
@@ -149,7 +148,7 @@ static bool write_report(const struct settings *s, const struct compared *c, int
 
 int command_compare(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1},
+    struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1, .tile = 16},
                          .expect = VERDICT_EQUIVALENT};
     struct compared c;
     if (!cli_read(options, argc, argv, &s, e))

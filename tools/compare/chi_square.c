@@ -45,18 +45,16 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
                   const struct part *from, struct part *to)
 {
     const struct pyramid_level *fine = &p->level[below], *coarse = &p->level[l];
-    int factor = coarse->side / fine->side;
+    size_t parts = (size_t)fine->nx * (size_t)fine->ny;
     size_t regions = (size_t)coarse->nx * (size_t)coarse->ny;
     for (size_t i = 0; i < regions; i++)
         to[i] = (struct part){.whole = true};
-    for (int y = 0; y < fine->ny; y++)
-        for (int x = 0; x < fine->nx; x++) {
-            const struct part *s = &from[(size_t)y * (size_t)fine->nx + (size_t)x];
-            struct part *d = &to[(size_t)(y / factor) * (size_t)coarse->nx + (size_t)(x / factor)];
-            d->sum += s->sum;
-            d->num += s->num;
-            d->whole = d->whole && s->whole;
-        }
+    for (size_t i = 0; i < parts; i++) {
+        struct part *d = &to[pyramid_parent(p, below, l, i)];
+        d->sum += from[i].sum;
+        d->num += from[i].num;
+        d->whole = d->whole && from[i].whole;
+    }
     for (size_t i = 0; i < regions; i++) {
         if (to[i].whole)
             continue;

@@ -103,9 +103,8 @@ static bool fill_images(const struct judge *j, const struct pyramid *p, struct c
 static double mdb_of(const struct judge *j, const struct pyramid *p, int level, size_t i)
 {
     struct measured own = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
-    size_t x = i % (size_t)p->level[level].nx, y = i / (size_t)p->level[level].nx;
-    for (int l = level; l < p->num_levels; l++, x /= 2, y /= 2) {
-        size_t at = y * (size_t)p->level[l].nx + x;
+    for (int l = level; l < p->num_levels; l++) {
+        size_t at = pyramid_parent(p, level, l, i);
         struct measured m = region_measure(j, &p->level[l].cell[at], pyramid_rect(p, l, at));
         if (region_testable(j, &m))
             return fmin(region_mdb_none, region_mdb(j, &m, CHANNEL_LUMINANCE) * m.unit / own.unit);

@@ -11,7 +11,7 @@ struct compare_options {
                              EQUIVALENT, each, over all regions and channels of this one claim */
     double margin_global;   /* relative, in [0, 1); 0: any difference counts (a regression test) */
     double margin_tile;     /* at least margin_global; both are 0 or none is */
-    int tile;               /* side of a reporting tile, pixels; divides width and height */
+    int tile;               /* side of a reporting tile, pixels (pyramid.h) */
     double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
                                as different estimators differ rightly */
 };

@@ -109,23 +109,38 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
     }
 }
 
-/* Every region of `dst` is the sum of the regions of `src` that lie in it; src's side divides
- * dst's. */
-static void fill_from(const struct pyramid_level *src, struct pyramid_level *dst)
+static int least(int a, int b)
 {
-    int factor = dst->side / src->side;
-    for (int y = 0; y < src->ny; y++)
-        for (int x = 0; x < src->nx; x++)
-            add_cell(&dst->cell[(size_t)(y / factor) * (size_t)dst->nx + (size_t)(x / factor)],
-                     &src->cell[(size_t)y * (size_t)src->nx + (size_t)x]);
+    return a < b ? a : b;
 }
 
-static void add_level(struct pyramid *p, int side)
+size_t pyramid_parent(const struct pyramid *p, int fine, int coarse, size_t i)
 {
-    struct pyramid_level *level = &p->level[p->num_levels++];
-    level->side = side;
-    level->nx = (p->width - 1) / side + 1;
-    level->ny = (p->height - 1) / side + 1;
+    const struct pyramid_level *f = &p->level[fine], *c = &p->level[coarse];
+    int factor = c->side / f->side;
+    int x = least((int)(i % (size_t)f->nx) / factor, c->nx - 1);
+    int y = least((int)(i / (size_t)f->nx) / factor, c->ny - 1);
+    return (size_t)y * (size_t)c->nx + (size_t)x;
+}
+
+/* Every region of a level is the sum of the regions of level `from` that lie in it; that one's side
+ * divides its own. */
+static void fill_from(struct pyramid *p, int from, int level)
+{
+    size_t regions = (size_t)p->level[from].nx * (size_t)p->level[from].ny;
+    for (size_t i = 0; i < regions; i++)
+        add_cell(&p->level[level].cell[pyramid_parent(p, from, level, i)], &p->level[from].cell[i]);
+}
+
+int pyramid_tiles(int length, int tile)
+{
+    int tiles = (length + tile / 2) / tile;
+    return tiles > 0 ? tiles : 1;
+}
+
+static void add_level(struct pyramid *p, int side, int nx, int ny)
+{
+    p->level[p->num_levels++] = (struct pyramid_level){.side = side, .nx = nx, .ny = ny};
 }
 
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
@@ -133,13 +148,16 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
 {
     assert(a->width == b->width && a->height == b->height && tile >= 1);
     *out = (struct pyramid){.width = a->width, .height = a->height};
+    tile = least(tile, a->width > a->height ? a->width : a->height);
     for (int side = 1; side < tile; side *= 2)
-        add_level(out, side);
+        add_level(out, side, (a->width - 1) / side + 1, (a->height - 1) / side + 1);
     out->tile_level = out->num_levels;
-    int longest = a->width > a->height ? a->width : a->height;
-    add_level(out, tile);
-    while (out->level[out->num_levels - 1].side < longest)
-        add_level(out, 2 * out->level[out->num_levels - 1].side);
+    int nx = pyramid_tiles(a->width, tile), ny = pyramid_tiles(a->height, tile);
+    for (int side = tile;; side *= 2, nx = (nx + 1) / 2, ny = (ny + 1) / 2) {
+        add_level(out, side, nx, ny);
+        if (nx == 1 && ny == 1)
+            break;
+    }
     /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has a pixel. */
     out->cells = calloc(pyramid_regions(out), sizeof *out->cells);
     if (out->cells == NULL)
@@ -155,7 +173,7 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
         if (level->side == 1)
             fill_pixels(a, b, channel, level);
         else /* a tile that is no power of two is not made of the level below it */
-            fill_from(&out->level[i == out->tile_level ? 0 : i - 1], level);
+            fill_from(out, i == out->tile_level ? 0 : i - 1, i);
     }
     return true;
 }
@@ -177,8 +195,8 @@ size_t pyramid_regions(const struct pyramid *p)
 struct rect pyramid_rect(const struct pyramid *p, int level, size_t i)
 {
     const struct pyramid_level *l = &p->level[level];
-    int x = (int)(i % (size_t)l->nx) * l->side, y = (int)(i / (size_t)l->nx) * l->side;
-    int width = p->width - x, height = p->height - y;
-    return (struct rect){x, y, width < l->side ? width : l->side,
-                         height < l->side ? height : l->side};
+    int column = (int)(i % (size_t)l->nx), row = (int)(i / (size_t)l->nx);
+    int x = column * l->side, y = row * l->side;
+    return (struct rect){x, y, column + 1 < l->nx ? l->side : p->width - x,
+                         row + 1 < l->ny ? l->side : p->height - y};
 }

@@ -1,7 +1,8 @@
 /* Sums of one comparison over square regions of all sizes, in one channel: what the tests of
  * compare.h are made of. Level sides are 1, 2, 4, .. below the reporting tile, then tile, 2 tile,
  * 4 tile, .. until one region is the image: dyadic if the tile is a power of two. Regions at the
- * right and lower border may be smaller. */
+ * right and lower border are what is left; what is left of tiles is half a tile or more, a narrower
+ * strip belonging to the tile beside it. */
 #ifndef ASSAY_PYRAMID_H
 #define ASSAY_PYRAMID_H
 
@@ -59,7 +60,10 @@ struct pyramid {
     struct cell *cells; /* of all levels */
 };
 
-/* Same sizes, tile >= 1. Fails only out of memory. Release with pyramid_free(). */
+/* Reporting tiles along `length` pixels, at least 1: the last has from 1/2 to 3/2 of a tile's pixels, or all. */
+int pyramid_tiles(int length, int tile);
+
+/* Same sizes, tile >= 1; beyond the longer side it is that side. Fails only out of memory. Release with pyramid_free(). */
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
@@ -73,5 +77,7 @@ struct rect {
     int x, y, width, height;
 };
 struct rect pyramid_rect(const struct pyramid *p, int level, size_t i);
+/* The region of level `coarse` in which region i of level `fine` lies; the finer side divides the other. */
+size_t pyramid_parent(const struct pyramid *p, int fine, int coarse, size_t i);
 
 #endif

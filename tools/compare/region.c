@@ -18,18 +18,24 @@ static bool is_image(const struct judge *j, struct rect r)
     return r.width == j->width && r.height == j->height;
 }
 
+static double clipped_area(double side, const struct judge *j)
+{
+    return fmin(side, j->width) * fmin(side, j->height);
+}
+
 /* margin_global for the image, margin_tile up to a tile, between them linear in the logarithm of
- * the side (of the square of the same area). */
+ * the area. */
 static double margin_of(const struct judge *j, struct rect r)
 {
     const struct compare_options *opt = &j->opt;
     if (is_image(j, r))
         return opt->margin_global;
-    if (r.width <= opt->tile && r.height <= opt->tile)
+    if (r.width < 2 * opt->tile &&
+        r.height < 2 * opt->tile) /* a tile at the border may be larger */
         return opt->margin_tile;
-    double side = 0.5 * log((double)r.width * r.height), tile = log(opt->tile);
-    double image = 0.5 * log((double)j->width * j->height);
-    double f = fmin(1, fmax(0, (side - tile) / (image - tile)));
+    double area = log((double)r.width * r.height), tile = log(clipped_area(opt->tile, j));
+    double image = log((double)j->width * j->height);
+    double f = fmin(1, fmax(0, (area - tile) / (image - tile)));
     return opt->margin_tile + f * (opt->margin_global - opt->margin_tile);
 }
 

@@ -201,7 +201,8 @@ class Scene {
   pickTile(x, y) {
     const side = this.claim ? this.claim.tile : 0;
     if (!(side > 0)) return;
-    const tile = { x: x - x % side, y: y - y % side, side };
+    const corner = (at, size) => side * Math.min(Math.floor(at / side), tilesAlong(size, side) - 1);
+    const tile = { x: corner(x, this.width), y: corner(y, this.height), side };
     if (this.tile && this.tile.x === tile.x && this.tile.y === tile.y) {
       this.tile = null;
       this.redraw();

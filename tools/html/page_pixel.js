@@ -20,10 +20,14 @@ function readPixel(scene) {
     ...(pairs.length ? [table(row("Luminance", ["difference", "t"], "th"), pairs)] : []));
 }
 
+// Tiles along `size` pixels, and the length of the one that begins at `at`: the last has half a tile or more.
+const tilesAlong = (size, side) => Math.max(1, Math.floor((size + (side >> 1)) / side));
+const tileLength = (at, size, side) => size - at < 1.5 * side ? size - at : side;
+
 // Says what is known of a tile below the claim's list of tiles.
 function readTile(scene, tile, claim) {
   if (!claim.tileReading) return;
-  const columns = Math.ceil(scene.width / tile.side), i = tile.y / tile.side * columns + tile.x / tile.side;
+  const columns = tilesAlong(scene.width, tile.side), i = tile.y / tile.side * columns + tile.x / tile.side;
   const p = claim.p[i], t = claim.t[i];
   claim.tileReading.textContent = "Tile at x " + tile.x + ", y " + tile.y + ": " + tileDifference(scene, tile, claim) +
     (p === null || p === undefined ? "; it has no noise." : ", t " + digits(t) + ", p " + digits(10 ** p) + ".");
@@ -32,7 +36,7 @@ function readTile(scene, tile, claim) {
 function tileDifference(scene, tile, claim) {
   if (!scene.ready) return "";
   const a = greyOf(claim.a.layer), b = greyOf(claim.b.layer);
-  const right = Math.min(tile.x + tile.side, scene.width), bottom = Math.min(tile.y + tile.side, scene.height);
+  const right = tile.x + tileLength(tile.x, scene.width, tile.side), bottom = tile.y + tileLength(tile.y, scene.height, tile.side);
   let sa = 0, sb = 0;
   for (let y = tile.y; y < bottom; y++)
     for (let x = tile.x; x < right; x++) {

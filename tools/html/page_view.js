@@ -116,14 +116,14 @@ class Pane {
     }
     if (s.grid) {
       c.beginPath();
-      for (let x = s.grid; x < s.width; x += s.grid) c.rect((x - v.x) * scale, 0, 0, height);
-      for (let y = s.grid; y < s.height; y += s.grid) c.rect(0, (y - v.y) * scale, width, 0);
+      for (let i = 1; i < tilesAlong(s.width, s.grid); i++) c.rect((i * s.grid - v.x) * scale, 0, 0, height);
+      for (let i = 1; i < tilesAlong(s.height, s.grid); i++) c.rect(0, (i * s.grid - v.y) * scale, width, 0);
       c.lineWidth = ratio;
       c.strokeStyle = "rgba(128,128,128,.75)";
       c.stroke();
     }
     const tile = s.tile || this.tile;
-    if (tile) box(tile.x, tile.y, tile.side, tile.side, false);
+    if (tile) box(tile.x, tile.y, tileLength(tile.x, s.width, tile.side), tileLength(tile.y, s.height, tile.side), false);
     if (s.pixel) box(s.pixel.x, s.pixel.y, 1, 1, true);
   }
 

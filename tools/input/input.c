@@ -201,14 +201,17 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
     double pixels = (double)a->m.width * a->m.height, share = (double)a->num_censored / pixels;
     double worst = 0;
     int worst_x = 0, worst_y = 0;
-    for (int y = 0; y < a->m.height; y += tile)
-        for (int x = 0; x < a->m.width; x += tile) {
+    for (int row = 0; row < c->tiles_y; row++)
+        for (int column = 0; column < c->tiles_x; column++) {
+            int x = column * tile, right = column + 1 < c->tiles_x ? x + tile : a->m.width;
+            int y = row * tile, bottom = row + 1 < c->tiles_y ? y + tile : a->m.height;
             double num = 0;
-            for (int i = 0; i < tile; i++)
-                for (int j = 0; j < tile; j++)
-                    num += a->censored[(size_t)(y + i) * (size_t)a->m.width + (size_t)(x + j)] != 0;
-            if (num / ((double)tile * tile) > worst) {
-                worst = num / ((double)tile * tile);
+            for (int i = y; i < bottom; i++)
+                for (int j = x; j < right; j++)
+                    num += a->censored[(size_t)i * (size_t)a->m.width + (size_t)j] != 0;
+            num /= (double)(right - x) * (bottom - y);
+            if (num > worst) {
+                worst = num;
                 worst_x = x;
                 worst_y = y;
             }

@@ -64,8 +64,8 @@ static void write_regions(FILE *f, const json_t *claim)
     write_fact(
         f, "Tile that reaches furthest out",
         "x %.0f, y %.0f, %.0f × %.0f pixels: %s, interval %s to %s, t = %s",
-        member_number(tile, "x"), member_number(tile, "y"), member_number(claim, "tile"),
-        member_number(claim, "tile"), html_percent_prose(member_number(tile, "difference")).s,
+        member_number(tile, "x"), member_number(tile, "y"), member_number(tile, "width"),
+        member_number(tile, "height"), html_percent_prose(member_number(tile, "difference")).s,
         html_percent_prose(member_end(tile, "ci", 0)).s,
         html_percent_prose(member_end(tile, "ci", 1)).s, html_number(member_number(tile, "t")).s);
     write_fact(f, "Smallest p of all regions",

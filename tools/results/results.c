@@ -57,11 +57,10 @@ static const struct member judged_members[] = {
     {"seed_a", COUNT, false},        {"seeds_b", COUNTS, false},
     {"version_b", STRING, false}};
 
-static const struct member worst_tile_members[] = {{"x", COUNT, true},
-                                                   {"y", COUNT, true},
-                                                   {"difference", NUMBER, true},
-                                                   {"ci", INTERVAL, true},
-                                                   {"t", NUMBER, true}};
+static const struct member worst_tile_members[] = {
+    {"x", COUNT, true},      {"y", COUNT, true},           {"width", COUNT, true},
+    {"height", COUNT, true}, {"difference", NUMBER, true}, {"ci", INTERVAL, true},
+    {"t", NUMBER, true}};
 
 static const struct member worst_members[] = {
     {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},

@@ -11,14 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* 16, or what divides the image at all. */
-static int default_tile(const struct moments *m)
-{
-    if (m->width % 16 == 0 && m->height % 16 == 0)
-        return 16;
-    return m->width == m->height ? m->width : 1;
-}
-
 /* Two sides as compare_moments() wants them. */
 struct pair {
     struct input in[2];
@@ -97,9 +89,6 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     struct compare_options opt = job->opt;
     if (!pair_read(job, job->path, &p, &out->notes, e))
         return false;
-    if (opt.tile == 0)
-        opt.tile = default_tile(&p.in[1].m);
-    out->tile = opt.tile;
     bool two = job->again[0] != NULL;
     bool ok = two ? two_stage_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
@@ -162,9 +151,6 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
         out->path[i] = job->path[i];
     }
     ok = ok && permutation_test(&r[0], &r[1], &stage, &out->perm, e);
-    if (ok && opt.tile == 0)
-        opt.tile = default_tile(&out->m[1]);
-    out->tile = opt.tile;
     ok = ok && compare_moments(&out->m[0], &out->m[1], &opt, &out->r, e);
     double mdb = out->perm.mdb;
     if (ok && two && out->perm.verdict == VERDICT_DIFFERENT)
@@ -241,7 +227,6 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
 {
     struct claim_context context = {
         .a = job->path[0], .b = job->path[1], .expected = expected, .opt = job->opt};
-    context.opt.tile = c->tile;
     char side[2][4096];
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
     const struct path z = fs_path("%s.z.exr", path);

@@ -9,7 +9,7 @@ struct compare_job {
     const char *path[2];  /* A is tested, B the reference */
     const char *again[2]; /* fresh renders of both for a second stage, or NULL */
     struct input_options input[2];
-    struct compare_options opt; /* tile 0: 16, or the whole image where 16 does not divide it */
+    struct compare_options opt;
     bool exchangeable;          /* judge by permutation of replicates */
     int min_side;               /* of a region to permute; 0: permutation.h chooses */
 };
@@ -22,7 +22,6 @@ struct compared {
     struct comparison r;     /* its verdict and reason are the claim's, whoever reached it */
     struct permutation perm; /* of an exchangeable job; of the last stage */
     struct notes notes;
-    int tile;
 };
 
 /* Reads, compares, and, with a second pair, confirms. The caller frees with compare_job_free(). */

@@ -149,7 +149,7 @@ TEST(missing_or_mistyped_member)
 TEST(nested_members)
 {
     static const char *const member[][2] = {
-        {"worst_tile", "x\0y\0difference\0ci\0t\0"},
+        {"worst_tile", "x\0y\0width\0height\0difference\0ci\0t\0"},
         {"worst", "width\0height\0channel\0"},
         {"files", "a\0b\0z\0relative\0"},
         {"direction", "name\0explained\0amount\0ci\0unit\0"},
