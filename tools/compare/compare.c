@@ -153,8 +153,8 @@ static bool fill_statistic(const struct judge *j, int s, double log10_p, struct 
 }
 
 static void fill_statistics(struct judge *j, const struct worst worst[2],
-                            const struct chi_square *dense, double directed, double noise,
-                            struct comparison *out)
+                            const struct chi_square *dense, enum error_mode_kind like,
+                            double directed, double noise, struct comparison *out)
 {
     struct statistic *st = out->statistic;
     for (int s = STATISTIC_IMAGE; s <= STATISTIC_PYRAMID; s++)
@@ -166,7 +166,7 @@ static void fill_statistics(struct judge *j, const struct worst worst[2],
                  "%d regions of %d x %d pixels or more (%s)", dense->regions, dense->side,
                  dense->side, channel_name[dense->channel]);
     if (fill_statistic(j, STATISTIC_MATCHED_FILTER, directed, out))
-        snprintf(st[STATISTIC_MATCHED_FILTER].what, sizeof st->what, "%s", out->direction.name);
+        snprintf(st[STATISTIC_MATCHED_FILTER].what, sizeof st->what, "%s", error_mode_name[like]);
     if (fill_statistic(j, STATISTIC_VARIANCE, noise, out))
         snprintf(st[STATISTIC_VARIANCE].what, sizeof st->what, "variance of a path: %.3g times",
                  out->variance.ratio);
@@ -174,12 +174,13 @@ static void fill_statistics(struct judge *j, const struct worst worst[2],
 
 /* The statistics besides those of the regions. */
 static bool test_rest(const struct moments *a, const struct moments *b, struct judge *j,
-                      double *directed, double *noise, struct comparison *out, struct err *e)
+                      enum error_mode_kind *like, double *directed, double *noise,
+                      struct comparison *out, struct err *e)
 {
     bool testable;
     *directed = 0;
-    if (j->share[STATISTIC_MATCHED_FILTER] > 0 &&
-        !matched_filter_test(a, b, j, &out->direction, directed, e))
+    *like = 0;
+    if (j->share[STATISTIC_MATCHED_FILTER] > 0 && !matched_filter_test(a, b, j, like, directed, e))
         return false;
     out->variance = variance_ratio_test(a, b, j, noise, &testable);
     j->num_tests[STATISTIC_VARIANCE] = j->share[STATISTIC_VARIANCE] > 0 && testable;
@@ -204,6 +205,7 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct cell image[NUM_CHANNELS];
     struct chi_square dense = {0};
     double squared = 0, mean = 0, directed, noise;
+    enum error_mode_kind like;
     if (!input_checks_run(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
@@ -221,9 +223,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         if (c < CHANNEL_LUMINANCE)
             squared += luminance_weight[c] * squared_bias(&p);
     }
-    if (!test_rest(a, b, &j, &directed, &noise, out, e))
+    if (!test_rest(a, b, &j, &like, &directed, &noise, out, e))
         goto fail;
-    fill_statistics(&j, worst, &dense, directed, noise, out);
+    fill_statistics(&j, worst, &dense, like, directed, noise, out);
     if (!fill_images(&j, &p, out, e) || !fill_tiles(&j, &p, out, &tiles, e))
         goto fail;
     mean = image[CHANNEL_LUMINANCE].b;

@@ -34,14 +34,11 @@ struct statistic {
     double log10_p; /* of its smallest p, times num_tests (Bonferroni), at most 0 */
     char what[96];  /* which test that was: "shift by x", "16 x 16 pixels at 32,48 (red)" */
 };
-/* The known kind of error that looks most like A - B. */
-struct error_mode {
-    const char *name; /* "shift by x", static; NULL if none could be tested */
-    double
-        explained; /* share of the squared difference, noise removed, that lies in this direction,
-                         0..1; an estimate */
-    double amount; /* its size to first order, and its 1 - 2 alpha interval: 0 where unit is "" */
-    double lo, hi;
+/* A change that, made to B, removes at least nine tenths of the difference (hint.h). */
+struct hint {
+    const char *name; /* "shift by x", static; NULL: no change that is known does */
+    double removed;   /* share of the squared difference, noise removed; about 1 */
+    double amount;    /* 0 where unit is "" */
     const char *unit; /* "%", "% of the mean", "in the exponent", "px", "" */
 };
 
@@ -76,7 +73,7 @@ struct comparison {
     char reason[256]; /* one sentence: what decided */
     int num_tests;    /* of all statistics together */
     struct statistic statistic[NUM_STATISTICS];
-    struct error_mode direction; /* of the smallest p of STATISTIC_MATCHED_FILTER */
+    struct hint hint; /* not set by compare_moments() */
     struct variance_ratio variance;
     struct region global[4];  /* per channel and luminance */
     struct region worst;      /* of all regions, smallest p in units of the level it is held to */

@@ -150,7 +150,7 @@ static void slope(const struct error_modes_base *base, int x, int y, bool down, 
         out[c] = -(base->mix[hi + c] - base->mix[lo + c]) / 2;
 }
 
-/* d from the rows (columns) beside that of the pixel, `same` from its own: no pixel is in both. */
+/* From the rows (columns) beside that of the pixel. */
 static void shift(const struct error_modes_base *base, bool down, int x, int y,
                   struct error_change *out)
 {
@@ -159,7 +159,6 @@ static void shift(const struct error_modes_base *base, bool down, int x, int y,
         return;
     slope(base, down ? x - 1 : x, down ? y : y - 1, down, left);
     slope(base, down ? x + 1 : x, down ? y : y + 1, down, right);
-    slope(base, x, y, down, out->same);
     for (int c = 0; c < 3; c++)
         out->d[c] = (left[c] + right[c]) / 2;
 }
@@ -174,14 +173,11 @@ static void exchange(const struct error_modes_base *base, size_t own, size_t oth
     for (size_t c = 0; c < 3; c++) {
         size_t k = (size_t)from[c];
         double there = moved ? s->b->mean[other + c] : s->b_around[own + k];
-        double noise = moved ? pow(s->sd[1][other + c], 2) : s->around[1][own + k] / 8;
         out->d[c] = there - s->b_around[own + c];
-        out->noise[c] = noise + s->around[1][own + c] / 8;
         to_other += s->sd[1][own + c] * s->sd[1][other + c] * s->weight[own + c];
         to_own += s->sd[1][own + c] * s->sd[1][other + c] * s->weight[other + c];
         near += (s->around[1][own + c] + (moved ? 0 : s->around[1][own + k])) * s->weight[own + c];
     }
-    memcpy(out->same, out->d, sizeof out->d);
     out->coupled = (moved ? to_other * to_own : 0) + near * near / 8;
 }
 
@@ -192,29 +188,20 @@ struct error_change error_mode_at(const struct error_modes_base *base, enum erro
     static const int same[3] = {0, 1, 2};
     int w = base->width, h = base->height;
     size_t own = at(base, x, y), other;
-    const double *mix = base->mix + own, *near = base->mix_around + own;
+    const double *near = base->mix_around + own;
     switch (kind) {
-    case ERROR_SCALE:
-        for (size_t c = 0; c < 3; c++) {
-            out.d[c] = near[c];
-            out.same[c] = base->b->mean[own + c];
-        }
-        return out;
+    case ERROR_SCALE: memcpy(out.d, near, sizeof out.d); return out;
     case ERROR_OFFSET:
         for (int c = 0; c < 3; c++)
-            out.d[c] = out.same[c] = 1;
+            out.d[c] = 1;
         return out;
     case ERROR_GAMMA:
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++)
             out.d[c] = power(near[c]);
-            out.same[c] = power(mix[c]);
-        }
         return out;
     case ERROR_CLAMP:
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++)
             out.d[c] = over(near[c]);
-            out.same[c] = over(mix[c]);
-        }
         return out;
     case ERROR_SHIFT_X:
     case ERROR_SHIFT_Y: shift(base, kind == ERROR_SHIFT_Y, x, y, &out); return out;

@@ -56,10 +56,6 @@ bool error_mode_applies(const struct error_modes_base *base, enum error_mode_kin
 /* One direction in one pixel. */
 struct error_change {
     double d[3]; /* free of what is seen in the pixel */
-    double
-        same[3]; /* the same quantity with noise of its own, for the amount; d where has_amount is
-                       false */
-    double noise[3]; /* variance of d, where `same` is d; else 0 */
     /* Variance of sum w D beyond that of D, because d in p is made of pixels in which d is made of p:
      * their product's mean does not vanish where d is B alone. */
     double coupled;

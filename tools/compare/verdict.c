@@ -10,9 +10,7 @@
 #include <string.h>
 
 static const double regression_mdb = 0.05; /* margins 0: a pass must have been able to see this */
-static const double named_share =
-    0.5; /* of the difference that a direction must explain to be named */
-static const double largest_factor = 1e4; /* of extra_factor */
+static const double largest_factor = 1e4;  /* of extra_factor */
 
 static bool inside_margin(const struct region *r)
 {
@@ -106,21 +104,11 @@ static bool rejects(const struct comparison *c, const struct compare_options *op
     return st->num_tests > 0 && st->log10_p <= log10(opt->alpha * st->share);
 }
 
-/* "shift by x +0.48 px [0.46, 0.50]" */
-static void name_direction(const struct error_mode *d, char *text, size_t size)
-{
-    if (d->unit[0] == '\0')
-        snprintf(text, size, "%s", d->name);
-    else
-        snprintf(text, size, "%s %+.3g %s [%.3g, %.3g]", d->name, d->amount, d->unit, d->lo, d->hi);
-}
-
 /* Regions say where; without one, the statistic whose p is furthest below its level. */
 static void judge_different(struct comparison *c, const struct compare_options *opt)
 {
-    char where[96], direction[128] = "";
+    char where[96];
     size_t size = sizeof c->reason;
-    bool directed = rejects(c, opt, STATISTIC_MATCHED_FILTER);
     int first = -1;
     for (int s = 0; s < NUM_STATISTICS; s++)
         if (rejects(c, opt, s) &&
@@ -131,8 +119,6 @@ static void judge_different(struct comparison *c, const struct compare_options *
     assert(first >= 0);
     const struct statistic *st = &c->statistic[first];
     c->verdict = VERDICT_DIFFERENT;
-    if (directed)
-        name_direction(&c->direction, direction, sizeof direction);
     if (first <= STATISTIC_PYRAMID) {
         place(c, &c->worst, where, sizeof where);
         snprintf(c->reason, size,
@@ -147,7 +133,7 @@ static void judge_different(struct comparison *c, const struct compare_options *
                  st->what, st->log10_p);
     } else if (first == STATISTIC_MATCHED_FILTER) {
         snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, p = 10^%.1f",
-                 direction, st->log10_p);
+                 st->what, st->log10_p);
     } else {
         snprintf(c->reason, size,
                  "the variance of a path is %.3g times that of B [%.3g, %.3g], beyond the margin "
@@ -155,11 +141,6 @@ static void judge_different(struct comparison *c, const struct compare_options *
                  c->variance.ratio, c->variance.lo, c->variance.hi, 100 * opt->margin_variance,
                  st->log10_p);
     }
-    size_t used = strlen(c->reason);
-    if (directed && c->direction.explained >= named_share)
-        snprintf(c->reason + used, size - used, "; looks like %s, %.0f %% of it",
-                 first == STATISTIC_MATCHED_FILTER ? "that" : direction,
-                 100 * c->direction.explained);
 }
 
 void verdict_decide(struct comparison *c, const struct compare_options *opt,

@@ -29,22 +29,20 @@ static void write_row(FILE *f, const json_t *s, double alpha)
     fputs("</td></tr>\n", f);
 }
 
-static void write_direction(FILE *f, const json_t *d)
+static void write_hint(FILE *f, const json_t *h)
 {
-    const char *unit = member_text(d, "unit");
-    html_print(f, "Of the known kinds of error the difference is most like <b>%s</b>",
-               member_text(d, "name"));
+    const char *unit = member_text(h, "unit");
+    html_print(f, "It looks like <b>%s</b>", member_text(h, "name"));
     if (unit[0] != '\0')
-        html_print(f, " of %s [%s, %s] %s", html_number(member_number(d, "amount")).s,
-                   html_number(member_end(d, "ci", 0)).s, html_number(member_end(d, "ci", 1)).s,
-                   unit);
-    fprintf(f, ", which explains %.0f\u00a0%% of it. ", 100 * member_number(d, "explained"));
+        html_print(f, " of %s %s", html_number(member_number(h, "amount")).s, unit);
+    fprintf(f, ": made to B, that removes %.0f\u00a0%% of the difference. ",
+            100 * member_number(h, "removed"));
 }
 
 void report_statistics(FILE *f, const json_t *claim)
 {
     const json_t *all = json_object_get(claim, "statistics");
-    const json_t *direction = json_object_get(claim, "direction");
+    const json_t *hint = json_object_get(claim, "hint");
     const json_t *ratio = json_object_get(claim, "variance_ratio");
     fputs("<h4>Which statistic looked</h4>\n", f);
     html_table_open(f, NULL, "Table of statistics",
@@ -52,11 +50,11 @@ void report_statistics(FILE *f, const json_t *claim)
     for (size_t i = 0; i < json_array_size(all); i++)
         write_row(f, json_array_get(all, i), member_number(claim, "alpha"));
     html_table_close(f);
-    if (direction == NULL && ratio == NULL)
+    if (hint == NULL && ratio == NULL)
         return;
     fputs("<p class=\"caption\">", f);
-    if (direction != NULL)
-        write_direction(f, direction);
+    if (hint != NULL)
+        write_hint(f, hint);
     if (ratio != NULL)
         fprintf(f, "The variance of one path of A is %s times that of B [%s, %s].",
                 html_number(member_number(ratio, "ratio")).s,

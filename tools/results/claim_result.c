@@ -40,17 +40,16 @@ static json_t *statistics_json(const struct comparison *r)
     return all;
 }
 
-/* Only what is known: a direction that could be tested, a variance ratio with an interval. */
+/* Only what is known: a change that removes the difference, a variance ratio with an interval. */
 static bool add_findings(json_t *claim, const struct comparison *r)
 {
-    const struct error_mode *d = &r->direction;
+    const struct hint *h = &r->hint;
     const struct variance_ratio *v = &r->variance;
     bool ok = true;
-    if (d->name != NULL)
-        ok = json_object_set_new(claim, "direction",
-                                 json_pack("{s:s, s:f, s:f, s:[f, f], s:s}", "name", d->name,
-                                           "explained", d->explained, "amount", d->amount, "ci",
-                                           d->lo, d->hi, "unit", d->unit)) == 0;
+    if (h->name != NULL)
+        ok = json_object_set_new(claim, "hint",
+                                 json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed",
+                                           h->removed, "amount", h->amount, "unit", h->unit)) == 0;
     if (v->valid)
         ok = ok && json_object_set_new(
                        claim, "variance_ratio",

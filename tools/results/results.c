@@ -49,7 +49,7 @@ static const struct member judged_members[] = {
     {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
     {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
     {"tiles_y", COUNT, true},        {"files", OBJECT, true},
-    {"direction", OBJECT, false},    {"variance_ratio", OBJECT, false},
+    {"hint", OBJECT, false},         {"variance_ratio", OBJECT, false},
     {"class", STRING, false},        {"n_a", NUMBER, false},
     {"n_b", NUMBER, false},          {"unit_b", STRING, false},
     {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
@@ -73,11 +73,10 @@ static const struct member statistic_members[] = {{"name", STRING, true},
                                                   {"log10_p", NUMBER, true},
                                                   {"what", STRING, true}};
 
-static const struct member direction_members[] = {{"name", STRING, true},
-                                                  {"explained", NUMBER, true},
-                                                  {"amount", NUMBER, true},
-                                                  {"ci", INTERVAL, true},
-                                                  {"unit", STRING, true}};
+static const struct member hint_members[] = {{"name", STRING, true},
+                                             {"removed", NUMBER, true},
+                                             {"amount", NUMBER, true},
+                                             {"unit", STRING, true}};
 
 static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
                                                        {"ci", INTERVAL, true}};
@@ -190,14 +189,13 @@ static bool check_statistics(const json_t *claim, const char *where, struct err 
 /* Members that may be absent. */
 static bool check_findings(const json_t *claim, const char *where, struct err *e)
 {
-    const json_t *direction = json_object_get(claim, "direction");
+    const json_t *hint = json_object_get(claim, "hint");
     const json_t *ratio = json_object_get(claim, "variance_ratio");
     const json_t *rays = json_object_get(claim, "rays_a");
     return (rays == NULL ||
             check_members(rays, rays_members, LENGTH(rays_members), where, "rays_a.", e)) &&
-           (direction == NULL ||
-            check_members(direction, direction_members, LENGTH(direction_members), where,
-                          "direction.", e)) &&
+           (hint == NULL ||
+            check_members(hint, hint_members, LENGTH(hint_members), where, "hint.", e)) &&
            (ratio == NULL ||
             check_members(ratio, variance_ratio_members, LENGTH(variance_ratio_members), where,
                           "variance_ratio.", e));

@@ -1,5 +1,6 @@
 #include "compare_job.h"
 
+#include "tools/compare/hint.h"
 #include "tools/results/claim_result.h"
 #include "tools/sequential/two_stage.h"
 #include "tools/results/results.h"
@@ -176,6 +177,7 @@ bool compare_job_run(const struct compare_job *job, struct compared *out, struct
 {
     *out = (struct compared){0};
     bool ok = job->exchangeable ? run_exchangeable(job, out, e) : run_moments(job, out, e);
+    ok = ok && hint_add(&out->m[0], &out->m[1], &out->r, e);
     if (!ok)
         compare_job_free(out);
     return ok;

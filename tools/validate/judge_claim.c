@@ -1,6 +1,7 @@
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
 
+#include "tools/compare/hint.h"
 #include "tools/results/claim_result.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
@@ -226,6 +227,10 @@ static void look(struct validation *v, struct claim_run *t)
     int stage;
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
     bool ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
+    if (ok && !hint_add(&p.image[0]->m, &p.image[1]->m, &c, &e)) {
+        comparison_free(&c);
+        ok = false;
+    }
     t->cpu_a += t->a->cpu_s - before_a;
     t->cpu_b += t->b->cpu_s - before_b;
     if (!ok && p.no_time) {

@@ -126,7 +126,7 @@ TEST(missing_or_mistyped_member)
         "tile_log10_p\0tile_t\0statistics\0files\0";
     static const char optional[] =
         "title\0detects\0blind_to\0class\0n_a\0n_b\0unit_b\0spp_b\0seconds_a\0seconds_b\0seed_a\0"
-        "seeds_b\0version_b\0rerun\0direction\0variance_ratio\0";
+        "seeds_b\0version_b\0rerun\0hint\0variance_ratio\0";
     for (const char *m = required; *m != '\0'; m += strlen(m) + 1) {
         bool boolean = strcmp(m, "passed") == 0 || strcmp(m, "skew_limited") == 0;
         expect_member("", m, NULL, "missing");
@@ -152,7 +152,7 @@ TEST(nested_members)
         {"worst_tile", "x\0y\0width\0height\0difference\0ci\0t\0"},
         {"worst", "width\0height\0channel\0"},
         {"files", "a\0b\0z\0relative\0"},
-        {"direction", "name\0explained\0amount\0ci\0unit\0"},
+        {"hint", "name\0removed\0amount\0unit\0"},
         {"variance_ratio", "ratio\0ci\0"},
         {"statistics", "name\0share\0num_tests\0log10_p\0what\0"},
     };
