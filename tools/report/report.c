@@ -42,7 +42,8 @@ static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
 }
 
 /* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
-static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left)
+static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left,
+                          const char *located)
 {
     size_t errors = 0, wrong = 0, must_differ = 0;
     for (size_t i = 0; i < num; i++) {
@@ -76,6 +77,8 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
                    member_text(claim->json, "reason"));
     if (errors + wrong > 0)
         write_claim_list(f, claim, errors + wrong);
+    if (located != NULL)
+        html_print(f, "<p class=\"lede\">%s</p>\n", located);
     if (must_differ == 1)
         fputs("<p class=\"lede\">1 claim is a deliberate mistake that had to be found, and "
               "was.</p>\n",
@@ -97,7 +100,8 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 {
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
-        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")));
+        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")),
+                      member_text(root, "located"));
     report_stated_error_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,

@@ -15,10 +15,10 @@ struct member {
     bool required;
 };
 
-static const struct member root_members[] = {{"command", STRING, true},  {"version", STRING, true},
-                                             {"date", STRING, true},     {"alpha", NUMBER, true},
-                                             {"machine", STRING, false}, {"mode", STRING, false},
-                                             {"seconds", NUMBER, false}};
+static const struct member root_members[] = {
+    {"command", STRING, true},  {"version", STRING, true},  {"date", STRING, true},
+    {"alpha", NUMBER, true},    {"machine", STRING, false}, {"mode", STRING, false},
+    {"located", STRING, false}, {"seconds", NUMBER, false}};
 
 /* A claim that could not be judged has these and no more. */
 static const struct member any_claim_members[] = {{"scene", STRING, true},

@@ -7,6 +7,7 @@
 #include "tools/results/results_table.h"
 #include "tools/results/stated_error_results.h"
 #include "import_result.h"
+#include "shared_features.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -108,6 +109,18 @@ static bool write_page_so_far(const json_t *so_far, const struct validate_option
     return ok;
 }
 
+static bool locate(json_t *results, const char *suite_dir, struct err *e)
+{
+    struct suite suite = {0};
+    char text[1024];
+    bool ok = suite_load(suite_dir, &suite, e) &&
+              shared_features_tell(results, &suite, text, sizeof text, e);
+    suite_free(&suite);
+    if (ok && text[0] != '\0')
+        json_object_set_new(results, "located", json_string(text));
+    return ok;
+}
+
 static bool write_all(const json_t *results, const char *out_dir, bool quiet, struct err *e)
 {
     const struct path json = fs_path("%s/results.json", out_dir);
@@ -119,6 +132,8 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     if (json_array_size(json_object_get(results, "claims")) > 0)
         results_table_print(stdout, results, false);
     stated_error_print(stdout, json_object_get(results, "consistency"), false);
+    if (member_text(results, "located") != NULL)
+        printf("\n%s\n", member_text(results, "located"));
     const json_t *loader = json_object_get(results, "loader");
     if (loader != NULL) {
         puts("");
@@ -194,10 +209,10 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
     return true;
 }
 
-int validate_command_finish(const struct validate_command *c, const json_t *results, struct err *e)
+int validate_command_finish(const struct validate_command *c, json_t *results, struct err *e)
 {
     int code = EXIT_NOT_JUDGED;
-    if (write_all(results, c->opt.out_dir, c->opt.quiet, e))
+    if (locate(results, c->opt.suite_dir, e) && write_all(results, c->opt.out_dir, c->opt.quiet, e))
         code = with_loader(results_exit_code(results), results, e);
     if (code == EXIT_NOT_JUDGED && e->msg[0] == '\0')
         tell_not_judged(results, e);
