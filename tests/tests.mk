@@ -22,7 +22,7 @@ BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_t
 SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c, \
   $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c tests/mutants/bug_effect.c))
 # Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
-RATES   := $(addprefix test_,calibration compare_rates converge permutation alpha_spending noise_estimate statistics diagnose)
+RATES   := $(addprefix test_,calibration compare_rates converge permutation sign_flip alpha_spending noise_estimate statistics diagnose)
 program  = $(addprefix $(1)/tests/,$(basename $(notdir $(2))))
 CHECKED  = $(filter-out $(addprefix %/,$(RATES)),$(call program,$(BUILD)/san,$(TESTS))) $(RATES:%=$(BUILD)/tests/%)
 

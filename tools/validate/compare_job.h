@@ -3,7 +3,7 @@
 #define ASSAY_COMPARE_JOB_H
 
 #include "tools/input/input.h"
-#include "tools/compare/permutation.h"
+#include "tools/exact/permutation.h"
 
 struct compare_job {
     const char *path[2];  /* A is tested, B the reference */

@@ -3,7 +3,7 @@
 #include "calibrate_synthetic.h"
 
 #include "tools/sequential/two_stage.h"
-#include "tools/compare/permutation.h"
+#include "tools/exact/permutation.h"
 
 enum { SIDE = 16, TILE = 8, RENEWED = 128, CHUNK = 500, REPLICATES = 6, PERMUTED_SIDE = 8 };
 const double permutation_level[NUM_PERMUTATION_LEVELS] = {0.1, 0.05, 0.01};

@@ -282,7 +282,7 @@ static void gates(FILE *f, const struct settings *s, const struct results *r)
     }
     fprintf(
         f,
-        "\nPermutation of 6 and 6 replicates (tools/compare/permutation.h), 8 x 8 pixels of one draw each; "
+        "\nPermutation of 6 and 6 replicates (tools/exact/permutation.h), 8 x 8 pixels of one draw each; "
         "%zu pairs a row. The test is exact, so the rate\nis at most alpha whatever the law.\n\n"
         "| law | alpha 0.1 | alpha 0.05 | alpha 0.01 | |\n|---|---|---|---|---|\n",
         s->permutation_pairs);

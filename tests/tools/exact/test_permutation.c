@@ -1,8 +1,8 @@
-/* tools/compare/permutation.c: p against an enumeration written another way, its level by simulation of laws for
+/* tools/exact/permutation.c: p against an enumeration written another way, its level by simulation of laws for
  * which no t would do, power, and a second stage. */
 #include "tests/support/simulate.h"
 
-#include "tools/compare/permutation.h"
+#include "tools/exact/permutation.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>

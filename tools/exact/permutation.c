@@ -1,7 +1,7 @@
 #include "permutation.h"
 
 #include "permutation_table.h"
-#include "region.h"
+#include "tools/compare/region.h"
 #include "tools/stats/distributions.h"
 
 #include <assert.h>

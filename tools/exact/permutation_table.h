@@ -2,7 +2,7 @@
 #ifndef ASSAY_PERMUTATION_TABLE_H
 #define ASSAY_PERMUTATION_TABLE_H
 
-#include "pyramid.h"
+#include "tools/compare/pyramid.h"
 #include "tools/images/replicate_dir.h"
 
 /* Means of all regions in all images. */

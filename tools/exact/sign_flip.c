@@ -1,0 +1,258 @@
+#include "sign_flip_score.h"
+
+#include "tools/compare/region.h"
+#include "tools/stats/distributions.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { MAX_SIDES = 64 };
+const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES] = {"level", "mean", "spread"};
+static const double share_of_score[NUM_SIGN_FLIP_SCORES] = {0.5, 0.3, 0.2};
+static const double share_of_luminance = 0.5;
+static const double bound_factor = 3.1787; /* 1/(4 Q(sqrt 2)), rounded up */
+/* Of a sum over all pixels: a window's part that is smaller may be rounding. */
+static const double lost_digits = 1e-10;
+
+/* All windows of one size; there is a last one at each border, the step to it may be shorter. */
+struct windows {
+    int width, height, step, nx, ny;
+};
+
+struct scan {
+    const struct sign_flip_options *opt;
+    struct windows size[MAX_SIDES];
+    int num_sizes;
+    int tile_size; /* of size[]: for mdb_tile; -1: none */
+    struct sign_flip *out;
+};
+
+static double sum_in(const struct sheet *s, int which, struct rect r)
+{
+    size_t row = (size_t)s->width + 1, top = (size_t)r.y * row + (size_t)r.x;
+    size_t bottom = top + (size_t)r.height * row;
+    const double *sum = s->sum[which];
+    return sum[bottom + (size_t)r.width] - sum[bottom] - sum[top + (size_t)r.width] + sum[top];
+}
+
+static struct rect window_rect(const struct sheet *s, const struct windows *w, int i)
+{
+    int x = i % w->nx * w->step, y = i / w->nx * w->step;
+    return (struct rect){x + w->width < s->width ? x : s->width - w->width,
+                         y + w->height < s->height ? y : s->height - w->height, w->width,
+                         w->height};
+}
+
+/* Of the two-sided bound. */
+static double log10_normal_bound(double t)
+{
+    return fmin(0, stats_t_log10_p(t, INFINITY) + log10(bound_factor));
+}
+
+/* The smallest of e^(-l t) prod cosh(l s) over l by Newton's method; t and s in units of the root of the sum of squares.
+ * Every l gives a bound, so the search need not be exact. */
+static double log_exponential_bound(const double *s, size_t num, double unit, double t)
+{
+    double best = 0, l = t;
+    for (int i = 0; i < 30; i++) {
+        double sum = -l * t, first = -t, second = 0;
+        for (size_t k = 0; k < num; k++) {
+            double x = fabs(s[k]) / unit, y = l * x, h = tanh(y);
+            sum += y + log1p(exp(-2 * y)) - M_LN2;
+            first += x * h;
+            second += x * x * (1 - h * h);
+        }
+        best = fmin(best, sum);
+        double next = second > 0 ? l - first / second : INFINITY;
+        next = fmax(l / 4, fmin(4 * l, next));
+        if (fabs(next - l) <= 1e-6 * l)
+            break;
+        l = next;
+    }
+    return best;
+}
+
+double sign_flip_log10_p(const double *s, size_t num)
+{
+    double sum = 0, squares = 0;
+    for (size_t k = 0; k < num; k++) {
+        sum += s[k];
+        squares += s[k] * s[k];
+    }
+    double unit = sqrt(squares), t = fabs(sum) / unit;
+    double exponential = (M_LN2 + log_exponential_bound(s, num, unit, t)) / M_LN10;
+    return fmin(0, fmin(log10_normal_bound(t), exponential));
+}
+
+static void list_sizes(const struct sheet *s, const struct sign_flip_options *opt,
+                       struct scan *scan)
+{
+    int longest = s->width > s->height ? s->width : s->height, num = 0;
+    double tile = fmax(1, (double)opt->tile / opt->filter_width);
+    scan->tile_size = -1;
+    for (int k = 4;
+         num == 0 || scan->size[num - 1].width < s->width || scan->size[num - 1].height < s->height;
+         k++) {
+        int side = (int)lround(pow(2, k / 2.0));
+        struct windows w = {side < s->width ? side : s->width, side < s->height ? side : s->height,
+                            side < 8 ? 1 : side / 8, 0, 0};
+        w.nx = (s->width - w.width + w.step - 1) / w.step + 1;
+        w.ny = (s->height - w.height + w.step - 1) / w.step + 1;
+        /* All signs alike have the chance 2^(1 - n). */
+        double coins = (double)s->num * w.width * w.height;
+        if ((coins - 1) * log10(2) < log10((double)w.nx * w.ny / opt->alpha) && side < longest)
+            continue;
+        assert(num < MAX_SIDES);
+        scan->size[num++] = w;
+        if (scan->tile_size < 0 && side >= tile)
+            scan->tile_size = num - 1;
+    }
+    scan->num_sizes = num;
+    if (scan->tile_size < 0)
+        scan->tile_size = num - 1;
+}
+
+static double share_of(const struct scan *scan, const struct windows *w, enum sign_flip_score score,
+                       int channel)
+{
+    double of_channel =
+        channel < CHANNEL_LUMINANCE ? (1 - share_of_luminance) / 3 : share_of_luminance;
+    if (score == SIGN_FLIP_SPREAD)
+        of_channel = 1;
+    return share_of_score[score] * of_channel / scan->num_sizes / w->nx / w->ny;
+}
+
+static void describe(const struct sheet *s, struct rect r, int filter, struct sign_flip *out)
+{
+    double a = 0, b = 0, larger = 0, differ = 0;
+    for (size_t v = 0; v < s->values; v++) {
+        int x = (int)(v % s->pixels % (size_t)s->width),
+            y = (int)(v % s->pixels / (size_t)s->width);
+        if (x < r.x || x >= r.x + r.width || y < r.y || y >= r.y + r.height)
+            continue;
+        a += s->a[v];
+        b += s->b[v];
+        larger += s->a[v] > s->b[v];
+        differ += s->a[v] != s->b[v];
+    }
+    out->rect = (struct rect){r.x * filter, r.y * filter, r.width * filter, r.height * filter};
+    out->difference = b != 0 ? fmax(-1e6, fmin(1e6, (a - b) / fabs(b))) : copysign(1e6, a);
+    out->larger = larger / fmax(1, differ);
+}
+
+/* The window with the largest |T| of each size is found by the sums over all pixels, and judged by sums of its own. */
+static void scan_size(struct sheet *s, struct scan *scan, const struct windows *w,
+                      enum sign_flip_score score, int channel)
+{
+    double largest = 0, all = s->sum[1][(size_t)(s->width + 1) * (size_t)(s->height + 1) - 1];
+    struct rect best = {0};
+    for (int i = 0; i < w->nx * w->ny; i++) {
+        struct rect r = window_rect(s, w, i);
+        double sum = sum_in(s, 0, r), squares = sum_in(s, 1, r);
+        if (squares > lost_digits * all && sum * sum > largest * squares) {
+            largest = sum * sum / squares;
+            best = r;
+        }
+    }
+    scan->out->num_tests += w->nx * w->ny;
+    size_t num = 0;
+    double sum = 0, squares = 0;
+    for (size_t v = 0; largest > 0 && v < s->values; v += s->pixels)
+        for (int y = best.y; y < best.y + best.height; y++)
+            for (int x = best.x; x < best.x + best.width; x++) {
+                double one = s->score[v + (size_t)y * (size_t)s->width + (size_t)x];
+                s->square[num++] = one;
+                sum += one;
+                squares += one * one;
+            }
+    if (!(squares > 0))
+        return;
+    double log10_p = sign_flip_log10_p(s->square, num) - log10(share_of(scan, w, score, channel));
+    if (log10_p >= scan->out->log10_p)
+        return;
+    scan->out->log10_p = log10_p;
+    scan->out->score = score;
+    scan->out->channel = channel;
+    scan->out->t = sum / sqrt(squares);
+    describe(s, best, scan->opt->filter_width, scan->out);
+}
+
+/* The smallest over the windows. */
+static double expected_t(struct sheet *s, const struct windows *w, double change)
+{
+    sheet_expect(s, change);
+    double smallest = INFINITY;
+    for (int i = 0; i < w->nx * w->ny; i++) {
+        struct rect r = window_rect(s, w, i);
+        double squares = sum_in(s, 1, r);
+        if (squares > 0)
+            smallest = fmin(smallest, sum_in(s, 0, r) / sqrt(squares));
+    }
+    return smallest;
+}
+
+static double find_mdb(struct sheet *s, const struct scan *scan, const struct windows *w)
+{
+    double share = share_of(scan, w, SIGN_FLIP_LEVEL, CHANNEL_LUMINANCE);
+    double t = stats_normal_quantile(scan->opt->alpha * share / (2 * bound_factor)) +
+               stats_normal_quantile(0.05);
+    double lo = log(1e-6), hi = log(1);
+    if (!(expected_t(s, w, 1) >= t))
+        return region_mdb_none;
+    for (int i = 0; i < 14; i++) {
+        double middle = (lo + hi) / 2;
+        if (expected_t(s, w, exp(middle)) >= t)
+            hi = middle;
+        else
+            lo = middle;
+    }
+    return exp(hi);
+}
+
+static void fill_mdb(struct sheet *s, const struct scan *scan, struct sign_flip *out)
+{
+    const struct windows *image = &scan->size[scan->num_sizes - 1],
+                         *w = &scan->size[scan->tile_size];
+    double tile = fmax(1, (double)scan->opt->tile / scan->opt->filter_width);
+    /* Of a window larger than the tile only a part changes. */
+    double diluted = fmax(1, w->width / tile) * fmax(1, w->height / tile);
+    out->mdb_global = find_mdb(s, scan, image);
+    out->mdb_tile = fmin(region_mdb_none, diluted * find_mdb(s, scan, w));
+}
+
+bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_options *opt,
+                    struct sign_flip *out, struct err *e)
+{
+    int filter = opt->filter_width;
+    assert(in->num > 0 && filter >= 1);
+    struct sheet s = {.width = (in->width + filter / 2) / filter,
+                      .height = (in->height + filter / 2) / filter,
+                      .num = in->num};
+    struct scan scan = {.opt = opt, .out = out};
+    *out = (struct sign_flip){.log10_p = INFINITY};
+    if (s.width < 1 || s.height < 1)
+        return err_set(e, "an image of %d x %d pixels is smaller than the filter's %d", in->width,
+                       in->height, filter);
+    if (!sheet_alloc(&s, e))
+        return false;
+    out->num_pixels = s.pixels;
+    list_sizes(&s, opt, &scan);
+    for (int channel = 0; channel < NUM_CHANNELS; channel++) {
+        sheet_load(&s, in, filter, channel);
+        for (int score = 0; score < NUM_SIGN_FLIP_SCORES; score++) {
+            if (score == SIGN_FLIP_SPREAD && channel < CHANNEL_LUMINANCE)
+                continue;
+            sheet_score(&s, score);
+            for (int i = 0; i < scan.num_sizes; i++)
+                scan_size(&s, &scan, &scan.size[i], score, channel);
+            if (score == SIGN_FLIP_LEVEL && channel == CHANNEL_LUMINANCE)
+                fill_mdb(&s, &scan, out);
+        }
+    }
+    sheet_free(&s);
+    if (isinf(out->log10_p))
+        return err_set(e, "no pixel differs: were both made with one seed?");
+    out->log10_p = fmin(0, out->log10_p);
+    return true;
+}

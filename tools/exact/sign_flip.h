@@ -1,0 +1,66 @@
+/* "Has the law of any pixel changed?" between two versions of one program, from as few as one render a side.
+ *
+ * H0: pixel p of A and of B are two independent draws of one law (its own in each pixel), and pixels are independent.
+ * Then, given the unordered pairs {a_p, b_p}, which of the two is A's is a fair coin in every pixel, all channels
+ * together: exchanging them flips the sign of any score s_p that is odd in the exchange, and |s_p| may depend on the
+ * unordered pairs of all pixels. Whatever the law (fireflies, codes of a PNG, 1 sample a pixel), over any window
+ *   T = sum s_p / sqrt(sum s_p^2) = sum a_p e_p,  sum a_p^2 = 1,  e_p = +-1 with probability 1/2 each, and
+ *   P(T >= t) <= min(c Q(t), inf over l >= 0 of e^(-l t) prod cosh(l a_p)),  c = 1/(4 Q(sqrt 2)) = 3.178,
+ * Q the tail of the normal law: the first is [BentkusDzindzalieta15, theorem 1.1], with the best possible c; the second is
+ * Markov's inequality of e^(l T), sharper where few pixels decide. Both hold for every t and all a_p, so the p below is
+ * no approximation at any level.
+ *
+ * Scores of the difference d = a - b, with f(x) = x/(1 + x^2/8), the score of Student's law with 8 degrees of freedom, so that a
+ * firefly weighs less than a pixel [Lange89], and "around" for the mean over 9 x 9 pixels:
+ *   level   sqrt(m/s) f(d/s), in R, G, B and luminance; m the radiance around, s the geometric mean of |d| around.
+ *           Where the renders state their error, s is its 3/4th power times the 1/4th power of that, and m the pixel's.
+ *   mean    d itself, in the same: sees what only rare bright samples show
+ *   spread  f(v/s), of v = |a - m| - |b - m| in luminance: noise that has changed, with s of |v|
+ * Over squares of sides 4, 6, 8, 11, 16, .. up to the image, an eighth of their side apart, so that a region need not
+ * lie on any grid. Bonferroni with shares: half for the level, 0.3 the mean, 0.2 the spread; half of each for luminance;
+ * equal parts for each side. Sides whose windows have too few pixels to reach alpha are left out. */
+#ifndef ASSAY_SIGN_FLIP_H
+#define ASSAY_SIGN_FLIP_H
+
+#include "tools/compare/pyramid.h"
+
+/* 3 numbers a pixel. The k-th of A and of B make a pair. */
+struct sign_flip_images {
+    int num, width, height;
+    float *const *a, *const *b; /* num renders each */
+    const float *error; /* standard error of A - B as both renders state it, of num = 1; or NULL */
+};
+
+struct sign_flip_options {
+    double alpha;     /* for mdb, and for what is left out */
+    int filter_width; /* pixels less than this apart, in x or in y, may share noise: one in filter_width^2 is judged. 1: all */
+    int tile;         /* side, pixels: for mdb_tile */
+};
+
+enum sign_flip_score { SIGN_FLIP_LEVEL, SIGN_FLIP_MEAN, SIGN_FLIP_SPREAD, NUM_SIGN_FLIP_SCORES };
+extern const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES];
+
+struct sign_flip {
+    double log10_p;    /* of all tests together: the smallest over its share; at most 0 */
+    int num_tests;     /* windows, channels and scores */
+    size_t num_pixels; /* judged, each with a coin for each pair of renders */
+    /* Of the smallest: */
+    enum sign_flip_score score;
+    struct rect rect;
+    int channel; /* 0..2 RGB, 3 luminance */
+    double t;
+    double difference; /* of the means there, over that of B */
+    double larger;     /* of its pixels that differ, the part where A is larger */
+    /* The relative change of the level that is found with about 95 %, of the image and of the worst
+     * window of a tile's side; region_mdb_none where none is. To first order. */
+    double mdb_global, mdb_tile;
+};
+
+/* Fails with a line where no pixel of any pair differs, and out of memory. */
+bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_options *opt,
+                    struct sign_flip *out, struct err *e) __attribute__((warn_unused_result));
+
+/* log10 of the bound on P(|sum of s e| >= |sum of s|), s of num > 0 numbers, not all 0; at most 0. */
+double sign_flip_log10_p(const double *s, size_t num);
+
+#endif

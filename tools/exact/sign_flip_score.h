@@ -1,0 +1,34 @@
+/* The scores of sign_flip.h, pixel by pixel, and their sums. Used by sign_flip.c only. */
+#ifndef ASSAY_SIGN_FLIP_SCORE_H
+#define ASSAY_SIGN_FLIP_SCORE_H
+
+#include "sign_flip.h"
+
+/* What is judged: one pixel in filter_width^2 of every pair of renders, in one channel. */
+struct sheet {
+    int width, height, num;
+    size_t pixels, values;  /* values: num x pixels */
+    double *a, *b;          /* values; the one allocation begins at a */
+    double *score, *square; /* values */
+    double *mean, *scale;   /* pixels: local, of both sides */
+    double *own;     /* pixels: standard error of A - B that the renders state; 0: not known */
+    double *work[2]; /* pixels */
+    double
+        *sum[2]; /* (width + 1)(height + 1): of score and of square, of all above and to the left */
+};
+
+/* width, height and num are set. Fails only out of memory. Release with sheet_free(). */
+bool sheet_alloc(struct sheet *s, struct err *e) __attribute__((warn_unused_result));
+void sheet_free(struct sheet *s);
+
+/* The channel's values, in the middles of cells of filter x filter pixels. */
+void sheet_load(struct sheet *s, const struct sign_flip_images *in, int filter, int channel);
+
+/* score, its square, and their sums. */
+void sheet_score(struct sheet *s, enum sign_flip_score score);
+
+/* The same as they are to be expected of the level, after it has been scored, where A is brighter by the part `change`
+ * and the noise as it is, whatever its signs. */
+void sheet_expect(struct sheet *s, double change);
+
+#endif
