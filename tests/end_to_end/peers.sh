@@ -29,6 +29,6 @@ for p in "${programs[@]}"; do
     if [ -z "$wrong" ]; then echo "ok peers: $(basename "$home") loads every scene"; else echo "not ok peers: $(basename "$home"): $wrong"; fi
 done
 # Does a scene that the starter code cannot read count as one?
-sed 's/<geometry id="floor-mesh" name="floor">/<geometry id="floor-mesh">/' tools/rubrics/box.dae >"$tmp/box.dae"
-(cd "$tmp" && timeout $seconds "${programs[0]}" -t 1 -s 1 -r 64 48 -f nameless.png box.dae) >/dev/null 2>&1
+sed 's/<geometry id="floor-mesh" name="floor">/<geometry id="floor-mesh">/' tools/rubrics/matt.dae >"$tmp/nameless.dae"
+(cd "$tmp" && timeout $seconds "${programs[0]}" -t 1 -s 1 -r 64 48 -f nameless.png nameless.dae) >/dev/null 2>&1
 if [ -e "$tmp/nameless.png" ]; then echo "not ok peers: a geometry without a name was loaded"; else echo "ok peers: a geometry without a name is not loaded"; fi

@@ -228,7 +228,7 @@ static const struct side *find_side(const struct side *s, int num, int a, int b)
     return bsearch(&(struct side){a, b, 0}, s, (size_t)num, sizeof *s, by_ends);
 }
 
-/* The normals of the starter code: of a closed mesh the mean of its triangles' by area, at the rim of two triangles
+/* The normals of the starter code: of a closed mesh the mean of its triangles' by area, at the rim of one or two triangles
  * the reverse of theirs. */
 static bool walk_normals(struct walk *w, const xmlNode *g, const struct mesh *m, bool closed)
 {
@@ -272,8 +272,10 @@ static bool walk_sides(struct walk *w, const xmlNode *g, const struct mesh *m, s
     }
     if (points != m->num_points)
         return breach(w, g, "a point that no triangle uses");
-    if (rim > 0 && (m->num_triangles != 2 || m->num_points != 4))
-        return breach(w, g, "a mesh is closed, or a quadrangle of two triangles");
+    if (rim > 0 && m->n == NULL)
+        return true;
+    if (rim > 0 && (m->num_triangles > 2 || m->num_points != m->num_triangles + 2))
+        return breach(w, g, "a mesh with normals is closed, or a triangle or quadrangle");
     for (int i = 0, fan; rim == 0 && i < num; i += fan) {
         const struct side *turn = &s[i];
         for (fan = 0; i + fan < num && s[i + fan].a == s[i].a;)
@@ -458,8 +460,8 @@ static bool walk_scene(struct walk *w, bool has_environment)
         return breach(w, scene, "one camera");
     if (w->num_lights == 0 && !has_environment)
         return breach(w, scene, "a light: directions of the hemisphere are counted by lights");
-    if (w->num_lit > 0 && w->num_emissive != w->num_areas)
-        return breach(w, scene, "what shines on something is an area light and a mesh, both");
+    if (w->num_lit > 0 && w->num_emissive > w->num_areas)
+        return breach(w, scene, "a mesh that shines on something has an area light");
     return splits(w->primitive, w->num_primitives) ||
            breach(w, scene, "centres that no plane parts");
 }

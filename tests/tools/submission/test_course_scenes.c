@@ -43,7 +43,7 @@ TEST(the_shipped_scenes_keep_the_rules)
         num++;
     }
     closedir(dir);
-    assert_true(num >= 18);
+    assert_true(num >= 21);
 }
 
 TEST(each_broken_rule_is_seen)
@@ -51,58 +51,58 @@ TEST(each_broken_rule_is_seen)
     static const struct {
         const char *scene, *from, *to, *rule;
     } cases[] = {
-        {"box.dae", "Z_UP", "Y_UPS", "Z_UP"},
-        {"box.dae", "url=\"#scene\"", "url=\"#scenes\"", "a visual scene"},
-        {"box.dae", "<node id=\"near-node\" name=\"near\">", "<node id=\"near-node\">",
+        {"matt.dae", "Z_UP", "Y_UPS", "Z_UP"},
+        {"matt.dae", "url=\"#scene\"", "url=\"#scenes\"", "a visual scene"},
+        {"matt.dae", "<node id=\"near-node\" name=\"near\">", "<node id=\"near-node\">",
          "a node has"},
-        {"box.dae", "<matrix>1 0 0 -0.42", "<translate>0 0 0</translate><matrix>1 0 0 -0.42",
+        {"matt.dae", "<matrix>1 0 0 -0.42", "<translate>0 0 0</translate><matrix>1 0 0 -0.42",
          "one matrix"},
-        {"box.dae", "<matrix>1 0 0 -0.42", "<matrix>0 0 -0.42", "one matrix"},
-        {"box.dae", "<instance_geometry url=\"#near-mesh\">", "<instance_geometry url=\"#none\">",
+        {"matt.dae", "<matrix>1 0 0 -0.42", "<matrix>0 0 -0.42", "one matrix"},
+        {"matt.dae", "<instance_geometry url=\"#near-mesh\">", "<instance_geometry url=\"#none\">",
          "one thing"},
-        {"box.dae", "<instance_light url=\"#lamp\"/>", "<node id=\"a\" name=\"a\"/>", "one thing"},
-        {"box.dae", "<geometry id=\"floor-mesh\" name=\"floor\">", "<geometry id=\"floor-mesh\">",
+        {"matt.dae", "<instance_light url=\"#lamp\"/>", "<node id=\"a\" name=\"a\"/>", "one thing"},
+        {"matt.dae", "<geometry id=\"floor-mesh\" name=\"floor\">", "<geometry id=\"floor-mesh\">",
          "a name"},
-        {"box.dae", "<light id=\"lamp\" name=\"lamp\">", "<light id=\"lamp\">", "a name"},
-        {"box.dae", "<camera id=\"eye\" name=\"eye\">", "<camera id=\"eye\">", "a name"},
-        {"box.dae", "<aspect_ratio>1.333333</aspect_ratio>", "", "aspect_ratio"},
-        {"box.dae", "<instance_camera url=\"#eye\"/>", "<instance_light url=\"#lamp\"/>",
+        {"matt.dae", "<light id=\"lamp\" name=\"lamp\">", "<light id=\"lamp\">", "a name"},
+        {"matt.dae", "<camera id=\"eye\" name=\"eye\">", "<camera id=\"eye\">", "a name"},
+        {"matt.dae", "<aspect_ratio>1.333333</aspect_ratio>", "", "aspect_ratio"},
+        {"matt.dae", "<instance_camera url=\"#eye\"/>", "<instance_light url=\"#lamp\"/>",
          "one camera"},
-        {"box.dae", " profile=\"CGL\"", "", "without a profile"},
-        {"box.dae", "<area><color>2.5 2.5 2.5</color></area>", "<spot><color>1 1 1</color></spot>",
+        {"matt.dae", " profile=\"CGL\"", "", "without a profile"},
+        {"matt.dae", "<area><color>2.5 2.5 2.5</color></area>", "<spot><color>1 1 1</color></spot>",
          "a light is"},
-        {"box.dae", "<area><color>2.5 2.5 2.5</color></area>",
+        {"matt.dae", "<area><color>2.5 2.5 2.5</color></area>",
          "<point><color>1 1 1</color></point>", "attenuations"},
-        {"ball.dae", " -1.1371 ", " 1.1371 ", "its own axis"},
-        {"box.dae", "<material id=\"matt\" name=\"matt\">", "<material id=\"matt\">",
+        {"ball.dae", " -1.354062 ", " 1.354062 ", "its own axis"},
+        {"matt.dae", "<material id=\"matt\" name=\"matt\">", "<material id=\"matt\">",
          "a material has"},
-        {"box.dae", "target=\"#matt\"", "target=\"#mat\"", "a material has"},
-        {"box.dae", "<technique sid=\"common\">", "<technique>", "without a sid"},
-        {"box.dae", "<emission><radiance>2.5 2.5 2.5</radiance></emission>", "<lambertian/>",
+        {"matt.dae", "target=\"#matt\"", "target=\"#mat\"", "a material has"},
+        {"matt.dae", "<technique sid=\"common\">", "<technique>", "without a sid"},
+        {"matt.dae", "<emission><radiance>2.5 2.5 2.5</radiance></emission>", "<lambertian/>",
          "unknown kind"},
         {"specular.dae", "<roughness>0</roughness>", "", "lacks one"},
-        {"box.dae", "<sphere><radius>0.3</radius></sphere>", "<sphere/>", "with a radius"},
-        {"box.dae", "<matrix>1 0 0 -0.42", "<matrix>2 0 0 -0.42", "not scaled"},
-        {"box.dae", "<source id=\"floor-p\">", "<source>", "a source has"},
-        {"box.dae", "count=\"12\"", "count=\"15\"", "a source has"},
-        {"box.dae", "<vertices id=\"floor-v\">", "<vertices>", "vertices with an id"},
-        {"box.dae", "</polylist>", "</polylist><triangles/>", "one polylist"},
-        {"box.dae", "semantic=\"NORMAL\"", "semantic=\"COLOR\"", "at most NORMAL"},
-        {"box.dae", "<vcount>3 3</vcount>", "<vcount>3</vcount>", "as many numbers"},
-        {"box.dae", "<vcount>3 3</vcount>", "<vcount>3 4</vcount>", "first three"},
-        {"box.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 0 0 3 3 3 3</p>",
+        {"matt.dae", "<sphere><radius>0.3</radius></sphere>", "<sphere/>", "with a radius"},
+        {"matt.dae", "<matrix>1 0 0 -0.42", "<matrix>2 0 0 -0.42", "not scaled"},
+        {"matt.dae", "<source id=\"floor-p\">", "<source>", "a source has"},
+        {"matt.dae", "count=\"12\"", "count=\"15\"", "a source has"},
+        {"matt.dae", "<vertices id=\"floor-v\">", "<vertices>", "vertices with an id"},
+        {"matt.dae", "</polylist>", "</polylist><triangles/>", "one polylist"},
+        {"matt.dae", "semantic=\"NORMAL\"", "semantic=\"COLOR\"", "at most NORMAL"},
+        {"matt.dae", "<vcount>3 3</vcount>", "<vcount>3</vcount>", "as many numbers"},
+        {"matt.dae", "<vcount>3 3</vcount>", "<vcount>3 4</vcount>", "first three"},
+        {"matt.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 0 0 3 3 3 3</p>",
          "a point twice"},
-        {"box.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 2 2 0 0 3 3</p>",
+        {"matt.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 2 2 0 0 3 3</p>",
          "the same direction"},
-        {"box.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 0 0 2 2 1 1</p>",
+        {"matt.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 1 1 2 2 0 0 2 2 1 1</p>",
          "no triangle uses"},
-        {"box.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 2 2 1 1 0 0 3 3 2 2</p>",
+        {"matt.dae", "<p>0 0 1 1 2 2 0 0 2 2 3 3</p>", "<p>0 0 2 2 1 1 0 0 3 3 2 2</p>",
          "the normals"},
         {"ball_mesh.dae", "<vcount>3 ", "<vcount> ", "as many numbers"},
-        {"box.dae", "<instance_light url=\"#lamp\"/>",
+        {"matt.dae", "<instance_light url=\"#lamp\"/>",
          "<instance_geometry url=\"#near-mesh\"><bind_material><technique_common><instance_material symbol=\"m\" target=\"#matt\"/></technique_common></bind_material></instance_geometry>",
          "counted by lights"},
-        {"box.dae", "target=\"#matt\"", "target=\"#glow\"", "an area light and a mesh"},
+        {"matt.dae", "target=\"#matt\"", "target=\"#glow\"", "has an area light"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char *text = read_scene(cases[i].scene), *hit = strstr(text, cases[i].from);
@@ -118,27 +118,30 @@ TEST(each_broken_rule_is_seen)
     }
 }
 
-/* The floor's mesh replaced: two tetrahedra that touch in a point, and one with a triangle beside it. */
+/* The floor's mesh replaced: two tetrahedra that touch in a point, and one with a triangle beside it: it may stand without normals. */
 TEST(surfaces_have_one_fan_at_each_point)
 {
     static const char mesh[] =
         "<source id=\"floor-p\"><float_array count=\"21\">0 0 0 1 0 0 0 1 0 0 0 1 -1 0 0 0 -1 0 0 0 -1</float_array>"
         "</source><vertices id=\"floor-v\"><input semantic=\"POSITION\" source=\"#floor-p\"/></vertices>"
-        "<polylist count=\"%d\"><input semantic=\"VERTEX\" source=\"#floor-v\" offset=\"0\"/>"
-        "<vcount>3 3 3 3%s</vcount><p>0 2 1 0 1 3 1 2 3 0 3 2%s</p></polylist>";
+        "<polylist count=\"%d\"><input semantic=\"VERTEX\" source=\"#floor-v\" offset=\"0\"/>%s"
+        "<vcount>3 3 3 3%s</vcount><p>%s</p></polylist>";
     static const struct {
         int count;
-        const char *more, *indices, *rule;
-    } cases[] = {{8, " 3 3 3 3", " 0 4 5 0 6 4 4 6 5 0 5 6", "two fans"},
-                 {5, " 3", " 4 5 6", "closed, or"}};
-    char *text = read_scene("box.dae"), *from = strstr(text, "<source id=\"floor-p\">"),
+        const char *normal, *more, *indices, *rule;
+    } cases[] = {{8, "", " 3 3 3 3", "0 2 1 0 1 3 1 2 3 0 3 2 0 4 5 0 6 4 4 6 5 0 5 6", "two fans"},
+                 {5, "<input semantic=\"NORMAL\" source=\"#floor-p\" offset=\"1\"/>", " 3",
+                  "0 0 2 2 1 1 0 0 1 1 3 3 1 1 2 2 3 3 0 0 3 3 2 2 4 4 5 5 6 6", "is closed, or"},
+                 {5, "", " 3", "0 2 1 0 1 3 1 2 3 0 3 2 4 5 6", ""}};
+    char *text = read_scene("matt.dae"), *from = strstr(text, "<source id=\"floor-p\">"),
          *to = strstr(from, "</mesh>");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char inner[1000];
-        snprintf(inner, sizeof inner, mesh, cases[i].count, cases[i].more, cases[i].indices);
+        snprintf(inner, sizeof inner, mesh, cases[i].count, cases[i].normal, cases[i].more,
+                 cases[i].indices);
         char *other = replaced(text, from, to, inner);
-        const char *told = course_scene_breach(other, false);
-        if (strstr(told, cases[i].rule) == NULL)
+        const char *told = course_scene_breach(other, false), *rule = cases[i].rule;
+        if (rule[0] != '\0' ? strstr(told, rule) == NULL : told[0] != '\0')
             fail_msg("%s", told);
         free(other);
     }
