@@ -30,13 +30,14 @@ static void leave_bright(const double *mean, size_t pixels, double clip, unsigne
 
 /* Correlation of the tiles' luminance with that of the reference; the largest over mirrored images, as a camera may
  * be wrong in that way. */
-static double likeness(const struct submitted_image *s, const struct moments *m)
+static bool likeness(const struct submitted_image *s, const struct moments *m, double *best,
+                     struct err *e)
 {
     int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE;
-    double best = -1;
     double *tiles = calloc(2 * (size_t)columns * (size_t)rows, sizeof *tiles);
+    *best = -1;
     if (tiles == NULL)
-        return -1;
+        return err_set(e, "out of memory");
     double *theirs = tiles, *ours = tiles + columns * rows;
     for (int y = 0; y < rows * RUBRIC_TILE; y++)
         for (int x = 0; x < columns * RUBRIC_TILE; x++)
@@ -60,27 +61,31 @@ static double likeness(const struct submitted_image *s, const struct moments *m)
             ab += u * v;
         }
         double spread = (aa - a * a / n) * (bb - b * b / n);
-        best = fmax(best, spread > 0 ? (ab - a * b / n) / sqrt(spread) : -1);
+        *best = fmax(*best, spread > 0 ? (ab - a * b / n) / sqrt(spread) : -1);
     }
     free(tiles);
-    return best;
+    return true;
 }
 
 static const double least_likeness = 0.5;
 
 /* Only that it draws the scene matters for its times. */
-static void carry_growth(const struct rubric *r, const struct answer_key *a, int set,
+static bool carry_growth(const struct rubric *r, const struct answer_key *a, int set,
                          const struct submitted_images *h, const struct rubric_check *c,
-                         struct result *out)
+                         struct result *out, struct err *e)
 {
     struct result other = *out;
-    if (likeness(&h->image[c->images[0]], answer_key_image(a, set, c->images[0])) < least_likeness)
-        return;
+    double like;
+    if (!likeness(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), &like, e))
+        return false;
+    if (like < least_likeness)
+        return true;
     grade_checks_growth(r, c, h, &other);
     if (other.share <= out->share)
-        return;
+        return true;
     *out = other;
     snprintf(out->carried, sizeof out->carried, "timed as it is: it shows the scene");
+    return true;
 }
 
 /* An image that shows no more than the earlier one has the ratio B/P: half way there nothing is left. */
@@ -94,21 +99,26 @@ static struct margin margin_of(const struct margin *given, double expected)
     return m;
 }
 
-static void carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
+static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
                         const struct submitted_images *h, const struct rubric_check *c,
-                        struct result *out)
+                        struct result *out, struct err *e)
 {
+    double like;
     const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
     const struct moments *rp = answer_key_image(a, set, c->images[0]),
                          *rb = answer_key_image(a, set, c->after);
     if (b->mean == NULL || p->width != b->width || p->height != b->height ||
-        strcmp(p->sha256, b->sha256) == 0 || likeness(p, rp) < least_likeness)
-        return;
+        strcmp(p->sha256, b->sha256) == 0)
+        return true;
+    if (!likeness(p, rp, &like, e))
+        return false;
+    if (like < least_likeness)
+        return true;
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     const double clip = rubric_sight_clip(r);
     unsigned char *use = malloc(2 * pixels);
     if (use == NULL)
-        return;
+        return err_set(e, "out of memory");
     unsigned char *own = use + pixels;
     /* What is cut off lies elsewhere where the camera is wrong, and in more places where all is too bright. */
     memset(use, 1, 2 * pixels);
@@ -127,18 +137,19 @@ static void carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     if (isnan(v) || fabs(other) < fabs(v))
         v = other;
     if (!isfinite(v))
-        return;
+        return true;
     const struct interval i = {v, v, v, 0};
     const struct margin m = margin_of(&c->carried, right);
     double share = score_share(&m, &i);
     if (share <= out->share)
-        return;
+        return true;
     out->share = share;
     out->chance = 0;
     snprintf(
         out->carried, sizeof out->carried,
         "held against '%s', which lost points before: %.3g times as bright as that, should be %.3g",
         r->image[c->after].name, right * exp(v), right);
+    return true;
 }
 
 static bool is_there(const struct submitted_images *h, const struct rubric_check *c)
@@ -170,31 +181,33 @@ static bool was_lost(const struct rubric *r, const struct rubric_check *c, int i
 }
 
 /* How many samples a wrong image takes differs a little from a right one. */
-static void carry_rates(const struct rubric *r, const struct answer_key *a, int set,
+static bool carry_rates(const struct rubric *r, const struct answer_key *a, int set,
                         const struct submitted_images *h, const struct rubric_check *c,
-                        struct result *out)
+                        struct result *out, struct err *e)
 {
     const struct rubric_image *p = &r->image[c->images[0]];
     const struct moments *ours = answer_key_counts(a, set, c->images[0]);
     struct rate_image rates;
     struct err why;
-    if (h->made[c->images[0]].rates[0] == '\0' ||
-        !rate_image_read(h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
+    if (h->made[c->images[0]].rates[0] == '\0')
+        return true;
+    if (!rate_image_read(h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
                          ours->n, &rates, &why))
-        return;
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     double v = rates.more > -1 ? log1p(rates.more) : -INFINITY,
            odd = rates.odd / fmax(1, rates.pixels);
     const struct interval count = {v, v, v, 0}, share = {odd, odd, odd, 0};
     const struct margin m = margin_of(&c->carried, rates.mean / (1 + rates.more) / p->spp);
     double better = fmin(score_share(&m, &count), score_share(&c->share, &share));
     if (better <= out->share)
-        return;
+        return true;
     out->share = better;
     out->chance = 0;
     snprintf(
         out->carried, sizeof out->carried,
         "an earlier part lost points in this scene: the number of samples may be off by %.0f %%",
         100 * expm1(m.full));
+    return true;
 }
 
 /* Another image of the same light with more samples, whose noise is low: -1: none. */
@@ -212,9 +225,9 @@ static int quieter(const struct rubric *r, const struct submitted_images *h, int
 }
 
 /* Noise is measured against the program's own image, if that is not what it should be. */
-static void carry_noise(const struct rubric *r, const struct answer_key *a,
+static bool carry_noise(const struct rubric *r, const struct answer_key *a,
                         struct submitted_images *h, const struct rubric_check *c, double alpha,
-                        struct result *out)
+                        struct result *out, struct err *e)
 {
     struct submitted_image *p = &h->image[c->images[0]], *q = &h->image[c->images[1]], own;
     int other = quieter(r, h, c->images[0]);
@@ -222,12 +235,12 @@ static void carry_noise(const struct rubric *r, const struct answer_key *a,
     struct interval i;
     struct err why;
     if (other < 0 || strcmp(p->sha256, q->sha256) == 0)
-        return;
+        return true;
     submitted_image_expect(&h->image[other], &a->of[0][other].noise, r->image[other].spp);
     unsigned char *use = malloc(pixels);
-    if (use == NULL || !submitted_image_copy(&h->image[other], &own, &why)) {
+    if (use == NULL || !submitted_image_copy(&h->image[other], &own, e)) {
         free(use);
-        return;
+        return err_set(e, "out of memory");
     }
     own.known = true;
     for (size_t k = 0; k < pixels; k++)
@@ -235,9 +248,9 @@ static void carry_noise(const struct rubric *r, const struct answer_key *a,
     submitted_image_unclipped(p, use);
     submitted_image_unclipped(q, use);
     submitted_image_unclipped(&own, use);
-    if (difference_related(q, &own, use) &&
-        difference_noise(p, &own, q, &own, use, alpha, &i, &why) &&
-        score_share(&c->log_ratio, &i) > out->share) {
+    bool related = difference_related(q, &own, use),
+         known = related && difference_noise(p, &own, q, &own, use, alpha, &i, &why);
+    if (known && score_share(&c->log_ratio, &i) > out->share) {
         out->share = score_share(&c->log_ratio, &i);
         out->chance = score_chance(&c->log_ratio, &i);
         out->more = 0;
@@ -248,24 +261,27 @@ static void carry_noise(const struct rubric *r, const struct answer_key *a,
     }
     submitted_image_free(&own);
     free(use);
+    return known || !related || !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
 }
 
-void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
+bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
                       struct submitted_images *h, double alpha, const double *share,
-                      const bool *paid, struct result *result)
+                      const bool *paid, struct result *result, struct err *e)
 {
-    for (int i = 0; i < r->num_checks; i++) {
+    bool ok = true;
+    for (int i = 0; ok && i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         const struct rubric_image *p = &r->image[c->images[0]];
         if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(h, c))
             continue;
         if (c->after >= 0 && was_lost(r, c, c->after, p, share))
-            carry_ratio(r, a, set, h, c, &result[i]);
+            ok = carry_ratio(r, a, set, h, c, &result[i], e);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
-            carry_rates(r, a, set, h, c, &result[i]);
+            ok = carry_rates(r, a, set, h, c, &result[i], e);
         else if (c->kind == CHECK_GROWTH)
-            carry_growth(r, a, set, h, c, &result[i]);
+            ok = carry_growth(r, a, set, h, c, &result[i], e);
         else if (c->kind == CHECK_NOISE)
-            carry_noise(r, a, h, c, alpha, &result[i]);
+            ok = carry_noise(r, a, h, c, alpha, &result[i], e);
     }
+    return ok;
 }

@@ -10,9 +10,9 @@
  * image's mean luminance, B that of IMAGE, primes the student's; log R against the margin `carried`. An image that is
  * the other one again, or does not look like what it should show, carries nothing on.
  * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin.
- * `noise`: against another image of the program's own with more samples, instead of the right one. */
-void carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
+ * `noise`: against another image of the program's own with more samples, instead of the right one. False: out of memory. */
+bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
                       struct submitted_images *h, double alpha, const double *share,
-                      const bool *paid, struct result *result);
+                      const bool *paid, struct result *result, struct err *e);
 
 #endif

@@ -68,6 +68,5 @@ bool mistake_judge(const struct rubric *r, const struct answer_key *a,
         out->found.finding = FINDING_UNKNOWN;
         out->located = located_by(r, h, share);
     }
-    carried_by_ratio(r, a, *set, h, alpha, share, paid, result);
-    return true;
+    return carried_by_ratio(r, a, *set, h, alpha, share, paid, result, e);
 }
