@@ -11,7 +11,13 @@
 
 #include <jansson.h>
 
-enum verdict { VERDICT_EQUIVALENT, VERDICT_DIFFERENT, VERDICT_INCONCLUSIVE };
+/* What each means, and who says it: tools/docs/background/verdict.md. */
+enum verdict {
+    VERDICT_EQUIVALENT, /* inside a margin that was declared; never without one */
+    VERDICT_DIFFERENT,
+    VERDICT_NOTHING_FOUND, /* "NO DIFFERENCE FOUND": no margin was declared, and nothing is known but its MDB */
+    VERDICT_INCONCLUSIVE /* neither, or something that was asked for could not be tested */
+};
 
 struct suite_reference {
     char engine[16];      /* of engine_table.h, with goldens, or "truth" */
@@ -91,5 +97,7 @@ bool suite_noise_is_known(const char *kind);
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */
 extern const char *const verdict_names[]; /* by enum verdict; end with NULL */
 bool verdict_parse(const char *name, enum verdict *out);
+/* EQUIVALENT and DIFFERENT: more samples would not change it. */
+bool verdict_decides(enum verdict v);
 
 #endif

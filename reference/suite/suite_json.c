@@ -8,9 +8,15 @@
 const char *const verdict_names[] = {
     [VERDICT_EQUIVALENT] = "EQUIVALENT",
     [VERDICT_DIFFERENT] = "DIFFERENT",
+    [VERDICT_NOTHING_FOUND] = "NO DIFFERENCE FOUND",
     [VERDICT_INCONCLUSIVE] = "INCONCLUSIVE",
     NULL,
 };
+
+bool verdict_decides(enum verdict v)
+{
+    return v == VERDICT_EQUIVALENT || v == VERDICT_DIFFERENT;
+}
 
 const char *verdict_name(enum verdict v)
 {

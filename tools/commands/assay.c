@@ -39,8 +39,8 @@ static void print_help(void)
     for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++)
         printf("  %-12s %s\n", verbs[i].name, verbs[i].help);
     puts("\n`assay VERB --help` lists its options.\n"
-         "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive,\n"
-         "3 could not judge, with one line on stderr.");
+         "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive\n"
+         "or nothing found without a margin, 3 could not judge, with one line on stderr.");
 }
 
 /* For jansson, whose calls add to documents in hundreds of places: a result that silently lacks a part would be worse

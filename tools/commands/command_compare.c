@@ -2,6 +2,7 @@
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"
+#include "tools/compare/verdict.h"
 #include "tools/report/report.h"
 #include "tools/results/results.h"
 #include "tools/base/temp_dir.h"
@@ -25,8 +26,7 @@ static const char usage[] =
 struct settings {
     struct compare_job job;
     int num_paths;
-    const char *json, *report;
-    enum verdict expect;
+    const char *json, *report, *expect;
     bool quiet, help;
 };
 
@@ -47,14 +47,22 @@ static const struct cli_option options[] = {
      TO(job.opt.alpha), 1e-12, 0.4},
     {0, "margin", "D",
      "largest relative difference of the image mean that\n"
-     "counts as equal; 0: any difference counts (0)",
+     "counts as equal. Without it nothing is EQUIVALENT: any\n"
+     "difference is looked for, and what could have been missed is\n"
+     "said",
      TO(job.opt.margin_global), 0, 0.99},
     {0, "margin-tile", "D", "the same for one tile (4 x --margin)", TO(job.opt.margin_tile), 0,
      0.99},
     {0, "margin-variance", "D",
-     "the same for the variance of one sample or replicate; 0:\n"
-     "variances are not judged (0)",
+     "the same for the variance of one sample or replicate;\n"
+     "without it variances are not judged",
      TO(job.opt.margin_variance), 0, 100},
+    {0, "accept-mdb", "X",
+     "without --margin: exit code 0 if nothing is found and an\n"
+     "error of X of the image (relative) could not have been missed",
+     TO(job.accept_mdb[0]), 1e-9, 1000},
+    {0, "accept-mdb-tile", "X", "the same for one tile (4 x --accept-mdb)", TO(job.accept_mdb[1]),
+     1e-9, 1000},
     {0, "tile", "N", "side of a reporting tile, pixels (16)", TO(job.opt.tile), 1, 65536},
     {0, "again", "A2 B2",
      "the same renders with fresh seeds: DIFFERENT only if they\n"
@@ -73,8 +81,10 @@ static const struct cli_option options[] = {
     {0, "spp-a", "N", "samples per pixel of A, if its file has a variance only",
      TO(job.input[0].spp), 3, 1e12},
     {0, "spp-b", "N", "the same for B", TO(job.input[1].spp), 3, 1e12},
-    {0, "expect", "VERDICT", "what exit code 0 stands for (EQUIVALENT)", TO(expect),
-     .names = verdict_names},
+    {0, "expect", "VERDICT",
+     "what exit code 0 stands for (EQUIVALENT; with --accept-mdb\n"
+     "NO DIFFERENCE FOUND)",
+     TO(expect), .names = verdict_names},
     {0, "json", "FILE", "write the claim as results.json", TO(json)},
     {'r', "report", "FILE", "write the claim as one HTML page with its images", TO(report)},
     {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
@@ -89,6 +99,20 @@ static bool check(struct settings *s, struct err *e)
         return err_set(e, "compare needs two images (see --help)");
     if (opt->margin_tile < 0)
         opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
+    double *accept = s->job.accept_mdb;
+    if (accept[0] > 0 && opt->margin_tile > 0)
+        return err_set(e, "--accept-mdb is for a search without --margin");
+    if (!(accept[0] > 0) && accept[1] > 0)
+        return err_set(e, "--accept-mdb-tile goes with --accept-mdb");
+    if (!(accept[1] > 0))
+        accept[1] = 4 * accept[0];
+    if (accept[1] < accept[0])
+        return err_set(e, "--accept-mdb-tile must be at least --accept-mdb");
+    s->job.expected = accept[0] > 0 ? VERDICT_NOTHING_FOUND : VERDICT_EQUIVALENT;
+    if (s->expect != NULL && !verdict_parse(s->expect, &s->job.expected))
+        return err_set(e, "--expect: '%s' is no verdict", s->expect);
+    if (s->job.expected == VERDICT_NOTHING_FOUND && !(accept[0] > 0))
+        return err_set(e, "--expect '%s' goes with --accept-mdb", s->expect);
     if (s->job.exchangeable && (opt->margin_tile > 0 || opt->margin_variance > 0))
         return err_set(e, "--exchangeable asks if anything differs at all: it takes no margin");
     if (s->job.exchangeable &&
@@ -100,25 +124,22 @@ static bool check(struct settings *s, struct err *e)
     return true;
 }
 
-/* "1.25 %", or "nothing" where no test covers it. */
-static const char *detectable(double mdb, int digits, char text[32])
+/* Up to two digits, so that what is printed still holds. */
+static double round_up(double x)
 {
-    if (mdb < region_mdb_none)
-        snprintf(text, 32, "%.*f %%", digits, 100 * mdb);
-    else
-        snprintf(text, 32, "nothing");
-    return text;
+    double unit = pow(10, floor(log10(x)) - 1);
+    return ceil(x / unit) * unit;
 }
 
-static void print_result(const struct compared *c, bool exchangeable)
+static void print_result(const struct compare_job *job, const struct compared *c)
 {
     const struct comparison *r = &c->r;
     const struct region *g = &r->global[3];
-    char image[32], tile[32];
-    detectable(r->mdb_global, 3, image);
-    detectable(r->mdb_tile, 2, tile);
+    char image[32], tile[32], more[128];
+    region_mdb_text(r->mdb_global, image);
+    region_mdb_text(r->mdb_tile, tile);
     printf("%s: %s\n", verdict_name(r->verdict), r->reason);
-    if (exchangeable)
+    if (job->exchangeable)
         printf("difference %+.3f %%, smallest detectable %s of the image; p = %.3g, smallest "
                "possible %.2g; %d regions\n",
                100 * g->difference, image, c->perm.p, c->perm.smallest_p, c->perm.num_regions);
@@ -126,10 +147,20 @@ static void print_result(const struct compared *c, bool exchangeable)
         printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %s of the image, %s of a "
                "tile; %d tests\n",
                100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, image, tile, r->num_tests);
-    if (r->verdict == VERDICT_INCONCLUSIVE && r->extra_factor > 1)
-        printf("about %.1f times the samples would decide\n", r->extra_factor);
+    if (r->extra_factor > 1) {
+        verdict_more_samples(r->extra_factor, "samples", more);
+        printf("%s\n", more);
+    }
     for (int i = 0; i < c->notes.num; i++)
         printf("note: %s\n", c->notes.line[i]);
+    if (r->verdict != VERDICT_NOTHING_FOUND || compare_job_passes(job, c))
+        return;
+    if (r->mdb_tile < region_mdb_none)
+        printf("for CI: --accept-mdb %.2g --accept-mdb-tile %.2g makes this exit with 0, as does "
+               "--margin D where both are shown to be equal within D\n",
+               round_up(r->mdb_global), round_up(fmax(r->mdb_global, r->mdb_tile)));
+    else
+        printf("for CI: --margin D exits with 0 where both are shown to be equal within D\n");
 }
 
 /* The page is made from a results.json, as every page is; this one goes with its directory. */
@@ -140,7 +171,7 @@ static bool write_report(const struct settings *s, const struct compared *c, int
     if (!temp_dir_open(&dir, "compare", e))
         return false;
     const struct path results = fs_path("%s/results.json", dir.path);
-    bool ok = compare_job_write_json(&s->job, c, s->expect, results.s, argc, argv, e) &&
+    bool ok = compare_job_write_json(&s->job, c, results.s, argc, argv, e) &&
               report_write(results.s, s->report, e);
     struct err ignored = {0};
     return temp_dir_close(&dir, ok ? e : &ignored) && ok;
@@ -148,8 +179,7 @@ static bool write_report(const struct settings *s, const struct compared *c, int
 
 int command_compare(int argc, char **argv, struct err *e)
 {
-    struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1, .tile = 16},
-                         .expect = VERDICT_EQUIVALENT};
+    struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1, .tile = 16}};
     struct compared c;
     if (!cli_read(options, argc, argv, &s, e))
         return EXIT_NOT_JUDGED;
@@ -157,14 +187,14 @@ int command_compare(int argc, char **argv, struct err *e)
         return 0;
     if (!check(&s, e) || !compare_job_run(&s.job, &c, e))
         return EXIT_NOT_JUDGED;
-    int code = EXIT_DIFFERENT;
-    if (c.r.verdict == s.expect)
+    int code = EXIT_INCONCLUSIVE;
+    if (compare_job_passes(&s.job, &c))
         code = EXIT_EQUIVALENT;
-    else if (c.r.verdict == VERDICT_INCONCLUSIVE)
-        code = EXIT_INCONCLUSIVE;
+    else if (verdict_decides(c.r.verdict))
+        code = EXIT_DIFFERENT;
     if (!s.quiet)
-        print_result(&c, s.job.exchangeable);
-    if (s.json != NULL && !compare_job_write_json(&s.job, &c, s.expect, s.json, argc, argv, e))
+        print_result(&s.job, &c);
+    if (s.json != NULL && !compare_job_write_json(&s.job, &c, s.json, argc, argv, e))
         code = EXIT_NOT_JUDGED;
     if (s.report != NULL && !write_report(&s, &c, argc, argv, e))
         code = EXIT_NOT_JUDGED;

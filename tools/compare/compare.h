@@ -9,11 +9,12 @@
 struct compare_options {
     double alpha;           /* in (0, 0.5): bounds the chance of a wrong DIFFERENT and of a wrong
                              EQUIVALENT, each, over all regions and channels of this one claim */
-    double margin_global;   /* relative, in [0, 1); 0: any difference counts (a regression test) */
+    double margin_global;   /* relative, in [0, 1); 0: none, so that nothing can be EQUIVALENT */
     double margin_tile;     /* at least margin_global; both are 0 or none is */
     int tile;               /* side of a reporting tile, pixels (pyramid.h) */
     double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
-                               as different estimators differ rightly */
+                               as different estimators differ rightly; else its interval must lie
+                               inside for EQUIVALENT and NO DIFFERENCE FOUND */
 };
 
 /* The claim's tests in groups, each with its own part of alpha. */
@@ -82,10 +83,11 @@ struct comparison {
     double mdb_tile;          /* largest over the reporting tiles, luminance */
     double rms_bias;          /* debiased RMS error over pixels and RGB (weighted as luminance) in
                                  units of the mean luminance of B: sqrt(max(0, ..)) */
-    double extra_factor; /* INCONCLUSIVE: about how many times the samples would decide; else 1 */
-    bool skew_limited;   /* some regions of a tile's size or larger were too skewed for their t and
+    double extra_factor;      /* not decided: about how many times the samples would decide, at most
+                            verdict_largest_factor, which stands for more; else 1 */
+    bool skew_limited; /* some regions of a tile's size or larger were too skewed for their t and
                             were judged only as part of larger ones */
-    int finest_side; /* smallest side of which at least half the luminance regions were tested */
+    int finest_side;   /* smallest side of which at least half the luminance regions were tested */
     int tiles_x, tiles_y; /* of reporting tiles */
     double *tile_log10_p; /* luminance, no margin (H0: equal), tiles_x*tiles_y; for the histogram */
     double *tile_t;

@@ -151,6 +151,15 @@ double region_mdb(const struct judge *j, const struct measured *m, int channel)
     return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
 }
 
+const char *region_mdb_text(double mdb, char text[32])
+{
+    if (mdb < region_mdb_none)
+        snprintf(text, 32, "%.3g %%", 100 * mdb);
+    else
+        snprintf(text, 32, "nothing");
+    return text;
+}
+
 double region_reach(const struct region *r)
 {
     return fmax(fabs(r->ci_lo), fabs(r->ci_hi));

@@ -64,6 +64,9 @@ extern const double region_smallest_log10_p; /* -1e6 */
 /* The mdb of a region that no test covers: 1e6. */
 extern const double region_mdb_none;
 
+/* "1.05 %" or, where no test covers it, "nothing"; returns text. */
+const char *region_mdb_text(double mdb, char text[32]);
+
 /* The end of the interval that is further from 0. */
 double region_reach(const struct region *r);
 

@@ -9,8 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const double regression_mdb = 0.05; /* margins 0: a pass must have been able to see this */
-static const double largest_factor = 1e4;  /* of extra_factor */
+const double verdict_largest_factor = 100;
 
 static bool inside_margin(const struct region *r)
 {
@@ -35,7 +34,7 @@ static double factor_needed(const struct region *r, size_t num_intervals)
     if (planned > 1)
         return planned;
     double gap = fabs(fabs(r->difference) - r->margin);
-    return gap > 0 ? pow((half + spare) / gap, 2) : largest_factor;
+    return gap > 0 ? pow((half + spare) / gap, 2) : verdict_largest_factor;
 }
 
 static void judge_equivalence(struct comparison *c, const struct region *tiles)
@@ -56,14 +55,15 @@ static void judge_equivalence(struct comparison *c, const struct region *tiles)
     if (furthest == NULL) {
         c->verdict = VERDICT_EQUIVALENT;
         snprintf(c->reason, sizeof c->reason,
-                 "the image lies within %.3g %% and each of %zu tiles within %.3g %%",
-                 100 * c->global[CHANNEL_LUMINANCE].margin, num_tiles, 100 * tiles[0].margin);
+                 "the image lies within %.3g %% and each of %zu tile%s within %.3g %%",
+                 100 * c->global[CHANNEL_LUMINANCE].margin, num_tiles, num_tiles == 1 ? "" : "s",
+                 100 * tiles[0].margin);
         return;
     }
     char where[96];
     place(c, furthest, where, sizeof where);
     c->verdict = VERDICT_INCONCLUSIVE;
-    c->extra_factor = fmin(largest_factor, factor);
+    c->extra_factor = fmin(verdict_largest_factor, factor);
     if (!furthest->ci_valid)
         snprintf(c->reason, sizeof c->reason,
                  "%s: samples too skewed for an interval, more of them are needed", where);
@@ -73,29 +73,58 @@ static void judge_equivalence(struct comparison *c, const struct region *tiles)
                  100 * furthest->ci_lo, 100 * furthest->ci_hi, 100 * furthest->margin);
 }
 
-/* Margins 0: nothing can be shown equal, so a pass is a search that found nothing and could have.
- */
-static void judge_regression(struct comparison *c)
+/* Without a margin nothing can be shown equal: all there is to say is what would have been seen. */
+static void judge_search(struct comparison *c)
 {
-    if (c->mdb_global <= regression_mdb) {
-        c->verdict = VERDICT_EQUIVALENT;
-        snprintf(c->reason, sizeof c->reason,
-                 "no difference found; %.3g %% of the image or %.3g %% of a tile would have been "
-                 "with 95 %%",
-                 100 * c->mdb_global, 100 * c->mdb_tile);
-        return;
-    }
-    c->verdict = VERDICT_INCONCLUSIVE;
-    if (c->mdb_global < region_mdb_none) {
-        c->extra_factor = fmin(largest_factor, pow(c->mdb_global / regression_mdb, 2));
-        snprintf(c->reason, sizeof c->reason,
-                 "no difference found, but one below %.3g %% of the image could have been missed",
-                 100 * c->mdb_global);
-    } else {
+    char image[32], tile[32];
+    if (c->mdb_global >= region_mdb_none) {
+        c->verdict = VERDICT_INCONCLUSIVE;
         c->extra_factor = 4;
         snprintf(c->reason, sizeof c->reason,
                  "the image: samples too skewed for a test, more of them are needed");
+        return;
     }
+    c->verdict = VERDICT_NOTHING_FOUND;
+    snprintf(c->reason, sizeof c->reason,
+             "an error of %s of the image or of %s of a tile would have been seen with 95 %%",
+             region_mdb_text(c->mdb_global, image), region_mdb_text(c->mdb_tile, tile));
+}
+
+/* For EQUIVALENT and NO DIFFERENCE FOUND the variance must be what was asked of it, too. */
+static void judge_variance(struct comparison *c, const struct compare_options *opt)
+{
+    const struct variance_ratio *v = &c->variance;
+    double limit = 1 + opt->margin_variance;
+    char mean[sizeof c->reason], *text = c->reason;
+    size_t size = sizeof c->reason;
+    size_t used = strlen(text);
+    if (v->valid && v->lo >= 1 / limit && v->hi <= limit) {
+        snprintf(text + used, size - used, "; the variance is %.3g times that of B [%.3g, %.3g]",
+                 v->ratio, v->lo, v->hi);
+        return;
+    }
+    memcpy(mean, text, size);
+    if (c->verdict != VERDICT_INCONCLUSIVE)
+        c->extra_factor = 1;
+    if (!(c->statistic[STATISTIC_VARIANCE].share > 0))
+        snprintf(text, size, "the variance could not be tested, as a side has none of its own");
+    else if (!(v->ratio > 0))
+        snprintf(text, size,
+                 "the variance could not be tested: a side has no noise, or paths that cannot be "
+                 "counted");
+    else if (!v->valid)
+        snprintf(text, size,
+                 "the variance could not be tested, being too skewed: it is about %.3g times that "
+                 "of B",
+                 v->ratio);
+    else
+        snprintf(text, size,
+                 "the variance of a path is %.3g times that of B [%.3g, %.3g], which is not inside "
+                 "the margin of %.3g %%",
+                 v->ratio, v->lo, v->hi, 100 * opt->margin_variance);
+    used = strlen(text);
+    snprintf(text + used, size - used, "; mean: %.*s", (int)(size - used - 9), mean);
+    c->verdict = VERDICT_INCONCLUSIVE;
 }
 
 static bool rejects(const struct comparison *c, const struct compare_options *opt, int s)
@@ -155,5 +184,18 @@ void verdict_decide(struct comparison *c, const struct compare_options *opt,
     else if (opt->margin_global > 0)
         judge_equivalence(c, tiles);
     else
-        judge_regression(c);
+        judge_search(c);
+    if (!rejected && opt->margin_variance > 0)
+        judge_variance(c, opt);
+}
+
+void verdict_more_samples(double factor, const char *of_what, char text[128])
+{
+    if (factor < verdict_largest_factor)
+        snprintf(text, 128, "about %.1f times the %s would decide", factor, of_what);
+    else
+        snprintf(
+            text, 128,
+            "more than %.0f times the %s would be needed: raise the margin or enlarge the tile",
+            verdict_largest_factor, of_what);
 }

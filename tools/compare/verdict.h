@@ -1,13 +1,17 @@
-/* From the tests and intervals of a claim to its verdict, with the sentence that says why. Used by
- * compare.c only. */
+/* From the tests and intervals of a claim to its verdict, with the sentence that says why. */
 #ifndef ASSAY_VERDICT_H
 #define ASSAY_VERDICT_H
 
 #include "compare.h"
 
-/* Fills verdict, reason and extra_factor; all else of c is filled but for the images' pixels. `tiles`
+/* For compare.c. Fills verdict, reason and extra_factor; all else of c is filled but for the images' pixels. `tiles`
  * are the luminance regions of the tiles_x x tiles_y reporting tiles. */
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles);
+
+/* The largest extra_factor; it stands for more. */
+extern const double verdict_largest_factor;
+/* What extra_factor says: "about 2.5 times the samples would decide", or what else can be done. */
+void verdict_more_samples(double factor, const char *of_what, char text[128]);
 
 #endif

@@ -13,8 +13,7 @@
 #include <gsl/gsl_sort.h>
 
 enum { MOST_LABELLINGS = 200000 };
-static const double regression_mdb = 0.05; /* as in verdict.c */
-static const double tie = 1e-9;            /* relative: the same sum in another order is the same */
+static const double tie = 1e-9; /* relative: the same sum in another order is the same */
 
 /* C(n, k), as a double: beyond 2^53 only its size matters. */
 static double choose(int n, int k)
@@ -206,17 +205,13 @@ static void decide(const struct permutation_options *opt, int num_a, int num_b, 
                  "no p below %.2g can be reached, alpha is %.2g: two stages (--again) of %d "
                  "replicates a side can",
                  out->smallest_p, opt->alpha, permutation_needed(sqrt(opt->alpha), 2));
-    else if (out->mdb > regression_mdb)
-        snprintf(out->reason, sizeof out->reason,
-                 "no difference found (p = %.3g by %d labellings), but one below %.3g %% of the "
-                 "image could have been missed",
-                 out->p, out->num_labellings, 100 * out->mdb);
     else {
-        out->verdict = VERDICT_EQUIVALENT;
+        char image[32];
+        out->verdict = VERDICT_NOTHING_FOUND;
         snprintf(out->reason, sizeof out->reason,
-                 "no difference found (p = %.3g by %d labellings, %s); %.3g %% of the image would "
-                 "have been",
-                 out->p, out->num_labellings, kind, 100 * out->mdb);
+                 "an error of %s of the image would have been seen with 95 %%; p = %.3g by %d "
+                 "labellings (%s)",
+                 region_mdb_text(out->mdb, image), out->p, out->num_labellings, kind);
     }
 }
 

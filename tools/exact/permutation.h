@@ -22,8 +22,8 @@ struct permutation_options {
 };
 
 struct permutation {
-    enum verdict verdict; /* DIFFERENT: p <= alpha. INCONCLUSIVE: smallest_p > alpha, or mdb > 5 %.
-                             Else EQUIVALENT: no difference found, and one of 5 % would have been */
+    enum verdict verdict; /* DIFFERENT: p <= alpha. INCONCLUSIVE: smallest_p > alpha. Else NO
+                             DIFFERENCE FOUND */
     char reason[256];
     double p, smallest_p; /* the second is what so many replicates can reach at best */
     int num_labellings;   /* compared, with the one observed */

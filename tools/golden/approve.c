@@ -1,6 +1,7 @@
 #include "approve.h"
 
-#include "tools/compare/compare.h"
+#include "tools/compare/region.h"
+#include "tools/compare/verdict.h"
 
 #include <string.h>
 #include <time.h>
@@ -118,15 +119,6 @@ static enum approval approve_incomparable(const struct approve_options *opt,
                          out);
 }
 
-/* An MDB; compare.h has 1e6 where no test covers the region. */
-static void percent_or_none(double mdb, char text[32])
-{
-    if (mdb < 1e6)
-        snprintf(text, 32, "%.3f %%", 100 * mdb);
-    else
-        strcpy(text, "none (too skewed)");
-}
-
 static enum approval approve_compared(const struct approve_options *opt,
                                       const struct suite_scene *scene,
                                       const struct suite_reference *ref,
@@ -143,18 +135,18 @@ static enum approval approve_compared(const struct approve_options *opt,
         return APPROVE_IMPOSSIBLE;
     }
     const struct region *g = &r.global[3];
-    char mdb[2][32];
-    percent_or_none(r.mdb_global, mdb[0]);
-    percent_or_none(r.mdb_tile, mdb[1]);
+    char image[32], tile[32], more[128];
     fprintf(out, "  %s: %s\n", verdict_name(r.verdict), r.reason);
     fprintf(out,
             "  difference %+.4f %% [%+.4f, %+.4f], smallest detectable: image %s, tile %s; margins "
             "%g %%, %g %%\n",
-            100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, mdb[0], mdb[1],
+            100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi,
+            region_mdb_text(r.mdb_global, image), region_mdb_text(r.mdb_tile, tile),
             100 * ref->margin_global, 100 * ref->margin_tile);
     enum approval done;
-    if (r.verdict == VERDICT_INCONCLUSIVE) {
-        fprintf(out, "  refused: about %.1f times the replicates would decide\n", r.extra_factor);
+    if (!verdict_decides(r.verdict)) {
+        verdict_more_samples(r.extra_factor, "replicates", more);
+        fprintf(out, "  refused: %s\n", more);
         done = APPROVE_INCONCLUSIVE;
     } else if (r.verdict == VERDICT_DIFFERENT && opt->why == NULL) {
         fprintf(out, "  refused: give --accept-difference \"why\"\n");

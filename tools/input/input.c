@@ -218,18 +218,20 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
         }
     if (worst > most_censored_tile)
         c->mdb_tile = region_mdb_none;
-    if (c->verdict != VERDICT_EQUIVALENT || (share <= most_censored && worst <= most_censored_tile))
+    bool passes = c->verdict == VERDICT_EQUIVALENT || c->verdict == VERDICT_NOTHING_FOUND;
+    if (!passes || (share <= most_censored && worst <= most_censored_tile))
         return;
     c->verdict = VERDICT_INCONCLUSIVE;
     c->extra_factor = 1;
     if (share > most_censored)
-        snprintf(c->reason, sizeof c->reason,
-                 "no difference found, but %.3g %% of the pixels are saturated, more than the %.3g "
-                 "%% that a verdict of EQUIVALENT allows",
-                 100 * share, 100 * most_censored);
+        snprintf(
+            c->reason, sizeof c->reason,
+            "%.3g %% of the pixels are saturated, more than the %.3g %% that may be: nothing is "
+            "known of them",
+            100 * share, 100 * most_censored);
     else
         snprintf(c->reason, sizeof c->reason,
-                 "no difference found, but %.3g %% of the tile at %d,%d is saturated: nothing is "
+                 "%.3g %% of the tile at %d,%d is saturated: nothing is "
                  "known of it",
                  100 * worst, worst_x, worst_y);
 }

@@ -50,7 +50,7 @@ void input_free(struct input *in);
 bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
     __attribute__((warn_unused_result));
 
-/* After compare_moments() on a pair: EQUIVALENT becomes INCONCLUSIVE, with the reason, if more than
+/* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than
  * 5 % of the image or half of a reporting tile is censored; in the latter case nothing is detectable
  * in that tile, and mdb_tile says so. */
 void input_limit(const struct input *a, int tile, struct comparison *c);

@@ -24,31 +24,43 @@ static int compare_claims(const void *a, const void *b)
     return (x->index > y->index) - (x->index < y->index);
 }
 
-static void write_claim_list(FILE *f, const struct claim_ref *claim, size_t num)
+static void write_claim_list(FILE *f, const json_t *claims, const struct claim_ref *claim,
+                             size_t num)
 {
     fputs("<ul class=\"lede\">\n", f);
     for (size_t i = 0; i < num; i++) {
         const json_t *c = claim[i].json;
+        bool judged = claim[i].outcome != OUTCOME_NOT_JUDGED;
+        size_t same = judged ? 1 : results_num_with_error(claims, claim[i].index);
+        if (same == 0)
+            continue;
         html_print(f, "<li><a href=\"#claim-%zu\">%s against ", claim[i].index,
                    member_text(c, "scene"));
         report_reference(f, &claim[i]);
-        if (claim[i].outcome == OUTCOME_NOT_JUDGED)
-            html_print(f, "</a> could not be judged: %s</li>\n", member_text(c, "error"));
+        fputs("</a>", f);
+        if (same > 1)
+            fprintf(f, " and %zu more", same - 1);
+        if (!judged)
+            html_print(f, " could not be judged: %s</li>\n", member_text(c, "error"));
         else
-            html_print(f, "</a> is %s, not %s</li>\n", member_text(c, "verdict"),
+            html_print(f, " is %s, not %s</li>\n", member_text(c, "verdict"),
                        member_text(c, "expected"));
     }
     fputs("</ul>\n", f);
 }
 
 /* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
-static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, json_int_t left,
-                          const char *located)
+static void write_verdict(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
 {
-    size_t errors = 0, wrong = 0, must_differ = 0;
+    static const char *const what[] = {
+        [OUTCOME_NOT_JUDGED] = "could not be judged",
+        [OUTCOME_OPPOSITE] = "did not come out as expected",
+        [OUTCOME_UNDECIDED] = "stayed undecided",
+    };
+    const json_int_t left = json_integer_value(json_object_get(root, "unfinished"));
+    size_t count[4] = {0}, must_differ = 0;
     for (size_t i = 0; i < num; i++) {
-        errors += claim[i].outcome == OUTCOME_NOT_JUDGED;
-        wrong += claim[i].outcome == OUTCOME_OPPOSITE || claim[i].outcome == OUTCOME_UNDECIDED;
+        count[claim[i].outcome]++;
         must_differ += claim[i].outcome == OUTCOME_AS_EXPECTED &&
                        strcmp(member_text(claim[i].json, "expected"), "DIFFERENT") == 0;
     }
@@ -57,26 +69,32 @@ static void write_verdict(FILE *f, const struct claim_ref *claim, size_t num, js
                 "<p class=\"error-line\">The run goes on: %" JSON_INTEGER_FORMAT
                 " more are to be judged. This page reloads itself until it has ended.</p>\n",
                 left);
-    fprintf(f, "<h1 class=\"%s\">%s", errors + wrong > 0 ? "bad" : "good",
-            left > 0 ? "So far " : "");
-    const char *s = num == 1 ? "" : "s";
-    if (errors > 0 && wrong > 0)
-        fprintf(f, "%s %zu claims, %zu could not be judged and %zu did not come out as expected.",
-                left > 0 ? "of" : "Of", num, errors, wrong);
-    else if (errors > 0)
-        fprintf(f, "%zu of %zu claim%s could not be judged.", errors, num, s);
-    else if (wrong > 0)
-        fprintf(f, "%zu of %zu claim%s did not come out as expected.", wrong, num, s);
-    else if (num == 1)
+    size_t good = count[OUTCOME_AS_EXPECTED], bad = num - good, kinds = 0, said = 0;
+    for (int k = 0; k < OUTCOME_AS_EXPECTED; k++)
+        kinds += count[k] > 0;
+    fprintf(f, "<h1 class=\"%s\">%s", bad > 0 ? "bad" : "good", left > 0 ? "So far " : "");
+    if (kinds > 1)
+        fprintf(f, "%s %zu claims, ", left > 0 ? "of" : "Of", num);
+    for (int k = 0; k < OUTCOME_AS_EXPECTED; k++) {
+        if (count[k] == 0)
+            continue;
+        said++;
+        fprintf(f, "%s%zu ", said == 1 ? "" : said < kinds ? ", " : " and ", count[k]);
+        if (kinds == 1)
+            fprintf(f, "of %zu claim%s ", num, num == 1 ? "" : "s");
+        fprintf(f, "%s%s", what[k], said == kinds ? "." : "");
+    }
+    if (kinds == 0 && num == 1)
         fprintf(f, "%s claim came out as expected.", left > 0 ? "the" : "The");
-    else
+    else if (kinds == 0)
         fprintf(f, "%s %zu claims came out as expected.", left > 0 ? "all" : "All", num);
     fputs("</h1>\n", f);
-    if (num == 1 && errors == 0)
+    if (num == 1 && count[OUTCOME_NOT_JUDGED] == 0)
         html_print(f, "<p class=\"lede\"><b>%s</b>: %s</p>\n", member_text(claim->json, "verdict"),
                    member_text(claim->json, "reason"));
-    if (errors + wrong > 0)
-        write_claim_list(f, claim, errors + wrong);
+    if (bad > 0)
+        write_claim_list(f, json_object_get(root, "claims"), claim, bad);
+    const char *located = member_text(root, "located");
     if (located != NULL)
         html_print(f, "<p class=\"lede\">%s</p>\n", located);
     if (must_differ == 1)
@@ -100,8 +118,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
 {
     fputs("<header>\n<p class=\"kicker\">Assay report</p>\n", f);
     if (num > 0)
-        write_verdict(f, claim, num, json_integer_value(json_object_get(root, "unfinished")),
-                      member_text(root, "located"));
+        write_verdict(f, root, claim, num);
     report_stated_error_headline(f, json_object_get(root, "consistency"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,

@@ -1,5 +1,7 @@
 #include "report_evidence.h"
 
+#include "tools/compare/region.h"
+#include "tools/compare/verdict.h"
 #include "tools/html/html.h"
 #include "report_statistics.h"
 #include "tools/results/results.h"
@@ -31,6 +33,7 @@ static __attribute__((format(printf, 3, 4))) void write_fact(FILE *f, const char
 static void write_numbers(FILE *f, const json_t *claim)
 {
     double alpha = member_number(claim, "alpha");
+    char image[32], tile[32];
     write_fact(f, "Difference of the image mean", "%s, %.6g\u00a0%% interval %s to %s",
                html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),
                html_percent_prose(member_end(claim, "ci", 0)).s,
@@ -40,12 +43,15 @@ static void write_numbers(FILE *f, const json_t *claim)
                html_percent_prose(json_number_value(json_array_get(channels, 0))).s,
                html_percent_prose(json_number_value(json_array_get(channels, 1))).s,
                html_percent_prose(json_number_value(json_array_get(channels, 2))).s);
-    write_fact(f, "Margin (counts as equal)", "±%s for the image, ±%s for a tile",
-               html_percent_plain(member_number(claim, "margin_global")).s,
-               html_percent_plain(member_number(claim, "margin_tile")).s);
+    if (member_number(claim, "margin_tile") > 0)
+        write_fact(f, "Margin (counts as equal)", "±%s for the image, ±%s for a tile",
+                   html_percent_plain(member_number(claim, "margin_global")).s,
+                   html_percent_plain(member_number(claim, "margin_tile")).s);
+    else
+        write_fact(f, "Margin (counts as equal)", "none declared");
     write_fact(f, "Smallest bias this run would find", "%s of the image mean, %s of a tile",
-               html_percent_plain(member_number(claim, "mdb_global")).s,
-               html_percent_plain(member_number(claim, "mdb_tile")).s);
+               region_mdb_text(member_number(claim, "mdb_global"), image),
+               region_mdb_text(member_number(claim, "mdb_tile"), tile));
     fact_open(f, "p of “no difference beyond the margin”");
     html_p_value(f, member_number(claim, "log10_p"));
     fact_close(f);
@@ -81,8 +87,9 @@ static void write_regions(FILE *f, const json_t *claim)
           f);
     fact_close(f);
     if (member_number(claim, "extra_factor") > 1) {
-        write_fact(f, "Samples that would decide", "about %s times as many",
-                   html_number(member_number(claim, "extra_factor")).s);
+        char more[128];
+        verdict_more_samples(member_number(claim, "extra_factor"), "samples", more);
+        write_fact(f, "More samples", "%s", more);
     }
 }
 

@@ -1,5 +1,6 @@
 #include "report_table.h"
 
+#include "tools/compare/region.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"
@@ -18,8 +19,8 @@ void report_reference(FILE *f, const struct claim_ref *claim)
 
 void report_badge(FILE *f, const struct claim_ref *claim)
 {
-    static const char *const style[] = {"error", "bad", "bad", "good"};
-    static const char *const mark[] = {"!", "✗", "✗", "✓"};
+    static const char *const style[] = {"error", "bad", "error", "good"};
+    static const char *const mark[] = {"!", "✗", "?", "✓"};
     bool judged = claim->outcome != OUTCOME_NOT_JUDGED || results_claim_lacks_time(claim->json);
     html_print(f, "<span class=\"badge %s\"><span aria-hidden=\"true\">%s</span> %s</span>",
                style[claim->outcome], mark[claim->outcome],
@@ -73,7 +74,10 @@ static void write_cell(FILE *f, const struct column *column, const struct claim_
         break;
     case COLUMN_PERCENT:
         open_cell(f, column, "num");
-        fputs(html_number(100 * member_number(c, key)).s, f);
+        if (member_number(c, key) >= region_mdb_none)
+            fputs("none", f);
+        else
+            fputs(html_number(100 * member_number(c, key)).s, f);
         break;
     case COLUMN_SECONDS:
         open_cell(f, column, "num");

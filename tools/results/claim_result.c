@@ -69,11 +69,22 @@ static json_t *claim_head(const struct claim_context *c)
         json_object_set_new(j, "detects", json_string(c->scene->detects));
         json_object_set_new(j, "blind_to", json_string(c->scene->blind_to));
     }
+    if (j != NULL && c->accept_mdb[0] > 0) {
+        json_object_set_new(j, "accept_mdb",
+                            json_pack("[f, f]", c->accept_mdb[0], c->accept_mdb[1]));
+    }
     if (j != NULL && c->fidelity != NULL)
         json_object_set_new(j, "class", json_string(c->fidelity));
     if (j != NULL && c->rerun != NULL)
         json_object_set_new(j, "rerun", json_string(c->rerun));
     return j;
+}
+
+bool claim_result_passes(const struct claim_context *c, const struct comparison *r)
+{
+    return r->verdict == c->expected &&
+           (r->verdict != VERDICT_NOTHING_FOUND ||
+            (r->mdb_global <= c->accept_mdb[0] && r->mdb_tile <= c->accept_mdb[1]));
 }
 
 json_t *claim_result_judged(const struct claim_context *c, const struct comparison *r)
@@ -84,7 +95,7 @@ json_t *claim_result_judged(const struct claim_context *c, const struct comparis
     json_t *more = json_pack(
         "{s:s, s:b, s:s, s:f, s:[f, f], s:[f, f, f], s:f, s:f, s:f, s:i, s:f, s:f, s:b, s:i, s:i, "
         "s:i, s:o, s:o, s:o, s:o, s:o}",
-        "verdict", verdict_name(r->verdict), "passed", r->verdict == c->expected, "reason",
+        "verdict", verdict_name(r->verdict), "passed", claim_result_passes(c, r), "reason",
         r->reason, "difference", g[3].difference, "ci", g[3].ci_lo, g[3].ci_hi,
         "channel_difference", g[0].difference, g[1].difference, g[2].difference, "log10_p",
         g[3].log10_p, "mdb_global", r->mdb_global, "mdb_tile", r->mdb_tile, "num_tests",

@@ -13,8 +13,13 @@ struct claim_context {
     const char *fidelity; /* "class" in results.json; NULL: none */
     enum verdict expected;
     struct compare_options opt;
-    const char *rerun; /* the command that judges this claim alone */
+    double accept_mdb[2]; /* of the image, of a tile: NO DIFFERENCE FOUND passes if expected and no
+                             more than that could have been missed; 0: never */
+    const char *rerun;    /* the command that judges this claim alone */
 };
+
+/* Is the verdict the one expected and, of NO DIFFERENCE FOUND, the MDB small enough? */
+bool claim_result_passes(const struct claim_context *c, const struct comparison *result);
 
 /* New references, NULL if out of memory. */
 json_t *claim_result_judged(const struct claim_context *c, const struct comparison *result);

@@ -36,16 +36,20 @@ static void print_title(FILE *f, enum outcome outcome, bool lacks_time, const ch
     print_escaped(f, scene, true);
 }
 
-static void print_claim(FILE *f, const json_t *claim)
+static void print_claim(FILE *f, const json_t *claims, size_t i)
 {
+    const json_t *claim = json_array_get(claims, i);
     enum outcome outcome = results_claim_outcome(claim);
-    if (outcome == OUTCOME_AS_EXPECTED)
+    size_t num = outcome == OUTCOME_NOT_JUDGED ? results_num_with_error(claims, i) : 1;
+    if (outcome == OUTCOME_AS_EXPECTED || num == 0)
         return;
     print_title(f, outcome, results_claim_lacks_time(claim), member_text(claim, "scene"));
     fputs("%3A ", f);
     print_escaped(f, member_text(claim, "a"), true);
     fputs(" against ", f);
     print_escaped(f, member_text(claim, "b"), true);
+    if (num > 1)
+        fprintf(f, " and %zu more", num - 1);
     fputs("::", f);
     if (outcome == OUTCOME_NOT_JUDGED) {
         fputs(results_claim_lacks_time(claim) ? "INCONCLUSIVE: " : "could not be judged: ", f);
@@ -115,7 +119,7 @@ void github_annotations_print(FILE *f, const json_t *results)
                  *consistency = json_object_get(results, "consistency"),
                  *convergence = json_object_get(results, "convergence");
     for (size_t i = 0; i < json_array_size(claims); i++)
-        print_claim(f, json_array_get(claims, i));
+        print_claim(f, claims, i);
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
         print_other(f, "stated errors", c, stated_error_outcome(c), member_text(c, "scene"));

@@ -1,6 +1,7 @@
 #include "results.h"
 
 #include "reference/base/xml_errors.h"
+#include "tools/compare/region.h"
 #include "renderer/base/fs.h"
 
 #include <stdlib.h>
@@ -54,14 +55,14 @@ static bool write_text(xmlTextWriter *w, const char *value)
 static bool write_numbers(xmlTextWriter *w, const json_t *claim)
 {
     const json_t *ci = json_object_get(claim, "ci");
-    char text[512];
+    char text[512], mdb[32];
     snprintf(
         text, sizeof text,
-        "difference %+.4f %% [%+.4f, %+.4f], margin %.4f %%, minimum detectable bias %.4f %%, "
+        "difference %+.4f %% [%+.4f, %+.4f], margin %.4f %%, minimum detectable bias %s, "
         "log10 p %.2f, alpha %.3g over %.0f tests",
         100 * member_number(claim, "difference"), 100 * json_number_value(json_array_get(ci, 0)),
         100 * json_number_value(json_array_get(ci, 1)), 100 * member_number(claim, "margin_global"),
-        100 * member_number(claim, "mdb_global"), member_number(claim, "log10_p"),
+        region_mdb_text(member_number(claim, "mdb_global"), mdb), member_number(claim, "log10_p"),
         member_number(claim, "alpha"), member_number(claim, "num_tests"));
     return write_text(w, text);
 }

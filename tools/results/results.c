@@ -55,7 +55,7 @@ static const struct member judged_members[] = {
     {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
     {"seconds_b", NUMBER, false},    {"rays_a", OBJECT, false},
     {"seed_a", COUNT, false},        {"seeds_b", COUNTS, false},
-    {"version_b", STRING, false}};
+    {"version_b", STRING, false},    {"accept_mdb", INTERVAL, false}};
 
 static const struct member worst_tile_members[] = {
     {"x", COUNT, true},      {"y", COUNT, true},           {"width", COUNT, true},
@@ -230,7 +230,10 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
         return err_set(e, "%s: 'verdict' is unknown: '%s'", where, name);
     if (!verdict_parse(member_text(claim, "expected"), &expected))
         return err_set(e, "%s: 'expected' is unknown", where);
-    if (json_is_true(json_object_get(claim, "passed")) != (verdict == expected))
+    bool enough = member_number(claim, "mdb_global") <= member_end(claim, "accept_mdb", 0) &&
+                  member_number(claim, "mdb_tile") <= member_end(claim, "accept_mdb", 1);
+    bool passes = verdict == expected && (verdict != VERDICT_NOTHING_FOUND || enough);
+    if (json_is_true(json_object_get(claim, "passed")) != passes)
         return err_set(e, "%s: 'passed' contradicts 'verdict' and 'expected'", where);
     return true;
 }
@@ -332,9 +335,21 @@ enum outcome results_claim_outcome(const json_t *claim)
     if (!verdict_parse(member_text(claim, "verdict"), &verdict) ||
         !verdict_parse(member_text(claim, "expected"), &expected))
         return OUTCOME_NOT_JUDGED;
-    if (verdict != VERDICT_INCONCLUSIVE && expected != VERDICT_INCONCLUSIVE)
-        return OUTCOME_OPPOSITE;
-    return OUTCOME_UNDECIDED;
+    return verdict_decides(verdict) && expected != VERDICT_INCONCLUSIVE ? OUTCOME_OPPOSITE
+                                                                        : OUTCOME_UNDECIDED;
+}
+
+size_t results_num_with_error(const json_t *claims, size_t i)
+{
+    const json_t *error = json_object_get(json_array_get(claims, i), "error");
+    size_t num = 0;
+    for (size_t k = 0; k < json_array_size(claims); k++)
+        if (json_equal(json_object_get(json_array_get(claims, k), "error"), error)) {
+            if (k < i)
+                return 0;
+            num++;
+        }
+    return num;
 }
 
 bool results_claim_lacks_time(const json_t *claim)

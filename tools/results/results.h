@@ -3,7 +3,8 @@
  *
  * Paths in "files" are absolute, or relative to the directory of results.json. A claim with "error" could not be
  * judged: it never counts as passed and makes the exit code 3, unless it also has the "verdict" INCONCLUSIVE:
- * then only time was missing, and it counts as that. "passed" is true exactly where "verdict" equals "expected".
+ * then only time was missing, and it counts as that. "passed" is true exactly where "verdict" equals "expected"
+ * and, of NO DIFFERENCE FOUND, the MDBs are at most those of "accept_mdb".
  *
  * After results_read() a reader may rely on what that page marks as needed, of the whole and of each claim (of one
  * with "error": scene, a, b, expected and passed alone), and on the type of everything else there that is present. */
@@ -23,10 +24,12 @@ enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_
 bool results_read(const char *path, json_t **out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* How a claim came out, worst first. OPPOSITE: DIFFERENT for EQUIVALENT or the reverse. UNDECIDED: any
+/* How a claim came out, worst first. OPPOSITE: DIFFERENT for what should pass, or EQUIVALENT for DIFFERENT. UNDECIDED: any
  * other verdict that was not expected. */
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
 enum outcome results_claim_outcome(const json_t *claim);
+/* How many claims have the error of claim i, which has one; 0 if an earlier one has it: it was said. */
+size_t results_num_with_error(const json_t *claims, size_t i);
 /* Of a claim that is OUTCOME_NOT_JUDGED: the budget ended before its first look. It has no numbers,
  * like any that was not judged, but counts as INCONCLUSIVE. */
 bool results_claim_lacks_time(const json_t *claim);

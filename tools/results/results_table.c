@@ -1,5 +1,7 @@
 #include "results_table.h"
 
+#include "tools/compare/region.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +9,8 @@
 const struct column results_columns[] = {
     {"verdict", COLUMN_VERDICT, NULL, "Verdict", NULL,
      "A <b>verdict</b> is EQUIVALENT only where the intervals of the image and of every tile lie inside their "
-     "margins, DIFFERENT where one lies outside, and INCONCLUSIVE where there are too few samples to tell. "},
+     "margins, DIFFERENT where one lies outside, NO DIFFERENCE FOUND where no margin was declared and nothing stood out, "
+     "and INCONCLUSIVE where there are too few samples to tell. "},
     {"scene", COLUMN_SCENE, "scene", "Scene", "scene", NULL},
     {"a", COLUMN_TESTED, "tested", "Tested", "tested", NULL},
     {"b", COLUMN_REFERENCE, "against", "Against", "against", NULL},
@@ -56,8 +59,8 @@ static const char *cell_text(const struct column *c, const json_t *claim, bool m
                              cell_buffer buffer)
 {
     static const char *const mark[2][4] = {
-        [false] = {"ERROR", "WRONG", "WRONG", "ok"},
-        [true] = {"**error**", "**wrong**", "**wrong**", "ok"},
+        [false] = {"ERROR", "WRONG", "undecided", "ok"},
+        [true] = {"**error**", "**wrong**", "**undecided**", "ok"},
     };
     enum outcome outcome = results_claim_outcome(claim);
     bool lacks_time = results_claim_lacks_time(claim);
@@ -73,6 +76,8 @@ static const char *cell_text(const struct column *c, const json_t *claim, bool m
     if (c->kind == COLUMN_DIFFERENCE)
         snprintf(buffer, sizeof(cell_buffer), "%+.3f [%+.3f, %+.3f]", percent(v),
                  percent(member_end(claim, "ci", 0)), percent(member_end(claim, "ci", 1)));
+    else if (c->kind == COLUMN_PERCENT && v >= region_mdb_none)
+        return "none";
     else if (c->kind == COLUMN_PERCENT)
         snprintf(buffer, sizeof(cell_buffer), "%.3f", percent(v));
     else
@@ -184,19 +189,23 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
         const char *error = member_text(claim, "error");
-        if (error == NULL)
+        size_t num = error != NULL ? results_num_with_error(claims, i) : 0;
+        if (num == 0)
             continue;
+        char more[32] = "";
+        if (num > 1)
+            snprintf(more, sizeof more, " and %zu more", num - 1);
         const char *scene = member_text(claim, "scene");
         const char *b = member_text(claim, "b");
         if (!markdown) {
-            fprintf(f, "%s against %s: %s\n", scene, b, error);
+            fprintf(f, "%s against %s%s: %s\n", scene, b, more, error);
             continue;
         }
         fputs("\n- ", f);
         print_markdown_text(f, scene);
         fputs(" against ", f);
         print_markdown_text(f, b);
-        fputs(": ", f);
+        fprintf(f, "%s: ", more);
         print_markdown_text(f, error);
         fputc('\n', f);
     }

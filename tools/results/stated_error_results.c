@@ -68,6 +68,7 @@ enum outcome stated_error_outcome(const json_t *claim)
     switch (v) {
     case VERDICT_EQUIVALENT: return OUTCOME_AS_EXPECTED;
     case VERDICT_DIFFERENT: return OUTCOME_OPPOSITE;
+    case VERDICT_NOTHING_FOUND:
     case VERDICT_INCONCLUSIVE: break;
     }
     return OUTCOME_UNDECIDED;
@@ -109,8 +110,8 @@ void stated_error_print(FILE *f, const json_t *consistency, bool markdown)
                 markdown ? "| %s | %.0f x %.0f spp | %.3f [%.3f, %.3f] | %.2f"
                          : "%s  %.0f x %.0f spp  %.3f [%.3f, %.3f]  %.2f",
                 member_text(c, "scene"), member_number(c, "renders"), member_number(c, "spp"),
-                member_number(c, "pixels"), member_end(c, "pixels_ci", 0), member_end(c, "pixels_ci", 1),
-                member_number(c, "image"));
+                member_number(c, "pixels"), member_end(c, "pixels_ci", 0),
+                member_end(c, "pixels_ci", 1), member_number(c, "image"));
         if (markdown || json_object_get(c, "noise") != NULL ||
             json_object_get(c, "too_early") != NULL)
             print_more(f, c, markdown ? " | " : "  ");

@@ -21,7 +21,7 @@
 double two_stage_alpha(double alpha);
 
 /* Stage 1. opt->alpha is that of the whole claim. Where nothing is flagged, out is the comparison at
- * alpha/2, and its verdict EQUIVALENT or INCONCLUSIVE is final; else it is the one at sqrt(alpha),
+ * alpha/2, and its verdict is final; else it is the one at sqrt(alpha),
  * and DIFFERENT. Its mdb is then no bound of what two stages miss; that of the unflagged one is
  * (for alpha up to 1e-2), as alpha/2 is stricter than two stages. Fails as compare_moments() does. */
 bool two_stage_first(const struct moments *a, const struct moments *b,

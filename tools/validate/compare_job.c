@@ -1,6 +1,7 @@
 #include "compare_job.h"
 
 #include "tools/compare/hint.h"
+#include "tools/compare/verdict.h"
 #include "tools/results/claim_result.h"
 #include "tools/sequential/two_stage.h"
 #include "tools/results/results.h"
@@ -8,6 +9,7 @@
 #include "renderer/base/fs.h"
 
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -93,8 +95,6 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     bool two = job->again[0] != NULL;
     bool ok = two ? two_stage_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
-    if (ok && p.in[0].is_guessed && opt.margin_variance > 0)
-        ok = err_set(e, "--margin-variance: an image without moments tells no variance of its own");
     if (ok)
         input_limit(&p.in[0], opt.tile, &out->r);
     keep_pair(job->path, &p, out);
@@ -173,6 +173,24 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     return ok;
 }
 
+void compare_job_free(struct compared *c)
+{
+    comparison_free(&c->r);
+    moments_free(&c->m[0]);
+    moments_free(&c->m[1]);
+}
+
+/* Nothing was found, but more than is accepted could have been missed. */
+static void tell_accepted(const struct compare_job *job, struct comparison *r)
+{
+    const double *accept = job->accept_mdb;
+    double over = fmax(r->mdb_global / accept[0], r->mdb_tile / accept[1]);
+    size_t used = strlen(r->reason);
+    snprintf(r->reason + used, sizeof r->reason - used,
+             "; accepted is no more than %.3g %% and %.3g %%", 100 * accept[0], 100 * accept[1]);
+    r->extra_factor = fmin(verdict_largest_factor, over * over);
+}
+
 bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
 {
     *out = (struct compared){0};
@@ -180,14 +198,10 @@ bool compare_job_run(const struct compare_job *job, struct compared *out, struct
     ok = ok && hint_add(&out->m[0], &out->m[1], &out->r, e);
     if (!ok)
         compare_job_free(out);
+    else if (job->accept_mdb[0] > 0 && out->r.verdict == VERDICT_NOTHING_FOUND &&
+             !compare_job_passes(job, out))
+        tell_accepted(job, &out->r);
     return ok;
-}
-
-void compare_job_free(struct compared *c)
-{
-    comparison_free(&c->r);
-    moments_free(&c->m[0]);
-    moments_free(&c->m[1]);
 }
 
 static json_t *notes_json(const struct notes *notes)
@@ -223,12 +237,25 @@ static bool side_file(const struct compared *c, int side, const char *json, char
     return ok;
 }
 
-bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
-                            enum verdict expected, const char *path, int argc, char **argv,
-                            struct err *e)
+static struct claim_context context_of(const struct compare_job *job)
 {
-    struct claim_context context = {
-        .a = job->path[0], .b = job->path[1], .expected = expected, .opt = job->opt};
+    return (struct claim_context){.a = job->path[0],
+                                  .b = job->path[1],
+                                  .expected = job->expected,
+                                  .opt = job->opt,
+                                  .accept_mdb = {job->accept_mdb[0], job->accept_mdb[1]}};
+}
+
+bool compare_job_passes(const struct compare_job *job, const struct compared *c)
+{
+    struct claim_context context = context_of(job);
+    return claim_result_passes(&context, &c->r);
+}
+
+bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
+                            const char *path, int argc, char **argv, struct err *e)
+{
+    struct claim_context context = context_of(job);
     char side[2][4096];
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
     const struct path z = fs_path("%s.z.exr", path);

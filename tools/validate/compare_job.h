@@ -10,8 +10,10 @@ struct compare_job {
     const char *again[2]; /* fresh renders of both for a second stage, or NULL */
     struct input_options input[2];
     struct compare_options opt;
-    bool exchangeable;          /* judge by permutation of replicates */
-    int min_side;               /* of a region to permute; 0: permutation.h chooses */
+    bool exchangeable; /* judge by permutation of replicates */
+    enum verdict expected;
+    double accept_mdb[2]; /* as of struct claim_context */
+    int min_side;         /* of a region to permute; 0: permutation.h chooses */
 };
 
 struct compared {
@@ -28,12 +30,14 @@ struct compared {
 bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
     __attribute__((warn_unused_result));
 void compare_job_free(struct compared *c);
+/* Did what was expected come out (claim_result_passes())? */
+bool compare_job_passes(const struct compare_job *job, const struct compared *c);
 
 /* results.json at `path` with one claim, and beside it what the report shows: PATH.z.exr,
  * PATH.relative.exr and, for sides that are no moments EXR, PATH.a.exr and PATH.b.exr. argc, argv:
  * the command line. */
 bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
-                            enum verdict expected, const char *path, int argc, char **argv,
-                            struct err *e) __attribute__((warn_unused_result));
+                            const char *path, int argc, char **argv, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

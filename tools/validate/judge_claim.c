@@ -125,6 +125,12 @@ static void announce(struct validation *v, struct claim_run *t)
     const char *verdict = member_text(t->result, "verdict"),
                *error = member_text(t->result, "error");
     v->done++;
+    for (int i = 0; error != NULL && i < v->num_tasks; i++) {
+        const json_t *other = v->task[i].result;
+        if (other != t->result &&
+            json_equal(json_object_get(other, "error"), json_object_get(t->result, "error")))
+            error = "not judged, for the reason above";
+    }
     validate_log(v, t->scene->name, error != NULL ? error : verdict);
     if (t->a != NULL) {
         release(t->a);
@@ -251,7 +257,7 @@ static void look(struct validation *v, struct claim_run *t)
                                                 v->alpha * t->looks->share[t->look], "stage",
                                                 stage + 1, "verdict", verdict_name(c.verdict)));
     claim_next_look(t);
-    if (c.verdict != VERDICT_INCONCLUSIVE)
+    if (verdict_decides(c.verdict))
         finish(v, t, NULL);
     else if (t->next == NUM_LOOKS)
         finish(v, t, t->looks == &alpha_spending_single ? NULL : "all looks are taken");

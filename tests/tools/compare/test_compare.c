@@ -3,6 +3,8 @@
 #include "tests/support/simulate.h"
 
 #include "tools/compare/pyramid.h"
+#include "tools/compare/region.h"
+#include "tools/compare/verdict.h"
 #include "compare_must.h"
 
 #include <gsl/gsl_cdf.h>
@@ -68,7 +70,7 @@ TEST(test_by_hand)
     double level = 0.05 * c.statistic[STATISTIC_IMAGE].share / 4;
     double reach = gsl_cdf_tdist_Qinv(level / 2, 10240) + gsl_cdf_tdist_Qinv(0.05, 10240);
     assert_near(c.mdb_global, reach * 0.25 + 1e-5 * 1.01, 1e-4);
-    assert_int_equal(c.verdict, VERDICT_INCONCLUSIVE); /* 5 % would have been missed */
+    assert_int_equal(c.verdict, VERDICT_NOTHING_FOUND);
     comparison_free(&c);
 
     /* Without noise the RMS is the root of the mean square: half the pixels off by 0.3 of mean 2. */
@@ -251,7 +253,7 @@ TEST(test_half_pixel_shift)
             }
     }
     struct compare_options opt = {1e-3, 0, 0, 4, 0};
-    assert_int_equal(verdict_of(&m[0], &m[1], opt), VERDICT_EQUIVALENT);
+    assert_int_equal(verdict_of(&m[0], &m[1], opt), VERDICT_NOTHING_FOUND);
     struct comparison c = compare(&m[2], &m[0], opt);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_near(c.global[3].difference, 0, 0.01);
@@ -275,7 +277,7 @@ TEST(test_noise_free)
     struct compare_options opt = {1e-3, 0, 0, 4, 0}, margin = {1e-3, 0.01, 0.02, 4, 0};
     constant(&a, 15, 64);
     constant(&b, 15 * (1 + 3e-6), 64);
-    assert_int_equal(verdict_of(&a, &b, opt), VERDICT_EQUIVALENT);
+    assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
     assert_int_equal(verdict_of(&a, &b, margin), VERDICT_EQUIVALENT);
     constant(&b, 15.1, 64); /* 0.7 %: inside the margins */
     assert_int_equal(verdict_of(&a, &b, margin), VERDICT_EQUIVALENT);
@@ -297,7 +299,7 @@ TEST(test_noise_free)
         COMPARISON c = compare(&a, &b, opt);
         /* event 1, a luminance of 0.1 in one pixel, tolerance 1e-5 0.1 */
         assert_near(c.worst.log10_p * log(10), -n * (0.1 - 1e-6), 0.02 * n * 0.1);
-        assert_int_equal(c.verdict, n == 64 ? VERDICT_EQUIVALENT : VERDICT_DIFFERENT);
+        assert_int_equal(c.verdict, n == 64 ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
     }
 }
 
@@ -358,7 +360,7 @@ TEST(test_rounding_noise)
     struct compare_options opt = {1e-3, 0, 0, 2, 0};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
     set_all(&b, 1000, 0.5 * (1 + 1e-7), 1000 * 2.5e-17, 0);
-    assert_int_equal(verdict_of(&a, &b, opt), VERDICT_EQUIVALENT);
+    assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
     set_all(&b, 1000, 0.5 * (1 + 1e-3), 1000 * 2.5e-17, 0);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_DIFFERENT);
 }
@@ -492,6 +494,74 @@ TEST(test_extra_factor)
                   equivalent[0], equivalent[1]);
     assert_true(equivalent[0] >= 51);
     assert_true(equivalent[1] < 30);
+}
+
+/* No margin, no EQUIVALENT: with too few samples to see half the light gone in a tile, what is said is
+ * that a tile could hide more than that. 32 x 32 pixels, v = 1 a pixel and side: a tile's standard error is
+ * sqrt(512)/256 = 0.088. */
+TEST(test_nothing_found)
+{
+    MOMENTS a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "replicate");
+    set_all(&a, 101, 1, 10100, 0);
+    set_all(&b, 101, 1, 10110, 0);
+    for (int i = 0; i < 3 * 32 * 32; i++)
+        if (i / 3 % 32 < 16 && i / 3 / 32 < 16)
+            a.mean[i] = 0.7;
+    COMPARISON c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0});
+    assert_int_equal(c.verdict, VERDICT_NOTHING_FOUND);
+    assert_true(c.mdb_tile > 0.3 && c.mdb_tile < 8 * 0.088);
+    char image[32], tile[32], wanted[256];
+    snprintf(wanted, sizeof wanted, "an error of %s of the image or of %s of a tile",
+             region_mdb_text(c.mdb_global, image), region_mdb_text(c.mdb_tile, tile));
+    assert_non_null(strstr(c.reason, wanted));
+    /* 1 % of the image needs (3.1 0.044/0.01)^2 = 190 times the samples: more than is said in numbers. */
+    COMPARISON d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0});
+    assert_int_equal(d.verdict, VERDICT_INCONCLUSIVE);
+    assert_true(d.extra_factor == 100);
+    char more[128];
+    verdict_more_samples(d.extra_factor, "samples", more);
+    assert_non_null(strstr(more, "more than 100 times the samples"));
+    verdict_more_samples(99.94, "samples", more);
+    assert_string_equal(more, "about 99.9 times the samples would decide");
+}
+
+/* A margin of the variance that was asked for stands in every verdict: 3 times the variance, in a few pixels
+ * too skewed to be tested; within the margin, and not known well enough for it; a side without noise. */
+TEST(test_margin_of_variance)
+{
+    const struct {
+        double times, margin;
+        bool in_few, exact;
+        enum verdict verdict;
+        const char *says;
+    } cases[] = {
+        {3, 0.5, true, false, VERDICT_INCONCLUSIVE, "too skewed"},
+        {1.02, 0.2, false, false, VERDICT_EQUIVALENT, "; the variance is "},
+        {1.02, 0.02, false, false, VERDICT_INCONCLUSIVE, "not inside the margin of 2 %"},
+        {3, 0.5, false, false, VERDICT_DIFFERENT, "beyond the margin of 50 %"},
+        {1, 0.5, false, true, VERDICT_INCONCLUSIVE, "could not be tested, as a side has none"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+        uint64_t seed = 3;
+        set_all(&b, 101, 1, 1e-4, 0);
+        set_all(&a, 101, 1, cases[i].times * 1e-4, 0);
+        for (int p = 0; p < 16 * 16; p++)
+            for (int c = 0; c < 3; c++) {
+                double few = p < 2 ? 100 : 1e-3;
+                a.m2[3 * p + c] *= cases[i].in_few ? few : 0.5 + uniform(&seed);
+                b.m2[3 * p + c] *= cases[i].in_few ? few : 0.5 + uniform(&seed);
+            }
+        if (cases[i].exact) {
+            constant(&b, 1, 1);
+            strcpy(b.unit, "exact");
+        }
+        COMPARISON c =
+            compare(&a, &b, (struct compare_options){1e-3, 0.1, 0.4, 16, cases[i].margin});
+        print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
+        assert_int_equal(c.verdict, cases[i].verdict);
+        assert_non_null(strstr(c.reason, cases[i].says));
+    }
 }
 
 /* A channel swap that keeps luminance: caught in R, G and B. */

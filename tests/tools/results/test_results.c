@@ -240,6 +240,41 @@ TEST(bad_file)
     json_decref(root);
 }
 
+/* NO DIFFERENCE FOUND has passed where no more could have been missed, of the image and of a tile, than was
+ * accepted; the fixture's MDBs are 0.7 % and 9 %. */
+TEST(accepted_mdb)
+{
+    static const struct {
+        const char *accepted;
+        bool passes;
+    } row[] = {{"[0.007, 0.09]", true},
+               {"[0.0069, 0.09]", false},
+               {"[0.007, 0.089]", false},
+               {NULL, false}};
+    for (size_t i = 0; i < COUNT(row); i++)
+        for (int passed = 0; passed < 2; passed++) {
+            json_t *claim = claim_with("NO DIFFERENCE FOUND", "NO DIFFERENCE FOUND");
+            set(claim, "mdb_global", "0.007");
+            set(claim, "mdb_tile", "0.09");
+            set(claim, "passed", passed ? "true" : "false");
+            if (row[i].accepted != NULL)
+                set(claim, "accept_mdb", row[i].accepted);
+            if (passed != row[i].passes) {
+                expect_claim_rejected(claim, "'passed' contradicts 'verdict' and 'expected'");
+                continue;
+            }
+            json_t *root = results_of(1, &claim), *out;
+            struct err e;
+            char *text = json_dumps(root, 0);
+            test_write(test_path("results.json"), text, strlen(text));
+            free(text);
+            MUST(results_read(test_path("results.json"), &out, &e));
+            assert_int_equal(results_exit_code(out), passed ? 0 : 2);
+            json_decref(out);
+            json_decref(root);
+        }
+}
+
 TEST(exit_codes)
 {
     static const struct {
@@ -253,6 +288,9 @@ TEST(exit_codes)
         {{"EQUIVALENT"}, {"DIFFERENT"}, 1},
         {{"INCONCLUSIVE"}, {"EQUIVALENT"}, 2},
         {{"INCONCLUSIVE"}, {"DIFFERENT"}, 2},
+        {{"NO DIFFERENCE FOUND"}, {"EQUIVALENT"}, 2},
+        {{"NO DIFFERENCE FOUND"}, {"DIFFERENT"}, 2},
+        {{"DIFFERENT"}, {"NO DIFFERENCE FOUND"}, 1},
         {{NULL}, {"EQUIVALENT"}, 3},
         {{"EQUIVALENT", "DIFFERENT", "EQUIVALENT"}, {"EQUIVALENT", "DIFFERENT", "EQUIVALENT"}, 0},
         {{"EQUIVALENT", "INCONCLUSIVE", "DIFFERENT"},
@@ -291,8 +329,8 @@ TEST(exit_codes)
     json_decref(root);
 }
 
-/* Four claims that need every width rule: a scene name with a two-byte letter, a value that rounds
- * to zero from below, a large one, and one without numbers. */
+/* Claims that need every width rule: a scene name with a two-byte letter, a value that rounds to zero from
+ * below, a large one, one that no test covers, and two without numbers, for one reason. */
 static json_t *table_results(void)
 {
     json_t *a = claim_with("EQUIVALENT", "EQUIVALENT");
@@ -308,10 +346,14 @@ static json_t *table_results(void)
     set(c, "difference", "-0.000001");
     set(c, "ci", "[-0.5, 0.5]");
     set(c, "mdb_global", "1.25");
-    return results_of(4, (json_t *[]){a, b, c, parse(error_claim)});
+    json_t *d = claim_with("NO DIFFERENCE FOUND", "EQUIVALENT");
+    set(d, "mdb_global", "1e6");
+    json_t *again = parse(error_claim);
+    set(again, "scene", "\"23\"");
+    return results_of(6, (json_t *[]){a, b, c, d, parse(error_claim), again});
 }
 
-/* Widths by the rule: 10, 10, 7, 26, 7, 8, 12, 10 columns, two spaces between. */
+/* Widths by the rule: 10, 10, 7, 26, 7, 8, 19, 10 columns, two spaces between. */
 TEST(tables)
 {
     static const char *const expected[] = {"tests/tools/results/table.expected",
