@@ -435,9 +435,9 @@ TEST(page_is_whole)
     }
     static const char claim[] = "//article[@id='claim-0']";
     static const char *const in_claim[] = {
-        "assay validate --only this",        "7, 8",
-        "shift by x of 0.48 [0.46, 0.5] px", "explains 93",
-        "1.9 times that of B [1.8, 2]",      "assay golden approve 41_cornell/cycles"};
+        "assay validate --only this",   "7, 8",
+        "shift by x of 0.48 px",        "removes 93",
+        "1.9 times that of B [1.8, 2]", "assay golden approve 41_cornell/cycles"};
     for (size_t i = 0; i < COUNT(in_claim); i++)
         assert_text_has(doc, claim, 0, in_claim[i]);
     assert_text_has(doc, "//article[@id='claim-0']//table", 0, "the image <red>");
