@@ -7,17 +7,25 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Mean luminance of a over that of b, by one mask: what shines, and what is cut off, tells nothing. */
+/* Mean luminance, by a mask: what shines, and what is cut off, tells nothing. */
+static double brightness(const struct rubric *r, const double *mean, int width, int height,
+                         const unsigned char *use)
+{
+    double sum = 0, num = 0;
+    for (size_t p = 0; p < (size_t)width * (size_t)height; p++)
+        if (use[p] && !rubric_masks(r, width, height, p)) {
+            for (size_t c = 0; c < 3; c++)
+                sum += luminance_weight[c] * mean[3 * p + c];
+            num++;
+        }
+    return num > 0 ? sum / num : 0;
+}
+
 static double ratio_of(const struct rubric *r, const double *a, const double *b, int width,
                        int height, const unsigned char *use)
 {
-    double sum_a = 0, sum_b = 0;
-    for (size_t p = 0; p < (size_t)width * (size_t)height; p++)
-        for (size_t c = 0; use[p] && !rubric_masks(r, width, height, p) && c < 3; c++) {
-            sum_a += luminance_weight[c] * a[3 * p + c];
-            sum_b += luminance_weight[c] * b[3 * p + c];
-        }
-    return sum_b > 0 ? sum_a / sum_b : 0;
+    double below = brightness(r, b, width, height, use);
+    return below > 0 ? brightness(r, a, width, height, use) / below : 0;
 }
 
 /* use[p] = 0 where the image is as bright as the brightest code. */
@@ -28,46 +36,74 @@ static void leave_bright(const double *mean, size_t pixels, double clip, unsigne
             use[i / 3] = 0;
 }
 
-/* Correlation of the tiles' luminance with that of the reference; the largest over mirrored images, as a camera may
- * be wrong in that way. */
-static bool likeness(const struct submitted_image *s, const struct moments *m, double *best,
-                     struct err *e)
+/* Luminance of an image's tiles, to be freed; NULL: out of memory. */
+static double *tiles_of(const double *mean, int width, int height, double clip)
 {
-    int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE;
-    double *tiles = calloc(2 * (size_t)columns * (size_t)rows, sizeof *tiles);
-    *best = -1;
-    if (tiles == NULL)
-        return err_set(e, "out of memory");
-    double *theirs = tiles, *ours = tiles + columns * rows;
-    for (int y = 0; y < rows * RUBRIC_TILE; y++)
+    int columns = width / RUBRIC_TILE, rows = height / RUBRIC_TILE;
+    double *tile = calloc((size_t)columns * (size_t)rows, sizeof *tile);
+    for (int y = 0; tile != NULL && y < rows * RUBRIC_TILE; y++)
         for (int x = 0; x < columns * RUBRIC_TILE; x++)
-            for (int c = 0; c < 3; c++) {
-                int tile = y / RUBRIC_TILE * columns + x / RUBRIC_TILE;
-                size_t i = 3 * ((size_t)y * (size_t)s->width + (size_t)x) + (size_t)c;
-                theirs[tile] += luminance_weight[c] * fmin(s->mean[i], s->clip);
-                ours[tile] += luminance_weight[c] * fmin(m->mean[i], s->clip);
-            }
+            for (size_t c = 0; c < 3; c++)
+                tile[y / RUBRIC_TILE * columns + x / RUBRIC_TILE] +=
+                    luminance_weight[c] *
+                    fmin(mean[3 * ((size_t)y * (size_t)width + (size_t)x) + c], clip);
+    return tile;
+}
+
+/* Of two images' tiles, the largest over mirrored ones, as a camera may be wrong in that way. */
+static double correlation(const double *u, const double *v, int columns, int rows)
+{
+    double n = columns * rows, best = -1;
     for (int flip = 0; flip < 4; flip++) {
-        double n = columns * rows, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+        double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
         for (int t = 0; t < columns * rows; t++) {
             int x = t % columns, y = t / columns;
             x = flip & 1 ? columns - 1 - x : x;
             y = flip & 2 ? rows - 1 - y : y;
-            double u = theirs[y * columns + x], v = ours[t];
-            a += u;
-            b += v;
-            aa += u * u;
-            bb += v * v;
-            ab += u * v;
+            double p = u[y * columns + x], q = v[t];
+            a += p;
+            b += q;
+            aa += p * p;
+            bb += q * q;
+            ab += p * q;
         }
         double spread = (aa - a * a / n) * (bb - b * b / n);
-        *best = fmax(*best, spread > 0 ? (ab - a * b / n) / sqrt(spread) : -1);
+        best = fmax(best, spread > 0 ? (ab - a * b / n) / sqrt(spread) : -1);
     }
-    free(tiles);
-    return true;
+    return best;
 }
 
-static const double least_likeness = 0.5;
+/* Standard deviation over mean. */
+static double spread_of(const double *tile, int num)
+{
+    double sum = 0, squares = 0;
+    for (int i = 0; i < num; i++) {
+        sum += tile[i];
+        squares += tile[i] * tile[i];
+    }
+    return sum > 0 ? sqrt(fmax(0, num * squares / (sum * sum) - 1)) : INFINITY;
+}
+
+/* Does it show what m shows? Of what is nearly of one radiance nothing can be seen but that it is; then what is seen there has to be in
+ * the program's image b of the scene as well. b NULL: that is not asked. */
+static bool is_like(const struct submitted_image *s, const struct moments *m,
+                    const struct submitted_image *b, bool *is, struct err *e)
+{
+    static const double least = 0.5, even = 0.15, noisy = 0.3;
+    int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE, num = columns * rows;
+    double *theirs = tiles_of(s->mean, s->width, s->height, s->clip),
+           *ours = tiles_of(m->mean, s->width, s->height, s->clip),
+           *other = b != NULL ? tiles_of(b->mean, s->width, s->height, b->clip) : NULL;
+    bool ok = (theirs != NULL && ours != NULL && (b == NULL || other != NULL)) ||
+              err_set(e, "out of memory");
+    *is = ok && (correlation(theirs, ours, columns, rows) >= least ||
+                 (spread_of(ours, num) < even && spread_of(theirs, num) < noisy &&
+                  (b == NULL || correlation(theirs, other, columns, rows) >= least)));
+    free(theirs);
+    free(ours);
+    free(other);
+    return ok;
+}
 
 /* Only that it draws the scene matters for its times. */
 static bool carry_growth(const struct rubric *r, const struct answer_key *a, int set,
@@ -75,10 +111,10 @@ static bool carry_growth(const struct rubric *r, const struct answer_key *a, int
                          struct result *out, struct err *e)
 {
     struct result other = *out;
-    double like;
-    if (!likeness(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), &like, e))
+    bool is;
+    if (!is_like(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), NULL, &is, e))
         return false;
-    if (like < least_likeness)
+    if (!is)
         return true;
     grade_checks_growth(r, c, h, &other);
     if (other.share <= out->share)
@@ -88,31 +124,51 @@ static bool carry_growth(const struct rubric *r, const struct answer_key *a, int
     return true;
 }
 
+/* Is the ratio of two images one that others do not have? */
+static bool is_telling(double ratio)
+{
+    return fabs(log(ratio)) > 0.1;
+}
+
 /* An image that shows no more than the earlier one has the ratio B/P: half way there nothing is left. */
 static struct margin margin_of(const struct margin *given, double expected)
 {
-    static const double telling = 0.1, least = 0.5;
+    static const double least = 0.5;
     struct margin m = *given;
-    if (fabs(log(expected)) > telling)
+    if (is_telling(expected))
         m.none = fmin(m.none, least * fabs(log(expected)));
     m.full = fmin(m.full, 0.5 * m.none);
     return m;
+}
+
+/* P/B as it should be where a wrong BSDF makes B, direct light, s times as bright: each bounce has the factor once more. Of an image
+ * of all bounces their radiances are taken for a geometric series; an image that is darker than B shows the last alone. */
+static double ratio_of_bounces(double right, double s, int bounces)
+{
+    if (right < 1)
+        return right * pow(s, bounces - 1);
+    double q[2] = {0, 1}, sum[2];
+    for (int step = 0; step < 40; step++) {
+        double mid = (q[0] + q[1]) / 2;
+        sum[0] = sum[1] = 1;
+        for (int k = 1; k < bounces; k++) {
+            sum[0] = 1 + mid * sum[0];
+            sum[1] = 1 + s * mid * sum[1];
+        }
+        q[sum[0] > right] = mid;
+    }
+    return sum[1];
 }
 
 static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
                         const struct submitted_images *h, const struct rubric_check *c,
                         struct result *out, struct err *e)
 {
-    double like;
     const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
     const struct moments *rp = answer_key_image(a, set, c->images[0]),
                          *rb = answer_key_image(a, set, c->after);
     if (b->mean == NULL || p->width != b->width || p->height != b->height ||
         strcmp(p->sha256, b->sha256) == 0)
-        return true;
-    if (!likeness(p, rp, &like, e))
-        return false;
-    if (like < least_likeness)
         return true;
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     const double clip = rubric_sight_clip(r);
@@ -129,6 +185,12 @@ static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     double right = ratio_of(r, rp->mean, rb->mean, p->width, p->height, use),
            theirs = ratio_of(r, p->mean, b->mean, p->width, p->height, own);
     double v = log(theirs / right);
+    if (r->image[c->after].bounces == 1 && r->image[c->images[0]].bounces > 1) {
+        double s = brightness(r, b->mean, p->width, p->height, own) /
+                   brightness(r, rb->mean, p->width, p->height, use);
+        double w = log(theirs / ratio_of_bounces(right, s, r->image[c->images[0]].bounces));
+        v = fabs(w) < fabs(v) ? w : v;
+    }
     for (size_t k = 0; k < pixels; k++)
         use[k] = use[k] && own[k];
     double other = log(ratio_of(r, p->mean, b->mean, p->width, p->height, use) /
@@ -136,7 +198,10 @@ static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     free(use);
     if (isnan(v) || fabs(other) < fabs(v))
         v = other;
-    if (!isfinite(v))
+    bool is;
+    if (!is_like(p, rp, is_telling(right) ? NULL : b, &is, e))
+        return false;
+    if (!isfinite(v) || !is)
         return true;
     const struct interval i = {v, v, v, 0};
     const struct margin m = margin_of(&c->carried, right);
@@ -274,8 +339,10 @@ bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int se
         const struct rubric_image *p = &r->image[c->images[0]];
         if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(h, c))
             continue;
+        /* Deviations that are accepted are not recognised where a mistake is in all images that show them. */
         if (c->after >= 0 && was_lost(r, c, c->after, p, share))
-            ok = carry_ratio(r, a, set, h, c, &result[i], e);
+            for (int k = 0; ok && k < r->num_sets; k++)
+                ok = carry_ratio(r, a, k, h, c, &result[i], e);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
             ok = carry_rates(r, a, set, h, c, &result[i], e);
         else if (c->kind == CHECK_GROWTH)
