@@ -73,7 +73,7 @@ TEST(each_broken_rule_is_seen)
          "a light is"},
         {"matt.dae", "<area><color>2.5 2.5 2.5</color></area>",
          "<point><color>1 1 1</color></point>", "attenuations"},
-        {"ball.dae", " -1.354062 ", " 1.354062 ", "its own axis"},
+        {"lights.dae", " -0.8700628 ", " 0.8700628 ", "its own axis"},
         {"matt.dae", "<material id=\"matt\" name=\"matt\">", "<material id=\"matt\">",
          "a material has"},
         {"matt.dae", "target=\"#matt\"", "target=\"#mat\"", "a material has"},
