@@ -17,7 +17,8 @@ bool bug_list(const char *dir, struct catalogue *c, struct err *e)
 {
     DIR *d = opendir(dir);
     bool ok = d != NULL || err_set(e, "%s: cannot be read", dir);
-    c->bug = calloc(MOST_BUGS, sizeof *c->bug);
+    if (c->bug == NULL)
+        c->bug = calloc(MOST_BUGS, sizeof *c->bug);
     ok = ok && (c->bug != NULL || err_set(e, "out of memory"));
     for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
         char path[4400];

@@ -4,7 +4,7 @@
 
 #include "tools/diagnose/catalogue.h"
 
-/* All NAME.patch of a directory, by name, into c->bug; catalogue_free() frees it. */
+/* All NAME.patch of a directory into c->bug, beside those that are there, by name; catalogue_free() frees it. */
 bool bug_list(const char *dir, struct catalogue *c, struct err *e)
     __attribute__((warn_unused_result));
 

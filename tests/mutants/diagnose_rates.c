@@ -408,7 +408,7 @@ int main(int argc, char **argv)
     r.build = argv[1];
     bool ok = suite_load("reference/scenes", &r.suite, &e) &&
               catalogue_read("golden/diagnose", &r.c, &e) &&
-              catalogue_current(&r.c, "tests/mutants", &e);
+              catalogue_current(&r.c, "tests/mutants", NULL, &e);
     if (ok)
         printf(
             "# How often a bug is named rightly\n\nWritten by `make diagnose-rates` (`tests/mutants/diagnose_rates.c`); "

@@ -1,7 +1,7 @@
 #!/bin/bash
-# tests/mutants/mutants.sh [--build-only | --quick | --table FILE] [--seconds S] BUILD [NAME...]
+# tests/mutants/mutants.sh [--build-only | --quick | --table FILE] [--seconds S] [--patches DIR] BUILD [NAME...]
 #
-# Builds each bug of tests/mutants (or those named) into a renderer of its own,
+# Builds each bug of DIR (tests/mutants; or those named) into a renderer of its own,
 # BUILD/mutants/NAME/pathtracer (A+B: both in one), and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
 # as there are processors. Mutants follow one path at a time; "none" is the renderer as it is, of which nothing may differ.
@@ -13,18 +13,19 @@
 # is "N caught, N missed"; exits 1 if one was missed.
 set -u
 export LC_ALL=C
-build_only='' quick='' table='' seconds=120
+build_only='' quick='' table='' seconds=120 patches=tests/mutants
 while [[ ${1:-} == --* ]]; do
     case $1 in
     --build-only) build_only=1 ;;
     --quick) quick=1 ;;
     --table) table=${2:?} && shift ;;
     --seconds) seconds=${2:?} && shift ;;
+    --patches) patches=${2:?} && shift ;;
     *) echo "tests/mutants/mutants.sh: unknown option $1" >&2 && exit 3 ;;
     esac
     shift
 done
-build=$(realpath "${1:?usage: tests/mutants/mutants.sh [--build-only | --quick | --table FILE] [--seconds S] BUILD [NAME...]}")
+build=$(realpath "${1:?usage: tests/mutants/mutants.sh [--build-only | --quick | --table FILE] [--seconds S] [--patches DIR] BUILD [NAME...]}")
 shift
 names=("$@") only=()
 if [ -n "$quick" ]; then
@@ -32,7 +33,7 @@ if [ -n "$quick" ]; then
     names=(none light_pdf_unnormalised samples_repeat pixels_minus_one)
     only=(--only 10_furnace_one --only 12_point_plane)
 fi
-[ ${#names[@]} -gt 0 ] || names=(none $(basename -s .patch -a tests/mutants/*.patch))
+[ ${#names[@]} -gt 0 ] || names=(none $(basename -s .patch -a "$patches"/*.patch))
 # The flags that make compiled the renderer with.
 compile=$(make -s --no-print-directory BUILD="$build" print-compile)
 libs=$(make -s --no-print-directory BUILD="$build" print-libs)
@@ -46,14 +47,14 @@ build_mutant() {
     mkdir -p "$dir"
     [ "$1" = none ] && { cp "$build/pathtracer" "$dir" && return; }
     cp -r renderer "$dir/renderer"
-    local patches
-    IFS=+ read -ra patches <<<"$1"
-    patches=("${patches[@]/#/tests/mutants/}") && patches=("${patches[@]/%/.patch}")
-    for file in "${patches[@]}"; do
+    local files
+    IFS=+ read -ra files <<<"$1"
+    files=("${files[@]/#/$patches/}") && files=("${files[@]/%/.patch}")
+    for file in "${files[@]}"; do
         patch --quiet --fuzz=0 --no-backup-if-mismatch -p1 -d "$dir" <"$file" || return 1
     done
     # A header changes all that includes it: make's dependency files know.
-    for file in $(sed -n 's,^+++ b/,,p' "${patches[@]}" | sort -u); do
+    for file in $(sed -n 's,^+++ b/,,p' "${files[@]}" | sort -u); do
         case $file in
         *.h) changed+=" $(cd "$build" && grep -rl "$file" renderer --include=*.c.d | sed 's,\.d$,,')" ;;
         *) changed+=" $file" ;;
@@ -128,7 +129,7 @@ one_and_tell() {
 }
 
 mkdir -p "$build/mutants"
-export build build_only compile libs kernels
+export build build_only patches compile libs kernels
 export only_scenes="${only[*]:-}" budget="--until-different --budget ${seconds}s"
 [ -n "$quick" ] && export budget=''
 export -f build_mutant find_claim run_mutant one_and_tell

@@ -22,6 +22,8 @@ const double bug_fit_largest_excess = 6;
 static const double least_light = 1e-3;
 /* Two bugs that add more than so many times the light that is there add up. */
 static const double much_light = 2;
+/* Of the difference between product and sum: how well is known what two bugs do together. */
+static const double unsure = 0.5;
 
 /* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
  * than the correct renderer has at as many samples is not believed. */
@@ -100,8 +102,9 @@ static void add_facts(const struct observation *clue, const struct effect *e, do
         double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
         t->log_likelihood += student(z2, var, fact_dof);
         t->chi2 += fmin(z2, 100);
-        t->left += fmin(z2, 1e4) - 1;
-        t->all += fmin(all, 1e4) - 1;
+        t->fact = fmax(t->fact, z2);
+        t->left += fmax(0, fmin(z2, 1e4) - 1);
+        t->all += fmax(0, fmin(all, 1e4) - 1);
         t->chi2_mean++;
         t->cells++;
     }
@@ -114,14 +117,15 @@ static void add_view(const struct observation *clue, const struct effect *e, dou
     double scale = signature_mean(&clue->view->correct);
     for (int i = 0; i < clue->seen.columns * clue->seen.rows; i++)
         add_cell(clue, e, amplitude, factor, scale, i, t);
+    t->left = fmax(0, t->left);
+    t->all = fmax(0, t->all);
     add_facts(clue, e, amplitude, t);
 }
 
 static double value_of_two(double c, double a, double b, double least, double clip)
 {
-    if (c <= least || (a > much_light * c && b > much_light * c))
-        return a + b;
-    double both = fmax((c + a) * (c + b) / c, 0);
+    bool adds = c <= least || (a > much_light * c && b > much_light * c);
+    double both = adds ? c + a + b : fmax((c + a) * (c + b) / c, 0);
     return (clip > 0 ? fmin(both, clip) : both) - c;
 }
 
@@ -140,7 +144,8 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, d
         bool is_product = light > least;
         room->mean[i] = (float)both;
         room->var[i] = (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
-                               (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1));
+                               (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1) +
+                               pow(unsure * (both - x - y), 2));
     }
     for (int f = 0; f < NUM_FACTS; f++) {
         room->fact[f] = a->fact[f] + b->fact[f] - c->fact[f];
@@ -171,6 +176,7 @@ static void sum_up(struct tally *to, const struct tally *t)
     to->chi2 += t->chi2;
     to->chi2_mean += t->chi2_mean;
     to->cells += t->cells;
+    to->fact = fmax(to->fact, t->fact);
     to->left += t->left;
     to->all += t->all;
 }
@@ -332,7 +338,8 @@ double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *cl
     *clue = -1;
     for (int k = 0; k < f->num_clues; k++) {
         struct tally t = bug_fit_view(f, k, c);
-        bool is_noise = t.chi2 - t.chi2_mean <= bug_fit_largest_excess * sqrt(2 * t.cells);
+        bool is_noise = t.chi2 - t.chi2_mean <= bug_fit_largest_excess * sqrt(2 * t.cells) &&
+                        t.fact <= pow(bug_fit_largest_excess, 2);
         double left = is_noise ? 0 : t.all > 0 ? t.left / t.all : 1;
         if (left > worst) {
             worst = left;

@@ -8,7 +8,9 @@
 struct tally {
     double log_likelihood;
     double chi2, chi2_mean, cells; /* of what is left; its mean if that is noise */
-    double left, all;              /* in the same weights: what is left, and without the bug */
+    double fact;                   /* the largest z^2 of a fact */
+    double left,
+        all; /* in the same weights: what is left, and without the bug; of a view at least 0 */
 };
 
 struct bug_fit {
@@ -31,7 +33,7 @@ bool bug_fit_start(const struct catalogue *c, const struct observation *clue, in
 void bug_fit_end(struct bug_fit *f);
 
 /* What two bugs do to a view: where each changes a cell by a factor, the product of both; where the correct image
- * is dark, or both add more than twice its light, the sum. second -1: `bug` alone. NULL: nothing at all; else the
+ * is dark, or both add more than twice its light, the sum. Half the difference between the two is a standard deviation. second -1: `bug` alone. NULL: nothing at all; else the
  * catalogue's, or *room. */
 const struct effect *bug_fit_effect(const struct view *v, int bug, int second, double clip,
                                     struct effect *room);
@@ -44,7 +46,8 @@ double bug_fit_refine(const struct bug_fit *f, int bug, double at);
 
 /* Is the effect there, and at its full strength: of two bugs each, where the other is taken for granted? */
 bool bug_fit_is_full(const struct bug_fit *f, const struct candidate *c);
-/* The largest share of its difference that a view keeps where what is left is no noise, and which view; -1 and 0: none. */
+/* The largest share of its difference that a view keeps where what is left, in cells or a fact, is no noise, and which view; -1
+ * and 0: none. */
 double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *clue);
 
 /* One view by a candidate; NULL: without a bug. */

@@ -71,6 +71,19 @@ bool catalogue_view_scene(const struct view *v, const struct suite *suite,
     return true;
 }
 
+void catalogue_mistake(const struct bug *b, char name[64])
+{
+    snprintf(name, sizeof b->name, "%.*s", (int)strcspn(b->name, "-"), b->name);
+}
+
+bool catalogue_same_mistake(const struct bug *a, const struct bug *b)
+{
+    char x[sizeof a->name], y[sizeof b->name];
+    catalogue_mistake(a, x);
+    catalogue_mistake(b, y);
+    return strcmp(x, y) == 0;
+}
+
 /* ---- patches */
 
 static bool header_line(const char *line, const char *key, char *out, size_t size)
@@ -125,14 +138,15 @@ bool catalogue_bug_of_patch(const char *path, struct bug *out, struct err *e)
     return true;
 }
 
-bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct err *e)
+/* How many patches a directory has, all of which are in the catalogue. */
+static bool has_patches(const struct catalogue *c, const char *patch_dir, int *patches,
+                        struct err *e)
 {
     static const char end[] = ".patch";
     DIR *d = opendir(patch_dir);
     if (d == NULL)
         return err_set(e, "%s: %s", patch_dir, strerror(errno));
     bool ok = true;
-    int patches = 0;
     for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
         size_t n = strlen(entry->d_name);
         struct bug bug;
@@ -146,12 +160,21 @@ bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct 
         else if (ok && strcmp(bug.patch_sha256, c->bug[b].patch_sha256) != 0)
             ok = err_set(e, "%s: has changed since the catalogue of bugs was made: make catalogue",
                          path.s);
-        patches++;
+        ++*patches;
     }
     closedir(d);
-    return ok && (patches == c->num_bugs ||
-                  err_set(e, "the catalogue has %d bugs, %s has %d: make catalogue", c->num_bugs,
-                          patch_dir, patches));
+    return ok;
+}
+
+bool catalogue_current(const struct catalogue *c, const char *patch_dir, const char *other_dir,
+                       struct err *e)
+{
+    int patches = 0;
+    return has_patches(c, patch_dir, &patches, e) &&
+           (other_dir == NULL || has_patches(c, other_dir, &patches, e)) &&
+           (patches == c->num_bugs ||
+            err_set(e, "the catalogue has %d bugs, %s has %d: make catalogue", c->num_bugs,
+                    patch_dir, patches));
 }
 
 /* ---- writing */

@@ -23,7 +23,7 @@
 #include "signature.h"
 
 struct bug {
-    char name[64];         /* of tests/mutants/NAME.patch */
+    char name[64];         /* of NAME.patch; NAME-VARIANT: catalogue_same_mistake() */
     char what[256];        /* its line "Bug:" */
     char where[160];       /* its line "Where:", the place in the assignment */
     char patch_sha256[65]; /* of what it says, removes and adds, without the lines around */
@@ -75,13 +75,18 @@ const struct view *catalogue_view(const struct catalogue *c, const char *name);
 /* Its number, -1 if there is none. */
 int catalogue_bug(const struct catalogue *c, const char *name);
 
+/* One mistake may stand in a program in several ways: NAME-VARIANT is another way to make the mistake NAME. */
+bool catalogue_same_mistake(const struct bug *a, const struct bug *b);
+/* Its name without the variant. */
+void catalogue_mistake(const struct bug *b, char name[64]);
+
 /* The header lines and the hash of a patch; the bug's name is the file's. Fails if a line is missing. */
 bool catalogue_bug_of_patch(const char *path, struct bug *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Holds the catalogue against a directory of patches: fails, naming the first, if one has no entry, has
- * changed since, or is gone. */
-bool catalogue_current(const struct catalogue *c, const char *patch_dir, struct err *e)
-    __attribute__((warn_unused_result));
+/* Holds the catalogue against the patches of a directory, and of another (NULL: none): fails, naming the first, if one has no
+ * entry, has changed since, or is gone. */
+bool catalogue_current(const struct catalogue *c, const char *patch_dir, const char *other_dir,
+                       struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -113,9 +113,23 @@ static bool gate(const struct observation *clue, int num_clues, double alpha, bo
 
 enum { LEADERS = 8 }; /* of pairs */
 
-static int excluded(const struct catalogue *c, const struct diagnose_options *opt)
+/* With all ways to make the same mistake. */
+static bool is_excluded(const struct catalogue *c, const struct diagnose_options *opt, int bug)
 {
-    return opt->without != NULL ? catalogue_bug(c, opt->without) : -1;
+    int without = opt->without != NULL ? catalogue_bug(c, opt->without) : -1;
+    return without >= 0 && catalogue_same_mistake(&c->bug[bug], &c->bug[without]);
+}
+
+/* Do both name the same mistakes? */
+static bool is_same(const struct catalogue *c, const struct candidate *a, const struct candidate *b)
+{
+    const struct bug *bug = c->bug;
+    if (a->second < 0 || b->second < 0)
+        return a->second == b->second && catalogue_same_mistake(&bug[a->bug], &bug[b->bug]);
+    return (catalogue_same_mistake(&bug[a->bug], &bug[b->bug]) &&
+            catalogue_same_mistake(&bug[a->second], &bug[b->second])) ||
+           (catalogue_same_mistake(&bug[a->bug], &bug[b->second]) &&
+            catalogue_same_mistake(&bug[a->second], &bug[b->bug]));
 }
 
 static void keep_likelier(struct candidate *c, const struct candidate *other)
@@ -130,7 +144,7 @@ static int rank_full(const struct bug_fit *f, const struct diagnose_options *opt
 {
     int num = 0;
     for (int b = 0; b < f->c->num_bugs; b++)
-        if (b != excluded(f->c, opt))
+        if (!is_excluded(f->c, opt, b))
             all[num++] = bug_fit_at(f, b, -1, 1);
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
     return num;
@@ -162,7 +176,8 @@ static int rank_pairs(const struct bug_fit *f, const struct candidate *single, i
     int pairs = 0;
     for (int i = 0; i < num && i < LEADERS; i++)
         for (int k = i + 1; k < num; k++)
-            pair[pairs++] = bug_fit_at(f, single[i].bug, single[k].bug, 1);
+            if (!catalogue_same_mistake(&f->c->bug[single[i].bug], &f->c->bug[single[k].bug]))
+                pair[pairs++] = bug_fit_at(f, single[i].bug, single[k].bug, 1);
     qsort(pair, (size_t)pairs, sizeof *pair, by_likelihood);
     return pairs;
 }
@@ -184,9 +199,10 @@ static bool gate_lead(const struct bug_fit *f, const struct candidate *best, dou
 static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
                            const struct candidate *c)
 {
-    static const double least_noise = 0.8, least_gone = 0.99, most_left = 0.5;
+    static const double least_noise = 0.5, least_gone = 0.99, most_left = 0.5, pair_excess = 2;
     int clue;
-    bool is_noise = c->excess <= bug_fit_largest_excess;
+    bool is_noise =
+        c->excess <= (opt->by_likelihood && c->second >= 0 ? pair_excess : bug_fit_largest_excess);
     if (!opt->by_likelihood)
         return is_noise || c->explained >= least_explained;
     bool is_gone =
@@ -208,25 +224,41 @@ static double tie_of(const struct diagnose_options *opt, const struct candidate 
     return fmax(log(tie), opt->by_likelihood ? variance_error * best->log_likelihood : 0);
 }
 
+/* Is it one of the first num candidates, or another way to make one of these mistakes? */
+static bool is_among(const struct catalogue *c, const struct diagnosis *d, int num,
+                     const struct candidate *one)
+{
+    for (int i = 0; i < num; i++)
+        if (is_same(c, &d->candidate[i], one))
+            return true;
+    return false;
+}
+
+/* Of the ways to make a mistake the likeliest stands for all. */
 static void name(const struct bug_fit *f, const struct diagnose_options *opt,
                  const struct candidate *all, int num, double bound, struct diagnosis *out)
 {
     double sum = 0, named = 0;
-    out->num_named = 0;
-    out->num_candidates = num < DIAGNOSE_CANDIDATES ? num : DIAGNOSE_CANDIDATES;
-    memcpy(out->candidate, all, (size_t)out->num_candidates * sizeof *all);
+    const struct candidate *best = &all[0], *next = out->candidate;
+    out->num_named = out->num_candidates = 0;
+    for (int i = 0; i < num && out->num_candidates < DIAGNOSE_CANDIDATES; i++)
+        if (!is_among(f->c, out, out->num_candidates, &all[i]))
+            out->candidate[out->num_candidates++] = all[i];
     out->finding = FINDING_UNKNOWN;
-    if (num == 0 || all[0].log_likelihood < bound || !is_explanation(f, opt, &all[0]))
+    if (num == 0 || best->log_likelihood < bound || !is_explanation(f, opt, best))
         return;
+    do {
+        out->num_named++;
+        next++;
+    } while (out->num_named < out->num_candidates &&
+             best->log_likelihood - next->log_likelihood <= tie_of(opt, best) &&
+             is_explanation(f, opt, next));
     for (int i = 0; i < num; i++) {
-        double relative = exp(all[i].log_likelihood - all[0].log_likelihood);
+        double relative = exp(all[i].log_likelihood - best->log_likelihood);
+        bool is_named = is_among(f->c, out, out->num_named, &all[i]);
         sum += relative;
-        if (i < out->num_candidates && out->num_named == i &&
-            all[0].log_likelihood - all[i].log_likelihood <= tie_of(opt, &all[0]) &&
-            is_explanation(f, opt, &all[i])) {
-            out->num_named++;
-            named += relative;
-        } else if (opt->by_likelihood && is_near(&all[0], &all[i])) {
+        named += is_named ? relative : 0;
+        if (opt->by_likelihood && !is_named && is_near(best, &all[i])) {
             out->num_named = 0;
             return;
         }
@@ -241,7 +273,8 @@ static bool name_pair(const struct bug_fit *f, const struct diagnose_options *op
 {
     struct diagnosis two = *out;
     bool is_single = out->num_named > 0;
-    if (num == 0 || (is_single && out->candidate[0].excess <= bug_fit_largest_excess))
+    int rest;
+    if (num == 0 || (is_single && bug_fit_worst(f, &out->candidate[0], &rest) == 0))
         return true;
     struct candidate *pair = calloc((size_t)num * LEADERS, sizeof *pair);
     if (pair == NULL)

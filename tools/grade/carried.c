@@ -1,6 +1,7 @@
 #include "carried.h"
 
 #include "rate_image.h"
+#include "stopping_rule.h"
 #include "tools/diagnose/bug_fit.h"
 #include "tools/stats/distributions.h"
 
@@ -263,29 +264,26 @@ static double share_off(const struct cells *s)
     return lit > 0 ? (double)off / lit : 1;
 }
 
-/* As the check itself, but of the number of samples that our renderer with the bugs takes. */
-static bool judge_rates(const struct carry *w, const struct rubric_check *c, int bugs,
-                        struct result *out, struct err *e)
+/* As the check itself, but of the number of samples that the rule takes with the light and the noise that the bugs leave. */
+static bool judge_rates(const struct carry *w, const struct rubric_check *c, struct result *out)
 {
-    int image = c->images[0], first = bugs & 1 ? w->bug[0] : w->bug[1];
+    int image = c->images[0];
     const struct rubric_image *p = &w->r->image[image];
-    const struct view *v = &w->b->catalogue.view[w->b->view[w->with][image]];
-    const struct moments *ours = answer_key_counts(w->a, w->with, image);
-    struct effect *room = malloc(sizeof *room);
+    struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
-    struct err why;
-    if (room == NULL)
-        return err_set(e, "out of memory");
-    const struct effect *effect = bug_fit_effect(v, first, bugs == 3 ? w->bug[1] : -1, 0, room);
-    double more = effect->fact[FACT_SAMPLES] - v->correct.fact[FACT_SAMPLES];
-    free(room);
-    if (!isfinite(more) || w->h->made[image].rates[0] == '\0' ||
-        !rate_image_read(w->h->made[image].rates, p->width, p->height, p->spp, c->batch, ours->n,
-                         &rates, &why))
-        return true; /* which has been said */
-    double value = (1 + rates.more) / exp(more) - 1, odd = rates.odd / fmax(1, rates.pixels),
-           half = stats_normal_quantile(w->alpha / 2) * hypot(rates.sd, effect_error * more);
-    const struct interval count = {value, value - half, value + half, rates.sd},
+    struct err why; /* which has been said */
+    if (w->h->made[image].rates[0] == '\0' ||
+        !rate_image_read(w->h->made[image].rates, p->width, p->height, p->spp, c->batch,
+                         answer_key_counts(w->a, w->with, image)->n, &rates, &why) ||
+        !stopping_rule_samples(p, &w->h->image[image], answer_key_image(w->a, w->with, image), by,
+                               &why))
+        return true;
+    double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
+           odd = rates.odd / fmax(1, rates.pixels),
+           half = stats_normal_quantile(w->alpha / 2) * rates.sd;
+    const struct interval count = {rates.mean / sqrt(least * most) - 1,
+                                   rates.mean / most - 1 - half, rates.mean / least - 1 + half,
+                                   rates.sd},
                           share = {odd, odd, odd, 0};
     out->share = fmin(score_share(&c->share, &share), score_share(&c->count, &count));
     out->chance = score_chance(&c->count, &count);
@@ -305,7 +303,7 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
         *is_judged = *is_judged && rubric_bugs_can_observe(w->b, w->h, w->with, c->images[k]);
     if (ok && *is_judged && c->kind == CHECK_RATES) {
         free(cells);
-        return judge_rates(w, c, bugs, out, e);
+        return judge_rates(w, c, out);
     }
     for (int k = 0; ok && *is_judged && k < images; k++)
         ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);

@@ -1,5 +1,7 @@
 #include "rubric_bugs.h"
 
+#include "stopping_rule.h"
+
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "tools/diagnose/bug_fit.h"
@@ -37,7 +39,16 @@ int rubric_bugs_set(const struct answer_key *a, int set, int image)
     return set;
 }
 
-bool rubric_bugs_key(const struct rubric *r, int image, char key[65], struct err *e)
+bool rubric_bugs_measures(const struct rubric *r, int set)
+{
+    bool single = set == 0;
+    for (int i = 0; i < r->num_accepted; i++)
+        single |= strcmp(r->set[set].name, r->accept[i].name) == 0;
+    return single;
+}
+
+bool rubric_bugs_key(const struct rubric *r, int set, int image, char name[128], char key[65],
+                     struct err *e)
 {
     const struct rubric_image *p = &r->image[image];
     char text[4096], path[8192], scene[65], environment[65] = "";
@@ -51,9 +62,11 @@ bool rubric_bugs_key(const struct rubric *r, int image, char key[65], struct err
     if (p->environment[0] != '\0' && !sha256_file(path, environment, e))
         return false;
     const char *options = p->reference_options[0] != '\0' ? p->reference_options : p->options;
-    snprintf(text, sizeof text, "%s %s %s %d %d %d %d %d %s %s", r->curve, scene, environment,
+    const char *words = r->set[set].words;
+    snprintf(text, sizeof text, "%s %s %s %d %d %d %d %d %s %s%s%s", r->curve, scene, environment,
              p->width, p->height, p->spp, p->lights, p->bounces, options,
-             rubric_sight_counts(r, image) ? p->options : "");
+             rubric_sight_counts(r, image) ? p->options : "", words[0] != '\0' ? " " : "", words);
+    snprintf(name, 128, "%s%s%.70s", p->name, set > 0 ? "@" : "", r->set[set].name);
     sha256_text(text, key);
     return true;
 }
@@ -70,19 +83,87 @@ bool rubric_bugs_observe(const struct rubric_bugs *b, const struct rubric *r,
 {
     const struct view *v = &b->catalogue.view[b->view[set][image]];
     struct answer right = a->of[rubric_bugs_set(a, set, image)][image];
-    right.as_asked = a->of[0][image].as_asked;
+    right.as_asked = *answer_key_counts(a, set, image);
     *out = (struct observation){.view = v, .is_consistent = true};
     return rubric_sight_of_student(r, image, h, &right, &v->correct, &out->seen, e);
 }
 
-static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answer_key *a,
-                 const struct submitted_images *h, int set, struct observation *clue, int *num,
-                 struct err *e)
+/* What is seen of a submission with one set of deviations. */
+struct sights {
+    int num, bugs;
+    struct observation clue[RUBRIC_IMAGES];
+    struct view own[RUBRIC_IMAGES]; /* of counting images; elsewhere effect is NULL */
+};
+
+static void forget(struct sights *s)
 {
-    *num = 0;
+    for (int k = 0; k < s->num; k++) {
+        for (int b = 0; s->own[k].effect != NULL && b < s->bugs; b++)
+            free(s->own[k].effect[b]);
+        free(s->own[k].effect);
+    }
+    *s = (struct sights){0};
+}
+
+static void set_samples(const struct stopping *s, int spp, double *fact, double *fact_sd)
+{
+    static const double ends =
+        4; /* of the range, in standard deviations: 3.3 and several shapes (stopping_rule.c) */
+    fact[FACT_SAMPLES] = log(s->least * s->most / ((double)spp * spp)) / 2;
+    fact_sd[FACT_SAMPLES] = log(s->most / s->least) / 2 / ends;
+}
+
+/* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
+ * what each rule takes with these replaces what the catalogue's bugs took with ours. */
+static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
+                           const struct answer_key *a, const struct submitted_images *h, int set,
+                           int image, struct sights *s, struct err *e)
+{
+    struct stopping by[NUM_STOPPING_KINDS];
+    struct observation *clue = &s->clue[s->num - 1];
+    struct view *own = &s->own[s->num - 1];
+    const int spp = r->image[image].spp;
+    struct err why;
+    if (isnan(clue->seen.fact[FACT_SAMPLES]))
+        return true;
+    if (!stopping_rule_samples(&r->image[image], &h->image[image], answer_key_image(a, set, image),
+                               by, &why)) {
+        clue->seen.fact[FACT_SAMPLES] = NAN;
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    }
+    *own = *clue->view;
+    own->effect = calloc((size_t)b->catalogue.num_bugs, sizeof(struct effect *));
+    if (own->effect == NULL)
+        return err_set(e, "out of memory");
+    set_samples(&by[STOPS_RIGHTLY], spp, own->correct.fact, own->correct.fact_sd);
+    for (int k = 0; k < b->catalogue.num_bugs; k++) {
+        const struct effect *plain = clue->view->effect[k];
+        enum stopping_kind kind = stopping_rule_of(b->catalogue.bug[k].name);
+        if (plain == NULL && kind == STOPS_RIGHTLY)
+            continue;
+        struct effect *mine = calloc(1, sizeof *mine);
+        if (mine == NULL)
+            return err_set(e, "out of memory");
+        if (plain != NULL)
+            *mine = *plain;
+        own->effect[k] = mine;
+        for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
+            mine->fact[f] = mine->fact_sd[f] = NAN;
+        set_samples(&by[kind], spp, mine->fact, mine->fact_sd);
+    }
+    clue->view = own;
+    return true;
+}
+
+static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answer_key *a,
+                 const struct submitted_images *h, int set, struct sights *out, struct err *e)
+{
+    forget(out);
+    out->bugs = b->catalogue.num_bugs;
     for (int i = 0; i < r->num_images; i++)
         if (rubric_bugs_can_observe(b, h, set, i) &&
-            !rubric_bugs_observe(b, r, a, h, set, i, &clue[(*num)++], e))
+            (!rubric_bugs_observe(b, r, a, h, set, i, &out->clue[out->num++], e) ||
+             (rubric_sight_counts(r, i) && !expect_samples(b, r, a, h, set, i, out, e))))
             return false;
     return true;
 }
@@ -97,18 +178,23 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                                    .without = without,
                                    .by_likelihood = true,
                                    .clip = isfinite(clip) ? clip : 0};
-    struct observation *clue = calloc((size_t)r->num_images, sizeof *clue);
-    bool ok = clue != NULL || err_set(e, "out of memory");
-    double best = -INFINITY;
+    struct sights *seen = calloc(1, sizeof *seen);
+    bool ok = seen != NULL || err_set(e, "out of memory");
+    double best = -INFINITY, likeliest = -INFINITY;
+    int likely = set;
     *found = (struct diagnosis){0};
     *with = set;
     for (int k = 0; ok && k < r->num_sets && !(*with == set && found->num_named > 0); k++) {
-        int num, tried = k == 0 ? set : k <= set ? k - 1 : k; /* `set` first */
+        int tried = k == 0 ? set : k <= set ? k - 1 : k; /* `set` first */
         struct diagnosis other;
-        ok = look(b, r, a, h, tried, clue, &num, e);
-        if (!ok || num == 0)
+        ok = look(b, r, a, h, tried, seen, e);
+        if (!ok || seen->num == 0)
             break;
-        ok = diagnose(&b->catalogue, clue, num, &opt, &other, e);
+        ok = diagnose(&b->catalogue, seen->clue, seen->num, &opt, &other, e);
+        if (ok && other.log_likelihood + other.largest_lead > likeliest) {
+            likeliest = other.log_likelihood + other.largest_lead;
+            likely = tried;
+        }
         double likelihood = ok && other.num_named > 0
                                 ? other.log_likelihood + other.candidate[0].log_likelihood
                                 : -INFINITY;
@@ -120,13 +206,19 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
             *with = tried;
         }
     }
-    if (ok && (found->num_named == 0 || found->candidate[0].excess > bug_fit_largest_excess)) {
-        int num;
-        opt.pairs = true;
-        ok = look(b, r, a, h, *with, clue, &num, e) &&
-             (num == 0 || diagnose(&b->catalogue, clue, num, &opt, found, e));
+    /* Two at once, where a single one is told but not all, or with the deviations that look likeliest. */
+    int tried = found->num_named > 0 ? *with : likely;
+    struct diagnosis two;
+    opt.pairs = true;
+    ok = ok && look(b, r, a, h, tried, seen, e) &&
+         (seen->num == 0 || diagnose(&b->catalogue, seen->clue, seen->num, &opt, &two, e));
+    if (ok && seen->num > 0 && (two.num_named > 0 || tried == *with)) {
+        *found = two;
+        *with = tried;
     }
-    free(clue);
+    if (seen != NULL)
+        forget(seen);
+    free(seen);
     return ok;
 }
 
@@ -137,7 +229,7 @@ static bool correct_of(const struct rubric *r, const struct answer *own, int ima
                        struct signature *out, struct err *e)
 {
     bool counts = rubric_sight_counts(r, image) && own->as_asked.width > 0;
-    return rubric_sight_of_render(r, image, counts ? &own->as_asked : &own->m, out, e);
+    return rubric_sight_of_render(r, image, counts, counts ? &own->as_asked : &own->m, out, e);
 }
 
 /* A bug on top of deviations: it changes a cell by the factor by which it changes the right one. */
@@ -159,6 +251,16 @@ static struct effect *derived(const struct effect *e, const struct signature *fr
     return out;
 }
 
+/* The measured set nearest to this one: the last that it contains. */
+static int from_set(const struct rubric *r, int set)
+{
+    int from = 0;
+    for (int k = 1; k < set; k++)
+        if (rubric_bugs_measures(r, k) && strstr(r->set[set].words, r->set[k].words) != NULL)
+            from = k;
+    return from;
+}
+
 static bool derive_view(const struct rubric *r, const struct answer_key *a, int set, int image,
                         struct rubric_bugs *b, struct err *e)
 {
@@ -168,7 +270,7 @@ static bool derive_view(const struct rubric *r, const struct answer_key *a, int 
         return err_set(e, "out of memory");
     c->view = more;
     struct view *v = &c->view[c->num_views];
-    const struct view *plain = &c->view[b->view[0][image]];
+    const struct view *plain = &c->view[b->view[from_set(r, set)][image]];
     *v = *plain;
     v->effect = calloc((size_t)c->num_bugs, sizeof(struct effect *));
     if (v->effect == NULL)
@@ -183,18 +285,19 @@ static bool derive_view(const struct rubric *r, const struct answer_key *a, int 
     return true;
 }
 
-static bool find_view(const struct rubric *r, int image, struct rubric_bugs *b, struct err *e)
+static bool find_view(const struct rubric *r, int set, int image, struct rubric_bugs *b,
+                      struct err *e)
 {
-    char key[65];
-    if (!rubric_bugs_key(r, image, key, e))
+    char name[128], key[65];
+    if (!rubric_bugs_key(r, set, image, name, key, e))
         return false;
-    const struct view *v = catalogue_view(&b->catalogue, r->image[image].name);
+    const struct view *v = catalogue_view(&b->catalogue, name);
     if (v == NULL || strcmp(v->scene_sha256, key) != 0)
         return err_set(
             e,
             "%s: bugs: '%s' has no view '%s', or of another image: make rubric-bugs, or leave out 'bugs'",
-            r->path, r->bugs, r->image[image].name);
-    b->view[0][image] = (int)(v - b->catalogue.view);
+            r->path, r->bugs, name);
+    b->view[set][image] = (int)(v - b->catalogue.view);
     return true;
 }
 
@@ -207,7 +310,8 @@ static bool find_views(const struct rubric *r, const struct answer_key *a, struc
             b->view[k][i] = k > 0 && first < k ? b->view[first][i] : -1;
             if (!rubric_bugs_sees(r, i) || first < k)
                 continue;
-            if (k == 0 ? !find_view(r, i, b, e) : !derive_view(r, a, k, i, b, e))
+            if (rubric_bugs_measures(r, k) ? !find_view(r, k, i, b, e)
+                                           : !derive_view(r, a, k, i, b, e))
                 return false;
         }
     return true;

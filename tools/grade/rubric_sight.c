@@ -12,6 +12,8 @@
 const double rubric_sight_masked = 1e6;
 /* How well the mean of noise that is cut off is known where a program is noisier than ours: of the clipping point. */
 static const double clip_error = 0.02;
+/* Share of the pixels of a rate image that stand for no number of batches. */
+static const double most_odd = 0.05;
 
 static const struct rubric_check *rates_check(const struct rubric *r, int image)
 {
@@ -77,11 +79,11 @@ static double clipped_mean(double mean, double sd, double clip)
     return clip - sd * (z * gsl_cdf_ugaussian_P(z) + gsl_ran_ugaussian_pdf(z));
 }
 
-bool rubric_sight_of_render(const struct rubric *r, int image, const struct moments *m,
-                            struct signature *out, struct err *e)
+bool rubric_sight_of_render(const struct rubric *r, int image, bool as_asked,
+                            const struct moments *m, struct signature *out, struct err *e)
 {
     const struct rubric_image *p = &r->image[image];
-    bool counts = rubric_sight_counts(r, image);
+    bool counts = as_asked && rubric_sight_counts(r, image);
     double clip = rubric_sight_clip(r), sum = 0, squares = 0, pixels = (double)p->width * p->height;
     if (!start(p, out, e))
         return false;
@@ -166,7 +168,7 @@ static double bias_of_codes(double half_bin, double v)
 }
 
 static bool count_samples(const struct rubric *r, int image, const struct answer *right,
-                          const struct made *made, double kappa, struct signature *s, struct err *e)
+                          const struct made *made, struct signature *s, struct err *e)
 {
     const struct rubric_image *p = &r->image[image];
     struct rate_image rates;
@@ -176,9 +178,10 @@ static bool count_samples(const struct rubric *r, int image, const struct answer
     if (!rate_image_read(made->rates, p->width, p->height, p->spp, rates_check(r, image)->batch,
                          right->as_asked.n, &rates, &why)) /* its check has said so */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
+    if (rates.odd > most_odd * rates.pixels) /* not what it stands for */
+        return true;
     s->fact[FACT_SAMPLES] = log(rates.mean / p->spp);
-    /* A program that is noisier by right takes more of them. */
-    s->fact_sd[FACT_SAMPLES] = hypot(rates.sd, log(kappa));
+    s->fact_sd[FACT_SAMPLES] = rates.sd;
     return true;
 }
 
@@ -206,5 +209,5 @@ bool rubric_sight_of_student(const struct rubric *r, int image, const struct sub
         }
     }
     return !rubric_sight_counts(r, image) ||
-           count_samples(r, image, right, &h->made[image], kappa, out, e);
+           count_samples(r, image, right, &h->made[image], out, e);
 }

@@ -3,8 +3,17 @@
 #include <gsl/gsl_randist.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { REPEATS = 8, SHAPES = 3 };
+static const double uncertain = 3.3; /* standard deviations of ln kappa */
+
+/* By the bugs that keep another rule. */
+static const char *const bug_of[NUM_STOPPING_KINDS] = {
+    [STOPS_BY_ONE_SIGMA] = "adaptive_one_sigma", [STOPS_BY_ABSOLUTE] = "adaptive_absolute",
+    [STOPS_BY_N] = "adaptive_without_root",      [STOPS_BY_SIGMA] = "adaptive_without_root-whole",
+    [STOPS_NEVER] = "adaptive_never_stops",
+};
 
 /* A sample is c, or c + a with probability p; p 1: no fluctuation, as if mean and variance were known. */
 struct shape {
@@ -20,14 +29,24 @@ static struct shape shape_of(int kind, double mean, double variance)
     return (struct shape){p, mean - p * a, a};
 }
 
-static bool stops(double n, double mean, double variance, double tolerance)
+static bool stops(enum stopping_kind by, double n, double mean, double variance, double tolerance)
 {
-    return 1.96 * sqrt(fmax(0, variance) / n) <= tolerance * mean;
+    double sigma = sqrt(fmax(0, variance));
+    switch (by) {
+    case STOPS_RIGHTLY: return 1.96 * sigma / sqrt(n) <= tolerance * mean;
+    case STOPS_BY_ONE_SIGMA: return sigma / sqrt(n) <= tolerance * mean;
+    case STOPS_BY_ABSOLUTE: return 1.96 * sigma / sqrt(n) <= tolerance;
+    case STOPS_BY_N: return 1.96 * sigma / n <= tolerance * mean;
+    case STOPS_BY_SIGMA: return 1.96 * sigma <= tolerance * mean;
+    case STOPS_NEVER:
+    case NUM_STOPPING_KINDS: break;
+    }
+    return false;
 }
 
 /* Samples after which one pixel stops; *bias: its mean then, less that of all `most` samples of the same run. */
-static double run_pixel(const gsl_rng *rng, struct shape s, double mean, double variance, int batch,
-                        double tolerance, int most, double *bias)
+static double run_pixel(const gsl_rng *rng, enum stopping_kind by, struct shape s, double mean,
+                        double variance, int batch, double tolerance, int most, double *bias)
 {
     double hits = 0, stopped = 0, at_stop = 0;
     *bias = 0;
@@ -39,7 +58,7 @@ static double run_pixel(const gsl_rng *rng, struct shape s, double mean, double 
             found = s.c + s.a * hits / n;
             spread = s.a * s.a * hits * (1 - hits / n) / (n - 1);
         }
-        if (stops(n, found, spread, tolerance)) {
+        if (stops(by, n, found, spread, tolerance)) {
             stopped = n;
             at_stop = found;
         }
@@ -58,6 +77,8 @@ struct simulation {
     const gsl_rng *rng;
     const struct rubric_image *image;
     const struct moments *m;
+    const double *light; /* of each tile, over that of m; NULL: as much */
+    enum stopping_kind by;
     double batch, tolerance;
 };
 
@@ -76,7 +97,7 @@ static void sample_of(const struct moments *m, size_t pixel, double *mean, doubl
 
 /* One tile with one shape and kappa: samples of all its pixels; *bias: relative. */
 static double run_tile(const struct simulation *s, struct rect r, int kind, double kappa,
-                       double *bias)
+                       double brighter, double *bias)
 {
     double taken = 0, light = 0, off = 0;
     for (int y = r.y; y < r.y + r.height; y++)
@@ -84,9 +105,10 @@ static double run_tile(const struct simulation *s, struct rect r, int kind, doub
             double mean, variance, b;
             int repeats = kind == 0 ? 1 : REPEATS;
             sample_of(s->m, (size_t)y * (size_t)s->m->width + (size_t)x, &mean, &variance);
+            mean *= brighter;
             const struct shape shape = shape_of(kind, mean, kappa * variance);
             for (int k = 0; k < repeats; k++) {
-                taken += run_pixel(s->rng, shape, mean, kappa * variance, (int)s->batch,
+                taken += run_pixel(s->rng, s->by, shape, mean, kappa * variance, (int)s->batch,
                                    s->tolerance, s->image->spp, &b) /
                          repeats;
                 off += b / repeats;
@@ -106,9 +128,11 @@ static void run_all(const struct simulation *s, const double *kappa, double fact
         double bias;
         const struct rect r = {t % columns * RUBRIC_TILE, t / columns * RUBRIC_TILE, RUBRIC_TILE,
                                RUBRIC_TILE};
-        taken += run_tile(s, r, kind, kappa[t] * factor, &bias);
-        out->low[t] = fmin(out->low[t], bias);
-        out->high[t] = fmax(out->high[t], bias);
+        taken += run_tile(s, r, kind, kappa[t] * factor, s->light != NULL ? s->light[t] : 1, &bias);
+        if (out->low != NULL) {
+            out->low[t] = fmin(out->low[t], bias);
+            out->high[t] = fmax(out->high[t], bias);
+        }
     }
     taken /= (double)s->image->width * s->image->height;
     out->least = fmin(out->least, taken);
@@ -119,7 +143,6 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
                          const struct submitted_image *right, const struct moments *m,
                          const unsigned char *use, struct stopping *out, struct err *e)
 {
-    static const double uncertain = 3.3; /* standard deviations of ln kappa */
     size_t tiles = (size_t)(p->width / RUBRIC_TILE) * (size_t)(p->height / RUBRIC_TILE);
     double *kappa = calloc(tiles, sizeof *kappa), sd;
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
@@ -129,8 +152,11 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
     bool ok = (kappa != NULL && rng != NULL && out->low != NULL && out->high != NULL) ||
               err_set(e, "out of memory");
     if (ok) {
-        const struct simulation sim = {rng, p, m, rubric_option(p, "-a", 0),
-                                       rubric_option(p, "-a", 1)};
+        const struct simulation sim = {.rng = rng,
+                                       .image = p,
+                                       .m = m,
+                                       .batch = rubric_option(p, "-a", 0),
+                                       .tolerance = rubric_option(p, "-a", 1)};
         difference_kappas(s, right, use, kappa, &sd);
         for (int kind = 0; kind < SHAPES; kind++)
             for (int end = -1; end <= 1; end += 2)
@@ -139,6 +165,78 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
         stopping_rule_free(out);
     }
     gsl_rng_free(rng);
+    free(kappa);
+    return ok;
+}
+
+enum stopping_kind stopping_rule_of(const char *bug)
+{
+    for (int k = 0; k < NUM_STOPPING_KINDS; k++)
+        if (bug_of[k] != NULL && strcmp(bug_of[k], bug) == 0)
+            return (enum stopping_kind)k;
+    return STOPS_RIGHTLY;
+}
+
+static double luminance_of(const double *px)
+{
+    double sum = 0;
+    for (size_t c = 0; c < 3; c++)
+        sum += luminance_weight[c] * px[c];
+    return sum;
+}
+
+/* Of each tile: the luminance of s over that of m, both cut off where codes end. */
+static void light_of(const struct submitted_image *s, const struct moments *m, double *light)
+{
+    int columns = s->width / RUBRIC_TILE, tiles = columns * (s->height / RUBRIC_TILE);
+    for (int t = 0; t < tiles; t++) {
+        double a = 0, b = 0;
+        for (int i = 0; i < RUBRIC_TILE * RUBRIC_TILE; i++) {
+            int x = t % columns * RUBRIC_TILE + i % RUBRIC_TILE,
+                y = t / columns * RUBRIC_TILE + i / RUBRIC_TILE;
+            size_t p = 3 * ((size_t)y * (size_t)s->width + (size_t)x);
+            a += fmin(luminance_of(s->mean + p), s->clip);
+            b += fmin(luminance_of(m->mean + p), s->clip);
+        }
+        light[t] = a > 0 && b > 0 ? a / b : 1;
+    }
+}
+
+bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_image *s,
+                           const struct moments *m, struct stopping out[NUM_STOPPING_KINDS],
+                           struct err *e)
+{
+    size_t tiles = (size_t)(p->width / RUBRIC_TILE) * (size_t)(p->height / RUBRIC_TILE),
+           pixels = (size_t)p->width * (size_t)p->height;
+    double *kappa = calloc(2 * tiles, sizeof *kappa), *light = kappa + tiles, sd;
+    unsigned char *use = malloc(pixels);
+    gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
+    struct submitted_image right = {0};
+    bool ok = (kappa != NULL && use != NULL && rng != NULL) || err_set(e, "out of memory");
+    if (ok)
+        memset(use, 1, pixels);
+    ok = ok && submitted_image_comparable(s, m, p->spp, false, use, e) &&
+         submitted_image_from(m, s, &right, e);
+    if (ok) {
+        struct simulation sim = {.rng = rng,
+                                 .image = p,
+                                 .m = m,
+                                 .light = light,
+                                 .batch = rubric_option(p, "-a", 0),
+                                 .tolerance = rubric_option(p, "-a", 1)};
+        difference_kappas(s, &right, use, kappa, &sd);
+        light_of(s, m, light);
+        for (int by = 0; by < NUM_STOPPING_KINDS; by++) {
+            sim.by = (enum stopping_kind)by;
+            out[by] = (struct stopping){.least = INFINITY};
+            for (int kind = 0; kind < SHAPES; kind++)
+                for (int end = -1; end <= 1; end += 2)
+                    run_all(&sim, kappa, exp(end * uncertain * sd), kind, &out[by]);
+        }
+    }
+    submitted_image_free(&right);
+    gsl_rng_free(rng);
+    free(use);
     free(kappa);
     return ok;
 }

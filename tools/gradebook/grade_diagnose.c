@@ -99,11 +99,15 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
         const struct candidate *one = &found->candidate[i];
         const struct bug *b = &c->bug[one->bug],
                          *other = one->second >= 0 ? &c->bug[one->second] : NULL;
-        json_t *entry = json_pack("{ss, ss, ss, sf}", "name", b->name, "bug", b->what, "where",
+        char name[64];
+        catalogue_mistake(b, name);
+        json_t *entry = json_pack("{ss, ss, ss, sf}", "name", name, "bug", b->what, "where",
                                   b->where, "explained", one->explained);
-        if (other != NULL)
-            json_object_update_new(entry, json_pack("{ss, ss, ss}", "and", other->name, "and_bug",
+        if (other != NULL) {
+            catalogue_mistake(other, name);
+            json_object_update_new(entry, json_pack("{ss, ss, ss}", "and", name, "and_bug",
                                                     other->what, "and_where", other->where));
+        }
         json_array_append_new(named, entry);
     }
     return json_pack("{ss, ss, so}", "finding", names[found->finding], "gate", found->gate, "named",

@@ -1,12 +1,14 @@
 /* make_rubric_bugs BUILD PATCHES RUBRIC...: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
- * (tools/grade/rubric_bugs.h): one for all, as they have images in common. Every bug of PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only),
- * the correct renderer is BUILD/pathtracer.
+ * (tools/grade/rubric_bugs.h): one for all, as they have images in common. Every bug of PATCHES, and of `bugs` beside this file, has been built as BUILD/mutants/NAME/pathtracer
+ * (tests/mutants/mutants.sh --build-only), the correct renderer is BUILD/pathtracer. The latter are mistakes as they stand in
+ * the assignment's code, which has a function for each way to sample light and gives direct light whatever the depth.
  *
- * The correct images are the references. Of each view, each bug and the correct renderer make BATCHES images of a
- * quarter of the samples asked for, with the same seeds, so that what a bug does not touch has no noise in the
- * difference; one image with all samples where their number is a fact. The effect is the mean of the differences; its variance that of
+ * The correct images are the references, without deviations and with each of those accepted by words. Of each view, each bug and
+ * the correct renderer make BATCHES images of a quarter of the samples asked for, LEAST_SPP at least, with the same seeds, so that what a bug does not touch has no noise in the
+ * difference. The effect is the mean of the differences; its variance that of
  * independent images times the level at which the batches scatter, and what one image with the bug has more noise than
- * one without. A bug that changes no pixel of an image of one sample (of four, where their number is a fact and the bug not in adaptive sampling itself) has no effect on it; an
+ * one without. Bugs of Part 5 depend on the number of samples: all are taken, and of adaptive images one as it is asked for; other bugs do to such an
+ * image what they do to one without adaptive sampling. A bug that changes no pixel of an image of one sample has no effect on it; an
  * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
@@ -15,23 +17,27 @@
 
 #include <limits.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 4, MOST_RUBRICS = 8 };
+enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 32, MOST_RUBRICS = 8 };
 
 struct course {
     struct rubric rubric;
     struct answer_key answers;
 };
 
+enum depth { QUARTER, ALL, AS_ASKED, NUM_DEPTHS };
+
 /* Of a view. */
 struct source {
     const struct course *course;
-    int image;
-    struct signature batch[BATCHES]; /* the correct renderer's */
-    struct moments few;              /* likewise, few_of() samples a pixel */
+    int image, set, plain;                       /* plain: number of the view without deviations */
+    struct signature batch[NUM_DEPTHS][BATCHES]; /* the correct renderer's */
+    bool made[NUM_DEPTHS];
+    struct moments one; /* likewise, one sample a pixel */
 };
 
 struct maker {
@@ -41,6 +47,8 @@ struct maker {
     int num;
     struct catalogue made;
     struct source *of; /* as many as views */
+    struct answer_options correct;
+    pthread_mutex_t lock;
 };
 
 /* Where a program's images are kept; hash tells its versions apart. */
@@ -62,36 +70,58 @@ static bool open_cache(const struct maker *m, const char *name, const char *hash
     return ok;
 }
 
-static bool render(const struct source *of, int batch, const struct answer_options *opt,
-                   struct signature *out, struct err *e)
+static bool is_adaptive(const struct source *of)
+{
+    return rubric_is_adaptive(&of->course->rubric.image[of->image]);
+}
+
+/* Of adaptive images, which take long, as many as of others. */
+static int samples_of(const struct source *of, enum depth depth)
+{
+    int spp = of->course->rubric.image[of->image].spp, quarter = spp / (is_adaptive(of) ? 16 : 4);
+    return depth != QUARTER ? spp : quarter < LEAST_SPP ? LEAST_SPP : quarter;
+}
+
+static bool render(const struct source *of, enum depth depth, int batch,
+                   const struct answer_options *opt, struct signature *out, struct err *e)
 {
     const struct rubric *r = &of->course->rubric;
-    int spp = r->image[of->image].spp;
-    bool counts = rubric_sight_counts(r, of->image);
-    char words[64];
+    char words[1024];
     struct moments made;
-    snprintf(words, sizeof words, "--seed %d", SEED + batch);
-    spp = counts || spp / 4 < LEAST_SPP ? spp : spp / 4;
-    if (!answer_key_render(r, of->image, counts, words, spp, opt, &made, e))
+    snprintf(words, sizeof words, "%s --seed %d", r->set[of->set].words, SEED + batch);
+    if (!answer_key_render(r, of->image, depth == AS_ASKED, words, samples_of(of, depth), opt,
+                           &made, e))
         return false;
-    bool ok = rubric_sight_of_render(r, of->image, &made, out, e);
+    bool ok = rubric_sight_of_render(r, of->image, depth == AS_ASKED, &made, out, e);
     moments_free(&made);
     return ok;
 }
 
-/* A few, where samples that depend on each other would show in their number. */
-static int few_of(const struct source *of)
+static int batches_of(enum depth depth)
 {
-    return rubric_sight_counts(&of->course->rubric, of->image) ? 4 : 1;
+    return depth == AS_ASKED ? 1 : BATCHES;
 }
 
-/* Few samples a pixel, by the bug: as by the correct renderer? */
+/* The correct renderer's, when the first bug needs them. */
+static bool make_batches(struct maker *m, struct source *of, enum depth depth, struct err *e)
+{
+    bool ok = true;
+    pthread_mutex_lock(&m->lock);
+    for (int k = 0; ok && !of->made[depth] && k < batches_of(depth); k++)
+        ok = render(of, depth, k, &m->correct, &of->batch[depth][k], e);
+    of->made[depth] = ok;
+    pthread_mutex_unlock(&m->lock);
+    return ok;
+}
+
+/* One sample a pixel, by the bug: as by the correct renderer? */
 static bool is_same(const struct source *of, const struct answer_options *bug, bool *same,
                     struct err *e)
 {
     struct moments a;
-    const struct moments *b = &of->few;
-    if (!answer_key_render(&of->course->rubric, of->image, false, "", few_of(of), bug, &a, e))
+    const struct moments *b = &of->one;
+    const struct rubric *r = &of->course->rubric;
+    if (!answer_key_render(r, of->image, false, r->set[of->set].words, 1, bug, &a, e))
         return false;
     *same = a.width == b->width && a.height == b->height &&
             memcmp(a.mean, b->mean, 3 * (size_t)a.width * (size_t)a.height * sizeof *a.mean) == 0;
@@ -105,19 +135,18 @@ static double of_one(const struct rubric *r, int image, const struct signature *
     return s->var[i] * s->n / ((double)r->image[image].spp * s->cell * s->cell);
 }
 
-static void set_effect(const struct source *of, const struct signature *bug, struct effect *out)
+static void set_effect(const struct source *of, enum depth depth, const struct signature *bug,
+                       struct effect *out)
 {
     const struct rubric *r = &of->course->rubric;
-    const struct signature a =
-        signature_average(bug, rubric_sight_counts(r, of->image) ? 1 : BATCHES);
+    const struct signature a = signature_average(bug, batches_of(depth)), *right = of->batch[depth];
     double more[SIGNATURE_VALUES] = {0};
     for (int i = 0; i < 3 * a.columns * a.rows; i++)
-        more[i] =
-            fmax(0, of_one(r, of->image, &bug[0], i) - of_one(r, of->image, &of->batch[0], i));
-    if (rubric_sight_counts(r, of->image))
-        bug_effect(bug, of->batch, 1, 1, more, bug, out);
+        more[i] = fmax(0, of_one(r, of->image, &bug[0], i) - of_one(r, of->image, right, i));
+    if (depth == AS_ASKED)
+        bug_effect(bug, right, 1, 1, more, bug, out);
     else
-        bug_effect(bug, of->batch, BATCHES, 0, more, &a, out);
+        bug_effect(bug, right, BATCHES, 0, more, &a, out);
 }
 
 static bool is_needed(const struct effect *e, const struct signature *correct)
@@ -126,25 +155,30 @@ static bool is_needed(const struct effect *e, const struct signature *correct)
     return e->pixels || fabs(far) > 0.01;
 }
 
+/* same: of each view so far, whether the bug leaves it alone. */
 static bool make_view(struct maker *m, int view, int b, const struct answer_options *bug,
-                      struct err *e)
+                      bool *same, struct err *e)
 {
     struct signature s[BATCHES];
     struct view *v = &m->made.view[view];
-    const struct source *of = &m->of[view];
-    bool same = false, counts = rubric_sight_counts(&of->course->rubric, of->image),
-         adaptive = strncmp(m->made.bug[b].where, "part 5", 6) == 0;
-    if (!(counts && adaptive) && !is_same(of, bug, &same, e))
+    struct source *of = &m->of[view];
+    bool adaptive = strncmp(m->made.bug[b].where, "part 5", 6) == 0;
+    enum depth depth = !adaptive ? QUARTER : is_adaptive(of) ? AS_ASKED : ALL;
+    if (of->plain != view && depth != AS_ASKED && same[of->plain])
+        same[view] = true;
+    else if (depth != AS_ASKED && !is_same(of, bug, &same[view], e))
         return false;
-    if (same)
+    if (same[view])
         return true;
-    for (int k = 0; k < (counts ? 1 : BATCHES); k++)
-        if (!render(of, k, bug, &s[k], e))
+    if (!make_batches(m, of, depth, e))
+        return false;
+    for (int k = 0; k < batches_of(depth); k++)
+        if (!render(of, depth, k, bug, &s[k], e))
             return false;
     struct effect *effect = calloc(1, sizeof *effect);
     if (effect == NULL)
         return err_set(e, "out of memory");
-    set_effect(of, s, effect);
+    set_effect(of, depth, s, effect);
     if (is_needed(effect, &v->correct))
         v->effect[b] = effect;
     else
@@ -159,11 +193,12 @@ static bool make_bug(void *ctx, int b, struct err *e)
     struct answer_options bug;
     const struct bug *what = &m->made.bug[b];
     int seen = 0;
+    bool same[MOST_RUBRICS * RUBRIC_IMAGES * 2] = {false};
     snprintf(program, sizeof program, "%.3900s/mutants/%s/pathtracer", m->build, what->name);
     if (!open_cache(m, what->name, what->patch_sha256, program, cache, &bug, e))
         return false;
     for (int v = 0; v < m->made.num_views; v++) {
-        if (!make_view(m, v, b, &bug, e))
+        if (!make_view(m, v, b, &bug, same, e))
             return err_prefix(e, "%s", what->name);
         seen += m->made.view[v].effect[b] != NULL;
     }
@@ -177,21 +212,23 @@ static bool make_correct(struct source *of, const struct answer_options *ours, s
                          struct err *e)
 {
     const struct rubric *r = &of->course->rubric;
-    for (int k = 0; k < BATCHES; k++)
-        if (!render(of, k, ours, &of->batch[k], e))
-            return false;
-    if (!answer_key_render(r, of->image, false, "", few_of(of), ours, &of->few, e))
+    struct signature batch[BATCHES];
+    if (!answer_key_render(r, of->image, false, r->set[of->set].words, 1, ours, &of->one, e))
         return false;
     if (!rubric_sight_counts(r, of->image))
-        return rubric_sight_of_render(r, of->image, &of->course->answers.of[0][of->image].m,
-                                      &v->correct, e);
-    v->correct = signature_average(of->batch, BATCHES);
+        return rubric_sight_of_render(
+            r, of->image, false, &of->course->answers.of[of->set][of->image].m, &v->correct, e);
+    for (int k = 0; k < BATCHES; k++)
+        if (!render(of, AS_ASKED, k, ours, &batch[k], e))
+            return false;
+    v->correct = signature_average(batch, BATCHES);
     return true;
 }
 
-static bool add_view(struct maker *m, const struct course *course, int image,
+static bool add_view(struct maker *m, const struct course *course, int set, int image,
                      const struct answer_options *ours, struct err *e)
 {
+    char key[65];
     const struct rubric_image *p = &course->rubric.image[image];
     struct view *v = &m->made.view[m->made.num_views];
     struct source *of = &m->of[m->made.num_views];
@@ -201,15 +238,17 @@ static bool add_view(struct maker *m, const struct course *course, int image,
                        .renders = 1,
                        .fixed_spp = true,
                        .seed = SEED};
-    *of = (struct source){.course = course, .image = image};
-    snprintf(v->name, sizeof v->name, "%s", p->name);
-    if (!rubric_bugs_key(&course->rubric, image, v->scene_sha256, e))
+    *of = (struct source){.course = course, .image = image, .set = set};
+    if (!rubric_bugs_key(&course->rubric, set, image, v->name, key, e))
         return false;
-    const struct view *other = catalogue_view(&m->made, p->name);
+    const struct view *other = catalogue_view(&m->made, v->name),
+                      *plain = catalogue_view(&m->made, p->name);
+    snprintf(v->scene_sha256, sizeof v->scene_sha256, "%s", key);
+    of->plain = set > 0 ? (int)(plain - m->made.view) : m->made.num_views;
     if (other != NULL)
-        return strcmp(other->scene_sha256, v->scene_sha256) == 0 ||
+        return strcmp(other->scene_sha256, key) == 0 ||
                err_set(e, "%s:%d: another rubric has another image '%s'", course->rubric.path,
-                       p->line, p->name);
+                       p->line, v->name);
     v->effect = calloc((size_t)m->made.num_bugs, sizeof(struct effect *));
     m->made.num_views++;
     return v->effect != NULL ? make_correct(of, ours, v, e) : err_set(e, "out of memory");
@@ -217,7 +256,7 @@ static bool add_view(struct maker *m, const struct course *course, int image,
 
 static bool add_views(struct maker *m, const struct answer_options *ours, struct err *e)
 {
-    const size_t most = MOST_RUBRICS * RUBRIC_IMAGES;
+    const size_t most = MOST_RUBRICS * RUBRIC_IMAGES * 2;
     m->made.view = calloc(most, sizeof *m->made.view);
     m->of = calloc(most, sizeof *m->of);
     if (m->made.view == NULL || m->of == NULL)
@@ -226,21 +265,26 @@ static bool add_views(struct maker *m, const struct answer_options *ours, struct
         struct course *course = m->course[k];
         if (!answer_key_make(&course->rubric, ours, &course->answers, e))
             return false;
-        for (int i = 0; i < course->rubric.num_images; i++)
-            if (rubric_bugs_sees(&course->rubric, i) && !add_view(m, course, i, ours, e))
-                return false;
+        for (int s = 0; s < course->rubric.num_sets; s++)
+            for (int i = 0; i < course->rubric.num_images; i++)
+                if (rubric_bugs_measures(&course->rubric, s) &&
+                    rubric_bugs_sees(&course->rubric, i) &&
+                    rubric_bugs_set(&course->answers, s, i) == s &&
+                    !add_view(m, course, s, i, ours, e))
+                    return false;
     }
     return true;
 }
 
 static bool make(struct maker *m, const char *patches, struct err *e)
 {
-    char cache[PATH_MAX], ours[PATH_MAX], out[2 * PATH_MAX];
-    struct answer_options opt;
+    static char cache[PATH_MAX];
+    char ours[PATH_MAX], out[2 * PATH_MAX];
     const struct rubric *r = &m->course[0]->rubric;
     snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
-    if (!bug_list(patches, &m->made, e) ||
-        !open_cache(m, "correct", "references", ours, cache, &opt, e) || !add_views(m, &opt, e))
+    if (!bug_list(patches, &m->made, e) || !bug_list("tests/studies/grading/bugs", &m->made, e) ||
+        !open_cache(m, "correct", "references", ours, cache, &m->correct, e) ||
+        !add_views(m, &m->correct, e))
         return false;
     snprintf(out, sizeof out, "%s/%s", r->dir, r->bugs);
     return work_run_all(m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
@@ -269,7 +313,7 @@ static bool read_course(struct maker *m, const char *path, struct err *e)
 int main(int argc, char **argv)
 {
     struct err e = {""};
-    static struct maker m;
+    static struct maker m = {.lock = PTHREAD_MUTEX_INITIALIZER};
     if (argc < 4 || argc > 3 + MOST_RUBRICS) {
         fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC...\n");
         return 3;
@@ -281,7 +325,7 @@ int main(int argc, char **argv)
     if (!ok)
         fprintf(stderr, "make_rubric_bugs: %s\n", e.msg);
     for (int v = 0; m.of != NULL && v < m.made.num_views; v++)
-        moments_free(&m.of[v].few);
+        moments_free(&m.of[v].one);
     catalogue_free(&m.made);
     for (int k = 0; k < m.num; k++) {
         answer_key_free(&m.course[k]->answers);

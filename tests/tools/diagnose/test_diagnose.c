@@ -77,7 +77,7 @@ TEST(test_every_patch_is_in_the_catalogue)
 {
     struct fixture *f = *state;
     struct err e = {""};
-    MUST(catalogue_current(&f->c, PATCHES, &e));
+    MUST(catalogue_current(&f->c, PATCHES, NULL, &e));
 }
 
 TEST(test_what_a_patch_is_by)
@@ -115,21 +115,21 @@ TEST(test_a_stale_catalogue_is_refused)
     const char *dir = test_path("same");
     const char *first = f->c.bug[0].name, *second = f->c.bug[1].name;
     copy_patches(f, dir, "", "");
-    assert_true(catalogue_current(&f->c, dir, &e));
+    assert_true(catalogue_current(&f->c, dir, NULL, &e));
     dir = test_path("changed");
     copy_patches(f, dir, second, "");
-    REFUSES(catalogue_current(&f->c, dir, &e), second);
+    REFUSES(catalogue_current(&f->c, dir, NULL, &e), second);
     assert_non_null(strstr(e.msg, "has changed"));
     dir = test_path("fewer");
     copy_patches(f, dir, "", first);
-    assert_false(catalogue_current(&f->c, dir, &e));
+    assert_false(catalogue_current(&f->c, dir, NULL, &e));
     dir = test_path("more");
     copy_patches(f, dir, "", "");
     char name[80];
     snprintf(name, sizeof name, "%s.patch", first);
     copy(PATCHES, name, test_path("."), -1);
     assert_int_equal(rename(test_path(name), test_path("more/a_new_one.patch")), 0);
-    REFUSES(catalogue_current(&f->c, dir, &e), "a_new_one");
+    REFUSES(catalogue_current(&f->c, dir, NULL, &e), "a_new_one");
 }
 
 TEST(test_a_damaged_catalogue_is_refused)

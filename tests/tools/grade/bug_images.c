@@ -35,6 +35,21 @@ static bool make_answer(const struct view *v, const struct rubric_image *p, doub
     return true;
 }
 
+/* With the deviations of a set: as the catalogue has it, else brighter from left to right; empty where they change nothing. */
+static bool make_answer_of(const struct rubric *r, const struct catalogue *c, int set, int image,
+                           struct moments *m)
+{
+    char name[128], key[65];
+    struct err e;
+    const struct rubric_image *p = &r->image[image];
+    if (!rubric_bugs_measures(r, set))
+        return make_answer(catalogue_view(c, p->name), p, 0.3, m);
+    if (!rubric_bugs_key(r, set, image, name, key, &e))
+        return false;
+    const struct view *v = catalogue_view(c, name);
+    return v == NULL || make_answer(v, p, 0, m);
+}
+
 bool bug_images_start(struct bug_images *b, const char *rubric)
 {
     struct rubric_mistakes mistakes;
@@ -53,7 +68,7 @@ bool bug_images_start(struct bug_images *b, const char *rubric)
         const struct rubric_image *p = &b->rubric->image[i];
         const struct view *v = catalogue_view(&c, p->name);
         for (int k = 0; ok && v != NULL && k < b->rubric->num_sets; k++)
-            ok = make_answer(v, p, k > 0 ? 0.3 : 0, &b->answers->of[k][i].m);
+            ok = make_answer_of(b->rubric, &c, k, i, &b->answers->of[k][i].m);
         ok = ok && (v == NULL || make_answer(v, p, 0, &b->answers->of[0][i].noise));
     }
     catalogue_free(&c);

@@ -13,7 +13,7 @@ struct bug_images {
     struct suite suite;
     struct rubric *rubric;
     struct answer_key *
-        answers; /* flat cells too; with a deviation the light grows by up to 30 % from left to right */
+        answers; /* flat cells too; with several deviations the light grows by up to 30 % from left to right */
     struct rubric_bugs bugs;
 };
 

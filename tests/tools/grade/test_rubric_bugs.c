@@ -136,7 +136,7 @@ TEST(every_bug_is_in_it)
 {
     struct err e;
     (void)state;
-    if (!catalogue_current(&of.bugs.catalogue, "tests/mutants", &e))
+    if (!catalogue_current(&of.bugs.catalogue, "tests/mutants", "tests/studies/grading/bugs", &e))
         fail_msg("%s (make rubric-bugs)", e.msg);
 }
 
