@@ -190,6 +190,7 @@ grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_tabl
 rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-*.rubric)
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)
+	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)
 	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRICS)
 
 # For tests/mutants/mutants.sh.
