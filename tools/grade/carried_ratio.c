@@ -84,24 +84,19 @@ static double spread_of(const double *tile, int num)
     return sum > 0 ? sqrt(fmax(0, num * squares / (sum * sum) - 1)) : INFINITY;
 }
 
-/* Does it show what m shows? Of what is nearly of one radiance nothing can be seen but that it is; then what is seen there has to be in
- * the program's image b of the scene as well. b NULL: that is not asked. */
-static bool is_like(const struct submitted_image *s, const struct moments *m,
-                    const struct submitted_image *b, bool *is, struct err *e)
+/* Does it show what m shows? Of what is nearly of one radiance nothing can be seen but that it is: even_too says whether that is enough. */
+static bool is_like(const struct submitted_image *s, const struct moments *m, bool even_too,
+                    bool *is, struct err *e)
 {
     static const double least = 0.5, even = 0.15, noisy = 0.3;
     int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE, num = columns * rows;
     double *theirs = tiles_of(s->mean, s->width, s->height, s->clip),
-           *ours = tiles_of(m->mean, s->width, s->height, s->clip),
-           *other = b != NULL ? tiles_of(b->mean, s->width, s->height, b->clip) : NULL;
-    bool ok = (theirs != NULL && ours != NULL && (b == NULL || other != NULL)) ||
-              err_set(e, "out of memory");
+           *ours = tiles_of(m->mean, s->width, s->height, s->clip);
+    bool ok = (theirs != NULL && ours != NULL) || err_set(e, "out of memory");
     *is = ok && (correlation(theirs, ours, columns, rows) >= least ||
-                 (spread_of(ours, num) < even && spread_of(theirs, num) < noisy &&
-                  (b == NULL || correlation(theirs, other, columns, rows) >= least)));
+                 (even_too && spread_of(ours, num) < even && spread_of(theirs, num) < noisy));
     free(theirs);
     free(ours);
-    free(other);
     return ok;
 }
 
@@ -112,7 +107,7 @@ static bool carry_growth(const struct rubric *r, const struct answer_key *a, int
 {
     struct result other = *out;
     bool is;
-    if (!is_like(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), NULL, &is, e))
+    if (!is_like(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), false, &is, e))
         return false;
     if (!is)
         return true;
@@ -141,6 +136,12 @@ static struct margin margin_of(const struct margin *given, double expected)
     return m;
 }
 
+static bool same_view(const struct rubric_image *a, const struct rubric_image *b)
+{
+    return strcmp(a->scene, b->scene) == 0 && strcmp(a->environment, b->environment) == 0 &&
+           a->width == b->width && a->height == b->height;
+}
+
 /* P/B as it should be where a wrong BSDF makes B, direct light, s times as bright: each bounce has the factor once more. Of an image
  * of all bounces their radiances are taken for a geometric series; an image that is darker than B shows the last alone. */
 static double ratio_of_bounces(double right, double s, int bounces)
@@ -161,7 +162,7 @@ static double ratio_of_bounces(double right, double s, int bounces)
 }
 
 static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
-                        const struct submitted_images *h, const struct rubric_check *c,
+                        const struct submitted_images *h, const struct rubric_check *c, bool drawn,
                         struct result *out, struct err *e)
 {
     const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
@@ -199,7 +200,7 @@ static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     if (isnan(v) || fabs(other) < fabs(v))
         v = other;
     bool is;
-    if (!is_like(p, rp, is_telling(right) ? NULL : b, &is, e))
+    if (!is_like(p, rp, is_telling(right) || drawn, &is, e))
         return false;
     if (!isfinite(v) || !is)
         return true;
@@ -225,12 +226,6 @@ static bool is_there(const struct submitted_images *h, const struct rubric_check
     return true;
 }
 
-static bool same_view(const struct rubric_image *a, const struct rubric_image *b)
-{
-    return strcmp(a->scene, b->scene) == 0 && strcmp(a->environment, b->environment) == 0 &&
-           a->width == b->width && a->height == b->height;
-}
-
 /* Did a check of an earlier part lose points that looks at this image? of -1: at one of the scene of `like`. */
 static bool was_lost(const struct rubric *r, const struct rubric_check *c, int image,
                      const struct rubric_image *like, const double *share)
@@ -242,6 +237,17 @@ static bool was_lost(const struct rubric *r, const struct rubric_check *c, int i
             if (seen == image || (image < 0 && same_view(&r->image[seen], like)))
                 return true;
         }
+    return false;
+}
+
+/* Has an image of the scene been found right by an earlier part, or carried? */
+static bool is_drawn(const struct rubric *r, const struct rubric_check *c,
+                     const struct result *result)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        if (r->check[i].part < c->part && r->check[i].kind == CHECK_EQUAL && result[i].share == 1 &&
+            same_view(&r->image[r->check[i].images[0]], &r->image[c->images[0]]))
+            return true;
     return false;
 }
 
@@ -342,7 +348,7 @@ bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int se
         /* Deviations that are accepted are not recognised where a mistake is in all images that show them. */
         if (c->after >= 0 && was_lost(r, c, c->after, p, share))
             for (int k = 0; ok && k < r->num_sets; k++)
-                ok = carry_ratio(r, a, k, h, c, &result[i], e);
+                ok = carry_ratio(r, a, k, h, c, is_drawn(r, c, result), &result[i], e);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
             ok = carry_rates(r, a, set, h, c, &result[i], e);
         else if (c->kind == CHECK_GROWTH)
