@@ -157,9 +157,8 @@ static bool pair_images(struct input *a, struct input *b, struct notes *notes, s
                "pixel or two counts as noise and is missed");
     input_notes_add(
         notes,
-        "neighbouring pixels share noise: means of 4 x 4 have %.2f, %.2f, %.2f times the "
-        "variance (R, G, B) of independent pixels; this is allowed for, noise shared more "
-        "widely (a denoiser's) is not",
+        "neighbouring pixels share noise: means of squares have %.2f, %.2f, %.2f times the variance "
+        "(R, G, B) that independent pixels of the same second differences have; this is allowed for",
         s.factor[0], s.factor[1], s.factor[2]);
     input_notes_add(
         notes,

@@ -8,15 +8,17 @@
  * neighbouring pixels share (filters wider than a pixel): the blocks' variances are multiplied by
  * the upper end of a one-sided 99.9 % interval of that factor and what still larger squares would add,
  * or by 1 if that is larger. The factor is that of D cut at 2.5 standard deviations: independence
- * survives the cut, heavy tails do not.
+ * survives the cut, heavy tails do not. Where it is half as large again as that of means of 2 x 2, squares of twice the
+ * side are asked until it rises no more (of a filter of 7 pixels at 16), by medians of squared differences of
+ * neighbours, which a region in which the images differ leaves as they are.
  *
  * Degrees of freedom: Var(sum r^2) is at most 4 sum r^4, for normal noise (2.52: neighbouring r are
  * correlated) and for the heaviest tails alike; an image of N pixels of normal noise has N/6.
  * Skewness of D: 6 sum r^3 (the kernel cubed sums to 1/6), one coefficient for the image, with its
  * jackknife error over the blocks on top.
  *
- * What this cannot see: an error as fine as a pixel or two looks like noise and hides itself; noise
- * shared over more than 4 pixels (denoisers) is taken for a difference. */
+ * What this cannot see: an error as fine as a pixel or two looks like noise and hides itself, and so does what differs
+ * in most of the image's larger squares. */
 #ifndef ASSAY_NOISE_ESTIMATE_H
 #define ASSAY_NOISE_ESTIMATE_H
 
@@ -24,7 +26,7 @@
 
 /* What was found, per channel. */
 struct noise_estimate {
-    double factor[3];   /* variance of means of 4 x 4 pixels over what independent pixels have */
+    double factor[3];   /* variance of means of squares over what independent pixels have */
     double skewness[3]; /* of D in one pixel */
     double skew_error[3];
 };
