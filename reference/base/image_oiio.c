@@ -7,6 +7,7 @@
 #include <ctype.h>
 #include <dlfcn.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -90,17 +91,32 @@ static const char *format_of(const char *path, double *size, struct err *e)
     return format;
 }
 
+static bool check_shape(const char *path, int width, int height, int channels, struct err *e)
+{
+    return (width >= 1 && height >= 1 && width <= IMAGE_MAX_SIDE && height <= IMAGE_MAX_SIDE &&
+            channels >= 1 && channels <= IMAGE_MAX_CHANNELS &&
+            (double)width * height * channels <= IMAGE_MAX_FLOATS) ||
+           err_set(e, "%s: an image of %d x %d x %d is more than this program takes", path, width,
+                   height, channels);
+}
+
+/* Floats of an image of which the file may hold as little as a pixel. */
+#define MAX_SHOWN 1e8
+
 static bool check_size(const char *path, const struct image_info *i, int depth, double bytes,
                        double size, struct err *e)
 {
-    if (i->width < 1 || i->height < 1 || i->width > IMAGE_MAX_SIDE || i->height > IMAGE_MAX_SIDE ||
-        i->channels < 1 || i->channels > IMAGE_MAX_CHANNELS || depth > 1 ||
-        (double)i->width * i->height * i->channels > IMAGE_MAX_FLOATS)
-        return err_set(e, "%s: an image of %d x %d x %d is more than this program takes", path,
-                       i->width, i->height, i->channels);
-    return bytes <= IMAGE_MAX_EXPANSION * size ||
-           err_set(e, "%s: an image of %d x %d x %d cannot be in %.0f bytes", path, i->width,
-                   i->height, i->channels, size);
+    if (!check_shape(path, i->width, i->height, depth > 1 ? 0 : i->channels, e) ||
+        !check_shape(path, i->data_width, i->data_height, i->channels, e))
+        return false;
+    if (bytes > IMAGE_MAX_EXPANSION * size)
+        return err_set(e, "%s: an image of %d x %d x %d cannot be in %.0f bytes", path,
+                       i->data_width, i->data_height, i->channels, size);
+    return (double)i->width * i->height * i->channels <=
+               fmax(MAX_SHOWN, IMAGE_MAX_EXPANSION * size) ||
+           err_set(e,
+                   "%s: %d x %d x %d stored of an image of %d x %d: more than this program takes",
+                   path, i->data_width, i->data_height, i->channels, i->width, i->height);
 }
 
 /* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
@@ -131,7 +147,7 @@ static bool alloc_like(const struct oiio_table *oiio, const struct oiio_image *p
     const char *names[IMAGE_MAX_CHANNELS];
     for (int c = 0; c < info->channels; c++)
         names[c] = oiio->channel(p, c);
-    return image_alloc(im, info->width, info->height, info->channels, names, e);
+    return image_alloc(im, info->data_width, info->data_height, info->channels, names, e);
 }
 
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
@@ -168,6 +184,30 @@ bool image_inspect(const char *path, struct image_info *out, struct err *e)
         return false;
     out->parts = oiio->parts(p);
     oiio->close(p);
+    return true;
+}
+
+bool image_uncrop(const struct image_info *info, struct image *im, struct err *e)
+{
+    if (!info->is_cropped)
+        return true;
+    struct image shown;
+    const char *names[IMAGE_MAX_CHANNELS];
+    for (int c = 0; c < im->channels; c++)
+        names[c] = im->names[c];
+    if (!image_alloc(&shown, info->width, info->height, im->channels, names, e))
+        return false;
+    size_t floats = (size_t)im->channels;
+    for (int y = 0; y < im->height; y++)
+        for (int x = 0; x < im->width; x++) {
+            int to_x = info->data_x + x, to_y = info->data_y + y;
+            if (to_x >= 0 && to_x < shown.width && to_y >= 0 && to_y < shown.height)
+                memcpy(shown.data + floats * ((size_t)to_y * (size_t)shown.width + (size_t)to_x),
+                       im->data + floats * ((size_t)y * (size_t)im->width + (size_t)x),
+                       floats * sizeof *im->data);
+        }
+    image_free(im);
+    *im = shown;
     return true;
 }
 

@@ -7,7 +7,7 @@
 #include "renderer/image/image.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
- * colour conversion. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+ * colour conversion. Of OpenEXR it is the data window. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
 
@@ -25,10 +25,16 @@ struct image_info {
     int bytes;            /* of one value of that channel */
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;            /* images in one file (EXR parts), 1 .. */
-    int width, height, channels;
-    bool is_cropped; /* the file holds another rectangle than the image shown */
+    int width, height, channels; /* of OpenEXR: of the display window */
+    bool is_cropped; /* the file holds another rectangle than the image: */
+    int data_x, data_y, data_width, data_height; /* from the image's top left corner */
 };
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
+    __attribute__((warn_unused_result));
+
+/* Makes what image_read() found in the file the image that is shown: 0 in all channels where the file has nothing,
+ * without what lies outside. */
+bool image_uncrop(const struct image_info *info, struct image *im, struct err *e)
     __attribute__((warn_unused_result));
 
 /* The file that it is loaded from. */

@@ -5,6 +5,7 @@ extern "C" {
 
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -78,8 +79,15 @@ bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *b
     *out = {};
     return guarded(why, size, [&]() -> std::string {
         const OIIO::ImageSpec &spec = p->in->spec();
-        out->width = spec.width;
-        out->height = spec.height;
+        bool exr = std::string(p->in->format_name()) == "openexr";
+        out->width = exr ? spec.full_width : spec.width;
+        out->height = exr ? spec.full_height : spec.height;
+        // Further off than any image is wide, it shows nothing anyway.
+        const long long far = 1 << 20;
+        out->data_x = int(std::clamp((long long)spec.x - spec.full_x, -far, far));
+        out->data_y = int(std::clamp((long long)spec.y - spec.full_y, -far, far));
+        out->data_width = spec.width;
+        out->data_height = spec.height;
         out->channels = spec.nchannels;
         *depth = spec.depth;
         *bytes = double(spec.image_bytes(true));

@@ -18,7 +18,7 @@ struct oiio_table {
     bool (*head)(struct oiio_image *p, struct image_info *out, int *depth, double *bytes, char *why,
                  size_t size);
     const char *(*channel)(const struct oiio_image *p, int c);
-    /* Row by row, width*height*channels floats. */
+    /* Row by row, data_width*data_height*channels floats. */
     bool (*read)(struct oiio_image *p, float *data, char *why, size_t size);
     /* Text number k of the file's metadata; false: there are no more. Texts are the image's. */
     bool (*text)(const struct oiio_image *p, int k, const char **name, const char **value);

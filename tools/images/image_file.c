@@ -22,12 +22,15 @@ static bool check_file(const char *path, const struct image_info *info, struct e
     if (info->orientation != 1)
         return err_set(e, "%s: is stored rotated or mirrored (orientation %d)", path,
                        info->orientation);
-    if (info->is_cropped)
-        return err_set(e,
-                       "%s: stores another rectangle than the image (data and display windows "
-                       "differ)",
-                       path);
+    if (info->is_cropped && strcmp(info->format, "openexr") != 0)
+        return err_set(e, "%s: stores another rectangle than the image", path);
     return true;
+}
+
+static bool is_stored(const struct image_info *info, size_t x, size_t y)
+{
+    int right = (int)x - info->data_x, down = (int)y - info->data_y;
+    return right >= 0 && right < info->data_width && down >= 0 && down < info->data_height;
 }
 
 static bool channels_of(const char *path, const struct image *im, int at[3], int *alpha,
@@ -67,7 +70,7 @@ bool image_file_from_image(const char *path, const struct image *im, const struc
         const float *px = im->data + (size_t)im->channels * p;
         size_t x = p % (size_t)im->width, y = p / (size_t)im->width;
         bool ok = true;
-        if (alpha >= 0 && px[alpha] != 1)
+        if (alpha >= 0 && px[alpha] != 1 && is_stored(info, x, y))
             ok = err_set(e, "%s: pixel %zu,%zu is not opaque (alpha %g)", path, x, y,
                          (double)px[alpha]);
         for (size_t c = 0; ok && c < 3; c++) {
@@ -97,7 +100,7 @@ bool image_file_read_inspected(const char *path, const struct image_info *info,
     struct image im = {0};
     if (!check_file(path, info, e) || !image_read(path, &im, NULL, e))
         return false;
-    bool ok = image_file_from_image(path, &im, info, out, e);
+    bool ok = image_uncrop(info, &im, e) && image_file_from_image(path, &im, info, out, e);
     image_free(&im);
     return ok;
 }

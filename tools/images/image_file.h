@@ -13,7 +13,8 @@ struct image_file {
 };
 
 /* EXR, HDR (RGBE), PFM, and PNG of 8 or 16 bits. Channels R, G, B, or Y alone for all three; A only
- * where it is 1 everywhere. Fails on other formats and channels, on a rotated or cropped image, on
+ * where it is 1 everywhere. An EXR whose data and display windows differ is the image shown (image_uncrop()).
+ * Fails on other formats and channels, on a rotated or otherwise cropped image, on
  * several images in one file, on NaN and infinity. The caller frees with image_file_free(). */
 bool image_file_read(const char *path, struct image_file *out, struct err *e)
     __attribute__((warn_unused_result));
@@ -21,7 +22,7 @@ bool image_file_read(const char *path, struct image_file *out, struct err *e)
 bool image_file_read_inspected(const char *path, const struct image_info *info,
                                struct image_file *out, struct err *e)
     __attribute__((warn_unused_result));
-/* The same from an image that is already read. */
+/* The same from an image that is already read, and uncropped. */
 bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
                            struct image_file *out, struct err *e)
     __attribute__((warn_unused_result));

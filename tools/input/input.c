@@ -72,6 +72,10 @@ static bool read_file(const char *path, char side, const struct input_options *o
         return plain_image_input(path, side, opt, out, notes, e);
     if (!image_read(path, &im, NULL, e))
         return false;
+    if (!is_moments(&im) && !image_uncrop(&info, &im, e)) {
+        image_free(&im);
+        return false;
+    }
     bool ok = is_moments(&im) ? read_moments(path, side, opt, out, e)
                               : input_mitsuba(path, side, &im, &info, opt, out, &mitsuba, notes, e);
     bool done = !ok || is_moments(&im) || mitsuba;

@@ -5,6 +5,9 @@
 #include "reference/base/image_oiio.h"
 #include "input.h"
 
+/* Tells where the file holds another rectangle than the image. */
+void input_note_crop(struct notes *notes, const char *path, const struct image_info *info);
+
 /* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is such a one at all; false and no error if
  * not. `im` is the file. */
 bool input_mitsuba(const char *path, char side, const struct image *im,

@@ -79,9 +79,11 @@ static bool needs(const char *path, char side, const struct image_info *info,
     return true;
 }
 
-/* mean and square (or variance) of X, Y, Z of one pixel. */
+/* Mean and variance of X, Y, Z of one pixel; scale: of the numbers that the variance is a difference of. *below
+ * counts what rounding has left below 0. */
 static bool set_pixel(const char *path, struct moments *m, size_t p, const double mean[3],
-                      const double variance[3], const double scale[3], double spp, struct err *e)
+                      const double variance[3], const double scale[3], double spp, size_t *below,
+                      struct err *e)
 {
     m->n[p] = spp;
     for (size_t c = 0; c < 3; c++) {
@@ -92,6 +94,7 @@ static bool set_pixel(const char *path, struct moments *m, size_t p, const doubl
         if (variance[c] < -1e-5 * scale[c])
             return err_set(e, "%s: pixel %zu,%zu has a negative variance %g", path, x, y,
                            variance[c]);
+        *below += variance[c] < 0;
         m->mean[3 * p + c] = mean[c];
         m->m2[3 * p + c] = spp * fmax(0, variance[c]);
     }
@@ -115,7 +118,8 @@ static int find_square(const struct image *im)
 }
 
 static bool read_integrator(const char *path, const struct image *im, int square,
-                            const struct input_options *opt, struct moments *m, struct err *e)
+                            const struct input_options *opt, struct moments *m, size_t *below,
+                            struct err *e)
 {
     int at[6];
     char name[32];
@@ -137,7 +141,7 @@ static bool read_integrator(const char *path, const struct image *im, int square
             squares[c] = px[at[3 + c]];
             variance[c] = squares[c] - mean[c] * mean[c];
         }
-        if (!set_pixel(path, m, p, mean, variance, squares, opt->spp, e))
+        if (!set_pixel(path, m, p, mean, variance, squares, opt->spp, below, e))
             return false;
     }
     return true;
@@ -145,7 +149,7 @@ static bool read_integrator(const char *path, const struct image *im, int square
 
 static bool read_pair(const char *path, const char *var_path, const struct image *im,
                       const struct image_info *info, const struct input_options *opt,
-                      struct moments *m, struct err *e)
+                      struct moments *m, size_t *below, struct err *e)
 {
     struct image_file mean = {0}, var = {0};
     bool ok = image_file_from_image(path, im, info, &mean, e) && image_file_read(var_path, &var, e);
@@ -163,9 +167,11 @@ static bool read_pair(const char *path, const char *var_path, const struct image
         }
         matrix(colour[0], xyz[0]);
         matrix(colour[1], xyz[1]);
+        /* The variance was E[x^2] - E[x]^2 before it was written. */
         for (int c = 0; c < 3; c++)
-            scale[c] = xyz[1][0] + xyz[1][1] + xyz[1][2];
-        ok = set_pixel(var_path, m, p, xyz[0], xyz[1], scale, opt->spp, e);
+            scale[c] =
+                xyz[1][0] + xyz[1][1] + xyz[1][2] + pow(xyz[0][0] + xyz[0][1] + xyz[0][2], 2);
+        ok = set_pixel(var_path, m, p, xyz[0], xyz[1], scale, opt->spp, below, e);
     }
     image_file_free(&mean);
     image_file_free(&var);
@@ -190,6 +196,7 @@ bool input_mitsuba(const char *path, char side, const struct image *im,
                    struct input *out, bool *is_it, struct notes *notes, struct err *e)
 {
     char beside[4096];
+    size_t below = 0;
     int square = find_square(im);
     bool pair = square == -1 && variance_beside(path, beside, sizeof beside);
     *is_it = square != -1 || pair;
@@ -203,11 +210,15 @@ bool input_mitsuba(const char *path, char side, const struct image *im,
     if (!*is_it)
         return true;
     if (!needs(path, side, info, opt, e) || !moments_alloc(&out->m, im->width, im->height, e) ||
-        !(pair ? read_pair(path, beside, im, info, opt, &out->m, e)
-               : read_integrator(path, im, square, opt, &out->m, e)))
+        !(pair ? read_pair(path, beside, im, info, opt, &out->m, &below, e)
+               : read_integrator(path, im, square, opt, &out->m, &below, e)))
         return false;
+    if (below > 0)
+        input_notes_add(notes, "%s: %zu variances are below 0 by rounding and taken as 0", path,
+                        below);
     out->kind = INPUT_VARIANCE;
     out->is_xyz = true;
+    input_note_crop(notes, path, info);
     input_notes_add(
         notes,
         "%s: Mitsuba's variance%s%s, that of one sample with n below it, n = %g as told; its "

@@ -1,4 +1,4 @@
-#include "input.h"
+#include "input_internal.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -18,4 +18,15 @@ void input_notes_add(struct notes *notes, const char *format, ...)
         if (strcmp(notes->line[i], line) == 0)
             return;
     notes->num++;
+}
+
+void input_note_crop(struct notes *notes, const char *path, const struct image_info *info)
+{
+    if (info->is_cropped)
+        input_notes_add(
+            notes,
+            "%s: stores %d x %d pixels at %d,%d of an image of %d x %d; the rest of it is "
+            "0, as OpenEXR has it",
+            path, info->data_width, info->data_height, info->data_x, info->data_y, info->width,
+            info->height);
 }

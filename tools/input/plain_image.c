@@ -69,6 +69,7 @@ static void tell(const char *path, const struct image_file *pic, const char *cur
         input_notes_add(
             notes, "%s: RGBE; its rounding, 0.4 to 0.8 %% of the brightest channel, is allowed for",
             path);
+    input_note_crop(notes, path, &pic->info);
     if (pic->num_other > 0)
         input_notes_add(notes, "%s: %d more channels are not looked at", path, pic->num_other);
 }

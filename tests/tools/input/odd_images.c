@@ -43,12 +43,13 @@ static void put_attribute(FILE *f, const char *name, const char *type, uint64_t 
     put_le(f, size, 4);
 }
 
-static void put_box(FILE *f, const char *name, int width, int height)
+static void put_box(FILE *f, const char *name, struct odd_window w)
 {
     put_attribute(f, name, "box2i", 16);
-    put_le(f, 0, 8);
-    put_le(f, (uint64_t)(width - 1), 4);
-    put_le(f, (uint64_t)(height - 1), 4);
+    put_le(f, (uint32_t)w.x, 4);
+    put_le(f, (uint32_t)w.y, 4);
+    put_le(f, (uint32_t)(w.x + w.width - 1), 4);
+    put_le(f, (uint32_t)(w.y + w.height - 1), 4);
 }
 
 static uint32_t float_bits(float v)
@@ -68,10 +69,17 @@ static uint32_t half_bits(float v)
     return (uint32_t)((v < 0) << 15 | (exponent + 14) << 10 | (int)ldexp(m - 0.5, 11));
 }
 
-void odd_exr(const char *path, int width, int height, const char *names, bool half, int shown,
-             const float *v)
+void odd_exr(const char *path, int width, int height, const char *names, bool half, const float *v)
+{
+    struct odd_window whole = {0, 0, width, height};
+    odd_exr_cropped(path, whole, whole, names, half, v);
+}
+
+void odd_exr_cropped(const char *path, struct odd_window data, struct odd_window shown,
+                     const char *names, bool half, const float *v)
 {
     FILE *f = open_file(path);
+    int width = data.width, height = data.height;
     int channels = (int)strlen(names), bytes = half ? 2 : 4;
     put_le(f, 20000630, 4);
     put_le(f, 2, 4);
@@ -86,8 +94,8 @@ void odd_exr(const char *path, int width, int height, const char *names, bool ha
     fputc(0, f);
     put_attribute(f, "compression", "compression", 1);
     fputc(0, f);
-    put_box(f, "dataWindow", width, height);
-    put_box(f, "displayWindow", shown, height);
+    put_box(f, "dataWindow", data);
+    put_box(f, "displayWindow", shown);
     put_attribute(f, "lineOrder", "lineOrder", 1);
     fputc(0, f);
     put_attribute(f, "pixelAspectRatio", "float", 4);
@@ -102,7 +110,7 @@ void odd_exr(const char *path, int width, int height, const char *names, bool ha
     for (int y = 0; y < height; y++)
         put_le(f, first + (uint64_t)y * (8 + line), 8);
     for (int y = 0; y < height; y++) {
-        put_le(f, (uint64_t)y, 4);
+        put_le(f, (uint32_t)(data.y + y), 4);
         put_le(f, line, 4);
         for (int c = 0; c < channels; c++)
             for (int x = 0; x < width; x++) {

@@ -7,10 +7,14 @@
 #include <stdint.h>
 
 /* OpenEXR, one part, scan lines, no compression. `names`: one channel for each letter, in alphabetical
- * order; v: interleaved. half: 16 bits, of numbers that they hold exactly. shown: width of the display
- * window (the data window is `width`). */
-void odd_exr(const char *path, int width, int height, const char *names, bool half, int shown,
-             const float *v);
+ * order; v: interleaved. half: 16 bits, of numbers that they hold exactly. */
+void odd_exr(const char *path, int width, int height, const char *names, bool half, const float *v);
+/* The same with a display window that is not the data window, whose pixels v are. */
+struct odd_window {
+    int x, y, width, height;
+};
+void odd_exr_cropped(const char *path, struct odd_window data, struct odd_window shown,
+                     const char *names, bool half, const float *v);
 /* PNG of 1 (grey), 3 or 4 channels of 8 or 16 bits, deflate in stored blocks; width*height*channels
  * below 30000. */
 void odd_png(const char *path, int width, int height, int channels, int bits, const uint16_t *code);

@@ -78,7 +78,7 @@ TEST(test_directory)
     write_floats(test_path("runs/s4.exr"), 1, 2, 3, rgb_names, v[0]);
     assert_refused(test_path("runs"), (struct input_options){0},
                    "is 1 x 2 pixels, s1.exr is 2 x 1");
-    odd_exr(test_path("runs/s4.exr"), 2, 1, "BGR", true, 2, v[0]);
+    odd_exr(test_path("runs/s4.exr"), 2, 1, "BGR", true, v[0]);
     assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
     odd_png(test_path("runs/s4.exr"), 2, 1, 3, 8, (uint16_t[6]){1, 2, 3, 4, 5, 6});
     assert_refused(test_path("runs"), (struct input_options){0}, "32-bit floats");
@@ -202,6 +202,14 @@ TEST(test_mitsuba_reference)
     assert_refused(test_path("ref.exr"), (struct input_options){0}, "--spp-a");
     write_floats(test_path("ref_var.exr"), 1, 2, 3, rgb_names, (float[6]){1, 0, 0, 1, 0, 0});
     assert_refused(test_path("ref.exr"), (struct input_options){.spp = 9}, "is 1 x 2 pixels");
+    /* A bright constant: squares of 100 have float32 steps of 8e-6 and sums of them lose more. */
+    write_floats(test_path("ref.exr"), 1, 1, 3, rgb_names, (float[3]){10, 10, 10});
+    write_floats(test_path("ref_var.exr"), 1, 1, 3, rgb_names, (float[3]){-6e-5f, -6e-5f, -6e-5f});
+    in = read_side(test_path("ref.exr"), (struct input_options){.spp = 50}, &notes);
+    assert_true(in.m.m2[0] == 0 && has_note(&notes, "3 variances are below 0 by rounding"));
+    input_free(&in);
+    write_floats(test_path("ref_var.exr"), 1, 1, 3, rgb_names, (float[3]){-0.1f, -0.1f, -0.1f});
+    assert_refused(test_path("ref.exr"), (struct input_options){.spp = 50}, "negative variance");
     assert_int_equal(unlink(test_path("ref_var.exr")), 0);
 }
 
@@ -267,7 +275,7 @@ TEST(test_codes)
 TEST(test_rounded_floats)
 {
     struct notes notes = {0};
-    odd_exr(test_path("half.exr"), 1, 1, "BGR", true, 1, (float[3]){0, 2.5, 1.5});
+    odd_exr(test_path("half.exr"), 1, 1, "BGR", true, (float[3]){0, 2.5, 1.5});
     struct input in = read_side(test_path("half.exr"), (struct input_options){0}, &notes);
     assert_near(in.m.mean[0], 1.5, 0);
     assert_near(in.m.mean[1], 2.5, 0);
@@ -292,26 +300,51 @@ TEST(test_rounded_floats)
     input_free(&in);
 }
 
+/* The display window is the image: what the file lacks of it is 0 and need not be opaque, what it has besides is
+ * not looked at. Data 3 x 2 from (9, 21), shown 4 x 3 from (10, 20): its columns 1 and 2 lie in rows 1 and 2. */
+TEST(test_cropped)
+{
+    struct notes notes = {0};
+    float v[6][4];
+    for (int p = 0; p < 6; p++)
+        for (int c = 0; c < 4; c++)
+            v[p][c] = c == 0 ? 1 : (float)(10 * p + c); /* A B G R */
+    odd_exr_cropped(test_path("crop.exr"), (struct odd_window){9, 21, 3, 2},
+                    (struct odd_window){10, 20, 4, 3}, "ABGR", false, v[0]);
+    struct input in = read_side(test_path("crop.exr"), (struct input_options){0}, &notes);
+    assert_true(in.m.width == 4 && in.m.height == 3);
+    for (int y = 0; y < 3; y++)
+        for (int x = 0; x < 4; x++)
+            for (int c = 0; c < 3; c++) {
+                int p = 3 * (y - 1) + x + 1;
+                assert_near(in.m.mean[3 * (4 * y + x) + c], y > 0 && x < 2 ? 10 * p + 3 - c : 0, 0);
+            }
+    assert_true(has_note(&notes, "stores 3 x 2 pixels at -1,1 of an image of 4 x 3"));
+    input_free(&in);
+    odd_exr_cropped(test_path("crop.exr"), (struct odd_window){0, 0, 1, 1},
+                    (struct odd_window){0, 0, 60000, 60000}, "ABGR", false, v[0]);
+    assert_refused(test_path("crop.exr"), (struct input_options){0},
+                   "more than this program takes");
+}
+
 TEST(test_hygiene)
 {
     struct input_options none = {0};
     static const struct {
         const char *names;
-        int shown;
         float v[4];
         const char *line;
     } cases[] = {
-        {"BGR", 2, {1, 1, 1}, "data and display windows"},
-        {"ABGR", 1, {.5f, 1, 1, 1}, "not opaque (alpha 0.5)"},
-        {"BGR", 1, {1, NAN, 1}, "pixel 0,0 is not a number"},
-        {"BGR", 1, {1, 1, INFINITY}, "infinite"},
-        {"XYZ", 1, {1, 1, 1}, "no channels R, G, B"},
+        {"ABGR", {.5f, 1, 1, 1}, "not opaque (alpha 0.5)"},
+        {"BGR", {1, NAN, 1}, "pixel 0,0 is not a number"},
+        {"BGR", {1, 1, INFINITY}, "infinite"},
+        {"XYZ", {1, 1, 1}, "no channels R, G, B"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        odd_exr(test_path("odd.exr"), 1, 1, cases[i].names, false, cases[i].shown, cases[i].v);
+        odd_exr(test_path("odd.exr"), 1, 1, cases[i].names, false, cases[i].v);
         assert_refused(test_path("odd.exr"), none, cases[i].line);
     }
-    odd_exr(test_path("ok.exr"), 1, 1, "ABGR", false, 1, (float[4]){1, 1, 1, 1});
+    odd_exr(test_path("ok.exr"), 1, 1, "ABGR", false, (float[4]){1, 1, 1, 1});
     assert_refused(test_path("ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
     struct notes notes = {0};
     struct input in = read_side(test_path("ok.exr"), none, &notes);
