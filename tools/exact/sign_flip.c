@@ -12,37 +12,15 @@ const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES] = {"level", "mean",
 static const double share_of_score[NUM_SIGN_FLIP_SCORES] = {0.5, 0.3, 0.2};
 static const double share_of_luminance = 0.5;
 static const double bound_factor = 3.1787; /* 1/(4 Q(sqrt 2)), rounded up */
-/* Of a sum over all pixels: a window's part that is smaller may be rounding. */
-static const double lost_digits = 1e-10;
-
-/* All windows of one size; there is a last one at each border, the step to it may be shorter. */
-struct windows {
-    int width, height, step, nx, ny;
-};
 
 struct scan {
     const struct sign_flip_options *opt;
+    int width, height; /* of the images */
     struct windows size[MAX_SIDES];
     int num_sizes;
     int tile_size; /* of size[]: for mdb_tile; -1: none */
     struct sign_flip *out;
 };
-
-static double sum_in(const struct sheet *s, int which, struct rect r)
-{
-    size_t row = (size_t)s->width + 1, top = (size_t)r.y * row + (size_t)r.x;
-    size_t bottom = top + (size_t)r.height * row;
-    const double *sum = s->sum[which];
-    return sum[bottom + (size_t)r.width] - sum[bottom] - sum[top + (size_t)r.width] + sum[top];
-}
-
-static struct rect window_rect(const struct sheet *s, const struct windows *w, int i)
-{
-    int x = i % w->nx * w->step, y = i / w->nx * w->step;
-    return (struct rect){x + w->width < s->width ? x : s->width - w->width,
-                         y + w->height < s->height ? y : s->height - w->height, w->width,
-                         w->height};
-}
 
 /* Of the two-sided bound. */
 static double log10_normal_bound(double t)
@@ -120,10 +98,10 @@ static double share_of(const struct scan *scan, const struct windows *w, enum si
         channel < CHANNEL_LUMINANCE ? (1 - share_of_luminance) / 3 : share_of_luminance;
     if (score == SIGN_FLIP_SPREAD)
         of_channel = 1;
-    return share_of_score[score] * of_channel / scan->num_sizes / w->nx / w->ny;
+    return share_of_score[score] * of_channel / scan->num_sizes / (double)windows_num(w);
 }
 
-static void describe(const struct sheet *s, struct rect r, int filter, struct sign_flip *out)
+static void describe(const struct sheet *s, struct rect r, const struct scan *scan)
 {
     double a = 0, b = 0, larger = 0, differ = 0;
     for (size_t v = 0; v < s->values; v++) {
@@ -136,9 +114,12 @@ static void describe(const struct sheet *s, struct rect r, int filter, struct si
         larger += s->a[v] > s->b[v];
         differ += s->a[v] != s->b[v];
     }
-    out->rect = (struct rect){r.x * filter, r.y * filter, r.width * filter, r.height * filter};
-    out->difference = b != 0 ? fmax(-1e6, fmin(1e6, (a - b) / fabs(b))) : copysign(1e6, a);
-    out->larger = larger / fmax(1, differ);
+    int filter = scan->opt->filter_width, x = r.x * filter, y = r.y * filter;
+    int right = r.x + r.width < s->width ? x + r.width * filter : scan->width;
+    int bottom = r.y + r.height < s->height ? y + r.height * filter : scan->height;
+    scan->out->rect = (struct rect){x, y, right - x, bottom - y};
+    scan->out->difference = b != 0 ? fmax(-1e6, fmin(1e6, (a - b) / fabs(b))) : copysign(1e6, a);
+    scan->out->larger = larger / fmax(1, differ);
 }
 
 /* The window with the largest |T| of each size is found by the sums over all pixels, and judged by sums of its own. */
@@ -147,15 +128,15 @@ static void scan_size(struct sheet *s, struct scan *scan, const struct windows *
 {
     double largest = 0, all = s->sum[1][(size_t)(s->width + 1) * (size_t)(s->height + 1) - 1];
     struct rect best = {0};
-    for (int i = 0; i < w->nx * w->ny; i++) {
-        struct rect r = window_rect(s, w, i);
-        double sum = sum_in(s, 0, r), squares = sum_in(s, 1, r);
-        if (squares > lost_digits * all && sum * sum > largest * squares) {
+    for (size_t i = 0; i < windows_num(w); i++) {
+        struct rect r = windows_rect(w, s, i);
+        double sum = sheet_sum(s, 0, r), squares = sheet_sum(s, 1, r);
+        if (squares > sheet_lost_digits * all && sum * sum > largest * squares) {
             largest = sum * sum / squares;
             best = r;
         }
     }
-    scan->out->num_tests += w->nx * w->ny;
+    scan->out->num_tests += windows_num(w);
     size_t num = 0;
     double sum = 0, squares = 0;
     for (size_t v = 0; largest > 0 && v < s->values; v += s->pixels)
@@ -175,7 +156,7 @@ static void scan_size(struct sheet *s, struct scan *scan, const struct windows *
     scan->out->score = score;
     scan->out->channel = channel;
     scan->out->t = sum / sqrt(squares);
-    describe(s, best, scan->opt->filter_width, scan->out);
+    describe(s, best, scan);
 }
 
 /* The smallest over the windows. */
@@ -183,11 +164,11 @@ static double expected_t(struct sheet *s, const struct windows *w, double change
 {
     sheet_expect(s, change);
     double smallest = INFINITY;
-    for (int i = 0; i < w->nx * w->ny; i++) {
-        struct rect r = window_rect(s, w, i);
-        double squares = sum_in(s, 1, r);
+    for (size_t i = 0; i < windows_num(w); i++) {
+        struct rect r = windows_rect(w, s, i);
+        double squares = sheet_sum(s, 1, r);
         if (squares > 0)
-            smallest = fmin(smallest, sum_in(s, 0, r) / sqrt(squares));
+            smallest = fmin(smallest, sheet_sum(s, 0, r) / sqrt(squares));
     }
     return smallest;
 }
@@ -229,7 +210,7 @@ bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_op
     struct sheet s = {.width = (in->width + filter / 2) / filter,
                       .height = (in->height + filter / 2) / filter,
                       .num = in->num};
-    struct scan scan = {.opt = opt, .out = out};
+    struct scan scan = {.opt = opt, .width = in->width, .height = in->height, .out = out};
     *out = (struct sign_flip){.log10_p = INFINITY};
     if (s.width < 1 || s.height < 1)
         return err_set(e, "an image of %d x %d pixels is smaller than the filter's %d", in->width,

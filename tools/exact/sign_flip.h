@@ -13,7 +13,7 @@
  * Scores of the difference d = a - b, with f(x) = x/(1 + x^2/8), the score of Student's law with 8 degrees of freedom, so that a
  * firefly weighs less than a pixel [Lange89], and "around" for the mean over 9 x 9 pixels:
  *   level   sqrt(m/s) f(d/s), in R, G, B and luminance; m the radiance around, s the geometric mean of |d| around.
- *           Where the renders state their error, s is its 3/4th power times the 1/4th power of that, and m the pixel's.
+ *           Where the renders state the error e of their difference, e^(3/4) s^(1/4) for s, and the pixel's own m.
  *   mean    d itself, in the same: sees what only rare bright samples show
  *   spread  f(v/s), of v = |a - m| - |b - m| in luminance: noise that has changed, with s of |v|
  * Over squares of sides 4, 6, 8, 11, 16, .. up to the image, an eighth of their side apart, so that a region need not
@@ -33,7 +33,7 @@ struct sign_flip_images {
 
 struct sign_flip_options {
     double alpha;     /* for mdb, and for what is left out */
-    int filter_width; /* pixels less than this apart, in x or in y, may share noise: one in filter_width^2 is judged. 1: all */
+    int filter_width; /* pixels less than this apart in x and in y may share noise: one in filter_width^2 is judged. 1: all */
     int tile;         /* side, pixels: for mdb_tile */
 };
 
@@ -42,7 +42,7 @@ extern const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES];
 
 struct sign_flip {
     double log10_p;    /* of all tests together: the smallest over its share; at most 0 */
-    int num_tests;     /* windows, channels and scores */
+    size_t num_tests;  /* windows, channels and scores */
     size_t num_pixels; /* judged, each with a coin for each pair of renders */
     /* Of the smallest: */
     enum sign_flip_score score;

@@ -6,6 +6,7 @@
 enum { RADIUS = 4 }; /* of what is local, pixels */
 /* Standard deviation of a normal law over the geometric mean of |x|: e^((ln 2 + gamma)/2). */
 static const double of_geometric_mean = 1.8874;
+const double sheet_lost_digits = 1e-10;
 
 bool sheet_alloc(struct sheet *s, struct err *e)
 {
@@ -114,7 +115,7 @@ static struct unit level_unit(const struct sheet *s, size_t v)
     size_t i = v % s->pixels;
     if (!(s->own[i] > 0))
         return (struct unit){s->scale[i], fabs(s->mean[i])};
-    return (struct unit){pow(s->own[i], 0.75) * pow(s->scale[i], 0.25),
+    return (struct unit){sqrt(s->own[i] * sqrt(s->own[i] * s->scale[i])),
                          fabs(s->a[v] + s->b[v]) / 2};
 }
 
@@ -177,4 +178,25 @@ void sheet_expect(struct sheet *s, double change)
         s->square[v] = (up * up + down * down) / 2;
     }
     sum_up(s);
+}
+
+double sheet_sum(const struct sheet *s, int which, struct rect r)
+{
+    size_t row = (size_t)s->width + 1, top = (size_t)r.y * row + (size_t)r.x;
+    size_t bottom = top + (size_t)r.height * row;
+    const double *sum = s->sum[which];
+    return sum[bottom + (size_t)r.width] - sum[bottom] - sum[top + (size_t)r.width] + sum[top];
+}
+
+size_t windows_num(const struct windows *w)
+{
+    return (size_t)w->nx * (size_t)w->ny;
+}
+
+struct rect windows_rect(const struct windows *w, const struct sheet *s, size_t i)
+{
+    int x = (int)(i % (size_t)w->nx) * w->step, y = (int)(i / (size_t)w->nx) * w->step;
+    return (struct rect){x + w->width < s->width ? x : s->width - w->width,
+                         y + w->height < s->height ? y : s->height - w->height, w->width,
+                         w->height};
 }

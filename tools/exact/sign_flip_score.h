@@ -31,4 +31,16 @@ void sheet_score(struct sheet *s, enum sign_flip_score score);
  * and the noise as it is, whatever its signs. */
 void sheet_expect(struct sheet *s, double change);
 
+/* Of score (0) or its square (1). */
+double sheet_sum(const struct sheet *s, int which, struct rect r);
+/* Of the sum over all pixels: a window's part that is smaller may be rounding. */
+extern const double sheet_lost_digits;
+
+/* All windows of one size; there is a last one at each border, the step to it may be shorter. */
+struct windows {
+    int width, height, step, nx, ny;
+};
+size_t windows_num(const struct windows *w);
+struct rect windows_rect(const struct windows *w, const struct sheet *s, size_t i);
+
 #endif
