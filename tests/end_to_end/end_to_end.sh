@@ -249,7 +249,7 @@ expect "compare: samples that are not independent" 3 "only replicates" \
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
 # compare: inputs from elsewhere. Replicates are any float images, so moments images do.
-for option in --alpha --margin --margin-tile --margin-variance --accept-mdb --accept-mdb-tile --again --exchangeable --curve --spp-a --spp-b; do
+for option in --alpha --margin --margin-tile --margin-variance --accept-mdb --accept-mdb-tile --again --exchangeable --same-program --filter-width --curve --spp-a --spp-b; do
     expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
 done
 for k in 1 2 3 4 5; do
@@ -303,6 +303,29 @@ expect "report --github" 0 "^::error title=.*DIFFERENT, expected EQUIVALENT" \
 expect "report --github: the summary" 0 "^## Of 1 claims 1 came out wrong" cat "$tmp/summary.md"
 expect "report --github: with another" 3 "no other" "$san_assay" report --github --matrix "$tmp/png/results.json"
 expect "report of PNGs" 0 "index.html" "$san_assay" report "$tmp/png/results.json"
+expect "compare: the same program, equal" 2 "^NO DIFFERENCE FOUND: no sign of another law" \
+    "$san_assay" compare --same-program "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: the same program, for CI" 0 "note: the mean by itself: EQUIVALENT" \
+    "$san_assay" compare --same-program --accept-mdb 0.01 --accept-mdb-tile 0.1 --margin 0.02 --margin-tile 0.08 \
+    "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: the same program, different" 1 "^DIFFERENT: the law changed: .*p <= 10" \
+    "$san_assay" compare --same-program --alpha 1e-6 --json "$tmp/law/results.json" "$tmp/shallow.exr" "$tmp/two.exr"
+expect "compare: results have the score" 0 '"score": "' cat "$tmp/law/results.json"
+expect "report of the same program" 0 "index.html" "$san_assay" report "$tmp/law/results.json"
+expect "compare: the same program, PNG without a curve" 1 "mean by itself was not judged: .*what light is a code" \
+    "$san_assay" compare --same-program --alpha 1e-6 "$tmp/shallow.png" "$tmp/two.png"
+expect "compare: the same program, no means for a page" 3 "needs means" \
+    "$san_assay" compare --same-program --json "$tmp/law/png.json" "$tmp/one.png" "$tmp/two.png"
+expect "compare: the same program, directories" 1 "flips of 121 pixels" \
+    "$san_assay" compare --same-program --filter-width 3 "$tmp/runs_c" "$tmp/runs_b"
+expect "compare: the same program, other samples" 3 "A has 8 samples a pixel, B 256" \
+    "$san_assay" compare --same-program "$tmp/few.exr" "$tmp/two.exr"
+expect "compare: the same program, one seed" 3 "one seed" \
+    "$san_assay" compare --same-program "$tmp/one.png" "$tmp/one.png"
+expect "compare: the same program, again" 3 "neither --exchangeable nor --again" \
+    "$san_assay" compare --same-program --again "$tmp/one.exr" "$tmp/one.exr" "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: a filter for nothing" 3 "is for --same-program" \
+    "$san_assay" compare --filter-width 3 "$tmp/one.exr" "$tmp/two.exr"
 expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
 expect "compare: the same PNG" 3 "the same image" \

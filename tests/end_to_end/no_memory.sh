@@ -79,10 +79,11 @@ for format in json pov xml; do no_memory "export: a sky, $format" "$assay" expor
 versus=("$assay" compare --alpha 0.01)
 no_memory "compare: moments" "${versus[@]}" --margin 0.3 --margin-tile 0.9 --json x.json "$tmp/in/1.exr" "$tmp/in/2.exr"
 no_memory "compare: variance, two stages" "${versus[@]}" --margin-variance 0.9 --again "$tmp/in/r1/1.exr" "$tmp/in/r2/1.exr" -- "$tmp/in/1.exr" "$tmp/in/2.exr"
+no_memory "compare: the same program" "${versus[@]}" --same-program "$tmp/in/1.exr" "$tmp/in/2.exr"
 most=5
 no_memory "compare: directories" "${versus[@]}" "$tmp/in/r1" "$tmp/in/r2"
 most=5
-no_memory "compare: the same program" "${versus[@]}" --exchangeable "$tmp/in/r1" "$tmp/in/r2"
+no_memory "compare: whole images exchanged" "${versus[@]}" --exchangeable "$tmp/in/r1" "$tmp/in/r2"
 most=5
 no_memory "compare: PNG" "${versus[@]}" --curve srgb "$tmp/in/1.png" "$tmp/in/2.png"
 

@@ -72,7 +72,19 @@ static const struct cli_option options[] = {
      "A and B are directories of replicates of what should be the\n"
      "same program: an exact test by permutation, without margins",
      TO(job.exchangeable)},
-    {0, "min-side", "N", "smallest region of that test, pixels (about 1/32 of the image)",
+    {0, "same-program", "",
+     "A and B are renders of equally many samples by two versions\n"
+     "of one program, one each or directories: DIFFERENT if the law\n"
+     "of any pixel has changed, exactly at any alpha, under\n"
+     "fireflies, from 1 sample on and of PNGs without --curve; a\n"
+     "better sampler changes it too. What the means by themselves\n"
+     "say, with --margin as ever, is a note",
+     TO(job.same_program)},
+    {0, "filter-width", "N",
+     "of that test: pixels less than N apart may share noise, as\n"
+     "by a filter N pixels wide; one in N x N is judged (1)",
+     TO(job.filter_width), 1, 1000},
+    {0, "min-side", "N", "smallest region of --exchangeable, pixels (about 1/32 of the image)",
      TO(job.min_side), 1, 65536},
     {0, "curve", "CURVE",
      "of PNG files, from light to code: srgb, linear, gamma=G\n"
@@ -100,7 +112,7 @@ static bool check(struct settings *s, struct err *e)
     if (opt->margin_tile < 0)
         opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
     double *accept = s->job.accept_mdb;
-    if (accept[0] > 0 && opt->margin_tile > 0)
+    if (accept[0] > 0 && opt->margin_tile > 0 && !s->job.same_program)
         return err_set(e, "--accept-mdb is for a search without --margin");
     if (!(accept[0] > 0) && accept[1] > 0)
         return err_set(e, "--accept-mdb-tile goes with --accept-mdb");
@@ -119,6 +131,13 @@ static bool check(struct settings *s, struct err *e)
         (s->job.input[0].curve != NULL || s->job.input[0].spp > 0 || s->job.input[1].spp > 0))
         return err_set(e, "--exchangeable takes directories of replicates, to which --curve and "
                           "--spp-a do not apply");
+    if (s->job.same_program && (s->job.exchangeable || s->job.again[0] != NULL))
+        return err_set(e, "--same-program is exact from one pair of renders: it takes neither "
+                          "--exchangeable nor --again");
+    if (!s->job.same_program && s->job.filter_width > 0)
+        return err_set(e, "--filter-width is for --same-program");
+    if (s->job.filter_width == 0)
+        s->job.filter_width = 1;
     if (!s->job.exchangeable && s->job.min_side > 0)
         return err_set(e, "--min-side is for --exchangeable");
     return true;
@@ -143,6 +162,9 @@ static void print_result(const struct compare_job *job, const struct compared *c
         printf("difference %+.3f %%, smallest detectable %s of the image; p = %.3g, smallest "
                "possible %.2g; %d regions\n",
                100 * g->difference, image, c->perm.p, c->perm.smallest_p, c->perm.num_regions);
+    else if (job->same_program)
+        printf("smallest detectable %s of the image, %s of a tile; p at most %.3g; %zu tests\n",
+               image, tile, pow(10, c->flip.log10_p), c->flip.num_tests);
     else
         printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %s of the image, %s of a "
                "tile; %d tests\n",
@@ -156,10 +178,12 @@ static void print_result(const struct compare_job *job, const struct compared *c
     if (r->verdict != VERDICT_NOTHING_FOUND || compare_job_passes(job, c))
         return;
     if (r->mdb_tile < region_mdb_none)
-        printf("for CI: --accept-mdb %.2g --accept-mdb-tile %.2g makes this exit with 0, as does "
-               "--margin D where both are shown to be equal within D\n",
-               round_up(r->mdb_global), round_up(fmax(r->mdb_global, r->mdb_tile)));
-    else
+        printf("for CI: --accept-mdb %.2g --accept-mdb-tile %.2g makes this exit with 0%s\n",
+               round_up(r->mdb_global), round_up(fmax(r->mdb_global, r->mdb_tile)),
+               job->same_program
+                   ? ""
+                   : ", as does --margin D where both are shown to be equal within D");
+    else if (!job->same_program)
         printf("for CI: --margin D exits with 0 where both are shown to be equal within D\n");
 }
 

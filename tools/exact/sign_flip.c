@@ -4,18 +4,19 @@
 #include "tools/stats/distributions.h"
 
 #include <assert.h>
+#include <gsl/gsl_sf_erf.h>
 #include <math.h>
 #include <stdlib.h>
 
 enum { MAX_SIDES = 64 };
 const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES] = {"level", "mean", "spread"};
-static const double share_of_score[NUM_SIGN_FLIP_SCORES] = {0.5, 0.3, 0.2};
-static const double share_of_luminance = 0.5;
+static const double share_of_score[NUM_SIGN_FLIP_SCORES] = {0.6, 0.25, 0.15};
+static const double share_of_luminance = 0.6;
 static const double bound_factor = 3.1787; /* 1/(4 Q(sqrt 2)), rounded up */
+static const double berry_esseen = 0.56;   /* [Shevtsova10] */
 
 struct scan {
     const struct sign_flip_options *opt;
-    int width, height; /* of the images */
     struct windows size[MAX_SIDES];
     int num_sizes;
     int tile_size; /* of size[]: for mdb_tile; -1: none */
@@ -28,21 +29,27 @@ static double log10_normal_bound(double t)
     return fmin(0, stats_t_log10_p(t, INFINITY) + log10(bound_factor));
 }
 
-/* The smallest of e^(-l t) prod cosh(l s) over l by Newton's method; t and s in units of the root of the sum of squares.
- * Every l gives a bound, so the search need not be exact. */
-static double log_exponential_bound(const double *s, size_t num, double unit, double t)
+/* ln of the smallest of the tilted bounds at the l of Newton's search for the tilted mean t; t and s in units of the root of the
+ * sum of squares. Each l gives a bound, so the search need not be exact. */
+static double log_tilted_bound(const double *s, size_t num, double unit, double t)
 {
     double best = 0, l = t;
     for (int i = 0; i < 30; i++) {
-        double sum = -l * t, first = -t, second = 0;
+        double markov = -l * t, mean = 0, variance = 0, third = 0;
         for (size_t k = 0; k < num; k++) {
-            double x = fabs(s[k]) / unit, y = l * x, h = tanh(y);
-            sum += y + log1p(exp(-2 * y)) - M_LN2;
-            first += x * h;
-            second += x * x * (1 - h * h);
+            double x = fabs(s[k]) / unit, y = l * x, h = tanh(y), v = x * x * (1 - h * h);
+            markov += y + log1p(exp(-2 * y)) - M_LN2;
+            mean += x * h;
+            variance += v;
+            third += x * v * (1 + h * h);
         }
-        best = fmin(best, sum);
-        double next = second > 0 ? l - first / second : INFINITY;
+        double sd = sqrt(variance), off = (mean - t) / sd, part = 1;
+        if (variance > 0)
+            part = exp(l * sd * (l * sd / 2 - off) + gsl_sf_log_erfc((l * sd - off) / M_SQRT2) -
+                       M_LN2) +
+                   2 * berry_esseen * third / (variance * sd);
+        best = fmin(best, markov + log(fmin(1, part)));
+        double next = variance > 0 ? l + (t - mean) / variance : INFINITY;
         next = fmax(l / 4, fmin(4 * l, next));
         if (fabs(next - l) <= 1e-6 * l)
             break;
@@ -59,8 +66,8 @@ double sign_flip_log10_p(const double *s, size_t num)
         squares += s[k] * s[k];
     }
     double unit = sqrt(squares), t = fabs(sum) / unit;
-    double exponential = (M_LN2 + log_exponential_bound(s, num, unit, t)) / M_LN10;
-    return fmin(0, fmin(log10_normal_bound(t), exponential));
+    double tilted = (M_LN2 + log_tilted_bound(s, num, unit, t)) / M_LN10;
+    return fmin(0, fmin(log10_normal_bound(t), tilted));
 }
 
 static void list_sizes(const struct sheet *s, const struct sign_flip_options *opt,
@@ -115,8 +122,8 @@ static void describe(const struct sheet *s, struct rect r, const struct scan *sc
         differ += s->a[v] != s->b[v];
     }
     int filter = scan->opt->filter_width, x = r.x * filter, y = r.y * filter;
-    int right = r.x + r.width < s->width ? x + r.width * filter : scan->width;
-    int bottom = r.y + r.height < s->height ? y + r.height * filter : scan->height;
+    int right = r.x + r.width < s->width ? x + r.width * filter : scan->out->width;
+    int bottom = r.y + r.height < s->height ? y + r.height * filter : scan->out->height;
     scan->out->rect = (struct rect){x, y, right - x, bottom - y};
     scan->out->difference = b != 0 ? fmax(-1e6, fmin(1e6, (a - b) / fabs(b))) : copysign(1e6, a);
     scan->out->larger = larger / fmax(1, differ);
@@ -210,8 +217,8 @@ bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_op
     struct sheet s = {.width = (in->width + filter / 2) / filter,
                       .height = (in->height + filter / 2) / filter,
                       .num = in->num};
-    struct scan scan = {.opt = opt, .width = in->width, .height = in->height, .out = out};
-    *out = (struct sign_flip){.log10_p = INFINITY};
+    struct scan scan = {.opt = opt, .out = out};
+    *out = (struct sign_flip){.log10_p = INFINITY, .width = in->width, .height = in->height};
     if (s.width < 1 || s.height < 1)
         return err_set(e, "an image of %d x %d pixels is smaller than the filter's %d", in->width,
                        in->height, filter);

@@ -4,11 +4,15 @@
  * Then, given the unordered pairs {a_p, b_p}, which of the two is A's is a fair coin in every pixel, all channels
  * together: exchanging them flips the sign of any score s_p that is odd in the exchange, and |s_p| may depend on the
  * unordered pairs of all pixels. Whatever the law (fireflies, codes of a PNG, 1 sample a pixel), over any window
- *   T = sum s_p / sqrt(sum s_p^2) = sum a_p e_p,  sum a_p^2 = 1,  e_p = +-1 with probability 1/2 each, and
- *   P(T >= t) <= min(c Q(t), inf over l >= 0 of e^(-l t) prod cosh(l a_p)),  c = 1/(4 Q(sqrt 2)) = 3.178,
- * Q the tail of the normal law: the first is [BentkusDzindzalieta15, theorem 1.1], with the best possible c; the second is
- * Markov's inequality of e^(l T), sharper where few pixels decide. Both hold for every t and all a_p, so the p below is
- * no approximation at any level.
+ *   T = sum s_p / sqrt(sum s_p^2) = sum a_p e_p,  a_p >= 0,  sum a_p^2 = 1,  e_p = +-1 with probability 1/2 each, and
+ *   P(T >= t) <= c Q(t), c = 1/(4 Q(sqrt 2)) = 3.178, Q the tail of the normal law       [BentkusDzindzalieta15, theorem 1.1],
+ *   P(T >= t) <= e^(K(l) - l t) E, K(l) = sum ln cosh(l a_p), for any l >= 0, where
+ *     E = min(1, e^(r (r/2 - w)) Q(r - w) + 1.12 sum a_p^3 (1 - h_p^4) / v^(3/2)), h_p = tanh(l a_p), v = sum a_p^2 (1 - h_p^2),
+ *     r = l sqrt v, w = (sum a_p h_p - t)/sqrt v.
+ * The second is the saddle point's with its error: under signs of chance (1 + h_p)/2, P(T >= t) = e^(K - l t) times the mean of
+ * e^(-l (T - t)) where T >= t, at most 1 [Chernoff52], and by parts within twice the distance of the law of T from the normal of
+ * the same mean and variance, which is at most 0.56 sum E|X - EX|^3 / v^(3/2) [Shevtsova10]. Both hold for every t and all
+ * a_p, so the p below is no approximation at any level; the smaller is taken.
  *
  * Scores of the difference d = a - b, with f(x) = x/(1 + x^2/8), the score of Student's law with 8 degrees of freedom, so that a
  * firefly weighs less than a pixel [Lange89], and "around" for the mean over 9 x 9 pixels:
@@ -17,7 +21,7 @@
  *   mean    d itself, in the same: sees what only rare bright samples show
  *   spread  f(v/s), of v = |a - m| - |b - m| in luminance: noise that has changed, with s of |v|
  * Over squares of sides 4, 6, 8, 11, 16, .. up to the image, an eighth of their side apart, so that a region need not
- * lie on any grid. Bonferroni with shares: half for the level, 0.3 the mean, 0.2 the spread; half of each for luminance;
+ * lie on any grid. Bonferroni with shares: 0.6 for the level, 0.25 the mean, 0.15 the spread; 0.6 of each for luminance;
  * equal parts for each side. Sides whose windows have too few pixels to reach alpha are left out. */
 #ifndef ASSAY_SIGN_FLIP_H
 #define ASSAY_SIGN_FLIP_H
@@ -42,6 +46,7 @@ extern const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES];
 
 struct sign_flip {
     double log10_p;    /* of all tests together: the smallest over its share; at most 0 */
+    int width, height; /* of the images */
     size_t num_tests;  /* windows, channels and scores */
     size_t num_pixels; /* judged, each with a coin for each pair of renders */
     /* Of the smallest: */

@@ -1,4 +1,5 @@
 #include "compare_job.h"
+#include "same_program.h"
 
 #include "tools/compare/hint.h"
 #include "tools/compare/verdict.h"
@@ -180,6 +181,37 @@ void compare_job_free(struct compared *c)
     moments_free(&c->m[1]);
 }
 
+/* The flips decide; what the means alone say stands beside it, if they can be compared. */
+static bool run_same_program(const struct compare_job *job, struct compared *out, struct err *e)
+{
+    struct sign_flip_options opt = {job->opt.alpha, job->filter_width, job->opt.tile};
+    struct err why;
+    out->has_means = run_moments(job, out, &why);
+    if (!out->has_means && err_is_of_memory(&why))
+        return err_set(e, "%s", why.msg);
+    if (!out->has_means) {
+        compare_job_free(out);
+        out->notes = (struct notes){0};
+    }
+    const struct moments *m = out->has_means && out->is_file[0] && out->is_file[1] ? out->m : NULL;
+    if (!same_program_judge(job->path, m, &opt, &out->flip, e))
+        return false;
+    out->mean_verdict = out->r.verdict;
+    snprintf(out->mean_reason, sizeof out->mean_reason, "%s", out->r.reason);
+    same_program_decide(&out->flip, job->opt.alpha, &out->r);
+    if (out->has_means)
+        input_notes_add(&out->notes, "the mean by itself: %s: %s", verdict_name(out->mean_verdict),
+                        out->mean_reason);
+    else
+        input_notes_add(&out->notes, "the mean by itself was not judged: %s", why.msg);
+    input_notes_add(&out->notes,
+                    "judged by flips of %zu pixels: exact if A and B have seeds of their own, and "
+                    "none of these pixels shares noise with another: filters wider than %d need "
+                    "--filter-width, denoisers --exchangeable",
+                    out->flip.num_pixels, job->filter_width);
+    return true;
+}
+
 /* Nothing was found, but more than is accepted could have been missed. */
 static void tell_accepted(const struct compare_job *job, struct comparison *r)
 {
@@ -194,8 +226,13 @@ static void tell_accepted(const struct compare_job *job, struct comparison *r)
 bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
 {
     *out = (struct compared){0};
-    bool ok = job->exchangeable ? run_exchangeable(job, out, e) : run_moments(job, out, e);
-    ok = ok && hint_add(&out->m[0], &out->m[1], &out->r, e);
+    bool (*run)(const struct compare_job *, struct compared *, struct err *) =
+        job->exchangeable   ? run_exchangeable
+        : job->same_program ? run_same_program
+                            : run_moments;
+    bool ok = run(job, out, e);
+    if (ok && (!job->same_program || out->has_means))
+        ok = hint_add(&out->m[0], &out->m[1], &out->r, e);
     if (!ok)
         compare_job_free(out);
     else if (job->accept_mdb[0] > 0 && out->r.verdict == VERDICT_NOTHING_FOUND &&
@@ -217,6 +254,16 @@ static json_t *permutation_json(const struct permutation *p)
     return json_pack("{s:f, s:f, s:i, s:b, s:i, s:f, s:f}", "p", p->p, "smallest_p", p->smallest_p,
                      "labellings", p->num_labellings, "exhaustive", p->is_exhaustive, "regions",
                      p->num_regions, "t", p->t, "mdb", p->mdb);
+}
+
+static json_t *same_program_json(const struct compared *c, int filter_width)
+{
+    const struct sign_flip *f = &c->flip;
+    return json_pack("{s:f, s:s, s:f, s:f, s:I, s:I, s:i, s:{s:s, s:s}}", "log10_p", f->log10_p,
+                     "score", sign_flip_score_name[f->score], "t", f->t, "larger", f->larger,
+                     "num_tests", (json_int_t)f->num_tests, "pixels", (json_int_t)f->num_pixels,
+                     "filter_width", filter_width, "mean", "verdict", verdict_name(c->mean_verdict),
+                     "reason", c->mean_reason);
 }
 
 /* The report reads moments: of a side that is none, they are written beside the results. */
@@ -256,6 +303,8 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
                             const char *path, int argc, char **argv, struct err *e)
 {
     struct claim_context context = context_of(job);
+    if (job->same_program && !c->has_means)
+        return err_set(e, "%s: needs means that can be compared (see the note)", path);
     char side[2][4096];
     const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
     const struct path z = fs_path("%s.z.exr", path);
@@ -279,6 +328,9 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
         ok = json_object_set_new(claim, "notes", notes_json(&c->notes)) == 0;
     if (ok && job->exchangeable)
         ok = json_object_set_new(claim, "permutation", permutation_json(&c->perm)) == 0;
+    if (ok && job->same_program)
+        ok = json_object_set_new(claim, "same_program", same_program_json(c, job->filter_width)) ==
+             0;
     ok = ok &&
          json_object_set_new(claim, "files",
                              json_pack("{s:s, s:s, s:s+, s:s+}", "a", side[0], "b", side[1], "z",

@@ -4,6 +4,7 @@
 
 #include "tools/input/input.h"
 #include "tools/exact/permutation.h"
+#include "tools/exact/sign_flip.h"
 
 struct compare_job {
     const char *path[2];  /* A is tested, B the reference */
@@ -11,6 +12,8 @@ struct compare_job {
     struct input_options input[2];
     struct compare_options opt;
     bool exchangeable; /* judge by permutation of replicates */
+    bool same_program; /* judge by flipping signs of pixels (same_program.h) */
+    int filter_width;  /* of that */
     enum verdict expected;
     double accept_mdb[2]; /* as of struct claim_context */
     int min_side;         /* of a region to permute; 0: permutation.h chooses */
@@ -23,6 +26,12 @@ struct compared {
     const char *path[2];     /* of that pair; the job's */
     struct comparison r;     /* its verdict and reason are the claim's, whoever reached it */
     struct permutation perm; /* of an exchangeable job; of the last stage */
+    struct sign_flip flip;   /* of a job of the same program */
+    bool
+        has_means; /* false: of the same program, whose means could not be compared; m and r but for verdict,
+                                reason and MDBs are empty */
+    enum verdict mean_verdict; /* if they could: what margins say of the means, and why */
+    char mean_reason[256];
     struct notes notes;
 };
 

@@ -56,7 +56,7 @@ TEST(test_bound_of_all_flips)
     assert_in_range(beyond, 50, 400);
 }
 
-/* n equal numbers of which k are negative: P = 2 P(Binomial(n, 1/2) <= k). The bound is above, and not by far: Markov's loses
+/* n equal numbers of which k are negative: P = 2 P(Binomial(n, 1/2) <= k). The bound is above, and not by far: Chernoff's loses
  * sqrt(2 pi) t at most [BahadurRao60], and nothing where all signs are the same. */
 TEST(test_bound_of_equal_numbers)
 {

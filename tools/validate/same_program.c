@@ -1,0 +1,152 @@
+#include "same_program.h"
+
+#include "tools/compare/region.h"
+#include "tools/images/image_file.h"
+#include "tools/images/replicate_dir.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+/* A directory's renders, or one image's, or one side's means. */
+struct renders {
+    struct replicate_dir dir;
+    struct image_file file;
+    float *mean;
+    int num, width, height;
+    float **rgb;
+};
+
+static void renders_free(struct renders *r)
+{
+    replicate_dir_free(&r->dir);
+    image_file_free(&r->file);
+    free(r->mean);
+}
+
+static bool renders_read(const char *path, struct renders *r, struct err *e)
+{
+    struct stat st;
+    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode)) {
+        if (!replicate_dir_read(path, &r->dir, e))
+            return false;
+        r->num = r->dir.num;
+        r->width = r->dir.width;
+        r->height = r->dir.height;
+        r->rgb = r->dir.rgb;
+        return true;
+    }
+    if (!image_file_read(path, &r->file, e))
+        return false;
+    r->num = 1;
+    r->width = r->file.width;
+    r->height = r->file.height;
+    r->rgb = &r->file.rgb;
+    return true;
+}
+
+static bool renders_take(const struct moments *m, struct renders *r, struct err *e)
+{
+    size_t values = 3 * (size_t)m->width * (size_t)m->height;
+    r->mean = malloc(values * sizeof *r->mean);
+    if (r->mean == NULL)
+        return err_set(e, "out of memory for an image");
+    for (size_t i = 0; i < values; i++)
+        r->mean[i] = (float)m->mean[i];
+    r->num = 1;
+    r->width = m->width;
+    r->height = m->height;
+    r->rgb = &r->mean;
+    return true;
+}
+
+/* Both must have been asked for the same: where each side has one number of samples in all pixels, that is it. */
+static bool check_samples(const struct moments *m, struct err *e)
+{
+    double n[2] = {m[0].n[0] * m[0].spp, m[1].n[0] * m[1].spp};
+    size_t pixels = (size_t)m[0].width * (size_t)m[0].height;
+    for (size_t i = 0; i < pixels; i++)
+        if (m[0].n[i] != m[0].n[0] || m[1].n[i] != m[1].n[0])
+            return true;
+    return n[0] == n[1] || err_set(e,
+                                   "A has %g samples a pixel, B %g: only with equally many can two "
+                                   "renders have one law",
+                                   n[0], n[1]);
+}
+
+/* Of A - B, from what both say of their own. NULL: out of memory. */
+static float *stated_error(const struct moments *m)
+{
+    size_t values = 3 * (size_t)m->width * (size_t)m->height;
+    float *error = malloc(values * sizeof *error);
+    for (size_t i = 0; error != NULL && i < values; i++) {
+        double v = moments_var_of_mean(&m[0], i / 3, (int)(i % 3)) +
+                   moments_var_of_mean(&m[1], i / 3, (int)(i % 3));
+        error[i] = v > 0 ? (float)sqrt(v) : 0; /* not a number where it is not known */
+    }
+    return error;
+}
+
+bool same_program_judge(const char *const path[2], const struct moments *m,
+                        const struct sign_flip_options *opt, struct sign_flip *out, struct err *e)
+{
+    struct renders r[2] = {{.num = 0}};
+    float *error = NULL;
+    bool ok = true;
+    for (int i = 0; ok && i < 2; i++)
+        ok = m != NULL ? renders_take(&m[i], &r[i], e) : renders_read(path[i], &r[i], e);
+    if (ok && (r[0].width != r[1].width || r[0].height != r[1].height))
+        ok = err_set(e, "A is %d x %d pixels, B is %d x %d", r[0].width, r[0].height, r[1].width,
+                     r[1].height);
+    if (ok && r[0].num != r[1].num)
+        ok = err_set(e, "A has %d renders, B %d: each of A is held against one of B", r[0].num,
+                     r[1].num);
+    if (ok && m != NULL) {
+        error = stated_error(m);
+        ok = error != NULL ? check_samples(m, e) : err_set(e, "out of memory for errors");
+    }
+    struct sign_flip_images in = {r[0].num, r[0].width, r[0].height, r[0].rgb, r[1].rgb, error};
+    ok = ok && sign_flip_test(&in, opt, out, e);
+    free(error);
+    renders_free(&r[0]);
+    renders_free(&r[1]);
+    return ok;
+}
+
+void same_program_decide(const struct sign_flip *f, double alpha, struct comparison *r)
+{
+    char where[96], image[32], tile[32];
+    size_t size = sizeof r->reason;
+    r->mdb_global = f->mdb_global;
+    r->mdb_tile = f->mdb_tile;
+    r->extra_factor = 1;
+    if (f->log10_p <= log10(alpha)) {
+        const char *more = f->t > 0 ? "brighter" : "darker",
+                   *noise = f->t > 0 ? "noisier" : "less noisy";
+        r->verdict = VERDICT_DIFFERENT;
+        region_name(f->width, f->height, f->rect, f->channel, where, sizeof where);
+        if (f->score == SIGN_FLIP_SPREAD)
+            snprintf(r->reason, size, "the law changed: %s: A is %s, p <= 10^%.1f", where, noise,
+                     f->log10_p);
+        else
+            snprintf(
+                r->reason, size,
+                "the law changed: %s: A is %s in %.0f %% of the pixels, mean %+.3g %%, p <= 10^%.1f",
+                where, more, 100 * (f->t > 0 ? f->larger : 1 - f->larger), 100 * f->difference,
+                f->log10_p);
+    } else if (f->mdb_global < region_mdb_none) {
+        r->verdict = VERDICT_NOTHING_FOUND;
+        snprintf(
+            r->reason, size,
+            "no sign of another law; an error of %s of the image or %s of a tile would have been "
+            "seen with 95 %%",
+            region_mdb_text(f->mdb_global, image), region_mdb_text(f->mdb_tile, tile));
+    } else {
+        r->verdict = VERDICT_INCONCLUSIVE;
+        snprintf(r->reason, size,
+                 "%zu pixels of so much noise cannot show any change at alpha %.2g", f->num_pixels,
+                 alpha);
+    }
+}
