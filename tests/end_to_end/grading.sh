@@ -74,7 +74,7 @@ printf '%s\n' "rubric Shapes" "command {program} -q -s {spp} -m {bounces} -r {wi
 shapes() { "$build/assay" grade -q -o "$tmp/shapes" "$tmp/shapes.rubric" "$tmp/submissions/ada" && grep '"sha256"' "$tmp/shapes/ada/grade.json"; }
 image=$(shapes)
 check "the same scene, the same image" test "$(shapes)" = "$image"
-sed -i 's/<radius>0.05</<radius>0.03</' "$tmp/shapes.dae"
+sed -i 's/<radius>0.056</<radius>0.03</' "$tmp/shapes.dae"
 check "another scene, another image" test "$(shapes)" != "$image"
 check "and all points" grep -q '"points": 1.0' "$tmp/shapes/ada/grade.json"
 
