@@ -222,6 +222,19 @@ expect "compare: different" 1 "^DIFFERENT" \
     "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/shallow.exr" "$tmp/two.exr"
 expect "compare: inconclusive" 2 "^INCONCLUSIVE" \
     "$san_assay" compare --margin 0.002 --margin-tile 0.01 "$tmp/few.exr" "$tmp/two.exr"
+# One seed on both sides, of a program and of one whose lamp is 0.1 % brighter.
+sed 's/10 10 10/10.01 10.01 10.01/' $scene >"$tmp/brighter.dae"
+"$pathtracer" -q -r 200 150 -s 16 --seed 4 -f "$tmp/dark.exr" $scene >/dev/null
+"$pathtracer" -q -r 200 150 -s 16 --seed 4 -f "$tmp/brighter.exr" "$tmp/brighter.dae" >/dev/null
+expect "compare: one seed" 1 "note: the sides are not independent" "$san_assay" compare "$tmp/brighter.exr" "$tmp/dark.exr"
+expect "compare: one seed, paired" 0 "^EQUIVALENT" "$san_assay" compare --paired --margin 0.05 "$tmp/brighter.exr" "$tmp/dark.exr"
+expect "compare: one seed, the interval" 0 "^difference +0.100 % \[+0.0[89].*, +0.1[012]" \
+    "$san_assay" compare --paired --margin 0.05 "$tmp/brighter.exr" "$tmp/dark.exr"
+expect "compare: one seed, not paired" 3 "paired judges them" "$san_assay" compare --margin 0.05 "$tmp/two.exr" "$tmp/two.exr"
+expect "compare: one seed, nothing changed" 0 "the same to the bit" \
+    "$san_assay" compare --paired --margin 0.05 "$tmp/two.exr" "$tmp/two.exr"
+expect "compare: paired and exchangeable" 3 "cannot be exchanged" \
+    "$san_assay" compare --paired --exchangeable "$tmp/two.exr" "$tmp/two.exr"
 # Without a margin nothing is equal; the last line has what makes it pass.
 expect "compare: nothing found" 2 "^NO DIFFERENCE FOUND" "$san_assay" compare "$tmp/one.exr" "$tmp/two.exr"
 accept=$("$san_assay" compare "$tmp/one.exr" "$tmp/two.exr" | sed -n '$s/^for CI: \(.*\) makes this exit with 0.*/\1/p')
@@ -249,7 +262,7 @@ expect "compare: samples that are not independent" 3 "only replicates" \
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
 # compare: inputs from elsewhere. Replicates are any float images, so moments images do.
-for option in --alpha --margin --margin-tile --margin-variance --accept-mdb --accept-mdb-tile --again --exchangeable --same-program --filter-width --curve --spp-a --spp-b; do
+for option in --alpha --margin --margin-tile --margin-variance --accept-mdb --accept-mdb-tile --paired --again --exchangeable --same-program --filter-width --curve --spp-a --spp-b; do
     expect "compare: help names $option" 0 "$option" "$san_assay" compare --help
 done
 for k in 1 2 3 4 5; do

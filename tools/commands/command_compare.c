@@ -68,6 +68,10 @@ static const struct cli_option options[] = {
      "the same renders with fresh seeds: DIFFERENT only if they\n"
      "confirm what A and B show, each stage at the root of alpha",
      TO(job.again)},
+    {0, "paired", "",
+     "A and B share their noise (one seed, two versions of a\n"
+     "program): it is taken from A - B, so that far less shows",
+     TO(job.paired)},
     {0, "exchangeable", "",
      "A and B are directories of replicates of what should be the\n"
      "same program: an exact test by permutation, without margins",
@@ -111,6 +115,8 @@ static bool check(struct settings *s, struct err *e)
         return err_set(e, "compare needs two images (see --help)");
     if (opt->margin_tile < 0)
         opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
+    if (s->job.paired && s->job.exchangeable)
+        return err_set(e, "--paired and --exchangeable: sides with one seed cannot be exchanged");
     double *accept = s->job.accept_mdb;
     if (accept[0] > 0 && opt->margin_tile > 0 && !s->job.same_program)
         return err_set(e, "--accept-mdb is for a search without --margin");

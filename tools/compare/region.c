@@ -153,8 +153,10 @@ double region_mdb(const struct judge *j, const struct measured *m, int channel)
 
 const char *region_mdb_text(double mdb, char text[32])
 {
-    if (mdb < region_mdb_none)
+    if (mdb < 10)
         snprintf(text, 32, "%.3g %%", 100 * mdb);
+    else if (mdb < region_mdb_none)
+        snprintf(text, 32, "more than 1000 %%");
     else
         snprintf(text, 32, "nothing");
     return text;

@@ -13,6 +13,8 @@ static const double skew_limit_widened = 1;
  * more observations. */
 static const double shared_by_chance = 1.0 / 3;
 static const double shared_level = 1e-6;
+/* Of the squared difference: bounds of the variance for any correlation of channels come near this alone. */
+static const double least_shared = 0.25;
 
 /* Paths in one observation of the kind in which both sides can be counted; 0 if there is none. */
 static double paths(const struct moments *m, const struct moments *other)
@@ -142,4 +144,26 @@ size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
         return 0;
     double p = gsl_cdf_binomial_Q((unsigned)(same - 1), shared_by_chance, (unsigned)noisy);
     return p <= shared_level ? same : 0;
+}
+
+double variance_ratio_of_difference(const struct moments *a, const struct moments *b)
+{
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    double largest = 0, log10_p = 0;
+    for (size_t c = 0; c < 3; c++) {
+        double sum = 0, num = 0;
+        for (size_t p = 0; p < pixels; p++) {
+            size_t i = 3 * p + c;
+            double v = moments_var_of_mean(a, p, (int)c) + moments_var_of_mean(b, p, (int)c);
+            if (v > 0) {
+                sum += pow(a->mean[i] - b->mean[i], 2) / v;
+                num++;
+            }
+        }
+        if (num > 0 && sum / num >= largest) {
+            largest = sum / num;
+            log10_p = log10(gsl_cdf_chisq_P(sum, num));
+        }
+    }
+    return largest <= least_shared && log10_p <= log10(shared_level) ? largest : 1;
 }

@@ -1,5 +1,5 @@
-/* What the moments of both sides say about the noise itself (tools/docs/background/verdict.md, "Noise"). Used by compare.c
- * and input_checks.c only. */
+/* What the moments of both sides say about the noise itself (tools/docs/background/verdict.md, "Noise"). For compare.c,
+ * input_checks.c and compare_job.c. */
 #ifndef ASSAY_VARIANCE_RATIO_H
 #define ASSAY_VARIANCE_RATIO_H
 
@@ -13,5 +13,10 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
 /* In how many pixels A and B hold the same observations (all moments agree bit by bit, and there is
  * noise), or 0 if that many can agree by chance. */
 size_t variance_ratio_shared(const struct moments *a, const struct moments *b);
+
+/* The mean of (A - B)^2 over its stated variance, over pixels with noise and in the channel where it is largest: 1 for
+ * equal and independent sides, less where they share their noise. 1, too, where it is more than 1/4, or
+ * independent sides could have as little with a chance of 1e-6 (left tail of chi-square). */
+double variance_ratio_of_difference(const struct moments *a, const struct moments *b);
 
 #endif

@@ -2,6 +2,7 @@
 #include "same_program.h"
 
 #include "tools/compare/hint.h"
+#include "tools/compare/variance_ratio.h"
 #include "tools/compare/verdict.h"
 #include "tools/results/claim_result.h"
 #include "tools/sequential/two_stage.h"
@@ -26,6 +27,27 @@ static void pair_free(struct pair *p)
     input_free(&p->in[1]);
 }
 
+/* Sides that share their noise: what they say of it is not that of A - B, which is looked at itself. */
+static void make_pairs(struct pair *p, struct notes *notes)
+{
+    struct moments *m[2] = {&p->in[0].m, &p->in[1].m};
+    size_t values = 3 * (size_t)m[0]->width * (size_t)m[0]->height;
+    bool same = m[0]->width == m[1]->width && m[0]->height == m[1]->height &&
+                memcmp(m[0]->mean, m[1]->mean, values * sizeof *m[0]->mean) == 0;
+    for (int i = 0; i < 2; i++) {
+        p->in[i].kind = same ? INPUT_MOMENTS : INPUT_IMAGE;
+        p->in[i].is_guessed = true;
+        for (size_t k = 0; same && k < values; k++) {
+            m[i]->n[k / 3] = 1;
+            m[i]->m2[k] = m[i]->m3[k] = 0;
+        }
+        if (same)
+            strcpy(m[i]->unit, "exact");
+    }
+    input_notes_add(notes, same ? "--paired: both images are the same to the bit"
+                                : "--paired: the noise is that of A - B, whatever the sides state");
+}
+
 static bool pair_read(const struct compare_job *job, const char *const path[2], struct pair *p,
                       struct notes *notes, struct err *e)
 {
@@ -37,6 +59,8 @@ static bool pair_read(const struct compare_job *job, const char *const path[2], 
              p->in[1].censored != NULL ||
              err_set(e, "--curve is for images of integers, neither %s nor %s is one", path[0],
                      path[1]);
+    if (ok && job->paired)
+        make_pairs(p, notes);
     ok = ok && input_pair(&p->in[0], &p->in[1], notes, e);
     if (!ok)
         pair_free(p);
@@ -94,6 +118,13 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     if (!pair_read(job, job->path, &p, &out->notes, e))
         return false;
     bool two = job->again[0] != NULL;
+    double seen = variance_ratio_of_difference(&p.in[0].m, &p.in[1].m);
+    if (seen < 1)
+        input_notes_add(&out->notes,
+                        "the sides are not independent, or state too much noise: A - B is %.2g of "
+                        "what they state (root mean square). Same seeds? --paired judges them as "
+                        "pairs",
+                        sqrt(seen));
     bool ok = two ? two_stage_first(&p.in[0].m, &p.in[1].m, &opt, &out->r, e)
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
     if (ok)

@@ -11,6 +11,7 @@ struct compare_job {
     const char *again[2]; /* fresh renders of both for a second stage, or NULL */
     struct input_options input[2];
     struct compare_options opt;
+    bool paired;       /* both sides share their noise: it is taken from A - B */
     bool exchangeable; /* judge by permutation of replicates */
     bool same_program; /* judge by flipping signs of pixels (same_program.h) */
     int filter_width;  /* of that */

@@ -10,6 +10,7 @@
 
 #include "tools/compare/error_modes.h"
 #include "tools/compare/hint.h"
+#include "tools/compare/variance_ratio.h"
 #include "tools/stats/distributions.h"
 #include "compare_must.h"
 
@@ -471,6 +472,38 @@ TEST(test_variance_ratio)
     assert_int_equal(found, tested);
 }
 
+/* Independent sides of any law and few samples are never called alike; sides that share 90 % of their noise, or all but
+ * a factor of 1.001, are: E (A - B)^2 is then 2 (1 - .9) of the variance of one side. */
+TEST(test_noise_shared)
+{
+    enum { SIDE = 24 };
+    static const enum law law[] = {LAW_NORMAL,  LAW_EXPONENTIAL, LAW_BLACK, LAW_RARE,
+                                   LAW_FIREFLY, LAW_LOGNORMAL,   LAW_PARETO};
+    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    MOMENTS own = new_moments(SIDE, SIDE, "sample");
+    uint64_t seed = 77;
+    for (size_t l = 0; l < COUNT(law); l++)
+        for (int n = 3; n <= 48; n *= 4)
+            for (int i = 0; i < 20; i++) {
+                simulate(&a, law[l], 1, n, false, &seed);
+                simulate(&b, law[l], 1, n, false, &seed);
+                assert_true(variance_ratio_of_difference(&a, &b) == 1);
+            }
+    simulate(&a, LAW_NORMAL, 1, 16, false, &seed);
+    simulate(&own, LAW_NORMAL, 1, 16, false, &seed);
+    for (int i = 0; i < 3 * SIDE * SIDE; i++) {
+        b.m2[i] = a.m2[i];
+        b.mean[i] = 1 + 0.9 * (a.mean[i] - 1) + sqrt(1 - 0.81) * (own.mean[i] - 1);
+    }
+    for (int i = 0; i < SIDE * SIDE; i++)
+        b.n[i] = a.n[i];
+    double ratio = variance_ratio_of_difference(&a, &b);
+    assert_true(ratio > 0.08 && ratio < 0.16);
+    for (int i = 0; i < 3 * SIDE * SIDE; i++)
+        b.mean[i] = 1.001 * a.mean[i];
+    assert_true(variance_ratio_of_difference(&a, &b) < 1e-3);
+}
+
 /* The same seeds on both sides are refused, as a whole and in three quarters of the pixels. Controls: other
  * seeds; an exact image compared with itself; and laws of two values, in which independent pixels can
  * agree in every moment: 500 claims of the rare and of the firefly law, none refused (each has less than
@@ -497,9 +530,9 @@ TEST(test_shared_seeds)
             assert_string_equal(
                 e.msg, part == 0
                            ? "A and B hold the same observations in 64 of 64 pixels: rendered "
-                             "with the same seed, or copied?"
+                             "with the same seed, or copied? (--paired judges them as pairs)"
                            : "A and B hold the same observations in 48 of 64 pixels: rendered "
-                             "with the same seed, or copied?");
+                             "with the same seed, or copied? (--paired judges them as pairs)");
     }
     uint64_t seed = 121;
     for (int i = 0; i < 1000; i++) {
