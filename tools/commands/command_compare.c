@@ -86,7 +86,8 @@ static const struct cli_option options[] = {
      TO(job.same_program)},
     {0, "filter-width", "N",
      "of that test: pixels less than N apart may share noise, as\n"
-     "by a filter N pixels wide; one in N x N is judged (1)",
+     "by a filter N pixels wide; one in N x N is judged (all, which\n"
+     "is INCONCLUSIVE where they look as if they shared noise)",
      TO(job.filter_width), 1, 1000},
     {0, "min-side", "N", "smallest region of --exchangeable, pixels (about 1/32 of the image)",
      TO(job.min_side), 1, 65536},
@@ -142,8 +143,6 @@ static bool check(struct settings *s, struct err *e)
                           "--exchangeable nor --again");
     if (!s->job.same_program && s->job.filter_width > 0)
         return err_set(e, "--filter-width is for --same-program");
-    if (s->job.filter_width == 0)
-        s->job.filter_width = 1;
     if (!s->job.exchangeable && s->job.min_side > 0)
         return err_set(e, "--min-side is for --exchangeable");
     return true;

@@ -17,6 +17,7 @@ static const double berry_esseen = 0.56;   /* [Shevtsova10] */
 
 struct scan {
     const struct sign_flip_options *opt;
+    int filter;
     struct windows size[MAX_SIDES];
     int num_sizes;
     int tile_size; /* of size[]: for mdb_tile; -1: none */
@@ -74,7 +75,7 @@ static void list_sizes(const struct sheet *s, const struct sign_flip_options *op
                        struct scan *scan)
 {
     int longest = s->width > s->height ? s->width : s->height, num = 0;
-    double tile = fmax(1, (double)opt->tile / opt->filter_width);
+    double tile = fmax(1, (double)opt->tile / scan->filter);
     scan->tile_size = -1;
     for (int k = 4;
          num == 0 || scan->size[num - 1].width < s->width || scan->size[num - 1].height < s->height;
@@ -121,7 +122,7 @@ static void describe(const struct sheet *s, struct rect r, const struct scan *sc
         larger += s->a[v] > s->b[v];
         differ += s->a[v] != s->b[v];
     }
-    int filter = scan->opt->filter_width, x = r.x * filter, y = r.y * filter;
+    int filter = scan->filter, x = r.x * filter, y = r.y * filter;
     int right = r.x + r.width < s->width ? x + r.width * filter : scan->out->width;
     int bottom = r.y + r.height < s->height ? y + r.height * filter : scan->out->height;
     scan->out->rect = (struct rect){x, y, right - x, bottom - y};
@@ -202,7 +203,7 @@ static void fill_mdb(struct sheet *s, const struct scan *scan, struct sign_flip 
 {
     const struct windows *image = &scan->size[scan->num_sizes - 1],
                          *w = &scan->size[scan->tile_size];
-    double tile = fmax(1, (double)scan->opt->tile / scan->opt->filter_width);
+    double tile = fmax(1, (double)scan->opt->tile / scan->filter);
     /* Of a window larger than the tile only a part changes. */
     double diluted = fmax(1, w->width / tile) * fmax(1, w->height / tile);
     out->mdb_global = find_mdb(s, scan, image);
@@ -212,12 +213,12 @@ static void fill_mdb(struct sheet *s, const struct scan *scan, struct sign_flip 
 bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_options *opt,
                     struct sign_flip *out, struct err *e)
 {
-    int filter = opt->filter_width;
-    assert(in->num > 0 && filter >= 1);
+    int filter = opt->filter_width > 1 ? opt->filter_width : 1;
+    assert(in->num > 0 && opt->filter_width >= 0);
     struct sheet s = {.width = (in->width + filter / 2) / filter,
                       .height = (in->height + filter / 2) / filter,
                       .num = in->num};
-    struct scan scan = {.opt = opt, .out = out};
+    struct scan scan = {.opt = opt, .filter = filter, .out = out};
     *out = (struct sign_flip){.log10_p = INFINITY, .width = in->width, .height = in->height};
     if (s.width < 1 || s.height < 1)
         return err_set(e, "an image of %d x %d pixels is smaller than the filter's %d", in->width,
@@ -234,8 +235,10 @@ bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_op
             sheet_score(&s, score);
             for (int i = 0; i < scan.num_sizes; i++)
                 scan_size(&s, &scan, &scan.size[i], score, channel);
-            if (score == SIGN_FLIP_LEVEL && channel == CHANNEL_LUMINANCE)
+            if (score == SIGN_FLIP_LEVEL && channel == CHANNEL_LUMINANCE) {
+                out->shares_noise = opt->filter_width == 0 && sheet_shares_noise(&s);
                 fill_mdb(&s, &scan, out);
+            }
         }
     }
     sheet_free(&s);

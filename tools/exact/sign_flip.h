@@ -36,9 +36,10 @@ struct sign_flip_images {
 };
 
 struct sign_flip_options {
-    double alpha;     /* for mdb, and for what is left out */
-    int filter_width; /* pixels less than this apart in x and in y may share noise: one in filter_width^2 is judged. 1: all */
-    int tile;         /* side, pixels: for mdb_tile */
+    double alpha; /* for mdb, and for what is left out */
+    int filter_width; /* pixels less than this apart in x and in y may share noise: one in filter_width^2 is judged.
+                         1: all; 0: all, and whether they share noise is looked at */
+    int tile; /* side, pixels: for mdb_tile */
 };
 
 enum sign_flip_score { SIGN_FLIP_LEVEL, SIGN_FLIP_MEAN, SIGN_FLIP_SPREAD, NUM_SIGN_FLIP_SCORES };
@@ -47,6 +48,8 @@ extern const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES];
 struct sign_flip {
     double log10_p;    /* of all tests together: the smallest over its share; at most 0 */
     int width, height; /* of the images */
+    bool
+        shares_noise; /* filter_width 0: neighbours look as if they shared noise, and then p means nothing */
     size_t num_tests;  /* windows, channels and scores */
     size_t num_pixels; /* judged, each with a coin for each pair of renders */
     /* Of the smallest: */

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { RADIUS = 4 }; /* of what is local, pixels */
+enum { RADIUS = 4, BLOCK = 8 }; /* of what is local, pixels */
 /* Standard deviation of a normal law over the geometric mean of |x|: e^((ln 2 + gamma)/2). */
 static const double of_geometric_mean = 1.8874;
 const double sheet_lost_digits = 1e-10;
@@ -178,6 +178,49 @@ void sheet_expect(struct sheet *s, double change)
         s->square[v] = (up * up + down * down) / 2;
     }
     sum_up(s);
+}
+
+/* Of one pair in the block at x, y. False if it is all difference or all alike. */
+static bool block_products(const struct sheet *s, const double *score, int x, int y, double *sum,
+                           double *squares)
+{
+    double mean = 0;
+    int up = 0, down = 0, w = s->width;
+    for (int i = 0; i < BLOCK * BLOCK; i++) {
+        double v = score[(y + i / BLOCK) * w + x + i % BLOCK];
+        mean += v / (BLOCK * BLOCK);
+        up += v > 0;
+        down += v < 0;
+    }
+    if (5 * (up < down ? up : down) < up + down || up + down < BLOCK)
+        return false;
+    *sum = *squares = 0;
+    for (int i = 0; i < BLOCK * BLOCK; i++) {
+        const double *v = score + (y + i / BLOCK) * w + x + i % BLOCK;
+        double right = i % BLOCK + 1 < BLOCK ? (v[0] - mean) * (v[1] - mean) : 0;
+        double below = i / BLOCK + 1 < BLOCK ? (v[0] - mean) * (v[w] - mean) : 0;
+        *sum += right + below;
+        *squares += right * right + below * below;
+    }
+    return true;
+}
+
+bool sheet_shares_noise(const struct sheet *s)
+{
+    double all = 0, variance = 0, sum, squares;
+    int blocks = 0, positive = 0;
+    for (int k = 0; k < s->num; k++)
+        for (int y = 0; y + BLOCK <= s->height; y += BLOCK)
+            for (int x = 0; x + BLOCK <= s->width; x += BLOCK) {
+                const double *score = s->score + (size_t)k * s->pixels;
+                if (!block_products(s, score, x, y, &sum, &squares))
+                    continue;
+                blocks++;
+                positive += sum > 0;
+                all += sum;
+                variance += squares;
+            }
+    return positive > 0.8 * blocks && all > 5 * sqrt(variance);
 }
 
 double sheet_sum(const struct sheet *s, int which, struct rect r)

@@ -31,6 +31,11 @@ void sheet_score(struct sheet *s, enum sign_flip_score score);
  * and the noise as it is, whatever its signs. */
 void sheet_expect(struct sheet *s, double change);
 
+/* Do neighbours look as if they shared noise? Products of scores next to each other, less the block's mean, in blocks of 8 x 8 pixels
+ * of which a fifth at least has the other sign, so that there is noise and not only a difference: by independent noise every
+ * other block's sum is positive, by a filter nearly all are. */
+bool sheet_shares_noise(const struct sheet *s);
+
 /* Of score (0) or its square (1). */
 double sheet_sum(const struct sheet *s, int which, struct rect r);
 /* Of the sum over all pixels: a window's part that is smaller may be rounding. */

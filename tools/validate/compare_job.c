@@ -239,7 +239,7 @@ static bool run_same_program(const struct compare_job *job, struct compared *out
                     "judged by flips of %zu pixels: exact if A and B have seeds of their own, and "
                     "none of these pixels shares noise with another: filters wider than %d need "
                     "--filter-width, denoisers --exchangeable",
-                    out->flip.num_pixels, job->filter_width);
+                    out->flip.num_pixels, job->filter_width > 1 ? job->filter_width : 1);
     return true;
 }
 

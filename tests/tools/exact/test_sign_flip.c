@@ -3,7 +3,9 @@
 #include "tests/support/rates.h"
 #include "tests/support/simulate.h"
 
+#include "tools/compare/region.h"
 #include "tools/exact/sign_flip_score.h"
+#include "tools/validate/same_program.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -57,7 +59,8 @@ TEST(test_bound_of_all_flips)
 }
 
 /* n equal numbers of which k are negative: P = 2 P(Binomial(n, 1/2) <= k). The bound is above, and not by far: Chernoff's loses
- * sqrt(2 pi) t at most [BahadurRao60], and nothing where all signs are the same. */
+ * sqrt(2 pi) t at most [BahadurRao60], and nothing where all signs are the same; the
+ * saddle point's less than a factor of 2 where there are 1000. */
 TEST(test_bound_of_equal_numbers)
 {
     static const int n[] = {20, 64, 300, 1000}, negative[] = {5, 20, 120, 450};
@@ -70,6 +73,8 @@ TEST(test_bound_of_equal_numbers)
             double bound = sign_flip_log10_p(s, (size_t)n[i]);
             assert_true(bound >= exact - 1e-9);
             assert_true(bound <= exact + log10(1 + 2.6 * t));
+            if (n[i] == 1000 && t > 4 && t < 9)
+                assert_true(bound <= exact + log10(2));
             if (k == 0)
                 assert_near(bound, exact, 1e-6);
         }
@@ -189,21 +194,50 @@ static void smooth(float *pixel)
 }
 
 /* Filtered pixels share noise: judged as if they did not, equal laws are told apart in most pairs (the control); one pixel in 3 x 3
- * is judged right. */
+ * is judged right. It is seen where nothing is said of a filter, and is not where there is none, with and without a difference. */
 TEST(test_filtered_pixels)
 {
     uint64_t seed = 31;
-    int wrong = 0, rejected = 0;
+    int wrong = 0, rejected = 0, seen = 0;
     for (int i = 0; i < 100; i++) {
         struct pair p;
+        draw_pair(&p, LAW_EXPONENTIAL, 4, 4, i % 4 * 0.1, everywhere, &seed);
+        assert_false(flip_pair(&p, 0.05, 0).shares_noise);
         draw_pair(&p, LAW_EXPONENTIAL, 4, 4, 0, everywhere, &seed);
         smooth(p.a);
         smooth(p.b);
         wrong += flip_pair(&p, 0.05, 1).log10_p <= log10(0.05);
+        seen += flip_pair(&p, 0.05, 0).shares_noise;
         rejected += flip_pair(&p, 0.05, 3).log10_p <= log10(0.05);
     }
     assert_true(lower_bound(wrong, 100) > 0.3);
+    assert_int_equal(seen, 100);
     assert_true(lower_bound(rejected, 100) <= 0.05);
+}
+
+TEST(test_decision)
+{
+    struct comparison r = {0};
+    struct sign_flip f = {.log10_p = -9,
+                          .mdb_global = 0.01,
+                          .mdb_tile = 0.1,
+                          .t = -7,
+                          .larger = 0.4,
+                          .width = 8,
+                          .height = 8,
+                          .rect = {0, 0, 4, 4}};
+    same_program_decide(&f, 1e-6, &r);
+    assert_int_equal(r.verdict, VERDICT_DIFFERENT);
+    assert_non_null(strstr(r.reason, "4 x 4 pixels at 0,0 (red): A is darker in 60 %"));
+    same_program_decide(&f, 1e-10, &r);
+    assert_int_equal(r.verdict, VERDICT_NOTHING_FOUND);
+    f.shares_noise = true;
+    same_program_decide(&f, 1e-6, &r);
+    assert_int_equal(r.verdict, VERDICT_INCONCLUSIVE);
+    f = (struct sign_flip){.mdb_global = region_mdb_none, .num_pixels = 16};
+    same_program_decide(&f, 1e-6, &r);
+    assert_int_equal(r.verdict, VERDICT_INCONCLUSIVE);
+    assert_non_null(strstr(r.reason, "16 pixels"));
 }
 
 /* 20 pairs with A brighter by 40 % in 16 x 16 pixels at 5,9, on no grid, 16 draws of an exponential law: a pixel's difference has the
