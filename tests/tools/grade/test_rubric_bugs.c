@@ -147,9 +147,9 @@ TEST(another_rubric_is_refused)
     struct err e;
     (void)state;
     for (int i = 0; i < of.rubric->num_images; i++)
-        if (strcmp(of.rubric->image[i].name, "box") == 0) {
+        if (strcmp(of.rubric->image[i].name, "corner") == 0) {
             of.rubric->image[i].bounces++;
-            REFUSES(rubric_bugs_open(of.rubric, of.answers, &other, &e), "'box'");
+            REFUSES(rubric_bugs_open(of.rubric, of.answers, &other, &e), "'corner'");
             of.rubric->image[i].bounces--;
         }
 }
