@@ -20,14 +20,15 @@ struct images {
     const struct moments *side[2];
     bool exact[2];
     int columns, rows;
-    double *weight; /* 3 for each block: 1 / variance of a pixel's A - B there */
-    double mean;    /* of B */
+    double *weight;  /* 3 for each block: 1 / variance of a pixel's A - B there */
+    double mean;     /* of B */
+    bool stands_out; /* A - B, from its noise */
 };
 
 /* Squared differences, noise removed: of pixels, and of the means of blocks. */
 struct excess {
     double before[2], after[2];
-    double all_before, all_after; /* of pixels, noise and all */
+    double all_before, all_after; /* of the means of blocks, noise and all */
     size_t num[2], of; /* pixels and blocks that have a partner, and all pixels that were asked */
 };
 
@@ -118,8 +119,6 @@ static void add_block(const struct images *m, enum error_mode_kind kind, double 
                 double d = m->side[0]->mean[i] - m->side[1]->mean[i], va = variance(m, 0, i),
                        r = m->side[0]->mean[i] - mean[c], vb = variance(m, 1, i);
                 out->before[0] += weight[c] * (d * d - va - vb);
-                out->all_before += weight[c] * d * d;
-                out->all_after += weight[c] * r * r;
                 out->after[0] += weight[c] * (r * r - va - var[c]);
                 before[c] += d;
                 after[c] += r;
@@ -130,6 +129,8 @@ static void add_block(const struct images *m, enum error_mode_kind kind, double 
     out->num[0] += (size_t)num;
     out->num[1] += num > 0;
     for (size_t c = 0; num > 0 && c < 3; c++) {
+        out->all_before += before[c] * before[c] / num;
+        out->all_after += after[c] * after[c] / num;
         out->before[1] += weight[c] / num * (before[c] * before[c] - v_before[c]);
         out->after[1] += weight[c] / num * (after[c] * after[c] - v_after[c]);
     }
@@ -146,19 +147,23 @@ static struct excess measure(const struct images *m, enum error_mode_kind kind, 
     return e;
 }
 
+static double standard_errors(const struct excess *e, int k)
+{
+    return e->num[k] > 0 ? e->before[k] / sqrt(2 * 3 * (double)e->num[k]) : 0;
+}
+
 /* Judged where the difference stands out most from noise. If it stands out nowhere (noise that was guessed from the
- * difference takes much of it for its own), noise and all: no change removes noise. 0: few pixels have a partner. */
+ * difference takes much of it for its own), noise and all: no change removes noise. -1: few pixels have a partner. */
 static double removed_by(const struct images *m, enum error_mode_kind kind, double amount,
                          size_t enough)
 {
     const struct excess e = measure(m, kind, amount, enough);
-    double z[2];
-    for (int k = 0; k < 2; k++)
-        z[k] = e.num[k] > 0 ? e.before[k] / sqrt(2 * 3 * (double)e.num[k]) : 0;
-    int best = z[1] > z[0];
     if (2 * e.num[0] < e.of || !(e.all_before > 0))
-        return 0;
-    return z[best] > certain ? 1 - e.after[best] / e.before[best] : 1 - e.all_after / e.all_before;
+        return -1;
+    if (!m->stands_out)
+        return 1 - e.all_after / e.all_before;
+    int best = standard_errors(&e, 1) > standard_errors(&e, 0);
+    return e.before[best] > 0 ? 1 - e.after[best] / e.before[best] : 0;
 }
 
 /* The amount that removes most: on a grid, then between its neighbours by thirds. */
@@ -237,6 +242,8 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
     for (size_t k = 0; k < 3 * blocks; k++)
         m->weight[k] =
             1 / (fmax(m->weight[k] / num[k / 3], least * mean_var) + dust * mean_square + 1e-300);
+    const struct excess e = measure(m, ERROR_SCALE, 0, ENOUGH);
+    m->stands_out = fmax(standard_errors(&e, 0), standard_errors(&e, 1)) > certain;
     return true;
 }
 
