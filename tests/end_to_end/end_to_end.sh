@@ -335,7 +335,7 @@ expect "compare: the same program, other samples" 3 "A has 8 samples a pixel, B 
     "$san_assay" compare --same-program "$tmp/few.exr" "$tmp/two.exr"
 expect "compare: the same program, one seed" 3 "one seed" \
     "$san_assay" compare --same-program "$tmp/one.png" "$tmp/one.png"
-expect "compare: the same program, again" 3 "neither --exchangeable nor --again" \
+expect "compare: the same program, again" 3 "nor --again nor --paired" \
     "$san_assay" compare --same-program --again "$tmp/one.exr" "$tmp/one.exr" "$tmp/one.exr" "$tmp/two.exr"
 expect "compare: a filter for nothing" 3 "is for --same-program" \
     "$san_assay" compare --filter-width 3 "$tmp/one.exr" "$tmp/two.exr"

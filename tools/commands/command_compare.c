@@ -138,9 +138,9 @@ static bool check(struct settings *s, struct err *e)
         (s->job.input[0].curve != NULL || s->job.input[0].spp > 0 || s->job.input[1].spp > 0))
         return err_set(e, "--exchangeable takes directories of replicates, to which --curve and "
                           "--spp-a do not apply");
-    if (s->job.same_program && (s->job.exchangeable || s->job.again[0] != NULL))
-        return err_set(e, "--same-program is exact from one pair of renders: it takes neither "
-                          "--exchangeable nor --again");
+    if (s->job.same_program && (s->job.exchangeable || s->job.paired || s->job.again[0] != NULL))
+        return err_set(e, "--same-program is exact from one pair of renders with seeds of their "
+                          "own: it takes neither --exchangeable nor --again nor --paired");
     if (!s->job.same_program && s->job.filter_width > 0)
         return err_set(e, "--filter-width is for --same-program");
     if (!s->job.exchangeable && s->job.min_side > 0)
