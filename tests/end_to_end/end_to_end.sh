@@ -277,6 +277,8 @@ done
 expect "compare: directories" 1 "5 replicates" "$san_assay" compare "$tmp/runs_c" "$tmp/runs_b"
 expect "compare: exchangeable, equal" 2 "^NO DIFFERENCE FOUND" \
     "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_a" "$tmp/runs_b"
+expect "compare: exchangeable, what could be missed is accepted" 0 "^NO DIFFERENCE FOUND" \
+    "$san_assay" compare --exchangeable --alpha 0.01 --accept-mdb 1 --accept-mdb-tile 9 "$tmp/runs_a" "$tmp/runs_b"
 expect "compare: exchangeable, different" 1 "^DIFFERENT.*p = 0.00794 by 252 labellings" \
     "$san_assay" compare --exchangeable --alpha 0.01 "$tmp/runs_c" "$tmp/runs_b"
 expect "compare: too few replicates" 2 "7 a side are needed" \

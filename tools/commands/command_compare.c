@@ -185,10 +185,10 @@ static void print_result(const struct compare_job *job, const struct compared *c
     if (r->mdb_tile < region_mdb_none)
         printf("for CI: --accept-mdb %.2g --accept-mdb-tile %.2g makes this exit with 0%s\n",
                round_up(r->mdb_global), round_up(fmax(r->mdb_global, r->mdb_tile)),
-               job->same_program
+               job->same_program || job->exchangeable
                    ? ""
                    : ", as does --margin D where both are shown to be equal within D");
-    else if (!job->same_program)
+    else if (!job->same_program && !job->exchangeable)
         printf("for CI: --margin D exits with 0 where both are shown to be equal within D\n");
 }
 

@@ -166,15 +166,38 @@ static void describe(const struct permutation_table *t, size_t r, struct permuta
     out->difference = b > 0 ? fmax(-1e6, fmin(1e6, d / b)) : copysign(1e6, d);
 }
 
-/* The difference of the image's luminance that exceeds the critical sum with about 95 %. */
-static double image_mdb(const struct permutation_table *t, double critical)
+/* The difference of a region's mean, in units of at least 5 % of the image's, that exceeds the critical sum with
+ * about 95 %. */
+static double region_found(const struct permutation_table *t, size_t r, double critical)
 {
-    size_t image = t->num - 1; /* coarsest of the last channel, luminance */
+    if (!(t->spread[r] > 0))
+        return 0; /* one value in all images */
     double f = 1.0 / t->num_a + 1.0 / t->num_b, dof = t->num_a + t->num_b - 2;
-    double s = (t->mean[0][image] - t->mean[1][image]) / t->spread[image] / f;
-    double se = t->spread[image] * sqrt(fmax(0, 1 - s * s * f) / dof * f);
-    return fmin(region_mdb_none,
-                (t_of_sum(t, critical) + stats_t_quantile(0.05, dof)) * se / t->mean[1][image]);
+    double s = (t->mean[0][r] - t->mean[1][r]) / t->spread[r] / f;
+    double se = t->spread[r] * sqrt(fmax(0, 1 - s * s * f) / dof * f);
+    double unit = fmax(t->mean[1][r], 0.05 * t->mean[1][t->num - 1]);
+    return fmin(region_mdb_none, (t_of_sum(t, critical) + stats_t_quantile(0.05, dof)) * se / unit);
+}
+
+/* The largest over the smallest squares that hold a tile, in luminance; in a larger square the tile's error is
+ * diluted. */
+static double tile_found(const struct permutation_table *t, int tile, double critical)
+{
+    size_t first = t->num - t->num / NUM_CHANNELS, level = t->num - 1;
+    double largest = 0;
+    for (size_t r = t->num; r-- > first;) {
+        int side = t->rect[r].width > t->rect[r].height ? t->rect[r].width : t->rect[r].height;
+        if (t->rect[r].x == 0 && t->rect[r].y == 0 && side >= tile)
+            level = r;
+    }
+    for (size_t r = level; r < t->num; r++) {
+        const struct rect *q = &t->rect[r];
+        if (r > level && q->x == 0 && q->y == 0)
+            break;
+        double held = fmin(tile, q->width) * fmin(tile, q->height);
+        largest = fmax(largest, region_found(t, r, critical) * q->width * q->height / held);
+    }
+    return fmin(region_mdb_none, largest);
 }
 
 static void decide(const struct permutation_options *opt, int num_a, int num_b, int width,
@@ -206,12 +229,14 @@ static void decide(const struct permutation_options *opt, int num_a, int num_b, 
                  "replicates a side can",
                  out->smallest_p, opt->alpha, permutation_needed(sqrt(opt->alpha), 2));
     else {
-        char image[32];
+        char image[32], tile[32];
         out->verdict = VERDICT_NOTHING_FOUND;
-        snprintf(out->reason, sizeof out->reason,
-                 "an error of %s of the image would have been seen with 95 %%; p = %.3g by %d "
-                 "labellings (%s)",
-                 region_mdb_text(out->mdb, image), out->p, out->num_labellings, kind);
+        snprintf(
+            out->reason, sizeof out->reason,
+            "an error of %s of the image or of %s of a tile would have been seen with 95 %%; p = "
+            "%.3g by %d labellings (%s)",
+            region_mdb_text(out->mdb, image), region_mdb_text(out->mdb_tile, tile), out->p,
+            out->num_labellings, kind);
     }
 }
 
@@ -245,8 +270,11 @@ bool permutation_test(const struct replicate_dir *a, const struct replicate_dir 
         out->p = (double)count_reaching(largest, n, observed) / n;
         describe(&t, where, out);
         out->t = t_of_sum(&t, copysign(observed, t.mean[0][where] - t.mean[1][where]));
-        out->mdb = most > 0 && out->smallest_p <= opt->alpha ? image_mdb(&t, largest[n - most])
-                                                             : region_mdb_none;
+        out->mdb = out->mdb_tile = region_mdb_none;
+        if (most > 0 && out->smallest_p <= opt->alpha) {
+            out->mdb = region_found(&t, image, largest[n - most]);
+            out->mdb_tile = tile_found(&t, opt->tile > 1 ? opt->tile : 1, largest[n - most]);
+        }
         decide(opt, a->num, b->num, a->width, a->height, out);
     }
     free(largest);

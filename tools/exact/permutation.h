@@ -19,6 +19,7 @@
 struct permutation_options {
     double alpha;
     int min_side; /* pixels; 0: the smallest power of 2 that leaves at most 1024 regions a channel */
+    int tile;     /* side of a reporting tile, pixels: for mdb_tile */
 };
 
 struct permutation {
@@ -34,6 +35,7 @@ struct permutation {
     double t;
     double difference; /* of the means there, over that of B */
     double mdb;        /* relative, luminance of the image: found with about 95 % */
+    double mdb_tile; /* the same of a tile, the largest over the image (unit as of struct region) */
 };
 
 /* Fails with a line if sizes differ, an image is in both, none varies, or B is black. */
@@ -42,7 +44,7 @@ bool permutation_test(const struct replicate_dir *a, const struct replicate_dir 
     __attribute__((warn_unused_result));
 
 /* A second stage on fresh replicates: the region of `first` alone, in its direction, at opt->alpha.
- * Everything in out but mdb (0) and min_side is of that one test. */
+ * Everything in out but mdb, mdb_tile (0) and min_side is of that one test. */
 bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
                          const struct replicate_dir *b2, const struct permutation_options *opt,
                          struct permutation *out, struct err *e)

@@ -175,8 +175,8 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     struct replicate_dir r[2] = {{0}};
     struct compare_options opt = job->opt;
     bool two = job->again[0] != NULL;
-    struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha,
-                                        job->min_side};
+    struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha, job->min_side,
+                                        opt.tile};
     bool ok =
         replicate_dir_read(job->path[0], &r[0], e) && replicate_dir_read(job->path[1], &r[1], e);
     for (int i = 0; ok && i < 2; i++) {
@@ -185,19 +185,20 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     }
     ok = ok && permutation_test(&r[0], &r[1], &stage, &out->perm, e);
     ok = ok && compare_moments(&out->m[0], &out->m[1], &opt, &out->r, e);
-    double mdb = out->perm.mdb;
+    double mdb = out->perm.mdb, mdb_tile = out->perm.mdb_tile;
     if (ok && two && out->perm.verdict == VERDICT_DIFFERENT)
         ok = permute_again(job, r, &stage, out, e);
     if (ok) {
         out->r.verdict = out->perm.verdict;
         out->r.extra_factor = 1;
         out->r.mdb_global = mdb;
+        out->r.mdb_tile = mdb_tile;
         snprintf(out->r.reason, sizeof out->r.reason, "%s", out->perm.reason);
         input_notes_add(
             &out->notes,
             "judged by permutation of %d and %d replicates, smallest p possible %.2g: exact "
-            "if equal renderers make them from independent seeds; intervals and the MDB of a "
-            "tile are those of the moments",
+            "if equal renderers make them from independent seeds; intervals are "
+            "those of the moments",
             r[0].num, r[1].num, out->perm.smallest_p);
     }
     replicate_dir_free(&r[0]);
