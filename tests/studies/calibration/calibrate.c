@@ -29,7 +29,8 @@ static size_t part(double share, double num)
 #define ADD_COVER(s, ...)               ADD(s, cover, 5000, __VA_ARGS__, 0)
 #define ADD_MARGIN(s, ...)              ADD(s, margin, 6000, __VA_ARGS__, 0)
 #define ADD_STAGES(s, ...)              ADD(s, stages, 7000, __VA_ARGS__, 0)
-#define ADD_PERMUTATION(s, law)         ADD(s, permutation, 8000, law, 0)
+#define ADD_PERMUTATION(s, law)         ADD(s, permutation, 8000, law, 0, 0)
+#define ADD_FLIPS(s, law, draws)        ADD(s, permutation, 8000, law, draws, 0)
 
 static void add_tail(struct settings *s, enum law law, int n_a, int n_b, size_t regions)
 {
@@ -104,6 +105,7 @@ struct settings settings_short(void)
         .power_pairs = 800,
         .cover_pairs = 400,
         .margin_pairs = 300,
+        .permutation_pairs = 1000,
     };
     ADD_SYNTHETIC(&s, LAW_NORMAL, 16, 16);
     ADD_SYNTHETIC(&s, LAW_EXPONENTIAL, 64, 64);
@@ -115,6 +117,7 @@ struct settings settings_short(void)
               .is_grey = true, .is_short = true);
     ADD_COVER(&s, LAW_NORMAL, 16, 16, 0.005);
     ADD_MARGIN(&s, LAW_NORMAL, 16, 0.01, 0.03, 0.08);
+    ADD_FLIPS(&s, LAW_PARETO, 4);
     return s;
 }
 
@@ -163,9 +166,12 @@ void settings_hash(const struct settings *s, char hex[65])
         const struct stages_cell *c = &s->stages[i];
         fprintf(f, "stages %s %d %g %ju\n", law_name[c->law], c->n, c->alpha, (uintmax_t)c->seed);
     }
-    for (int i = 0; i < s->num_permutation; i++)
-        fprintf(f, "permutation %s %ju\n", law_name[s->permutation[i].law],
-                (uintmax_t)s->permutation[i].seed);
+    for (int i = 0; i < s->num_permutation; i++) {
+        const struct permutation_cell *c = &s->permutation[i];
+        fprintf(f, "permutation %s %ju\n", law_name[c->law], (uintmax_t)c->seed);
+        if (c->draws > 0)
+            fprintf(f, "of flips, %d draws\n", c->draws);
+    }
     fprintf(f, "pairs %zu %zu %zu %zu %zu %zu\n", s->render_pairs, s->power_pairs, s->cover_pairs,
             s->margin_pairs, s->stages_pairs, s->permutation_pairs);
     fclose(f);

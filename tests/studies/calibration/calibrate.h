@@ -16,7 +16,7 @@ enum {
     MAX_COVER = 20,
     MAX_MARGIN = 12,
     MAX_STAGES = 8,
-    MAX_PERMUTATION = 4
+    MAX_PERMUTATION = 12
 };
 
 struct settings {

@@ -4,9 +4,10 @@
 
 #include "tools/sequential/two_stage.h"
 #include "tools/exact/permutation.h"
+#include "tools/exact/sign_flip.h"
 
 enum { SIDE = 16, TILE = 8, RENEWED = 128, CHUNK = 500, REPLICATES = 6, PERMUTED_SIDE = 8 };
-const double permutation_level[NUM_PERMUTATION_LEVELS] = {0.1, 0.05, 0.01};
+const double permutation_level[2][NUM_PERMUTATION_LEVELS] = {{0.1, 0.05, 0.01}, {1e-2, 1e-3, 1e-4}};
 
 struct gate_job {
     const struct stages_cell *stages;
@@ -87,7 +88,7 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
     struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image, names};
     struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image + REPLICATES,
                               names + REPLICATES};
-    struct permutation_options opt = {.alpha = permutation_level[0], .min_side = 2};
+    struct permutation_options opt = {.alpha = permutation_level[0][0], .min_side = 2};
     size_t end = (size_t)(chunk + 1) * CHUNK;
     for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
         struct permutation p;
@@ -96,7 +97,41 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
         if (!permutation_test(&a, &b, &opt, &p, e))
             return false;
         for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-            job->count[chunk][l] += p.p <= permutation_level[l];
+            job->count[chunk][l] += p.p <= permutation_level[0][l];
+    }
+    return true;
+}
+
+static void draw_means(enum law law, int draws, uint64_t *state, float *pixels)
+{
+    for (int p = 0; p < SIDE * SIDE; p++) {
+        double sum = 0;
+        for (int k = 0; k < draws; k++)
+            sum += draw(law, state);
+        for (int c = 0; c < 3; c++)
+            pixels[3 * p + c] = (float)(sum / draws);
+    }
+}
+
+static bool flips_chunk(void *arg, int chunk, struct err *e)
+{
+    struct gate_job *job = arg;
+    const struct permutation_cell *cell = job->permutation;
+    uint64_t state = (cell->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
+    float a[3 * SIDE * SIDE], b[3 * SIDE * SIDE];
+    float *rows[] = {a, b};
+    struct sign_flip_images in = {1, SIDE, SIDE, &rows[0], &rows[1], NULL};
+    struct sign_flip_options opt = {
+        .alpha = permutation_level[1][0], .filter_width = 1, .tile = TILE};
+    size_t end = (size_t)(chunk + 1) * CHUNK;
+    for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
+        struct sign_flip f;
+        draw_means(cell->law, cell->draws, &state, a);
+        draw_means(cell->law, cell->draws, &state, b);
+        if (!sign_flip_test(&in, &opt, &f, e))
+            return false;
+        for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
+            job->count[chunk][l] += f.log10_p <= log10(permutation_level[1][l]);
     }
     return true;
 }
@@ -154,11 +189,14 @@ double permutations_cost(size_t pairs)
 bool permutations_run(struct work *w, const struct permutation_cell *cell, size_t pairs,
                       struct permutation_result *out, struct err *e)
 {
-    *out = (struct permutation_result){.pairs = (double)pairs};
+    *out = (struct permutation_result){.pairs = (double)pairs, .is_flips = cell->draws > 0};
     snprintf(out->name, sizeof out->name, "%s", law_name[cell->law]);
+    if (out->is_flips)
+        snprintf(out->name, sizeof out->name, "%s, %d", law_name[cell->law], cell->draws);
     struct gate_job job = {.permutation = cell, .pairs = pairs};
-    if (!run_chunks(w, &job, permutations_cost(pairs), permutation_chunk, out->rejected, e))
-        return err_prefix(e, "permutation, %s", out->name);
+    if (!run_chunks(w, &job, permutations_cost(pairs),
+                    out->is_flips ? flips_chunk : permutation_chunk, out->rejected, e))
+        return err_prefix(e, "%s, %s", out->is_flips ? "flips" : "permutation", out->name);
     return true;
 }
 
@@ -166,8 +204,9 @@ bool permutations_check(const struct permutation_result *r, struct checks *c)
 {
     bool holds = true;
     for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-        holds = check_at_most(c, r->rejected[l], r->pairs, permutation_level[l],
-                              "%s: permutation at %g", r->name, permutation_level[l]) &&
+        holds = check_at_most(c, r->rejected[l], r->pairs, permutation_level[r->is_flips][l],
+                              "%s: %s at %g", r->name, r->is_flips ? "flips" : "permutation",
+                              permutation_level[r->is_flips][l]) &&
                 holds;
     return holds;
 }

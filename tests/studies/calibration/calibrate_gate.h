@@ -31,12 +31,16 @@ bool stages_check(const struct stages_result *r, struct checks *c);
  * pixels up. The smallest p is 2/924. */
 struct permutation_cell {
     enum law law;
+    int draws; /* above 0: instead one image of 16 x 16 on each side, each pixel the mean of as many draws, judged by flips of
+                  pixels (tools/exact/sign_flip.h) */
     uint64_t seed;
 };
 enum { NUM_PERMUTATION_LEVELS = 3 };
-extern const double permutation_level[NUM_PERMUTATION_LEVELS]; /* 0.1, 0.05, 0.01 */
+extern const double
+    permutation_level[2][NUM_PERMUTATION_LEVELS]; /* 0.1, 0.05, 0.01; of flips 0.01, 1e-3, 1e-4 */
 struct permutation_result {
     char name[64];
+    bool is_flips;
     double pairs, rejected[NUM_PERMUTATION_LEVELS];
 };
 bool permutations_run(struct work *w, const struct permutation_cell *cell, size_t pairs,

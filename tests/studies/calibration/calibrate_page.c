@@ -263,6 +263,21 @@ static void intervals(FILE *f, const struct settings *s, const struct results *r
     fputs("\n", f);
 }
 
+static void exchanges(FILE *f, const struct settings *s, const struct results *r, bool is_flips)
+{
+    for (int i = 0; i < s->num_permutation; i++) {
+        const struct permutation_result *p = &r->permutation[i];
+        struct checks c = {.num = 0};
+        if (p->is_flips != is_flips)
+            continue;
+        permutations_check(p, &c);
+        fprintf(f, "| %s |", p->name);
+        for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
+            rate_cell(f, p->rejected[l], p->pairs);
+        fprintf(f, " %s |\n", checks_word(&c, 0));
+    }
+}
+
 static void gates(FILE *f, const struct settings *s, const struct results *r)
 {
     fprintf(
@@ -286,14 +301,13 @@ static void gates(FILE *f, const struct settings *s, const struct results *r)
         "%zu pairs a row. The test is exact, so the rate\nis at most alpha whatever the law.\n\n"
         "| law | alpha 0.1 | alpha 0.05 | alpha 0.01 | |\n|---|---|---|---|---|\n",
         s->permutation_pairs);
-    for (int i = 0; i < s->num_permutation; i++) {
-        const struct permutation_result *p = &r->permutation[i];
-        struct checks c = {.num = 0};
-        permutations_check(p, &c);
-        fprintf(f, "| %s |", p->name);
-        for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-            rate_cell(f, p->rejected[l], p->pairs);
-        fprintf(f, " %s |\n", checks_word(&c, 0));
+    exchanges(f, s, r, false);
+    if (s->num_permutation > 0 && r->permutation[s->num_permutation - 1].is_flips) {
+        fputs(
+            "\nFlips of pixels (tools/exact/sign_flip.h), as many pairs of images of 16 x 16, each pixel the mean of so many "
+            "draws.\n\n| law and n | alpha 0.01 | alpha 0.001 | alpha 0.0001 | |\n|---|---|---|---|---|\n",
+            f);
+        exchanges(f, s, r, true);
     }
     fputs("\n", f);
 }
