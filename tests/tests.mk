@@ -21,10 +21,14 @@ BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_t
 # What several tests share: a library, of which each takes what it wants.
 SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c, \
   $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c tests/mutants/bug_effect.c))
-# Simulations of thousands of claims: without sanitizers, which the same code meets in the others.
-RATES   := $(addprefix test_,calibration compare_rates converge permutation sign_flip alpha_spending noise_estimate statistics diagnose)
+# Without sanitizers, which the same code meets in the others: simulations of thousands of claims, and closed forms and other
+# programs against millions of rays and samples (test_widths has every material, light and option, test_bvh_wide all of the tracing).
+RATES   := $(addprefix test_,alpha_spending calibration compare_rates converge diagnose noise_estimate permutation sign_flip statistics)
+TRUTHS  := $(addprefix test_,embree independence integrator lights materials metamorphic povray_optics suite_scenes truth_lens \
+  truth_mirrors_and_glass)
+PLAIN   := $(RATES) $(TRUTHS)
 program  = $(addprefix $(1)/tests/,$(basename $(notdir $(2))))
-CHECKED  = $(filter-out $(addprefix %/,$(RATES)),$(call program,$(BUILD)/san,$(TESTS))) $(RATES:%=$(BUILD)/tests/%)
+CHECKED  = $(filter-out $(addprefix %/,$(PLAIN)),$(call program,$(BUILD)/san,$(TESTS))) $(PLAIN:%=$(BUILD)/tests/%)
 
 # -g1: file and line are all that a finding says, and -g doubles the time that the kernels take to compile.
 SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
@@ -32,6 +36,7 @@ SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize
 # under ThreadSanitizer, and with clang's counts of what ran.
 $(BUILD)/san/%: OPT := $(SANITIZE)
 $(BUILD)/san/%: WERROR := 1
+$(BUILD)/tests/%: WERROR := 1
 $(BUILD)/clang/%: CC := clang
 $(BUILD)/clang/%: CXX := clang++
 $(BUILD)/clang/%: OPT := $(SANITIZE),fuzzer-no-link
@@ -41,8 +46,10 @@ $(BUILD)/cov/%: CC := clang
 $(BUILD)/cov/%: CXX := clang++
 $(BUILD)/cov/%: OPT := -O2 -g -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: WERROR := 1
-# No fuzzer traces a ray; the tests do, in san/.
-$(patsubst %,$(BUILD)/clang/%.o,$(filter-out renderer/bvh/sah_split%,$(KERNELS))): OPT := -O1
+# What no fuzzer runs is compiled in a fifth of the time; one that ran it after all would end (tests/fuzz/fuzz.c).
+UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) $(addprefix reference/,truth cycles povray mitsuba pbrt) \
+  $(addprefix tools/,stats compare sequential plots report validate converge commands)
+$(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
 $(foreach b,san clang tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
 
 define test_program
@@ -107,16 +114,17 @@ lint: order $(BUILD)/deps-lint $(patsubst %,$(BUILD)/lint/%.ok,$(LINT) $(KERNELS
 order: all
 	tests/lint/order.sh $(BUILD)
 # A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
-# every va_list but the first file's for one that was never started.
+# every va_list but the first file's for one that was never started. Of a kernel the paths are followed for one instruction set,
+# as only its intrinsics differ in the others.
 define clang_tidy
 	$(call say,TIDY,$<)
-	$(Q)mkdir -p $(@D); clang-tidy --quiet $< -- -std=c17 -I. -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) >$@.log 2>&1 || { cat $@.log; exit 1; }; touch $@
+	$(Q)mkdir -p $(@D); clang-tidy --quiet $(2) $< -- -std=c17 -I. -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) >$@.log 2>&1 || { cat $@.log; exit 1; }; touch $@
 endef
 $(patsubst %,$(BUILD)/lint/%.ok,$(LINT)): $(BUILD)/lint/%.ok: % .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
 	$(call clang_tidy,-DASSAY_VERSION='""' -DASSAY_COMMIT='""')
 define kernel_lint
 $(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
-	$$(call clang_tidy,$(call isa_flags,$(2)))
+	$$(call clang_tidy,$(call isa_flags,$(2)),$(if $(filter sse42 avx512,$(2)),--checks=-clang-analyzer-*))
 endef
 $(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_lint,$(k),$(i)))))
 # Both are asked about planted faults first: who does not see them sees nothing (cppcheck is silent about a file that it cannot read).

@@ -20,6 +20,22 @@ void fuzz_require(int ok, const char *what)
     abort();
 }
 
+/* What is compiled without sanitizers, in the belief that no fuzzer runs it, calls this (tests/tests.mk). */
+void __cyg_profile_func_enter(void *function, void *caller);
+void __cyg_profile_func_exit(void *function, void *caller);
+
+void __cyg_profile_func_enter(void *function, void *caller)
+{
+    fprintf(stderr, "fuzz: %p runs without sanitizers, called from %p\n", function, caller);
+    abort();
+}
+
+void __cyg_profile_func_exit(void *function, void *caller)
+{
+    (void)function;
+    (void)caller;
+}
+
 const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix)
 {
     if (path[0] == '\0') {
