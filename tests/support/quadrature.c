@@ -1,4 +1,5 @@
 #include "quadrature.h"
+#include "suite_files.h"
 #include "test.h"
 
 #include "reference/truth/truth.h"
@@ -52,28 +53,54 @@ double integrate_plane(double (*f)(double, double, const void *), const void *ct
 
 void render_truth(const char *name, int width, int height, struct moments *out)
 {
-    struct suite suite;
     struct err e;
-    if (!suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", e.msg);
-    const struct suite_scene *shipped = suite_find(&suite, name);
-    assert_non_null(shipped);
-    struct suite_scene scene = *shipped;
+    struct suite_scene scene = *suite_shipped_scene(name);
     scene.width = width;
     scene.height = height;
-    const struct suite_reference *truth = NULL;
-    for (int i = 0; i < scene.num_references; i++)
-        if (strcmp(scene.reference[i].engine, "truth") == 0)
-            truth = &scene.reference[i];
+    const struct suite_reference *truth = suite_reference_of(&scene, "truth");
     assert_non_null(truth);
-    if (!truth_render(&scene, truth, out, &e))
-        fail_msg("%s", e.msg);
-    suite_free(&suite);
+    MUST(truth_render(&scene, truth, out, &e));
 }
 
 double mean_at(const struct moments *m, int col, int row, int channel)
 {
     return m->mean[3 * (row * m->width + col) + channel];
+}
+
+void expect_box_filter(const struct plane_scene *p, const int (*pixels)[2], size_t num)
+{
+    struct moments m;
+    render_truth(p->name, 64, 64, &m);
+    for (size_t i = 0; i < num; i++) {
+        int col = pixels[i][0], row = pixels[i][1];
+        double side = p->half / 32, x = p->left + side * col, z = p->top + side * row;
+        double centre = p->irradiance(x + side / 2, z + side / 2, NULL);
+        double mean = integrate_plane(p->irradiance, NULL, (double[2]){x, x + side},
+                                      (double[2]){z, z + side}) /
+                      (side * side);
+        for (int c = 0; c < 3; c++)
+            assert_true(same(mean_at(&m, col, row, c), p->albedo[c] * p->source[c] * mean / M_PI));
+        assert_false(same(mean_at(&m, col, row, 0), p->albedo[0] * p->source[0] * centre / M_PI));
+    }
+    moments_free(&m);
+}
+
+void expect_any_resolution(const char *name)
+{
+    struct moments coarse, fine;
+    render_truth(name, 64, 64, &coarse);
+    render_truth(name, 128, 128, &fine);
+    assert_string_equal(coarse.unit, "exact");
+    for (int row = 0; row < 64; row++)
+        for (int col = 0; col < 64; col++)
+            for (int c = 0; c < 3; c++) {
+                double mean = 0;
+                for (int k = 0; k < 4; k++)
+                    mean += mean_at(&fine, 2 * col + (k & 1), 2 * row + (k >> 1), c) / 4;
+                assert_true(same(mean_at(&coarse, col, row, c), mean));
+            }
+    moments_free(&coarse);
+    moments_free(&fine);
 }
 
 void expect_refusal(const char *kind, const char *text, int depth, const char *message)

@@ -21,6 +21,22 @@ void render_truth(const char *name, int width, int height, struct moments *out);
 /* Value of that channel of that pixel. */
 double mean_at(const struct moments *m, int col, int row, int channel);
 
+/* A plane as such a scene shows it, 2 `half` wide from the point (left, top) on; the image's top is -Z. */
+struct plane_scene {
+    const char *name;
+    double (*irradiance)(double x, double z, const void *); /* by another route */
+    double source[3], albedo[3], left, top, half;
+    int bright_col, bright_row; /* the pixel of 64 x 64 below the source's centre */
+    bool symmetric;
+};
+
+/* The mean over each of those pixels of 64 x 64 is the image's value, and that of its centre is not. */
+void expect_box_filter(const struct plane_scene *p, const int (*pixels)[2], size_t num);
+
+/* An image of twice the resolution, averaged 2 x 2, is the same image: the quadrature over a pixel has converged, and
+ * pixels tile the footprint. */
+void expect_any_resolution(const char *name);
+
 /* Renders the closed form `kind` at 4 x 4 pixels from `values` (JSON text) as scene 19_bad, lens of
  * radius .25 focused at 2. Passes if it is refused with a line that names the scene and holds
  * `message`, or if message is NULL and it is accepted. */

@@ -60,6 +60,12 @@ double sky_radiance(const struct sky *s, double x, double y)
     return sum;
 }
 
+double sky_seen(const struct sky *s, const double w[3])
+{
+    double phi = atan2(-w[2], w[0]) + M_PI, theta = atan2(hypot(w[0], w[2]), w[1]);
+    return sky_radiance(s, phi / (2 * M_PI) * s->width, theta / M_PI * s->height);
+}
+
 void sky_direction(const struct sky *s, double x, double y, double w[3])
 {
     double theta = M_PI * y / s->height, phi = 2 * M_PI * x / s->width - M_PI;

@@ -24,6 +24,9 @@ struct environment *sky_environment(const struct sky *s);
  * and the last row y is that of the middle. */
 double sky_radiance(const struct sky *s, double x, double y);
 
+/* The same from the direction w, of any length. */
+double sky_seen(const struct sky *s, const double w[3]);
+
 /* Irradiance of the first channel on a plane with the unit normal n, which must be an axis:
  * Gauss-Legendre quadrature over quarters of texels, at whose edges cosine and radiance have their
  * kinks. width must be a multiple of 4, height of 2. */

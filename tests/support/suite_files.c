@@ -1,9 +1,26 @@
 #include "suite_files.h"
 
+#include "test.h"
 #include "vectors.h"
 
 #include <assert.h>
 #include <string.h>
+
+const struct suite *suite_shipped(void)
+{
+    static struct suite suite;
+    struct err e;
+    if (suite.num_scenes == 0)
+        MUST(suite_load("reference/scenes", &suite, &e));
+    return &suite;
+}
+
+const struct suite_scene *suite_shipped_scene(const char *name)
+{
+    const struct suite_scene *s = suite_find(suite_shipped(), name);
+    assert_non_null(s);
+    return s;
+}
 
 static void skin(double s, double t, double p[3])
 {

@@ -1,12 +1,17 @@
-/* The files of reference/scenes that no hand can write: the mesh of 44_mesh and the sky images of
+/* The suite that is shipped, and the files of it that no hand can write: the mesh of 44_mesh and the sky images of
  * 46_sky and 96_sky_turned. make_suite_files writes them; test_suite_scenes holds the shipped files
  * against these functions. */
 #ifndef ASSAY_TEST_SUITE_FILES_H
 #define ASSAY_TEST_SUITE_FILES_H
 
+#include "reference/suite/suite.h"
 #include "renderer/image/image.h"
 
 #include <stdio.h>
+
+/* reference/scenes, read once, and a scene of it. What is missing fails the test. */
+const struct suite *suite_shipped(void);
+const struct suite_scene *suite_shipped_scene(const char *name);
 
 /* A point of the knot's skin and the unit normal there, outside. s in [0,1) runs along the tube, t in
  * [0,1) around it. The tube's middle runs 2 times around the axis Y and 3 times around the ring of

@@ -55,6 +55,18 @@ char *test_read(const char *path)
     return text;
 }
 
+const char *test_course_file(const char *name)
+{
+    static char path[4096];
+    const char *root = getenv("ASSAY_CS184");
+    snprintf(path, sizeof path, "%s/%s", root != NULL ? root : "../shared/scenes/cs184", name);
+    if (access(path, R_OK) != 0) {
+        print_message("SKIPPED: no %s (set ASSAY_CS184)\n", path);
+        skip();
+    }
+    return path;
+}
+
 void test_write(const char *path, const void *bytes, size_t size)
 {
     FILE *f = fopen(path, "wb");

@@ -47,6 +47,10 @@ const char *test_path(const char *name);
 char *test_read(const char *path);
 void test_write(const char *path, const void *bytes, size_t size);
 
+/* Path of one of the assignment's files, which are not ours to ship (ASSAY_CS184 says where they are); else it skips the test, and
+ * says so. */
+const char *test_course_file(const char *name);
+
 /* Fails at the first line of the text that is not the one of the file `expected`. Numbers are the same that differ by
  * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
 void test_same_text(const char *text, const char *expected);

@@ -55,13 +55,27 @@ void probe_finish(struct probe *f)
              &e);
 }
 
-void probe_need_blender(void)
+void probe_size(struct probe *f, int width, int height)
 {
     char path[4096];
+    f->suite.width = width;
+    f->suite.height = height;
     if (process_find("blender", path, sizeof path))
         return;
     print_message("SKIPPED: blender is not installed, so Cycles itself was not tested\n");
     skip();
+}
+
+void probe_sky(struct probe *f, const struct sky *sky)
+{
+    f->s.environment = sky_environment(sky);
+    build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
+}
+
+void probe_uniform(const double d[3], double out[3], const void *data)
+{
+    (void)d;
+    memcpy(out, data, 3 * sizeof *out);
 }
 
 /* Statistics of a part of the image: the sum over its pixels of the mean, and its standard error;
@@ -163,4 +177,12 @@ void probe_judge(struct probe *f, struct moments *m, double *truth, double allow
     assert_true(agrees);
     assert_false(brighter);
     assert_int_equal(mirrored, symmetric);
+}
+
+void probe_check(struct probe *f, double tan_h, int sub, probe_radiance *radiance, const void *data,
+                 double allowed, bool symmetric)
+{
+    struct moments m;
+    probe_render(f, &m);
+    probe_judge(f, &m, probe_expect(f, tan_h, sub, radiance, data), allowed, symmetric);
 }

@@ -4,6 +4,7 @@
 #define ASSAY_CYCLES_PROBE_H
 
 #include "tests/support/build_scene.h"
+#include "tests/support/sky.h"
 
 #include "reference/cycles/cycles_driver.h"
 
@@ -25,8 +26,11 @@ int probe_teardown(void **state);
 /* Fails the test with the line of *e. */
 void probe_ok(bool ok, const struct err *e);
 
-/* Skips the test, and says so, where there is no Blender. */
-void probe_need_blender(void);
+/* For a test of Blender itself: sets the size of the image, or skips the test, and says so, where there is no Blender. */
+void probe_size(struct probe *f, int width, int height);
+
+/* The sky as environment and light of the scene. */
+void probe_sky(struct probe *f, const struct sky *sky);
 
 /* scene_finish() and camera_init(), or the test fails with their line. */
 void probe_finish(struct probe *f);
@@ -34,6 +38,9 @@ void probe_finish(struct probe *f);
 /* Radiance that arrives at the eye from direction d, which is not of unit length: at distance 1 along
  * the camera's axis it is (x, y, -1). */
 typedef void probe_radiance(const double d[3], double out[3], const void *data);
+
+/* The same from everywhere; data: the three channels. */
+probe_radiance probe_uniform;
 
 /* Mean of f over each pixel, midpoint rule with sub x sub points. The ray is formed here, not by the
  * renderer's camera. The caller frees. */
@@ -53,5 +60,8 @@ bool probe_agrees(const struct moments *m, const double *truth, double allowed);
 /* It agrees, and the negative controls do not: 1 % brighter, and left and right exchanged unless the
  * image is symmetric. Prints the figures, frees both. */
 void probe_judge(struct probe *f, struct moments *m, double *truth, double allowed, bool symmetric);
+/* probe_render(), and its judgement by what probe_expect() gives. */
+void probe_check(struct probe *f, double tan_h, int sub, probe_radiance *radiance, const void *data,
+                 double allowed, bool symmetric);
 
 #endif

@@ -1,7 +1,6 @@
 /* Spot lights, fall-offs, environments and the thin lens in the real Cycles against closed forms. Skips
  * without Blender. */
 #include "cycles_probe.h"
-#include "tests/support/sky.h"
 #include "tests/support/test.h"
 
 /* A wall of albedo (.5, .25, .8) at z = -2, seen from the origin, 60 degrees wide. */
@@ -12,13 +11,6 @@ static void build_wall(struct probe *f, float half)
     build_quad(&f->s, v3(-half, -half, -2), v3(2 * half, 0, 0), v3(0, 2 * half, 0),
                build_material(&f->s, (rgb){.5f, .25f, .8f}, grey(0)));
     build_camera(&f->s, v3(0, 0, 0), 60);
-}
-
-static void set_size(struct probe *f)
-{
-    probe_need_blender();
-    f->suite.width = 24;
-    f->suite.height = 16;
 }
 
 /* At (.7, .4, -.9), value (7, 5, 3), falling off as 1/(.3 + .2 d + .5 d^2); a spot shines along
@@ -37,8 +29,7 @@ static void lamp_radiance(const double d[3], double out[3], const void *data)
 
 static void check_lamp(struct probe *f, bool spot)
 {
-    struct moments m;
-    set_size(f);
+    probe_size(f, 24, 16);
     build_wall(f, 5);
     build_light(&f->s, (struct light){.kind = spot ? LIGHT_SPOT : LIGHT_POINT,
                                       .value = {7, 5, 3},
@@ -47,9 +38,8 @@ static void check_lamp(struct probe *f, bool spot)
                                       .cos_cutoff = .8f,
                                       .exponent = 2.5f,
                                       .attenuation = {.3f, .2f, .5f}});
-    probe_render(f, &m);
     /* the midpoint rule at the cone's edge */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 64, lamp_radiance, &spot), 3e-4, false);
+    probe_check(f, tan(M_PI / 6), 64, lamp_radiance, &spot, 3e-4, false);
 }
 
 TEST_WITH(falloff_with_all_three_terms, probe_setup, probe_teardown)
@@ -61,26 +51,19 @@ TEST_WITH(spot_with_a_hard_edge, probe_setup, probe_teardown)
     check_lamp(*state, true);
 }
 
-static double seen_sky(const struct sky *sky, const double w[3])
-{
-    double phi = atan2(-w[2], w[0]) + M_PI, theta = atan2(hypot(w[0], w[2]), w[1]);
-    return sky_radiance(sky, phi / (2 * M_PI) * sky->width, theta / M_PI * sky->height);
-}
-
 /* Looks straight up, with +X to the right and +Z up in the image: the pole in its middle. */
 static void zenith_radiance(const double d[3], double out[3], const void *data)
 {
     const double w[3] = {d[0], -d[2], d[1]};
     for (int k = 0; k < 3; k++)
-        out[k] = (k + 1) * seen_sky(data, w);
+        out[k] = (k + 1) * sky_seen(data, w);
 }
 
 TEST_WITH(sky_around_the_pole, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     struct sky sky = sky_uneven(16, 8);
-    set_size(f);
+    probe_size(f, 24, 16);
     for (int i = 0; i < 16; i++) /* beside the pole nothing is constant, nor equal across it */
         sky.value[i] = (float)(1 + i * i % 7);
     build_quad(&f->s, v3(-1, -3, -1), v3(2, 0, 0), v3(0, 0, 2),
@@ -88,35 +71,23 @@ TEST_WITH(sky_around_the_pole, probe_setup, probe_teardown)
     build_camera(&f->s, v3(0, 0, 0), 60);
     f->s.camera.up = v3(0, 0, 1);
     f->s.camera.backward = v3(0, -1, 0);
-    f->s.environment = sky_environment(&sky);
-    build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
-    probe_render(f, &m);
+    probe_sky(f, &sky);
     /* the midpoint rule at the pole, where radiance is not continuous */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 32, zenith_radiance, &sky), 3e-4, false);
-}
-
-static void uniform_radiance(const double d[3], double out[3], const void *data)
-{
-    (void)d;
-    for (int k = 0; k < 3; k++)
-        out[k] = ((const double *)data)[k];
+    probe_check(f, tan(M_PI / 6), 32, zenith_radiance, &sky, 3e-4, false);
 }
 
 /* The wall in a sky with a hot texel: radiance = albedo / pi x irradiance, by quadrature. */
 TEST_WITH(irradiance_of_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     const struct sky sky = sky_uneven(16, 8);
-    set_size(f);
+    probe_size(f, 24, 16);
     build_wall(f, 5);
-    f->s.environment = sky_environment(&sky);
-    build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
-    probe_render(f, &m);
+    probe_sky(f, &sky);
     double want[3], e = sky_irradiance(&sky, (const double[3]){0, 0, 1});
     for (int k = 0; k < 3; k++)
         want[k] = ALBEDO[k] / M_PI * (k + 1) * e;
-    probe_judge(f, &m, probe_expect(f, 1, 1, uniform_radiance, want), 1e-4, true);
+    probe_check(f, 1, 1, probe_uniform, want, 1e-4, true);
 }
 
 /* Ambient light of (1, 2, 4) from above lights the wall with pi/2 of that. Right of x = .5 there is a
@@ -132,9 +103,8 @@ static void ambient_radiance(const double d[3], double out[3], const void *data)
 TEST_WITH(ambient_light_on_rough_surfaces_alone, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     struct err e;
-    set_size(f);
+    probe_size(f, 24, 16);
     f->suite.depth = 3;
     build_quad(&f->s, v3(-4, -4, -2), v3(4.5f, 0, 0), v3(0, 4.4f, 0),
                build_material(&f->s, (rgb){.5f, .25f, .8f}, grey(0)));
@@ -144,9 +114,8 @@ TEST_WITH(ambient_light_on_rough_surfaces_alone, probe_setup, probe_teardown)
     build_camera(&f->s, v3(0, 0, 0), 60);
     f->s.environment = environment_upper_half((rgb){1, 2, 4}, &e);
     build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
-    probe_render(f, &m);
     /* the midpoint rule at the edges, which cut pixels */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 64, ambient_radiance, NULL), 3e-3, false);
+    probe_check(f, tan(M_PI / 6), 64, ambient_radiance, NULL, 3e-3, false);
 }
 
 /* A lens of radius .3 in focus at 1.5, a wall at 3 that glows with (1, 2, 3) right of x = .2. A ray
@@ -164,7 +133,7 @@ TEST_WITH(lens_on_an_edge, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
-    set_size(f);
+    probe_size(f, 24, 16);
     build_quad(&f->s, v3(.2f, -9, -3), v3(9, 0, 0), v3(0, 18, 0),
                build_material(&f->s, grey(0), (rgb){1, 2, 3}));
     build_camera(&f->s, v3(0, 0, 0), 30);

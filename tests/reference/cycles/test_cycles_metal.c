@@ -2,7 +2,6 @@
  * textbook formulas. Skips without Blender. */
 #include "cycles_probe.h"
 #include "tests/support/optics.h"
-#include "tests/support/sky.h"
 #include "tests/support/test.h"
 
 #include <complex.h>
@@ -83,9 +82,7 @@ static void check_ball(struct probe *f, struct metal is, struct metal is_not, do
 {
     struct moments m;
     struct err e;
-    probe_need_blender();
-    f->suite.width = 24;
-    f->suite.height = 16;
+    probe_size(f, 24, 16);
     build_sphere(&f->s, v3(0, 0, BALL_Z), (float)BALL_RADIUS, 1, build_metal(&f->s, &is));
     f->s.environment = environment_constant(grey(1), &e);
     build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
@@ -137,16 +134,7 @@ static double reflected_sky(const double wi[3], void *data)
     double w[3];
     for (int k = 0; k < 3; k++)
         w[k] = wi[0] * AXIS[0][k] + wi[1] * AXIS[1][k] + wi[2] * AXIS[2][k];
-    double phi = atan2(-w[2], w[0]) + M_PI, theta = atan2(hypot(w[0], w[2]), w[1]);
-    return optics_metal_f_cos(&l->metal, l->wo, wi) *
-           sky_radiance(l->sky, phi / (2 * M_PI) * l->sky->width, theta / M_PI * l->sky->height);
-}
-
-static void uniform_radiance(const double d[3], double out[3], const void *data)
-{
-    (void)d;
-    for (int k = 0; k < 3; k++)
-        out[k] = ((const double *)data)[k];
+    return optics_metal_f_cos(&l->metal, l->wo, wi) * sky_seen(l->sky, w);
 }
 
 static void check_lobe(struct probe *f, struct metal is)
@@ -154,15 +142,12 @@ static void check_lobe(struct probe *f, struct metal is)
     struct moments m;
     struct sky sky = sky_uneven(8, 4);
     double want[3];
-    probe_need_blender();
-    f->suite.width = 24;
-    f->suite.height = 16;
+    probe_size(f, 24, 16);
     sky.value[1 * 8 + 4] = 2; /* no single bright texel */
     vec3 x = v3((float)AXIS[0][0], 0, (float)AXIS[0][2]), y = v3(0, 1, 0);
     build_quad(&f->s, sub(v3(0, 0, -3), add(x, y)), scale(x, 2), scale(y, 2),
                build_metal(&f->s, &is));
-    f->s.environment = sky_environment(&sky);
-    build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
+    probe_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), .5f);
     probe_finish(f);
     probe_run(f, a_closure(&is) ? 256 : 1024, &m);
@@ -175,7 +160,7 @@ static void check_lobe(struct probe *f, struct metal is)
                                               reflected_sky, &l);
     }
     /* the quadrature, where the sky has kinks, and a quarter of a degree to each side */
-    probe_judge(f, &m, probe_expect(f, 1, 1, uniform_radiance, want), 5e-4, true);
+    probe_judge(f, &m, probe_expect(f, 1, 1, probe_uniform, want), 5e-4, true);
 }
 
 TEST_WITH(closure_in_a_sky, probe_setup, probe_teardown)

@@ -2,7 +2,6 @@
  * round, with tilted normals, glowing, and cut off at a depth. Skips without Blender. */
 #include "cycles_probe.h"
 #include "tests/support/optics.h"
-#include "tests/support/sky.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -38,18 +37,6 @@ static void mirrored(const double w[3], const double n[3], double out[3])
     along(w, -2 * dot3(w, n), n, out);
 }
 
-static void set_sky(struct probe *f, const struct sky *sky)
-{
-    f->s.environment = sky_environment(sky);
-    build_light(&f->s, (struct light){.kind = LIGHT_ENVIRONMENT});
-}
-
-static double seen_sky(const struct sky *sky, const double w[3])
-{
-    double phi = atan2(-w[2], w[0]) + M_PI, theta = atan2(hypot(w[0], w[2]), w[1]);
-    return sky_radiance(sky, phi / (2 * M_PI) * sky->width, theta / M_PI * sky->height);
-}
-
 /* Nearest distance > 0 at which o + t w (unit) meets the sphere of radius r around c; inside: the far
  * one. */
 static bool meet_sphere(const double o[3], const double w[3], const double c[3], double r,
@@ -77,7 +64,7 @@ static void mirror_ball_radiance(const double d[3], double out[3], const void *d
         unit(n, n);
         mirrored(w, n, w);
     }
-    double l = seen_sky(data, w);
+    double l = sky_seen(data, w);
     for (int c = 0; c < 3; c++)
         out[c] = l * (c + 1) * (hit ? REFLECTANCE[c] : 1);
 }
@@ -85,18 +72,14 @@ static void mirror_ball_radiance(const double d[3], double out[3], const void *d
 TEST_WITH(mirror_ball_in_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     const struct sky sky = sky_uneven(16, 8);
-    probe_need_blender();
-    f->suite.width = 48;
-    f->suite.height = 32;
+    probe_size(f, 48, 32);
     build_sphere(&f->s, v3((float)BALL[0], (float)BALL[1], (float)BALL[2]), (float)BALL_RADIUS, 1,
                  specular(&f->s, MATERIAL_MIRROR, 0, false));
-    set_sky(f, &sky);
+    probe_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), 60);
-    probe_render(f, &m);
     /* the midpoint rule at the ball's edge */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 32, mirror_ball_radiance, &sky), 3e-4, false);
+    probe_check(f, tan(M_PI / 6), 32, mirror_ball_radiance, &sky, 3e-4, false);
 }
 
 /* Inside a mirror that glows: at depth 3, emission (1 + a + a^2 + a^3). */
@@ -113,9 +96,7 @@ TEST_WITH(mirrors_count_as_bounces, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
     struct moments m;
-    probe_need_blender();
-    f->suite.width = 24;
-    f->suite.height = 16;
+    probe_size(f, 24, 16);
     f->suite.depth = 3;
     uint32_t glow = build_material(&f->s, (rgb){.5f, .8f, .2f}, (rgb){1, 2, 3});
     f->s.materials[glow].kind = MATERIAL_MIRROR;
@@ -177,9 +158,7 @@ static void build_walls(struct probe *f)
 static void check_slab(struct probe *f, bool schlick)
 {
     struct moments m;
-    probe_need_blender();
-    f->suite.width = 48;
-    f->suite.height = 32;
+    probe_size(f, 48, 32);
     f->suite.depth = 4;
     uint32_t glass = specular(&f->s, MATERIAL_GLASS, 1.5, schlick);
     build_quad(&f->s, v3(-40, -40, -2), v3(80, 0, 0), v3(0, 80, 0), glass);
@@ -217,7 +196,7 @@ static void boundary_radiance(const double d[3], double out[3], const void *data
     for (int k = 0; k < 3; k++)
         in[k] = w[k] / b->ior + (c / b->ior - sqrt(fmax(0, 1 - sine2))) * n[k];
     double through = sine2 < 1 ? (b->glass ? 1 - r : 1) / (b->ior * b->ior) : 0;
-    double sky_in = seen_sky(b->sky, in), sky_m = b->glass ? r * seen_sky(b->sky, m) : 0;
+    double sky_in = sky_seen(b->sky, in), sky_m = b->glass ? r * sky_seen(b->sky, m) : 0;
     for (int k = 0; k < 3; k++)
         out[k] =
             b->glow[k] + (k + 1) * (TRANSMITTANCE[k] * through * sky_in + REFLECTANCE[k] * sky_m);
@@ -226,22 +205,18 @@ static void boundary_radiance(const double d[3], double out[3], const void *data
 /* front: the eye is where the normal points. The index is of the far side. */
 static void check_boundary(struct probe *f, struct boundary b, bool front)
 {
-    struct moments m;
     const struct sky sky = sky_uneven(16, 8);
-    probe_need_blender();
-    f->suite.width = 48;
-    f->suite.height = 32;
+    probe_size(f, 48, 32);
     b.sky = &sky;
     uint32_t glass = specular(&f->s, b.glass ? MATERIAL_GLASS : MATERIAL_REFRACTION,
                               front ? b.ior : 1 / b.ior, b.schlick);
     f->s.materials[glass].radiance = (rgb){(float)b.glow[0], (float)b.glow[1], (float)b.glow[2]};
     vec3 x = v3(80, 0, 0), y = v3(0, 80, 0);
     build_quad(&f->s, v3(-40, -40, -2), front ? x : y, front ? y : x, glass);
-    set_sky(f, &sky);
+    probe_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), 120);
-    probe_render(f, &m);
     /* the midpoint rule where total reflection begins */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, boundary_radiance, &b), 4e-4, false);
+    probe_check(f, tan(M_PI / 3), 32, boundary_radiance, &b, 4e-4, false);
 }
 
 TEST_WITH(eye_before_glowing_glass, probe_setup, probe_teardown)
@@ -278,7 +253,7 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
     unit(d, w);
     if (!meet_sphere(ORIGIN, w, BALL, BALL_RADIUS, false, &t)) {
         for (int k = 0; k < 3; k++)
-            out[k] = seen_sky(data, w) * (k + 1);
+            out[k] = sky_seen(data, w) * (k + 1);
         return;
     }
     along(ORIGIN, t, w, p);
@@ -287,7 +262,7 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
     double c = -dot3(w, n), ci = sqrt(1 - (1 - c * c) / (ior * ior)), r = optics_fresnel(c, ior);
     double m[3], in[3];
     mirrored(w, n, m);
-    double sky = seen_sky(data, m), factor[3];
+    double sky = sky_seen(data, m), factor[3];
     for (int k = 0; k < 3; k++) {
         out[k] = REFLECTANCE[k] * r * sky * (k + 1);
         factor[k] = TRANSMITTANCE[k] * TRANSMITTANCE[k] * (1 - r) * (1 - r);
@@ -301,7 +276,7 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
         unit(n, n);
         for (int k = 0; k < 3; k++)
             leaving[k] = in[k] * ior + (c - ior * ci) * n[k];
-        sky = seen_sky(data, leaving);
+        sky = sky_seen(data, leaving);
         for (int k = 0; k < 3; k++) {
             out[k] += factor[k] * sky * (k + 1);
             factor[k] *= REFLECTANCE[k] * r;
@@ -313,19 +288,15 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
 TEST_WITH(glass_ball_in_a_sky, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     const struct sky sky = sky_uneven(16, 8);
-    probe_need_blender();
-    f->suite.width = 48;
-    f->suite.height = 32;
+    probe_size(f, 48, 32);
     f->suite.depth = BALL_DEPTH;
     build_sphere(&f->s, v3((float)BALL[0], (float)BALL[1], (float)BALL[2]), (float)BALL_RADIUS, 1,
                  specular(&f->s, MATERIAL_GLASS, 1.5, false));
-    set_sky(f, &sky);
+    probe_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), 60);
-    probe_render(f, &m);
     /* the facets of the ball */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 32, glass_ball_radiance, &sky), 1e-3, false);
+    probe_check(f, tan(M_PI / 6), 32, glass_ball_radiance, &sky, 1e-3, false);
 }
 
 /* A mirror whose shading normals are all (1, 2, 2)/3 or, where they look away from the eye, give way
@@ -336,7 +307,7 @@ static void tilted_mirror_radiance(const double d[3], double out[3], const void 
     double w[3];
     unit(d, w);
     mirrored(w, dot3(w, tilted) < 0 ? tilted : true_normal, w);
-    double l = w[2] > 0 ? seen_sky(data, w) : 0;
+    double l = w[2] > 0 ? sky_seen(data, w) : 0;
     for (int k = 0; k < 3; k++)
         out[k] = REFLECTANCE[k] * l * (k + 1);
 }
@@ -344,20 +315,15 @@ static void tilted_mirror_radiance(const double d[3], double out[3], const void 
 TEST_WITH(mirror_with_tilted_normals, probe_setup, probe_teardown)
 {
     struct probe *f = *state;
-    struct moments m;
     const struct sky sky = sky_uneven(16, 8);
-    probe_need_blender();
-    f->suite.width = 48;
-    f->suite.height = 32;
+    probe_size(f, 48, 32);
     build_quad(&f->s, v3(-40, -40, -2), v3(80, 0, 0), v3(0, 80, 0),
                specular(&f->s, MATERIAL_MIRROR, 0, false));
     for (int i = 0; i < 6; i++)
         f->s.normal[i] = normalize(v3(1, 2, 2));
-    set_sky(f, &sky);
+    probe_sky(f, &sky);
     build_camera(&f->s, v3(0, 0, 0), 120);
-    probe_render(f, &m);
     /* Cycles moves reflections nearer than 0.01 to the true surface up to there: the line along which
      * they graze it crosses the whole image. */
-    probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 32, tilted_mirror_radiance, &sky), 3e-3,
-                false);
+    probe_check(f, tan(M_PI / 3), 32, tilted_mirror_radiance, &sky, 3e-3, false);
 }

@@ -10,30 +10,19 @@
 #include "reference/suite/features.h"
 #include "reference/replicates/engine_driver.h"
 #include "renderer/base/shell_quote.h"
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 
 enum { W = 4, H = 3, PIXELS = W * H, K = 3, SEED = 5 };
 
-static struct suite suite;
 static struct suite_scene point_plane; /* 12_point_plane at W x H */
 
 static int set_up(void **state)
 {
     (void)state;
-    struct err e;
-    MUST(suite_load("reference/scenes", &suite, &e));
-    const struct suite_scene *s = suite_find(&suite, "12_point_plane");
-    assert_non_null(s);
-    point_plane = *s;
+    point_plane = *suite_shipped_scene("12_point_plane");
     point_plane.width = W;
     point_plane.height = H;
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    suite_free(&suite);
     return 0;
 }
 
@@ -273,7 +262,7 @@ TEST(scenes_know_what_they_need)
         {"41_cornell", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA | 1u << FEATURE_SPHERE},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        const struct suite_scene *s = suite_find(&suite, cases[i].name);
+        const struct suite_scene *s = suite_shipped_scene(cases[i].name);
         struct scene scene;
         struct camera camera;
         struct err e;
@@ -346,10 +335,10 @@ TEST(what_cannot_be_expressed_is_said)
               "[\"diffuse\", \"point\"], \"command\": [\"x\", \"{scene}\", \"{out}\", \"{seed}\"]}",
               &en);
     assert_true(engine_expresses(&en, &point_plane, test_path("."), &e));
-    assert_false(engine_expresses(&en, suite_find(&suite, "41_cornell"), test_path("."), &e));
+    assert_false(engine_expresses(&en, suite_shipped_scene("41_cornell"), test_path("."), &e));
     assert_string_equal(e.msg, "the description does not list: area, sphere");
     /* The format's own limits, whatever the description says. */
-    struct suite_scene deep = *suite_find(&suite, "41_cornell");
+    struct suite_scene deep = *suite_shipped_scene("41_cornell");
     en.feature = ~0u;
     deep.depth = 60;
     REFUSES(engine_expresses(&en, &deep, test_path("."), &e), "POV-Ray is verified to depth");
@@ -521,4 +510,4 @@ TEST(the_table_is_bound)
     scene_free(&scene);
 }
 
-TEST_GROUP(set_up, tear_down)
+TEST_GROUP(set_up, NULL)

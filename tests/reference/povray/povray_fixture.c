@@ -7,6 +7,8 @@
 #include "renderer/base/fs.h"
 #include "renderer/transport/render.h"
 
+#include <gsl/gsl_cdf.h>
+
 void fixture_init(struct fixture *f, struct scene s, int size, int depth)
 {
     struct err e;
@@ -53,13 +55,13 @@ void look_down(struct scene *s, float h)
                                       .far = 1e3f};
 }
 
-bool have_povray(void)
+void need_povray(void)
 {
     char path[4096];
     if (process_find("povray", path, sizeof path))
-        return true;
+        return;
     print_message("SKIPPED: povray is not in PATH; POV-Ray itself was not tested\n");
-    return false;
+    skip();
 }
 
 double image_mean(const struct moments *m, int channel)
@@ -97,4 +99,16 @@ void render_ours(struct fixture *f, int depth, double mean[3], double variance[3
     }
     moments_free(&m);
     bvh_free(bvh);
+}
+
+bool means_agree(double x[CALLS][3], int channel, double ours, double variance)
+{
+    double mean = 0;
+    for (int i = 0; i < CALLS; i++)
+        mean += x[i][channel] / CALLS;
+    for (int i = 0; i < CALLS; i++)
+        variance += pow(x[i][channel] - mean, 2) / (CALLS - 1) / CALLS;
+    print_message("POV-Ray / ours - 1: %+.4f, standard error %.4f\n", mean / ours - 1,
+                  sqrt(variance) / ours);
+    return fabs(mean - ours) < gsl_cdf_tdist_Qinv(.0005, CALLS - 1) * sqrt(variance);
 }

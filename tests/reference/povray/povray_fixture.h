@@ -25,10 +25,15 @@ void fixture_free(struct fixture *f);
 struct moments must_render(struct fixture *f, json_t *manifest);
 /* Looks straight down at the plane y = 0 from height h; the image is 2 h x 2 h wide. */
 void look_down(struct scene *s, float h);
-/* Says so where there is none. */
-bool have_povray(void);
+/* Skips the test, and says so, where there is none. */
+void need_povray(void);
 double image_mean(const struct moments *m, int channel);
 /* Our own renderer: image means of paths of up to `depth` bounces, and their variances. */
 void render_ours(struct fixture *f, int depth, double mean[3], double variance[3]);
+
+enum { CALLS = 6 };
+/* H0: the image means x of that channel, one from each of independent calls of POV-Ray, are around ours: t-test, alpha = 1e-3
+ * two-sided. Prints the difference. */
+bool means_agree(double x[CALLS][3], int channel, double ours, double variance);
 
 #endif

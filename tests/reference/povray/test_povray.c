@@ -9,7 +9,6 @@
 #include "renderer/base/fs.h"
 #include "tests/support/test.h"
 
-#include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
 #include <sys/stat.h>
 
@@ -327,8 +326,7 @@ static double under_rectangle(double x, double z)
  * measured 1e-4 and 3e-6). Negative control: light that is 0.1 % brighter is outside. */
 TEST(test_direct_light)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     static double (*const truth[4])(double, double) = {under_point, under_flat_point, under_sun,
                                                        under_rectangle};
     const rgb value = {2, 1, 3};
@@ -368,8 +366,7 @@ TEST(test_direct_light)
  * Negative control: one bounce less or more. */
 TEST(test_furnace)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     for (int depth = 0; depth <= 5; depth += 5) {
         const rgb albedo = {.7f, .5f, .3f}, emission = {.3f, 1, 2};
         const double a[3] = {albedo.r, albedo.g, albedo.b};
@@ -399,9 +396,7 @@ TEST(test_furnace)
  * at most; two bounces instead of five are 5 to 8 % darker and are the negative control. */
 TEST(test_indirect_light)
 {
-    if (!have_povray())
-        skip();
-    enum { CALLS = 6 };
+    need_povray();
     struct fixture f;
     double x[CALLS][3], ours[2][3], variance[2][3];
     fixture_init(&f, corner(), 8, 5);
@@ -422,26 +417,16 @@ TEST(test_indirect_light)
     }
     render_ours(&f, 5, ours[0], variance[0]);
     render_ours(&f, 2, ours[1], variance[1]);
-    double limit = gsl_cdf_tdist_Qinv(.0005, CALLS - 1);
-    for (int k = 0; k < 3; k++) {
-        double sum = 0, square = 0;
-        for (int i = 0; i < CALLS; i++)
-            sum += x[i][k] / CALLS;
-        for (int i = 0; i < CALLS; i++)
-            square += pow(x[i][k] - sum, 2) / (CALLS - 1) / CALLS;
-        for (int depth = 0; depth < 2; depth++) {
-            double t = (sum - ours[depth][k]) / sqrt(square + variance[depth][k]);
-            assert_int_equal(fabs(t) < limit, depth == 0);
-        }
-    }
+    for (int k = 0; k < 3; k++)
+        for (int depth = 0; depth < 2; depth++)
+            assert_int_equal(means_agree(x, k, ours[depth][k], variance[depth][k]), depth == 0);
     fixture_free(&f);
 }
 
 /* One seed, the same bits, whatever the number of threads; another seed, other bits. */
 TEST(test_reproducible)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     struct moments m[3];
     size_t bytes = 8 * 8 * 3 * sizeof(double);
     for (int i = 0; i < 3; i++) {

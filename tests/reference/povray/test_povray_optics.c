@@ -3,13 +3,11 @@
 #include "tests/support/build_scene.h"
 #include "povray_fixture.h"
 
-#include "reference/truth/truth_one_lamp.h"
 #include "reference/truth/truth.h"
 #include "reference/truth/truth_one_lamp.h"
 #include "renderer/scene/environment.h"
 #include "tests/support/test.h"
 
-#include <gsl/gsl_cdf.h>
 #include <gsl/gsl_math.h>
 
 enum { SIZE = 16 };
@@ -85,8 +83,7 @@ static void under_spot(double u, double v, const void *with, double out[3])
  * black. */
 TEST(test_spot_light)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     for (int cut = 0; cut < 2; cut++) {
         struct spot spot = {cut ? .85 : .1, 3}, wrong = {spot.cos_cutoff, 3.03};
         struct scene s = build_scene();
@@ -124,8 +121,7 @@ static void under_ball(double u, double v, const void *with, double out[3])
 /* 256 points in each of 32 windows. Negative control: a radius of 1 % more. */
 TEST(test_ball_lamp)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     struct scene s = build_scene();
     build_quad(&s, v3(-2, 0, -2), v3(0, 0, 4), v3(4, 0, 0),
                build_material(&s, (rgb){.8f, .5f, .3f}, grey(0)));
@@ -169,8 +165,7 @@ static void constant(double u, double v, const void *with, double out[3])
  * bound is that of test_povray.c's furnace; negative control: one bounce more. */
 TEST(test_mirror_box)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     const rgb r = {.9f, .75f, .5f}, e = {.5f, 1, 2};
     const double rs[3] = {.9f, .75, .5}, es[3] = {.5, 1, 2};
     for (int depth = 0; depth <= 4; depth += 2) {
@@ -219,8 +214,7 @@ static void slab_radiance(double u, double v, const void *with, double out[3])
 /* Negative control: one bounce more, which is 2 % at least of L up to depth 3. */
 TEST(test_glass_slab)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     for (int depth = 1; depth <= 3; depth++) {
         struct scene s = build_scene();
         uint32_t m = build_material(&s, grey(1), grey(0));
@@ -295,8 +289,7 @@ static struct environment *sky(void)
 /* All around the horizon. Negative control: the sky turned by half a degree. */
 TEST(test_sky)
 {
-    if (!have_povray())
-        skip();
+    need_povray();
     for (int quarter = 0; quarter < 4; quarter++) {
         struct err e;
         struct fixture f;
@@ -352,9 +345,7 @@ static struct scene hall(bool with_optics)
  * darker. */
 TEST(test_optics_among_diffuse_surfaces)
 {
-    if (!have_povray())
-        skip();
-    enum { CALLS = 6 };
+    need_povray();
     struct fixture f, bare;
     double x[CALLS][3], ours[2][3], variance[2][3];
     fixture_init(&f, hall(true), 8, 8);
@@ -373,20 +364,9 @@ TEST(test_optics_among_diffuse_surfaces)
     }
     render_ours(&f, 8, ours[0], variance[0]);
     render_ours(&bare, 8, ours[1], variance[1]);
-    double limit = gsl_cdf_tdist_Qinv(.0005, CALLS - 1);
-    for (int k = 0; k < 3; k++) {
-        double sum = 0, square = 0;
-        for (int i = 0; i < CALLS; i++)
-            sum += x[i][k] / CALLS;
-        for (int i = 0; i < CALLS; i++)
-            square += pow(x[i][k] - sum, 2) / (CALLS - 1) / CALLS;
-        print_message("POV-Ray / ours - 1: %+.4f, standard error %.4f\n", sum / ours[0][k] - 1,
-                      sqrt(square + variance[0][k]) / ours[0][k]);
-        for (int which = 0; which < 2; which++) {
-            double t = (sum - ours[which][k]) / sqrt(square + variance[which][k]);
-            assert_int_equal(fabs(t) < limit, which == 0);
-        }
-    }
+    for (int k = 0; k < 3; k++)
+        for (int which = 0; which < 2; which++)
+            assert_int_equal(means_agree(x, k, ours[which][k], variance[which][k]), which == 0);
     fixture_free(&f);
     fixture_free(&bare);
 }

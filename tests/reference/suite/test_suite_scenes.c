@@ -26,15 +26,10 @@ static struct integrator_options paths(int depth, uint64_t seed)
 
 static struct scene open_shipped(const char *name)
 {
-    struct suite suite;
     struct scene s;
     struct camera c;
     struct err e = {""};
-    MUST(suite_load("reference/scenes", &suite, &e));
-    const struct suite_scene *scene = suite_find(&suite, name);
-    assert_non_null(scene);
-    MUST(suite_open(scene, &s, &c, &e));
-    suite_free(&suite);
+    MUST(suite_open(suite_shipped_scene(name), &s, &c, &e));
     return s;
 }
 

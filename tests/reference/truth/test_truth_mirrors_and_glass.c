@@ -5,6 +5,7 @@
 #include "reference/truth/truth_mirrors_and_glass.h"
 #include "tests/support/optics.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -77,16 +78,12 @@ static double pixel_mean(radiance_at *f, const void *scene, double half, int siz
 /* The shipped scene's image at another depth and size; its own where they are 0. */
 static void render(const char *name, int depth, int size, struct moments *out)
 {
-    struct suite suite;
     struct err e;
-    MUST(suite_load("reference/scenes", &suite, &e));
-    assert_non_null(suite_find(&suite, name));
-    struct suite_scene scene = *suite_find(&suite, name);
+    struct suite_scene scene = *suite_shipped_scene(name);
     scene.depth = depth ? depth : scene.depth;
     scene.width = scene.height = size ? size : scene.width;
     assert_string_equal(scene.reference[0].engine, "truth");
     MUST(truth_render(&scene, &scene.reference[0], out, &e));
-    suite_free(&suite);
 }
 
 /* 18_mirror_box, its numbers once more. */

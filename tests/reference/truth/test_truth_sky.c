@@ -7,6 +7,7 @@
 #include "tests/support/optics.h"
 #include "reference/base/image_oiio.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -349,14 +350,10 @@ TEST(map_stands_for_the_gradient)
  * the camera's geometry written once more. */
 static void render(const char *name, struct moments *out)
 {
-    struct suite suite;
     struct err e;
-    MUST(suite_load("reference/scenes", &suite, &e));
-    const struct suite_scene *scene = suite_find(&suite, name);
-    assert_non_null(scene);
+    const struct suite_scene *scene = suite_shipped_scene(name);
     assert_string_equal(scene->reference[0].engine, "truth");
     MUST(truth_render(scene, &scene->reference[0], out, &e));
-    suite_free(&suite);
 }
 
 static double floor_seen_down(double u, double v, int channel)

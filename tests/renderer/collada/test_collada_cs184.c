@@ -6,26 +6,12 @@
 
 static const double DEGREE = 3.14159265358979323846 / 180;
 
-static void path_of(char path[4096], const char *name)
-{
-    const char *root = getenv("ASSAY_CS184");
-    snprintf(path, 4096, "%s/%s", root != NULL ? root : "../shared/scenes/cs184", name);
-}
-
 /* Skips the test, loudly, if the file is not there. */
 static struct scene must_load(const char *name, enum dialect dialect)
 {
-    char path[4096];
-    path_of(path, name);
-    FILE *f = fopen(path, "rb");
-    if (f == NULL) {
-        print_message("SKIPPED: no %s (set ASSAY_CS184)\n", path);
-        skip();
-    }
-    fclose(f);
     struct scene s = {0};
     struct err e = {""};
-    MUST(collada_load(path, dialect, &s, &e));
+    MUST(collada_load(test_course_file(name), dialect, &s, &e));
     return s;
 }
 
@@ -47,14 +33,7 @@ static const struct material *material_of(const struct scene *s, const char *obj
 
 static void must_fail(const char *name, enum dialect dialect, const char *keyword)
 {
-    char path[4096];
-    path_of(path, name);
-    FILE *f = fopen(path, "rb");
-    if (f == NULL) {
-        print_message("SKIPPED: no %s (set ASSAY_CS184)\n", path);
-        skip();
-    }
-    fclose(f);
+    const char *path = test_course_file(name);
     struct scene s = {0};
     struct err e = {""};
     if (collada_load(path, dialect, &s, &e))

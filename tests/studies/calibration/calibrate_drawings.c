@@ -22,19 +22,32 @@ static void add_curve(struct drawing_series *s, const struct null_result *pool, 
     }
 }
 
+static bool save(const char *dir, const char *name, const struct drawing *p, struct err *e)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s.svg", dir, name);
+    return drawing_write(path, p, e);
+}
+
+/* Of rates over what was asked for, both as logarithms. */
+static struct drawing rates_drawing(void)
+{
+    return (struct drawing){.x.is_log = true,
+                            .y.is_log = true,
+                            .x.lo = 1e-4,
+                            .x.hi = 1,
+                            .y.lo = 1e-5,
+                            .y.hi = 1,
+                            .is_diagonal = true};
+}
+
 static bool draw_false_alarms(const char *dir, const struct settings *s, const struct results *r,
                               struct err *e)
 {
-    struct drawing p = {.title = "False alarms of the gate",
-                        .x.label = "alpha asked for",
-                        .y.label = "rate of DIFFERENT at equal means",
-                        .x.is_log = true,
-                        .y.is_log = true,
-                        .x.lo = 1e-4,
-                        .x.hi = 1,
-                        .y.lo = 1e-5,
-                        .y.hi = 1,
-                        .is_diagonal = true};
+    struct drawing p = rates_drawing();
+    p.title = "False alarms of the gate";
+    p.x.label = "alpha asked for";
+    p.y.label = "rate of DIFFERENT at equal means";
     for (int k = 0; k < NUM_LAWS; k++) {
         struct null_result part[MAX_SYNTHETIC], pool;
         int num = 0;
@@ -47,32 +60,22 @@ static bool draw_false_alarms(const char *dir, const struct settings *s, const s
     struct null_result pool;
     null_pool(r->render, s->num_render, "", &pool);
     add_curve(&p.series[p.num++], &pool, COLUMN_GATE, "renders");
-    char path[4096];
-    snprintf(path, sizeof path, "%s/false_alarms.svg", dir);
-    return drawing_write(path, &p, e);
+    return save(dir, "false_alarms", &p, e);
 }
 
 static bool draw_statistics(const char *dir, const struct settings *s, const struct results *r,
                             struct err *e)
 {
-    struct drawing p = {.title = "p-values at equal means, all laws together",
-                        .x.label = "p",
-                        .y.label = "share of pairs with a smaller p",
-                        .x.is_log = true,
-                        .y.is_log = true,
-                        .x.lo = 1e-4,
-                        .x.hi = 1,
-                        .y.lo = 1e-5,
-                        .y.hi = 1,
-                        .is_diagonal = true};
+    struct drawing p = rates_drawing();
+    p.title = "p-values at equal means, all laws together";
+    p.x.label = "p";
+    p.y.label = "share of pairs with a smaller p";
     struct null_result pool;
     null_pool(r->synthetic, s->num_synthetic, "", &pool);
     for (int c = 0; c < NUM_COLUMNS; c++)
         if (pool.tested[c][LEVEL_SHAPE] > 0)
             add_curve(&p.series[p.num++], &pool, c, column_name[c]);
-    char path[4096];
-    snprintf(path, sizeof path, "%s/statistics.svg", dir);
-    return drawing_write(path, &p, e);
+    return save(dir, "statistics", &p, e);
 }
 
 static bool draw_tail(const char *dir, const struct settings *s, const struct results *r,
@@ -99,9 +102,7 @@ static bool draw_tail(const char *dir, const struct settings *s, const struct re
                         rate_lower(t->rejected[l], t->tested, check_tail) / tail_level[l],
                         rate_upper(t->rejected[l], t->tested, check_tail) / tail_level[l]);
     }
-    char path[4096];
-    snprintf(path, sizeof path, "%s/tail.svg", dir);
-    return drawing_write(path, &p, e);
+    return save(dir, "tail", &p, e);
 }
 
 static bool draw_power(const char *dir, const struct settings *s, const struct results *r,
@@ -132,9 +133,7 @@ static bool draw_power(const char *dir, const struct settings *s, const struct r
                         rate_lower(w->found[k], w->pairs, check_tail),
                         rate_upper(w->found[k], w->pairs, check_tail));
     }
-    char path[4096];
-    snprintf(path, sizeof path, "%s/power.svg", dir);
-    return drawing_write(path, &p, e);
+    return save(dir, "power", &p, e);
 }
 
 bool page_draw(const char *dir, const struct settings *s, const struct results *r, struct err *e)

@@ -1,5 +1,6 @@
 /* The manuals of files (tools/docs/formats): the real reader takes every example, and a page's tables list what the reader knows,
  * no key more, none less. What a reader knows is asked of it: every word in quotes in its folder is tried as a key. */
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 
 #include "reference/external/engine_description.h"
@@ -16,27 +17,7 @@
 
 enum { TEXT = 1 << 16, WORDS = 2048 };
 
-static struct suite suite;
-static struct rubric *rubric;
-
-static int set_up(void **state)
-{
-    (void)state;
-    struct err e;
-    rubric = calloc(1, sizeof *rubric);
-    if (rubric == NULL || !suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", rubric == NULL ? "memory" : e.msg);
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    free(rubric);
-    suite_free(&suite);
-    return 0;
-}
-TEST_GROUP(set_up, tear_down)
+static struct rubric one, *const rubric = &one;
 
 static const char *write_text(const char *name, const char *text)
 {
@@ -364,7 +345,7 @@ static bool rubric_says(const char *text, const char *words)
     static struct rubric_mistakes m;
     struct err e;
     bool says = false;
-    MUST(rubric_read(write_text("a.rubric", text), &suite, rubric, &m, &e));
+    MUST(rubric_read(write_text("a.rubric", text), suite_shipped(), rubric, &m, &e));
     for (int i = 0; i < m.num; i++)
         says |= strstr(m.at[i].text, words) != NULL;
     return says;
@@ -405,7 +386,7 @@ TEST(rubrics_are_as_their_page_says)
     struct rubric_mistakes m;
     struct err e;
     read_block("rubric.md", "rubric", 0, text);
-    MUST(rubric_read(write_text("example.rubric", text), &suite, rubric, &m, &e));
+    MUST(rubric_read(write_text("example.rubric", text), suite_shipped(), rubric, &m, &e));
     if (m.num > 0)
         fail_msg("rubric.md: line %d of the example: %s", m.at[0].line, m.at[0].text);
     assert_true(rubric_points(rubric) == 10);

@@ -3,6 +3,7 @@
 #include "reference/suite/suite.h"
 #include "renderer/base/fs.h"
 #include "tools/converge/depth_ladder.h"
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 #include "tools/plots/plot_convergence.h"
 #include "tools/results/convergence_results.h"
@@ -24,7 +25,6 @@ static double number(const json_t *rungs, size_t i, const char *name)
  * seed. Control: one bounce more or fewer, a change of at least 0.2^5 in blue and 0.8^5 in red, is rejected everywhere. */
 TEST(furnace)
 {
-    struct suite suite;
     struct err e = {""};
     char self[4096], program[4200];
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
@@ -32,9 +32,7 @@ TEST(furnace)
     self[n] = '\0';
     snprintf(program, sizeof program, "%.4000s/../pathtracer", dirname(self));
     assert_true(fs_make_dirs(test_path("work"), &e));
-    MUST(suite_load("reference/scenes", &suite, &e));
-    const struct suite_scene *scene = suite_find(&suite, "11_furnace");
-    assert_non_null(scene);
+    const struct suite_scene *scene = suite_shipped_scene("11_furnace");
     struct suite_scene small = *scene;
     small.width = small.height = 16;
     const struct converge_job job = {.scene = &small,
@@ -72,7 +70,6 @@ TEST(furnace)
     struct converge_job none = job;
     none.pathtracer = "/nonexistent";
     assert_false(depth_ladder_measure(&none, NULL, 16, &depths, &e));
-    suite_free(&suite);
 }
 
 static htmlDocPtr page_of(const char *json)

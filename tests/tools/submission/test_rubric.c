@@ -2,35 +2,17 @@
  * that are listed), put in by hand. */
 
 #include "tools/submission/rubric.h"
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 
-static struct suite suite;
-static struct rubric *rubric;
+static struct rubric one, *const rubric = &one;
 static struct rubric_mistakes mistakes;
-
-static int load(void **state)
-{
-    (void)state;
-    struct err e;
-    rubric = calloc(1, sizeof *rubric);
-    if (rubric == NULL || !suite_load("reference/scenes", &suite, &e))
-        fail_msg("%s", rubric == NULL ? "memory" : e.msg);
-    return 0;
-}
-
-static int unload(void **state)
-{
-    (void)state;
-    suite_free(&suite);
-    free(rubric);
-    return 0;
-}
 
 static void read_text(const char *text)
 {
     struct err e;
     test_write(test_path("rubric"), text, strlen(text));
-    MUST(rubric_read(test_path("rubric"), &suite, rubric, &mistakes, &e));
+    MUST(rubric_read(test_path("rubric"), suite_shipped(), rubric, &mistakes, &e));
 }
 
 static const char head[] = "rubric A course\n"           /* 1 */
@@ -149,7 +131,7 @@ TEST(the_shipped_ones_are_right)
     static const int sets[] = {2, 2, 4, 1, 8};
     struct err e;
     for (int i = 0; i < 5; i++) {
-        assert_true(rubric_read(paths[i], &suite, rubric, &mistakes, &e));
+        assert_true(rubric_read(paths[i], suite_shipped(), rubric, &mistakes, &e));
         if (mistakes.num > 0)
             fail_msg("%s:%d: %s", paths[i], mistakes.at[0].line, mistakes.at[0].text);
         assert_true(rubric_points(rubric) == points[i]);
@@ -159,7 +141,7 @@ TEST(the_shipped_ones_are_right)
     assert_string_equal(rubric->set[0].name, "");
     assert_string_equal(rubric->set[5].name, "light_pdf, camera_crop");
     assert_string_equal(rubric->set[5].words, "--starter light-pdf --frame crop");
-    REFUSES(rubric_read("/nowhere.rubric", &suite, rubric, &mistakes, &e),
+    REFUSES(rubric_read("/nowhere.rubric", suite_shipped(), rubric, &mistakes, &e),
             "/nowhere.rubric: cannot read");
 }
 
@@ -278,5 +260,3 @@ TEST(rubbish_is_survived)
     assert_true(mistakes.num >= 1);
     assert_non_null(strstr(mistakes.at[0].text, "longer than"));
 }
-
-TEST_GROUP(load, unload)

@@ -1,25 +1,8 @@
 /* What claims that differ are told to have in common: which scenes have a feature is read off their files' text. */
+#include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 #include "tools/results/results.h"
 #include "tools/validate/shared_features.h"
-
-static struct suite suite;
-
-static int load(void **state)
-{
-    struct err e;
-    (void)state;
-    return suite_load("reference/scenes", &suite, &e) ? 0 : -1;
-}
-
-static int unload(void **state)
-{
-    (void)state;
-    suite_free(&suite);
-    return 0;
-}
-
-TEST_GROUP(load, unload)
 
 static bool file_has(const char *path, const char *word)
 {
@@ -38,8 +21,8 @@ static int tell(bool (*differs)(const struct suite_scene *s), const char *a, cha
     json_t *claims = json_array(), *results = json_pack("{so}", "claims", claims);
     struct err e = {""};
     int num = 0;
-    for (int i = 0; i < suite.num_scenes; i++) {
-        const struct suite_scene *s = &suite.scene[i];
+    for (int i = 0; i < suite_shipped()->num_scenes; i++) {
+        const struct suite_scene *s = &suite_shipped()->scene[i];
         bool is = s->expect == VERDICT_EQUIVALENT && differs(s);
         num += is;
         json_array_append_new(claims, json_pack("{ss,ss,ss,ss,ss}", "scene", s->name, "a",
@@ -47,7 +30,7 @@ static int tell(bool (*differs)(const struct suite_scene *s), const char *a, cha
                                                 verdict_name(s->expect), "verdict",
                                                 is ? "DIFFERENT" : verdict_name(s->expect)));
     }
-    MUST(shared_features_tell(results, &suite, text, size, &e));
+    MUST(shared_features_tell(results, suite_shipped(), text, size, &e));
     json_decref(results);
     print_message("%d: %s\n", num, text);
     return num;
@@ -76,7 +59,7 @@ static bool has_mirror_and_spheres(const struct suite_scene *s)
 
 static bool every_third(const struct suite_scene *s)
 {
-    return (s - suite.scene) % 3 == 0;
+    return (s - suite_shipped()->scene) % 3 == 0;
 }
 
 static bool all(const struct suite_scene *s)
