@@ -185,13 +185,12 @@ static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     leave_bright(rb->mean, pixels, clip, use);
     double right = ratio_of(r, rp->mean, rb->mean, p->width, p->height, use),
            theirs = ratio_of(r, p->mean, b->mean, p->width, p->height, own);
-    double v = log(theirs / right);
-    if (r->image[c->after].bounces == 1 && r->image[c->images[0]].bounces > 1) {
-        double s = brightness(r, b->mean, p->width, p->height, own) /
-                   brightness(r, rb->mean, p->width, p->height, use);
-        double w = log(theirs / ratio_of_bounces(right, s, r->image[c->images[0]].bounces));
-        v = fabs(w) < fabs(v) ? w : v;
-    }
+    double v = log(theirs / right), bounced = right;
+    if (r->image[c->after].bounces == 1 && r->image[c->images[0]].bounces > 1)
+        bounced = ratio_of_bounces(right,
+                                   brightness(r, b->mean, p->width, p->height, own) /
+                                       brightness(r, rb->mean, p->width, p->height, use),
+                                   r->image[c->images[0]].bounces);
     for (size_t k = 0; k < pixels; k++)
         use[k] = use[k] && own[k];
     double other = log(ratio_of(r, p->mean, b->mean, p->width, p->height, use) /
@@ -199,6 +198,11 @@ static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int 
     free(use);
     if (isnan(v) || fabs(other) < fabs(v))
         v = other;
+    /* By a small factor little is left of the bounces: whether they are there is not to be seen. */
+    if (is_telling(bounced) && fabs(log(theirs / bounced)) < fabs(v)) {
+        v = log(theirs / bounced);
+        right = bounced;
+    }
     bool is;
     if (!is_like(p, rp, is_telling(right) || drawn, &is, e))
         return false;
