@@ -289,7 +289,7 @@ static int num_entries;
 static void blame(const char *what, const char *about)
 {
     if (why[0] == '\0')
-        snprintf(why, sizeof why, "%s: %s", what, about);
+        snprintf(why, sizeof why, "%s: %.200s", what, about);
     for (char *c = strchr(why, '\n'); c != NULL; c = strchr(c, '\n'))
         *c = '|';
 }
