@@ -105,12 +105,23 @@ static void forget(struct sights *s)
     *s = (struct sights){0};
 }
 
-static void set_samples(const struct stopping *s, int spp, double *fact, double *fact_sd)
+/* Odds of the way from one batch to all samples, as a logarithm: what the noise of a program is not sure of moves it as much at
+ * both ends, where a mean of counts hardly moves. */
+static double progress(const struct rubric_image *p, double taken)
+{
+    double batch = rubric_option(p, "-a", 0), end = 0.01 * (p->spp - batch);
+    return log((fmax(0, taken - batch) + end) / (fmax(0, p->spp - taken) + end));
+}
+
+static void set_samples(const struct rubric_image *p, const struct stopping *s, double *fact,
+                        double *fact_sd)
 {
     static const double ends =
         4; /* of the range, in standard deviations: 3.3 and several shapes (stopping_rule.c) */
-    fact[FACT_SAMPLES] = log(s->least * s->most / ((double)spp * spp)) / 2;
-    fact_sd[FACT_SAMPLES] = log(s->most / s->least) / 2 / ends;
+    static const double least_sd = 0.05;
+    double lo = progress(p, s->least), hi = progress(p, s->most);
+    fact[FACT_SAMPLES] = (lo + hi) / 2;
+    fact_sd[FACT_SAMPLES] = hypot((hi - lo) / 2 / ends, least_sd);
 }
 
 /* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
@@ -122,7 +133,7 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
     struct stopping by[NUM_STOPPING_KINDS];
     struct observation *clue = &s->clue[s->num - 1];
     struct view *own = &s->own[s->num - 1];
-    const int spp = r->image[image].spp;
+    const struct rubric_image *p = &r->image[image];
     struct err why;
     if (isnan(clue->seen.fact[FACT_SAMPLES]))
         return true;
@@ -131,11 +142,15 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
         clue->seen.fact[FACT_SAMPLES] = NAN;
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     }
+    double taken = p->spp * exp(clue->seen.fact[FACT_SAMPLES]),
+           sd = taken * clue->seen.fact_sd[FACT_SAMPLES];
+    clue->seen.fact[FACT_SAMPLES] = progress(p, taken);
+    clue->seen.fact_sd[FACT_SAMPLES] = (progress(p, taken + sd) - progress(p, taken - sd)) / 2;
     *own = *clue->view;
     own->effect = calloc((size_t)b->catalogue.num_bugs, sizeof(struct effect *));
     if (own->effect == NULL)
         return err_set(e, "out of memory");
-    set_samples(&by[STOPS_RIGHTLY], spp, own->correct.fact, own->correct.fact_sd);
+    set_samples(p, &by[STOPS_RIGHTLY], own->correct.fact, own->correct.fact_sd);
     for (int k = 0; k < b->catalogue.num_bugs; k++) {
         const struct effect *plain = clue->view->effect[k];
         enum stopping_kind kind = stopping_rule_of(b->catalogue.bug[k].name);
@@ -149,7 +164,7 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
         own->effect[k] = mine;
         for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
             mine->fact[f] = mine->fact_sd[f] = NAN;
-        set_samples(&by[kind], spp, mine->fact, mine->fact_sd);
+        set_samples(p, &by[kind], mine->fact, mine->fact_sd);
     }
     clue->view = own;
     return true;

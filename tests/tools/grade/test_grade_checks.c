@@ -7,6 +7,7 @@
 #include "renderer/image/tone.h"
 #include "tools/grade/grade_checks.h"
 #include "tools/grade/rate_image.h"
+#include "tools/grade/stopping_rule.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -593,6 +594,37 @@ TEST(pixels_are_exact_or_not)
 }
 
 /* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
+/* Of exponential samples the variance is the squared mean, so a pixel stops after (1.96 / tolerance)^2 of them, however bright it is;
+ * the lamp, 64 of 3072 pixels, after the first batch. */
+TEST(samples_go_by_the_rule_of_stopping)
+{
+    static const struct rubric_image image = {
+        .width = WIDTH, .height = HEIGHT, .spp = SPP, .options = "-a 16 0.15"};
+    const double lamp = 64.0 / PIXELS, right = (1 - lamp) * 176 + lamp * 16,
+                 one_sigma = (1 - lamp) * 48 + lamp * 16;
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        struct bug darker = none;
+        struct stopping by[NUM_STOPPING_KINDS];
+        struct err e;
+        darker.scale = k == 0 ? 1 : 0.5;
+        struct submitted_image s = submit_render(&darker, SPP);
+        submitted_image_expect(&s, &reference, SPP);
+        MUST(stopping_rule_samples(&image, &s, &reference, by, &e));
+        submitted_image_free(&s);
+        assert_true(by[STOPS_RIGHTLY].least <= right && right <= by[STOPS_RIGHTLY].most);
+        assert_true(by[STOPS_RIGHTLY].most < 1.6 * by[STOPS_RIGHTLY].least);
+        assert_true(by[STOPS_BY_ONE_SIGMA].least <= one_sigma &&
+                    one_sigma <= by[STOPS_BY_ONE_SIGMA].most);
+        assert_true(by[STOPS_BY_ONE_SIGMA].most < by[STOPS_RIGHTLY].least);
+        assert_true(by[STOPS_BY_N].most < by[STOPS_BY_ONE_SIGMA].least);
+        assert_true(by[STOPS_BY_SIGMA].least > by[STOPS_RIGHTLY].most);
+        assert_float_equal(by[STOPS_NEVER].least, SPP, 1e-9);
+    }
+    assert_int_equal(stopping_rule_of("adaptive_absolute"), STOPS_BY_ABSOLUTE);
+    assert_int_equal(stopping_rule_of("cosine_missing"), STOPS_RIGHTLY);
+}
+
 TEST(rates_are_whole_batches_or_not)
 {
     static uint8_t rgb8[3 * PIXELS];
