@@ -195,7 +195,7 @@ bvh-table: $(BUILD)/pathtracer
 grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
 	tests/studies/grading/grade_show.sh $(BUILD)
 #: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="FILES"
-rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-*.rubric)
+rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-3-1*.rubric) --plain tools/rubrics/cs184-3-2.rubric
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)
 	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)

@@ -267,11 +267,11 @@ static struct effect *derived(const struct effect *e, const struct signature *fr
 }
 
 /* The measured set nearest to this one: the last that it contains. */
-static int from_set(const struct rubric *r, int set)
+static int from_set(const struct rubric *r, const struct rubric_bugs *b, int set, int image)
 {
     int from = 0;
     for (int k = 1; k < set; k++)
-        if (rubric_bugs_measures(r, k) && strstr(r->set[set].words, r->set[k].words) != NULL)
+        if (b->view[k][image] >= 0 && strstr(r->set[set].words, r->set[k].words) != NULL)
             from = k;
     return from;
 }
@@ -285,7 +285,7 @@ static bool derive_view(const struct rubric *r, const struct answer_key *a, int 
         return err_set(e, "out of memory");
     c->view = more;
     struct view *v = &c->view[c->num_views];
-    const struct view *plain = &c->view[b->view[from_set(r, set)][image]];
+    const struct view *plain = &c->view[b->view[from_set(r, b, set, image)][image]];
     *v = *plain;
     v->effect = calloc((size_t)c->num_bugs, sizeof(struct effect *));
     if (v->effect == NULL)
@@ -307,6 +307,8 @@ static bool find_view(const struct rubric *r, int set, int image, struct rubric_
     if (!rubric_bugs_key(r, set, image, name, key, e))
         return false;
     const struct view *v = catalogue_view(&b->catalogue, name);
+    if (v == NULL && set > 0)
+        return true;
     if (v == NULL || strcmp(v->scene_sha256, key) != 0)
         return err_set(
             e,
@@ -325,8 +327,8 @@ static bool find_views(const struct rubric *r, const struct answer_key *a, struc
             b->view[k][i] = k > 0 && first < k ? b->view[first][i] : -1;
             if (!rubric_bugs_sees(r, i) || first < k)
                 continue;
-            if (rubric_bugs_measures(r, k) ? !find_view(r, k, i, b, e)
-                                           : !derive_view(r, a, k, i, b, e))
+            if ((rubric_bugs_measures(r, k) && !find_view(r, k, i, b, e)) ||
+                (b->view[k][i] < 0 && !derive_view(r, a, k, i, b, e)))
                 return false;
         }
     return true;

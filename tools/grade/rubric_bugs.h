@@ -19,15 +19,15 @@ struct rubric_bugs {
 bool rubric_bugs_sees(const struct rubric *r, int image);
 /* The first set of deviations whose reference is, bit by bit, that of `set`. */
 int rubric_bugs_set(const struct answer_key *a, int set, int image);
-/* Has the catalogue a view of its own for images with these deviations? If they are none or a single one by words, of which bugs
- * are measured; others are derived. */
+/* May the catalogue have a view of its own for images with these deviations? If they are none or a single one by words; others,
+ * and those that it has not, are derived. */
 bool rubric_bugs_measures(const struct rubric *r, int set);
 /* Of such a view: its name, and a hash of all that decides the correct image. */
 bool rubric_bugs_key(const struct rubric *r, int set, int image, char name[128], char key[65],
                      struct err *e) __attribute__((warn_unused_result));
 
-/* Reads r->bugs, and makes the views with several deviations: there a bug changes the light of a cell by the factor by which it
- * changes that of the image with the first of them. Fails if a view is missing or has been made of another image. The caller closes it. */
+/* Reads r->bugs, and makes the views with deviations that it has not: there a bug changes the light of a cell by the factor by which it
+ * changes that of the image with one of them, or the right one. Fails if a view without deviations is missing or has been made of another image. The caller closes it. */
 bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct rubric_bugs *out,
                       struct err *e) __attribute__((warn_unused_result));
 void rubric_bugs_close(struct rubric_bugs *b);

@@ -1,15 +1,16 @@
-/* make_rubric_bugs BUILD PATCHES RUBRIC...: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
+/* make_rubric_bugs BUILD PATCHES RUBRIC... [--plain RUBRIC...]: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
  * (tools/grade/rubric_bugs.h): one for all, as they have images in common. Every bug of PATCHES, and of `bugs` beside this file, has been built as BUILD/mutants/NAME/pathtracer
  * (tests/mutants/mutants.sh --build-only), the correct renderer is BUILD/pathtracer. The latter are mistakes as they stand in
  * the assignment's code, which has a function for each way to sample light and gives direct light whatever the depth.
  *
- * The correct images are the references, without deviations and with each of those accepted by words. Of each view, each bug and
+ * The correct images are the references, without deviations and with each of those accepted by words (after --plain: without). Of each view, each bug and
  * the correct renderer make BATCHES images of a quarter of the samples asked for, LEAST_SPP at least, with the same seeds, so that what a bug does not touch has no noise in the
  * difference. The effect is the mean of the differences; its variance that of
  * independent images times the level at which the batches scatter, and what one image with the bug has more noise than
  * one without. Bugs of Part 5 depend on the number of samples: all are taken, and of adaptive images one as it is asked for; other bugs do to such an
  * image what they do to one without adaptive sampling. A bug that changes no pixel of an image of one sample has no effect on it; an
- * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on. */
+ * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on; effects that
+ * the catalogue has of a bug that has not changed, on an image that has not, are kept: remove it to make all anew. */
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
 #include "tests/mutants/bug_effect.h"
@@ -25,6 +26,7 @@
 enum { BATCHES = 2, SEED = 40260, LEAST_SPP = 32, MOST_RUBRICS = 8 };
 
 struct course {
+    bool plain;
     struct rubric rubric;
     struct answer_key answers;
 };
@@ -45,7 +47,7 @@ struct maker {
     struct suite suite;
     struct course *course[MOST_RUBRICS];
     int num;
-    struct catalogue made;
+    struct catalogue made, old;
     struct source *of; /* as many as views */
     struct answer_options correct;
     pthread_mutex_t lock;
@@ -155,6 +157,24 @@ static bool is_needed(const struct effect *e, const struct signature *correct)
     return e->pixels || fabs(far) > 0.01;
 }
 
+/* What the catalogue has of it already. */
+static bool keep_effect(struct maker *m, struct view *v, int b, bool *kept, struct err *e)
+{
+    const struct view *old = catalogue_view(&m->old, v->name);
+    int number = catalogue_bug(&m->old, m->made.bug[b].name);
+    if (old == NULL || number < 0 || strcmp(old->scene_sha256, v->scene_sha256) != 0 ||
+        strcmp(m->old.bug[number].patch_sha256, m->made.bug[b].patch_sha256) != 0)
+        return true;
+    *kept = true;
+    if (old->effect[number] == NULL)
+        return true;
+    v->effect[b] = malloc(sizeof *v->effect[b]);
+    if (v->effect[b] == NULL)
+        return err_set(e, "out of memory");
+    *v->effect[b] = *old->effect[number];
+    return true;
+}
+
 /* same: of each view so far, whether the bug leaves it alone. */
 static bool make_view(struct maker *m, int view, int b, const struct answer_options *bug,
                       bool *same, struct err *e)
@@ -162,6 +182,9 @@ static bool make_view(struct maker *m, int view, int b, const struct answer_opti
     struct signature s[BATCHES];
     struct view *v = &m->made.view[view];
     struct source *of = &m->of[view];
+    bool kept = false;
+    if (!keep_effect(m, v, b, &kept, e) || kept)
+        return kept;
     bool adaptive = strncmp(m->made.bug[b].where, "part 5", 6) == 0;
     enum depth depth = !adaptive ? QUARTER : is_adaptive(of) ? AS_ASKED : ALL;
     if (of->plain != view && depth != AS_ASKED && same[of->plain])
@@ -267,7 +290,7 @@ static bool add_views(struct maker *m, const struct answer_options *ours, struct
             return false;
         for (int s = 0; s < course->rubric.num_sets; s++)
             for (int i = 0; i < course->rubric.num_images; i++)
-                if (rubric_bugs_measures(&course->rubric, s) &&
+                if ((s == 0 || !course->plain) && rubric_bugs_measures(&course->rubric, s) &&
                     rubric_bugs_sees(&course->rubric, i) &&
                     rubric_bugs_set(&course->answers, s, i) == s &&
                     !add_view(m, course, s, i, ours, e))
@@ -287,11 +310,14 @@ static bool make(struct maker *m, const char *patches, struct err *e)
         !add_views(m, &m->correct, e))
         return false;
     snprintf(out, sizeof out, "%s/%s", r->dir, r->bugs);
+    struct err none;
+    if (!catalogue_read(out, &m->old, &none))
+        m->old = (struct catalogue){0};
     return work_run_all(m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
 }
 
 /* That the directory of the catalogue is not there is a mistake: it is made before. */
-static bool read_course(struct maker *m, const char *path, struct err *e)
+static bool read_course(struct maker *m, const char *path, bool plain, struct err *e)
 {
     struct rubric_mistakes mistakes = {0};
     char dir[2 * PATH_MAX];
@@ -299,6 +325,7 @@ static bool read_course(struct maker *m, const char *path, struct err *e)
     if (c == NULL)
         return err_set(e, "out of memory");
     m->course[m->num++] = c;
+    c->plain = plain;
     if (!rubric_read(path, &m->suite, &c->rubric, &mistakes, e))
         return false;
     if (c->rubric.bugs[0] == '\0')
@@ -314,19 +341,24 @@ int main(int argc, char **argv)
 {
     struct err e = {""};
     static struct maker m = {.lock = PTHREAD_MUTEX_INITIALIZER};
-    if (argc < 4 || argc > 3 + MOST_RUBRICS) {
-        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC...\n");
+    if (argc < 4 || argc > 4 + MOST_RUBRICS) {
+        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC... [--plain RUBRIC...]\n");
         return 3;
     }
     bool ok = realpath(argv[1], m.build) != NULL && suite_load("reference/scenes", &m.suite, &e);
+    bool plain = false;
     for (int i = 3; ok && i < argc; i++)
-        ok = read_course(&m, argv[i], &e);
+        if (strcmp(argv[i], "--plain") == 0)
+            plain = true;
+        else
+            ok = read_course(&m, argv[i], plain, &e);
     ok = ok && make(&m, argv[2], &e);
     if (!ok)
         fprintf(stderr, "make_rubric_bugs: %s\n", e.msg);
     for (int v = 0; m.of != NULL && v < m.made.num_views; v++)
         moments_free(&m.of[v].one);
     catalogue_free(&m.made);
+    catalogue_free(&m.old);
     for (int k = 0; k < m.num; k++) {
         answer_key_free(&m.course[k]->answers);
         free(m.course[k]);
