@@ -82,6 +82,14 @@ static double image_fact(const struct effect *e, const struct observation *clue)
     return s;
 }
 
+/* An excess of chi-square over that of so many values, where it is more than noise. */
+static double beyond_noise(double excess, double values)
+{
+    const double noise =
+        values > 1 ? 20 : 3; /* standard deviations; of cells as of views that are clearly off */
+    return excess > noise * sqrt(2 * values) ? excess : 0;
+}
+
 static void add_facts(const struct observation *clue, const struct effect *e, double amplitude,
                       struct tally *t)
 {
@@ -103,8 +111,8 @@ static void add_facts(const struct observation *clue, const struct effect *e, do
         t->log_likelihood += student(z2, var, fact_dof);
         t->chi2 += fmin(z2, 100);
         t->fact = fmax(t->fact, z2);
-        t->left += fmax(0, fmin(z2, 1e4) - 1);
-        t->all += fmax(0, fmin(all, 1e4) - 1);
+        t->left += beyond_noise(fmin(z2, 1e4) - 1, 1);
+        t->all += beyond_noise(fmin(all, 1e4) - 1, 1);
         t->chi2_mean++;
         t->cells++;
     }
@@ -117,8 +125,8 @@ static void add_view(const struct observation *clue, const struct effect *e, dou
     double scale = signature_mean(&clue->view->correct);
     for (int i = 0; i < clue->seen.columns * clue->seen.rows; i++)
         add_cell(clue, e, amplitude, factor, scale, i, t);
-    t->left = fmax(0, t->left);
-    t->all = fmax(0, t->all);
+    t->left = beyond_noise(t->left, t->cells);
+    t->all = beyond_noise(t->all, t->cells);
     add_facts(clue, e, amplitude, t);
 }
 
@@ -235,16 +243,18 @@ static struct tally total(const struct bug_fit *f, const struct candidate *b)
     return sum;
 }
 
-static void project_facts(const struct observation *clue, const struct effect *e, double *along,
-                          double *norm)
+/* base: the effect that is there in any case; NULL: none. */
+static void project_facts(const struct observation *clue, const struct effect *e,
+                          const struct effect *base, double *along, double *norm)
 {
     const struct signature *a = &clue->seen, *c = &clue->view->correct;
     for (int f = 0; f < NUM_FACTS; f++) {
-        double effect = (f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f]) - c->fact[f];
+        double there = base != NULL ? base->fact[f] : c->fact[f];
+        double effect = (f == FACT_IMAGE ? image_fact(e, clue) : e->fact[f]) - there;
         double var = pow(a->fact_sd[f], 2) + pow(e->fact_sd[f], 2) + pow(fact_error[f], 2);
         if (isnan(a->fact[f]) || isnan(effect))
             continue;
-        *along += effect * (a->fact[f] - c->fact[f]) / var;
+        *along += effect * (a->fact[f] - there) / var;
         *norm += effect * effect / var;
     }
 }
@@ -270,8 +280,8 @@ static void project(const struct bug_fit *f, int bug, int second, int given, dou
             *along += effect * (a->mean[i] - c->mean[i] - there) / var;
             *norm += effect * effect / var;
         }
-        if (e != NULL && base == NULL)
-            project_facts(&f->clue[k], e, along, norm);
+        if (e != NULL)
+            project_facts(&f->clue[k], e, base, along, norm);
     }
 }
 
@@ -334,11 +344,13 @@ struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double
 
 double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *clue)
 {
+    static const double clear =
+        20; /* standard deviations: edges of lamps differ between right programs */
     double worst = 0;
     *clue = -1;
     for (int k = 0; k < f->num_clues; k++) {
         struct tally t = bug_fit_view(f, k, c);
-        bool is_noise = t.chi2 - t.chi2_mean <= bug_fit_largest_excess * sqrt(2 * t.cells) &&
+        bool is_noise = t.chi2 - t.chi2_mean <= clear * sqrt(2 * t.cells) &&
                         t.fact <= pow(bug_fit_largest_excess, 2);
         double left = is_noise ? 0 : t.all > 0 ? t.left / t.all : 1;
         if (left > worst) {

@@ -10,7 +10,7 @@ struct tally {
     double chi2, chi2_mean, cells; /* of what is left; its mean if that is noise */
     double fact;                   /* the largest z^2 of a fact */
     double left,
-        all; /* in the same weights: what is left, and without the bug; of a view at least 0 */
+        all; /* in the same weights: what is left, and without the bug; of a view 0 where it is noise */
 };
 
 struct bug_fit {

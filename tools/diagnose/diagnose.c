@@ -169,14 +169,21 @@ static void rank_free(const struct bug_fit *f, struct candidate *all, int num)
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
 }
 
-/* The likeliest singles, each with every other bug; likeliest first. */
+/* Two of one part of the assignment are more often a third that is not known. */
+static bool is_of_one_part(const struct bug *a, const struct bug *b)
+{
+    size_t n = strcspn(a->where, ",");
+    return n == strcspn(b->where, ",") && strncmp(a->where, b->where, n) == 0;
+}
+
+/* The likeliest singles, each with every other bug of another part; likeliest first. */
 static int rank_pairs(const struct bug_fit *f, const struct candidate *single, int num,
                       struct candidate *pair)
 {
     int pairs = 0;
     for (int i = 0; i < num && i < LEADERS; i++)
         for (int k = i + 1; k < num; k++)
-            if (!catalogue_same_mistake(&f->c->bug[single[i].bug], &f->c->bug[single[k].bug]))
+            if (!is_of_one_part(&f->c->bug[single[i].bug], &f->c->bug[single[k].bug]))
                 pair[pairs++] = bug_fit_at(f, single[i].bug, single[k].bug, 1);
     qsort(pair, (size_t)pairs, sizeof *pair, by_likelihood);
     return pairs;

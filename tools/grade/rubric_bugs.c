@@ -109,18 +109,19 @@ static void forget(struct sights *s)
  * both ends, where a mean of counts hardly moves. */
 static double progress(const struct rubric_image *p, double taken)
 {
-    double batch = rubric_option(p, "-a", 0), end = 0.01 * (p->spp - batch);
+    double batch = rubric_option(p, "-a", 0), end = 0.05 * (p->spp - batch);
     return log((fmax(0, taken - batch) + end) / (fmax(0, p->spp - taken) + end));
 }
 
-static void set_samples(const struct rubric_image *p, const struct stopping *s, double *fact,
-                        double *fact_sd)
+/* What a rule leads to that is in its range is as likely everywhere there. */
+static void set_samples(const struct rubric_image *p, const struct stopping *s, double seen,
+                        double *fact, double *fact_sd)
 {
     static const double ends =
         4; /* of the range, in standard deviations: 3.3 and several shapes (stopping_rule.c) */
-    static const double least_sd = 0.05;
+    static const double least_sd = 0.2;
     double lo = progress(p, s->least), hi = progress(p, s->most);
-    fact[FACT_SAMPLES] = (lo + hi) / 2;
+    fact[FACT_SAMPLES] = fmin(fmax(seen, lo), hi);
     fact_sd[FACT_SAMPLES] = hypot((hi - lo) / 2 / ends, least_sd);
 }
 
@@ -150,7 +151,8 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
     own->effect = calloc((size_t)b->catalogue.num_bugs, sizeof(struct effect *));
     if (own->effect == NULL)
         return err_set(e, "out of memory");
-    set_samples(p, &by[STOPS_RIGHTLY], own->correct.fact, own->correct.fact_sd);
+    set_samples(p, &by[STOPS_RIGHTLY], clue->seen.fact[FACT_SAMPLES], own->correct.fact,
+                own->correct.fact_sd);
     for (int k = 0; k < b->catalogue.num_bugs; k++) {
         const struct effect *plain = clue->view->effect[k];
         enum stopping_kind kind = stopping_rule_of(b->catalogue.bug[k].name);
@@ -164,7 +166,7 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
         own->effect[k] = mine;
         for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
             mine->fact[f] = mine->fact_sd[f] = NAN;
-        set_samples(p, &by[kind], mine->fact, mine->fact_sd);
+        set_samples(p, &by[kind], clue->seen.fact[FACT_SAMPLES], mine->fact, mine->fact_sd);
     }
     clue->view = own;
     return true;
