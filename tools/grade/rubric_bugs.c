@@ -197,8 +197,7 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
                                    .clip = isfinite(clip) ? clip : 0};
     struct sights *seen = calloc(1, sizeof *seen);
     bool ok = seen != NULL || err_set(e, "out of memory");
-    double best = -INFINITY, likeliest = -INFINITY;
-    int likely = set;
+    double best = -INFINITY;
     *found = (struct diagnosis){0};
     *with = set;
     for (int k = 0; ok && k < r->num_sets && !(*with == set && found->num_named > 0); k++) {
@@ -208,10 +207,6 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
         if (!ok || seen->num == 0)
             break;
         ok = diagnose(&b->catalogue, seen->clue, seen->num, &opt, &other, e);
-        if (ok && other.log_likelihood + other.largest_lead > likeliest) {
-            likeliest = other.log_likelihood + other.largest_lead;
-            likely = tried;
-        }
         double likelihood = ok && other.num_named > 0
                                 ? other.log_likelihood + other.candidate[0].log_likelihood
                                 : -INFINITY;
@@ -223,16 +218,30 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
             *with = tried;
         }
     }
-    /* Two at once, where a single one is told but not all, or with the deviations that look likeliest. */
-    int tried = found->num_named > 0 ? *with : likely;
-    struct diagnosis two;
+    /* Two at once: with the deviations of a single one that is told, else with any, where they are likelier than one with these. */
+    const bool single = found->num_named > 0;
+    int likely = *with;
     opt.pairs = true;
-    ok = ok && look(b, r, a, h, tried, seen, e) &&
-         (seen->num == 0 || diagnose(&b->catalogue, seen->clue, seen->num, &opt, &two, e));
-    if (ok && seen->num > 0 && (two.num_named > 0 || tried == *with)) {
-        *found = two;
-        *with = tried;
+    best = -INFINITY;
+    for (int k = 0; ok && k < r->num_sets; k++) {
+        int tried = k == 0 ? *with : k <= *with ? k - 1 : k;
+        struct diagnosis two;
+        ok = look(b, r, a, h, tried, seen, e);
+        if (!ok || seen->num == 0 || (single && k > 0))
+            break;
+        ok = diagnose(&b->catalogue, seen->clue, seen->num, &opt, &two, e);
+        double likelihood = ok && two.num_named > 0 && (k == 0 || two.candidate[0].second >= 0)
+                                ? two.log_likelihood + two.candidate[0].log_likelihood
+                                : -INFINITY;
+        if (ok && (k == 0 || likelihood > best)) {
+            best = k == 0 && two.num_named == 0 ? two.log_likelihood + fmax(0, two.largest_lead) +
+                                                      diagnose_bound(&b->catalogue, alpha)
+                                                : likelihood;
+            *found = two;
+            likely = tried;
+        }
     }
+    *with = likely;
     if (seen != NULL)
         forget(seen);
     free(seen);
