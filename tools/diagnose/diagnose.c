@@ -214,7 +214,8 @@ static bool is_explanation(const struct bug_fit *f, const struct diagnose_option
         return is_noise || c->explained >= least_explained;
     bool is_gone =
         c->explained >= (is_noise ? least_noise : least_gone) && (is_noise || c->second < 0);
-    return is_gone && bug_fit_is_full(f, c) && bug_fit_worst(f, c, &clue) <= most_left;
+    return is_gone && bug_fit_is_full(f, c) &&
+           bug_fit_worst(f, c, &clue) <= (c->second >= 0 ? 0 : most_left);
 }
 
 /* Where more is left than noise, a likelihood says little: another that leaves less than twice as much comes near. */

@@ -119,10 +119,20 @@ static void set_samples(const struct rubric_image *p, const struct stopping *s, 
 {
     static const double ends =
         4; /* of the range, in standard deviations: 3.3 and several shapes (stopping_rule.c) */
-    static const double least_sd = 0.2;
+    static const double least_sd = 0.1;
     double lo = progress(p, s->least), hi = progress(p, s->most);
     fact[FACT_SAMPLES] = fmin(fmax(seen, lo), hi);
     fact_sd[FACT_SAMPLES] = hypot((hi - lo) / 2 / ends, least_sd);
+}
+
+/* So much of it that its light and noise are not known. */
+static bool is_clipped(const struct submitted_image *s)
+{
+    static const double most = 0.05;
+    size_t values = 3 * (size_t)s->width * (size_t)s->height, clipped = 0;
+    for (size_t i = 0; i < values; i++)
+        clipped += s->clipped[i];
+    return (double)clipped > most * (double)values;
 }
 
 /* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
@@ -138,11 +148,15 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
     struct err why;
     if (isnan(clue->seen.fact[FACT_SAMPLES]))
         return true;
-    if (!stopping_rule_samples(&r->image[image], &h->image[image], answer_key_image(a, set, image),
-                               by, &why)) {
+    if (is_clipped(&h->image[image]))
+        clue->seen.fact[FACT_SAMPLES] = NAN;
+    else if (!stopping_rule_samples(&r->image[image], &h->image[image],
+                                    answer_key_image(a, set, image), by, &why)) {
         clue->seen.fact[FACT_SAMPLES] = NAN;
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     }
+    if (isnan(clue->seen.fact[FACT_SAMPLES]))
+        return true;
     double taken = p->spp * exp(clue->seen.fact[FACT_SAMPLES]),
            sd = taken * clue->seen.fact_sd[FACT_SAMPLES];
     clue->seen.fact[FACT_SAMPLES] = progress(p, taken);
