@@ -77,13 +77,14 @@ static bool shifted(const struct images *m, bool down, double amount, int x, int
 static bool changed(const struct images *m, enum error_mode_kind kind, double amount, int x, int y,
                     double mean[3], double var[3])
 {
-    static const int swap[3][3] = {{2, 1, 0}, {1, 0, 2}, {0, 2, 1}};
+    static const int from[NUM_ERROR_MODES][3] = {
+        [ERROR_SWAP_RB] = {2, 1, 0}, [ERROR_SWAP_RG] = {1, 0, 2}, [ERROR_SWAP_GB] = {0, 2, 1}};
     if (kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y)
         return shifted(m, kind == ERROR_SHIFT_Y, amount, x, y, mean, var);
     bool swaps = kind >= ERROR_SWAP_RB && kind <= ERROR_SWAP_GB;
     size_t p = source(m, kind, x, y);
     for (size_t c = 0; c < 3; c++) {
-        size_t i = p + (swaps ? (size_t)swap[kind - ERROR_SWAP_RB][c] : c);
+        size_t i = p + (swaps ? (size_t)from[kind][c] : c);
         double own = m->side[1]->mean[i], v = variance(m, 1, i), slope = 1;
         mean[c] = own;
         if (kind == ERROR_SCALE) {
