@@ -141,7 +141,7 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
                            const struct answer_key *a, const struct submitted_images *h, int set,
                            int image, struct sights *s, struct err *e)
 {
-    struct stopping by[NUM_STOPPING_KINDS];
+    struct stopping by[NUM_STOPPING_KINDS] = {0};
     struct observation *clue = &s->clue[s->num - 1];
     struct view *own = &s->own[s->num - 1];
     const struct rubric_image *p = &r->image[image];
