@@ -206,23 +206,12 @@ static bool gate_lead(const struct bug_fit *f, const struct candidate *best, dou
 static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
                            const struct candidate *c)
 {
-    static const double least_noise = 0.5, least_gone = 0.99, most_left = 0.5, pair_excess = 2;
+    static const double least_gone = 0.5, most_left = 0.5, most_excess = 4;
     int clue;
-    bool is_noise =
-        c->excess <= (opt->by_likelihood && c->second >= 0 ? pair_excess : bug_fit_largest_excess);
     if (!opt->by_likelihood)
-        return is_noise || c->explained >= least_explained;
-    bool is_gone =
-        c->explained >= (is_noise ? least_noise : least_gone) && (is_noise || c->second < 0);
-    return is_gone && bug_fit_is_full(f, c) &&
+        return c->excess <= bug_fit_largest_excess || c->explained >= least_explained;
+    return c->excess <= most_excess && c->explained >= least_gone && bug_fit_is_full(f, c) &&
            bug_fit_worst(f, c, &clue) <= (c->second >= 0 ? 0 : most_left);
-}
-
-/* Where more is left than noise, a likelihood says little: another that leaves less than twice as much comes near. */
-static bool is_near(const struct candidate *best, const struct candidate *other)
-{
-    return best->excess > bug_fit_largest_excess &&
-           1 - other->explained < 2 * (1 - best->explained);
 }
 
 /* In logarithms. Bugs that leave noise are told apart by what the model knows of variances, to this share of the lead. */
@@ -266,10 +255,6 @@ static void name(const struct bug_fit *f, const struct diagnose_options *opt,
         bool is_named = is_among(f->c, out, out->num_named, &all[i]);
         sum += relative;
         named += is_named ? relative : 0;
-        if (opt->by_likelihood && !is_named && is_near(best, &all[i])) {
-            out->num_named = 0;
-            return;
-        }
     }
     out->finding = FINDING_BUG;
     out->probability = named / sum;
