@@ -1,6 +1,7 @@
 #include "noise_estimate.h"
 
 #include <gsl/gsl_cdf.h>
+#include <gsl/gsl_sort.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -184,12 +185,6 @@ static struct block grid_sums(const struct grid *d)
     return s;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Mean variance of the blocks in which one square of a side lies. */
 static double blocks_under(const struct blocks *g, int side, int x, int y)
 {
@@ -228,7 +223,7 @@ static bool coarse(const struct grid *d, const struct blocks *g, int side, doubl
                     square[num++] = r * r / v;
             }
     if (ok && num >= FEWEST) {
-        qsort(square, num, sizeof *square, compare_doubles);
+        gsl_sort(square, 1, num);
         *factor = side * side * square[num / 2] / gsl_cdf_chisq_Pinv(0.5, 1);
         *dof = median_dof * (double)num;
     }
