@@ -30,7 +30,7 @@ static int tell(bool (*differs)(const struct suite_scene *s), const char *a, cha
                                                 verdict_name(s->expect), "verdict",
                                                 is ? "DIFFERENT" : verdict_name(s->expect)));
     }
-    MUST(shared_features_tell(results, suite_shipped(), text, size, &e));
+    MUST(shared_features_tell(results, "reference/scenes", text, size, &e));
     json_decref(results);
     print_message("%d: %s\n", num, text);
     return num;
