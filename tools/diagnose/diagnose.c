@@ -214,6 +214,25 @@ static bool is_explanation(const struct bug_fit *f, const struct diagnose_option
            bug_fit_worst(f, c, &clue) <= (c->second >= 0 ? 0 : most_left);
 }
 
+/* Of what is left with one of the two alone, does the other explain most? */
+static bool is_needed_beside(const struct bug_fit *f, const struct candidate *two, int one)
+{
+    static const double most_left = 0.1;
+    return 1 - two->explained <= most_left * (1 - bug_fit_at(f, one, -1, 1).explained);
+}
+
+/* Effects of two do not quite multiply: more than noise may be left if it is little of each view, and no others come near. */
+static bool is_nearly_all(const struct bug_fit *f, const struct diagnose_options *opt,
+                          const struct candidate *best, const struct candidate *next)
+{
+    static const double least_gone = 0.97, most_left = 0.05, near = 0.1;
+    int clue;
+    return opt->by_likelihood && best->second >= 0 && best->explained >= least_gone &&
+           bug_fit_is_full(f, best) && bug_fit_worst(f, best, &clue) <= most_left &&
+           is_needed_beside(f, best, best->bug) && is_needed_beside(f, best, best->second) &&
+           (next == NULL || next->log_likelihood <= (1 - near) * best->log_likelihood);
+}
+
 /* In logarithms. Bugs that leave noise are told apart by what the model knows of variances, to this share of the lead. */
 static double tie_of(const struct diagnose_options *opt, const struct candidate *best)
 {
@@ -242,7 +261,9 @@ static void name(const struct bug_fit *f, const struct diagnose_options *opt,
         if (!is_among(f->c, out, out->num_candidates, &all[i]))
             out->candidate[out->num_candidates++] = all[i];
     out->finding = FINDING_UNKNOWN;
-    if (num == 0 || best->log_likelihood < bound || !is_explanation(f, opt, best))
+    if (num == 0 || best->log_likelihood < bound ||
+        (!is_explanation(f, opt, best) &&
+         !is_nearly_all(f, opt, best, out->num_candidates > 1 ? &next[1] : NULL)))
         return;
     do {
         out->num_named++;

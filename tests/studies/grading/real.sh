@@ -82,7 +82,7 @@ if [ "${1:-}" != --table ]; then
             # shellcheck disable=SC2254 # a pattern
             case $kind in
             right | bug | held) case $a in $only) one "$a" "$b" "$a"; break ;; esac ;;
-            pair) case $a+$b in $only) one "$a+$b" "$(field "$a" 3)" "$a" "$b"; break ;; esac ;;
+            pair | drawn) case $a+$b in $only) one "$a+$b" "$(field "$a" 3)" "$a" "$b"; break ;; esac ;;
             esac
         done
     done <"$table"

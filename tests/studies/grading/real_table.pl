@@ -14,10 +14,10 @@ while (<$in>) {
     next if !defined $kind || /^[ #]/ || $kind eq 'base';
     if ($kind eq 'right') {
         push @rows, { id => $name, kind => 'right', parts => [], names => [], what => join ' ', @rest[1 .. $#rest] };
-    } elsif ($kind eq 'pair') {
+    } elsif ($kind eq 'pair' || $kind eq 'drawn') {
         my @two = map { $told{$_} // die "$table: no bug $_\n" } $name, $rest[0];
-        push @rows, { id => "$name+$rest[0]", kind => 'pair', parts => [map { @{ $_->{parts} } } @two], names => [map { @{ $_->{names} } } @two],
-            held => $two[0]{held} || $two[1]{held}, what => join ' and ', map { $_->{what} } @two };
+        push @rows, { id => "$name+$rest[0]", kind => $kind, parts => [map { @{ $_->{parts} } } @two], names => [map { @{ $_->{names} } } @two],
+            held => $kind eq 'drawn' || $two[0]{held} || $two[1]{held}, what => join ' and ', map { $_->{what} } @two };
     } else {
         push @rows, $told{$name} = { id => $name, kind => 'bug', parts => [$rest[1]], names => [$rest[2]], held => $kind eq 'held',
             what => join ' ', @rest[3 .. $#rest] };
@@ -58,14 +58,14 @@ for my $row (@rows) {
         $g->{located} // '', $g->{provisional} ? 'yes' : '', $g->{cpu_s} // 0;
 }
 print "| program | what it is | part | points lost | as it is | named | located | provisional | CPU s |\n|---|---|---|---|---|---|---|---|--:|\n", @lines, "\n";
-for my $kind (qw(right bug pair)) {
+for my $kind (qw(right bug pair drawn)) {
     my $c = $of{$kind} or next;
     my $n = sub { $c->{ $_[0] } // 0 };
     my $end = sprintf "wrong names: %d; provisional: %d; %.0f CPU s each.\n", $n->('wrong'), $n->('provisional'), $n->('cpu') / $n->('n');
     printf "- Right programs: %d of %d keep all points; %s", $n->('full'), $n->('n'), $end if $kind eq 'right';
     printf "- Bugs: %d of %d lose points in their own part alone (held aside: %d of %d), %d lose none; of %d in the catalogue %d are named; %s", $n->('only'), $n->('n'),
         $n->('held_only'), $n->('held'), $n->('full'), $n->('known'), $n->('named'), $end if $kind eq 'bug';
-    printf "- Pairs: %d of %d lose points in the two parts alone, %d of them in both; of %d in the catalogue both are named in %d; %s", $n->('only'), $n->('n'), $n->('both'),
-        $n->('known'), $n->('named'), $end if $kind eq 'pair';
+    printf "- %s: %d of %d lose points in the two parts alone, %d of them in both; of %d in the catalogue both are named in %d; %s",
+        $kind eq 'pair' ? 'Pairs' : 'Pairs drawn', $n->('only'), $n->('n'), $n->('both'), $n->('known'), $n->('named'), $end if $kind eq 'pair' || $kind eq 'drawn';
 }
 exit((($of{right} // {})->{n} // 0) > (($of{right} // {})->{full} // 0) || grep { $_->{wrong} } values %of);
