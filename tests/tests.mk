@@ -15,7 +15,7 @@ $(BUILD)/deps-slurm: | $(BUILD)/deps
 # Sources of the tests, and of programs that measure or make what is stored. Names are unique in the tree, so that
 # all programs stand side by side, in BUILD/tests and BUILD/san/tests.
 TESTS    := $(wildcard tests/*/test_*.c tests/*/*/test_*.c)
-PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c tests/studies/grading/grade_table.c \
+PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c \
   tests/end_to_end/student_tracer.c tests/studies/bench/bench.c
 BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
 # What several tests share: a library, of which each takes what it wants.
@@ -191,9 +191,6 @@ bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 #: make bvh-table  time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)
 bvh-table: $(BUILD)/pathtracer
 	tests/studies/bench/bvh_table.sh $(BUILD)
-#: make grade-show  grade a class of fifty, write tests/studies/grading/
-grade-show: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/grade_table
-	tests/studies/grading/grade_show.sh $(BUILD)
 #: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="FILES"
 rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-3-1*.rubric) --plain tools/rubrics/cs184-3-2.rubric
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
@@ -210,4 +207,4 @@ print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 .PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table grade-show rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
+  bench bench-rays bvh-table rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

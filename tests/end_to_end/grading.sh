@@ -80,4 +80,24 @@ check "and all points" grep -q '"points": 1.0' "$tmp/shapes/ada/grade.json"
 
 check "another seed" grade -o "$tmp/other" --seed 2
 check "other numbers (control)" test "$(sums "$tmp/other")" != "$(sums "$tmp/two")"
+# One image for three scenes is no evidence of any; for two (control) it is judged.
+{
+    printf 'rubric One\ncurve srgb\ncommand {program} -f {out} {scene}\ntotal 3\n'
+    for name in 12_point_plane 13_square_patch 11_furnace; do
+        printf 'image %s\n  scene %s\n  size 32 32\n  spp 16\n  bounces 1\n  reference ours 16\n' $name $name
+    done
+    printf 'part 1 All\n'
+    for name in 12_point_plane 13_square_patch 11_furnace; do printf 'check %s 1 equal %s\n  image 90 100\n  tile 90 100\n' $name $name; done
+} >"$tmp/one.rubric"
+mkdir "$tmp/same"
+"$build/pathtracer" -q -r 32 32 -s 16 -m 1 -f "$tmp/same/12_point_plane.png" reference/scenes/12_point_plane.dae >/dev/null
+one() { # POINTS
+    "$build/assay" grade -q -o "$tmp/one-image" --again "$tmp/one.rubric" "$tmp/same"
+    grep "^\"same\",$1," "$tmp/one-image/grades.csv"
+}
+cp "$tmp/same/12_point_plane.png" "$tmp/same/13_square_patch.png"
+check "one image for two scenes is judged" one 2.00
+cp "$tmp/same/12_point_plane.png" "$tmp/same/11_furnace.png"
+check "one image for three scenes has no points" one 0.00
+check "and is told so" grep -q "the same image was handed in for 2 other scenes" "$tmp/one-image/same/grade.json"
 [ $failures -eq 0 ]

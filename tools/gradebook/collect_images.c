@@ -39,6 +39,49 @@ static bool make_image(const struct collect *c, const struct rubric_image *p, st
     return true;
 }
 
+static bool is_one_colour(const struct submitted_image *s)
+{
+    for (int i = 3; i < 3 * s->width * s->height; i++)
+        if (s->mean[i] != s->mean[i - 3])
+            return false;
+    return true;
+}
+
+/* How many other scenes have the same image, bit by bit. */
+static int repeats_of(const struct rubric *r, const struct submitted_images *h, int image)
+{
+    const char *seen[RUBRIC_IMAGES];
+    int num = 0;
+    seen[num++] = r->image[image].scene;
+    for (int i = 0; i < r->num_images; i++) {
+        bool is_new = i != image && h->image[i].mean != NULL;
+        for (int k = 0; is_new && k < num; k++)
+            is_new = strcmp(r->image[i].scene, seen[k]) != 0;
+        if (is_new && submitted_image_same(&h->image[i], &h->image[image]))
+            seen[num++] = r->image[i].scene;
+    }
+    return num - 1;
+}
+
+/* No program makes one image of three scenes; some scene may look like it. What is of one colour is judged: a program without
+ * light is black. */
+static void refuse_repeated(const struct rubric *r, struct submitted_images *h)
+{
+    enum { MOST = 1 };
+    int repeats[RUBRIC_IMAGES] = {0};
+    for (int i = 0; i < r->num_images; i++)
+        if (h->image[i].mean != NULL && !is_one_colour(&h->image[i]))
+            repeats[i] = repeats_of(r, h, i);
+    for (int i = 0; i < r->num_images; i++) {
+        if (repeats[i] <= MOST)
+            continue;
+        submitted_image_free(&h->image[i]);
+        h->image[i] = (struct submitted_image){0};
+        snprintf(h->why[i], sizeof h->why[i], "the same image was handed in for %d other scenes",
+                 repeats[i]);
+    }
+}
+
 bool collect_images(const struct collect *c, struct submitted_images *h, struct err *e)
 {
     const struct rubric *r = c->job->rubric;
@@ -50,6 +93,7 @@ bool collect_images(const struct collect *c, struct submitted_images *h, struct 
             return false;
     }
     submission_conclude(r, h->made, h->why, c->submission);
+    refuse_repeated(r, h);
     return true;
 }
 

@@ -1,6 +1,6 @@
 /* Submissions made of what the catalogue of a rubric's bugs says: flat cells of the right mean and of the effect of one or
  * two bugs, normal noise of as much as a render of ours has, written as PNG by the assignment's curve and read back. So a test
- * by them is about codes, clipping and noise; what real renders give is measured by make grade-show. */
+ * by them is about codes, clipping and noise; what real programs give is measured by tests/studies/grading/real.sh. */
 #ifndef ASSAY_TESTS_BUG_IMAGES_H
 #define ASSAY_TESTS_BUG_IMAGES_H
 
