@@ -96,7 +96,7 @@ static _Noreturn void child_main(const struct process *p, const char *path, pid_
     out = fcntl(out, F_DUPFD_CLOEXEC, 3);
     int null = fcntl(open("/dev/null", O_RDONLY | O_CLOEXEC), F_DUPFD_CLOEXEC, 3);
     if (setpgid(0, group) == 0 && dup2(null, 0) >= 0 && dup2(out, 1) >= 0 && dup2(out, 2) >= 0 &&
-        (p->cwd == NULL || chdir(p->cwd) == 0))
+        (p->cwd == NULL || chdir(p->cwd) == 0) && (p->before == NULL || p->before(p->before_ctx)))
         execv(path, (char *const *)p->argv);
     int saved = errno;
     ssize_t ignored = write(status, &saved, sizeof saved);
@@ -180,34 +180,36 @@ static void tail_quote(const struct tail *t, char out[LAST_CHARS + 8])
 struct run {
     pid_t guard, child;
     int out, log; /* -1: closed */
-    size_t logged;
+    size_t logged, log_most;
+    bool log_full;
     int log_errno; /* of the first failed write */
     struct tail tail;
 };
 
-static void log_write(struct run *r, const char *data, size_t n)
+static void write_all(struct run *r, const char *data, size_t n)
 {
-    if (r->log < 0 || r->log_errno != 0)
-        return;
-    static const char full[] = "\n[more output than this log may hold]\n";
-    if (r->logged + n > LOG_MAX) {
-        data = full;
-        n = r->logged <= LOG_MAX ? sizeof full - 1 : 0;
-        r->logged = (size_t)LOG_MAX + 1;
-    } else {
-        r->logged += n;
-    }
-    while (n > 0) {
+    while (n > 0 && r->log_errno == 0) {
         ssize_t w = write(r->log, data, n);
-        if (w < 0 && errno != EINTR) {
+        if (w < 0 && errno != EINTR)
             r->log_errno = errno;
-            return;
-        }
         if (w > 0) {
             data += w;
             n -= (size_t)w;
         }
     }
+}
+
+static void log_write(struct run *r, const char *data, size_t n)
+{
+    static const char full[] = "\n[more output than this log may hold]\n";
+    size_t room = r->log_most - r->logged;
+    if (r->log < 0 || r->log_full)
+        return;
+    write_all(r, data, n < room ? n : room);
+    r->logged += n < room ? n : room;
+    r->log_full = n > room;
+    if (r->log_full)
+        write_all(r, full, sizeof full - 1);
 }
 
 /* Takes what the pipe holds, at most about 1 MiB at a time so that a flood cannot hide the clock.
@@ -310,7 +312,8 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     if (!process_find(p->argv[0], path, sizeof path))
         return err_set(e, "%s: no such program%s", p->argv[0],
                        strchr(p->argv[0], '/') != NULL ? "" : " in PATH");
-    struct run r = {.out = -1, .log = -1};
+    struct run r = {
+        .out = -1, .log = -1, .log_most = p->log_most > 0 ? p->log_most : (size_t)LOG_MAX};
     if (p->log != NULL &&
         (r.log = open(p->log, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666)) < 0)
         return err_set(e, "%s: cannot write: %s", p->log, strerror(errno));
@@ -333,6 +336,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
         *usage = (struct process_usage){
             .wall_s = wall,
             .exit_status = late || WIFSIGNALED(status) ? -1 : WEXITSTATUS(status),
+            .signal = !late && WIFSIGNALED(status) ? WTERMSIG(status) : 0,
             .cpu_s = (double)(ru.ru_utime.tv_sec + ru.ru_stime.tv_sec) +
                      1e-6 * (double)(ru.ru_utime.tv_usec + ru.ru_stime.tv_usec)};
 

@@ -10,7 +10,12 @@ struct process {
     const char *const *argv; /* argv[0] looked up in PATH; NULL-terminated */
     const char *cwd;         /* NULL: the current one */
     const char *log;         /* file that receives stdout and stderr, at most 64 MiB; NULL: none */
-    double timeout_s;        /* wall time; 0: none */
+    size_t log_most;         /* bytes of it, instead; 0: those */
+    /* Called in the new process before it becomes the program, with calls that may follow fork() alone; false, with
+     * errno: it is not started. May be NULL. */
+    bool (*before)(const void *ctx);
+    const void *before_ctx;
+    double timeout_s; /* wall time; 0: none */
     /* Called a few times a second while it runs (progress); may be NULL. */
     void (*tick)(void *ctx);
     void *tick_ctx;
@@ -19,6 +24,7 @@ struct process {
 struct process_usage {
     double wall_s, cpu_s; /* of the child and of those of its descendants that were waited for */
     int exit_status;      /* -1: it did not end by itself */
+    int signal;           /* that ended it, before its time was up; 0: none */
 };
 
 /* Runs to the end. True if it exited with status 0. Otherwise the line says: not found / killed by

@@ -1,9 +1,9 @@
 #define _GNU_SOURCE
 #include "fs.h"
 
-#include "renderer/base/fs.h"
+#include <dirent.h>
 #include <errno.h>
-#include <ftw.h>
+#include <fcntl.h>
 #include <stdarg.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -96,22 +96,51 @@ bool fs_make_parent_dirs(const char *path, struct err *e)
     return fs_make_dirs(dir, e);
 }
 
-static int remove_one(const char *path, const struct stat *st, int flag, struct FTW *ftw)
+enum { DEEP = 16 };
+
+/* Removes what `name` in the open directory `dir` is. Whoever may write there may put a link or another folder in its place meanwhile:
+ * no path is ever followed. Folders that lie deep are first moved to `top`, so that neither descriptors nor the stack run out. */
+static bool remove_at(int top, int dir, const char *name, int depth, unsigned *moved)
 {
-    (void)st;
-    (void)flag;
-    (void)ftw;
-    return remove(path);
+    struct stat st;
+    if (fstatat(dir, name, &st, AT_SYMLINK_NOFOLLOW) != 0)
+        return errno == ENOENT;
+    if (!S_ISDIR(st.st_mode))
+        return unlinkat(dir, name, 0) == 0 || errno == ENOENT;
+    if (depth == DEEP) {
+        char to[32];
+        do
+            snprintf(to, sizeof to, ".deep-%u", (*moved)++);
+        while (faccessat(top, to, F_OK, AT_SYMLINK_NOFOLLOW) == 0);
+        return renameat(dir, name, top, to) == 0;
+    }
+    int fd = openat(dir, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *d = fd >= 0 ? fdopendir(fd) : NULL;
+    if (d == NULL) {
+        if (fd >= 0)
+            close(fd);
+        return false;
+    }
+    bool ok = true;
+    struct dirent *entry;
+    while (ok && (entry = readdir(d)) != NULL)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            ok = remove_at(depth == 0 ? fd : top, fd, entry->d_name, depth + 1, moved);
+    int saved = errno;
+    closedir(d);
+    errno = saved;
+    return ok && (unlinkat(dir, name, AT_REMOVEDIR) == 0 || errno == ENOENT);
 }
 
 bool fs_remove_tree(const char *path, struct err *e)
 {
-    struct stat st;
-    if (lstat(path, &st) != 0)
-        return errno == ENOENT ? true : err_set(e, "%s: %s", path, strerror(errno));
-    if (nftw(path, remove_one, 16, FTW_DEPTH | FTW_PHYS) != 0)
-        return err_set(e, "%s: cannot remove: %s", path, strerror(errno));
-    return true;
+    unsigned moved = 0, before;
+    bool ok;
+    do { /* folders that were moved to the top may have been missed */
+        before = moved;
+        ok = remove_at(-1, AT_FDCWD, path, 0, &moved);
+    } while (!ok && moved > before);
+    return ok || err_set(e, "%s: cannot remove: %s", path, strerror(errno));
 }
 
 bool fs_copy(const char *from, const char *to, struct err *e)

@@ -4,7 +4,6 @@
 
 #include "err.h"
 
-#include "renderer/base/fs.h"
 #include <limits.h>
 #include <stdio.h>
 
@@ -35,7 +34,7 @@ void out_abandon(struct out_file *o);
 bool fs_make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
 /* mkdir -p of the directory part of path. */
 bool fs_make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
-/* rm -r of a directory that we made; missing is fine. */
+/* rm -r of a directory that we made; missing is fine. No link in it is followed, also where others change it meanwhile. */
 bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
 
 /* Copies a file; everybody may read the copy. */

@@ -10,7 +10,13 @@
  *
  * Limits of this: no filter of system calls (a hole in the kernel is a way out); memory is watched five times
  * a second, not reserved, beyond what each process may have for itself; System V shared memory that no process
- * has attached is not seen. A machine that forbids user namespaces (many containers) has no sandbox. */
+ * has attached is not seen. A machine that forbids user namespaces (many containers) has no sandbox.
+ *
+ * Unsafe, as it is called, where namespaces are forbidden: as root, each run is made by a user of its own (run_user.h), of whom
+ * nothing stays: all its processes are ended, its files removed; unpacking, copying and packing are done as that user, so that no link is
+ * followed by root. System calls for what no limit counts, the network and other processes are refused by seccomp, files that are not the
+ * system's or its own by Landlock (confine.h), where the kernel has these. Not kept: the limits of disk and of memory of all processes together.
+ * As another user, only the last two and the limits of a process hold. */
 #ifndef ASSAY_SANDBOX_H
 #define ASSAY_SANDBOX_H
 
@@ -19,11 +25,12 @@
 #include <stddef.h>
 
 struct sandbox {
-    bool
-        unsafe; /* no bubblewrap: limits of time, memory a process and file size; else only what `drop` does */
-    bool drop;           /* we are root: run as nobody */
+    bool unsafe;         /* no bubblewrap: see above */
+    bool drop;           /* we are root: programs run as somebody else */
     struct temp_dir dir; /* for what runs read and write, readable by everybody */
-    char hidden[4][512]; /* directories that must not be seen though they lie below /usr */
+    char filter[544];    /* a file of it with what seccomp(2) refuses; "": none */
+    char hidden[16]
+               [512]; /* files and directories that must not be seen though they lie below /usr */
     int num_hidden;
 };
 
@@ -76,7 +83,7 @@ struct sandbox_result {
 };
 
 /* Looks whether the sandbox works here by running `true` in it. Fails with the reason where it does not;
- * with `unsafe` nothing is asked and nothing protected. hidden: directories (NULL at the end) with what no
+ * with `unsafe` nothing is asked. hidden: directories (NULL at the end) with what no
  * program may read; only those below /usr need it. Makes out->dir. The caller calls sandbox_close(). */
 bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
     __attribute__((warn_unused_result));

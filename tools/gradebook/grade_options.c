@@ -45,7 +45,7 @@ static const struct cli_option options[] = {
      TO(appeals)},
     {0, "unsafe-no-sandbox", "",
      "run programs without a sandbox: they can read and write all that you can\n"
-     "(as root: that nobody can)",
+     "(as root: each by a user of its own; tools/docs/guide-course.md says what holds)",
      TO(unsafe)},
     {0, "pathtracer", "PROGRAM", "our renderer, for references (the one beside this program)",
      TO(pathtracer)},
