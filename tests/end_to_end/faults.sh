@@ -2,12 +2,12 @@
 # tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
 # render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
 # of an uninterrupted run. Full disk, read-only directory, closed pipe. Prints "ok NAME" or "not ok NAME: why".
-# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock (all these; disk uses what grading and
+# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock ours_to_mend (all these; disk uses what grading and
 # validation leave); memory: tests/end_to_end/no_memory.sh with every allocation (an hour).
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/faults.sh BUILD [KILLS [PART...]]}") kills=${2:-6}
 shift $(($# > 2 ? 2 : $#))
-[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock
+[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock ours_to_mend
 pathtracer=$build/pathtracer assay=$build/assay scene=$PWD/reference/scenes/41_cornell.dae
 tmp=$(mktemp -d)
 # What is killed here, or has no disk, keeps no counts for tests/end_to_end/coverage.sh (LLVM_PROFILE_FILE): it would spoil those of the others.
@@ -308,6 +308,72 @@ clock() {
     timeout --preserve-status -k 60 -s INT 2 env LD_PRELOAD="$so" "$pathtracer" -q -r 32 32 -s 16000000 -f "$tmp/clock.exr" "$scene" >/dev/null 2>&1
     [ $? -eq 130 ] || why="${why:-an interrupted render ended otherwise}"
     tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
+}
+
+# A right program whose grading lacks something: all points, or none are said and exit 3 with a line; never fewer. The control is a wrong
+# program that lacks nothing. With the sandbox where there is one, and without.
+ours_to_mend() {
+    local mode n dir=$tmp/ours rubric=$tmp/ours/quick.rubric pid bare=--unsafe-no-sandbox
+    chmod 711 "$tmp"
+    mkdir -p "$dir/right" "$dir/wrong" "$dir/temp" "$dir/bin" "$dir/few"
+    cp "$pathtracer" "$dir/right/ours" && cp "$assay" "$pathtracer" "$dir/few"
+    printf 'pathtracer:\n\tcp ours pathtracer\n' >"$dir/right/Makefile"
+    printf 'pathtracer:\n\tprintf "\043!/bin/sh\\nexit 1\\n" >pathtracer; chmod +x pathtracer\n' >"$dir/wrong/Makefile"
+    sed 's/^command/build make\ncommand/' tests/end_to_end/quick.rubric >"$rubric"
+    chmod -R a+rX "$dir"
+    judge() { # NAME COMMAND...: as above; status 0 if it got to the points
+        local name=$1 why="" status
+        shift
+        rm -rf "$dir/grades"
+        LLVM_PROFILE_FILE=/dev/null "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
+        status=$?
+        if [ $status -eq 0 ]; then grep -q " 8.00 of 8" "$tmp/out" || why="status 0: $(cat "$tmp/out")"
+        elif [ $status -ne 3 ] || [ "$(wc -l <"$tmp/err")" -ne 1 ]; then why="status $status: $(head -c 600 "$tmp/out" "$tmp/err")"
+        elif [ -e "$dir/grades/right/grade.json" ]; then why="it is kept: $(head -c 600 "$tmp/err")"; fi
+        [ -z "$why" ] || tell "$name" "$why"
+        return $status
+    }
+    for mode in "" $bare; do
+        local grade=("$assay" grade -o "$dir/grades" $mode "$rubric" "$dir/right")
+        if ! judge "nothing is missing${mode:+, $mode}" "${grade[@]}"; then
+            grep -q "no sandbox" "$tmp/err" && echo "skip what is ours to mend: $(head -c 200 "$tmp/err")" && continue
+            tell "nothing is missing${mode:+, $mode}" "$(cat "$tmp/err")"
+        fi
+        "$assay" grade -o "$dir/grades" $mode "$rubric" "$dir/wrong" >"$tmp/out" 2>&1
+        grep -q " 0.00 of 8" "$tmp/out" || tell "a wrong program${mode:+, $mode}" "$(cat "$tmp/out")"
+        n=0
+        if [ "$(id -u)" = 0 ] && mount -t tmpfs -o size=1m none "$dir/temp" 2>/dev/null; then
+            for size in 1 3 5 7 9 11 13; do
+                mount -o remount,size=${size}m "$dir/temp"
+                TMPDIR=$dir/temp judge "TMPDIR of $size MB${mode:+, $mode}" "${grade[@]}" && n=$((n + 1))
+            done
+            umount "$dir/temp"
+            tell "TMPDIR of 1 to 13 MB takes no points${mode:+, $mode}" "$([ $n -lt 7 ] || echo 'there was room every time')"
+        else echo "skip TMPDIR of 1 to 13 MB: cannot mount one"; fi
+        for k in 1 2 3 4 5 6; do
+            "${grade[@]}" >/dev/null 2>&1 &
+            pid=$! && sleep 0.$k
+            while kill -0 $pid 2>/dev/null; do
+                pkill -KILL -P $pid 2>/dev/null
+                sleep 0.3
+            done
+            wait $pid
+            n=$?
+            [ $n -eq 3 ] || { [ $n -eq 0 ] && grep -q ',8.00,' "$dir/grades/grades.csv"; } ||
+                tell "a killed supervisor${mode:+, $mode}" "status $n: $(cat "$dir/grades/grades.csv")"
+            rm -rf "$dir/grades"
+        done
+        tell "6 killed supervisors take no points${mode:+, $mode}" ""
+        for k in 8 12 16 20 24 32; do
+            judge "$k descriptors${mode:+, $mode}" bash -c 'ulimit -n '$k'; exec "$@"' bash "${grade[@]}"
+        done
+        tell "8 to 32 descriptors take no points${mode:+, $mode}" ""
+        sed 's/^build make/build no-such-tool/' "$rubric" >"$dir/tool.rubric"
+        judge "the build's tool is missing" "$assay" grade -o "$dir/grades" $mode "$dir/tool.rubric" "$dir/right"
+        tell "a missing tool of the build takes no points${mode:+, $mode}" "$([ $? -eq 3 ] && grep -q no-such-tool "$tmp/err" || cat "$tmp/err")"
+        judge "oiio.so is missing" "$dir/few/assay" grade -o "$dir/grades" $mode "$rubric" "$dir/right"
+        tell "a missing oiio.so takes no points${mode:+, $mode}" "$([ $? -eq 3 ] && grep -q oiio.so "$tmp/err" || cat "$tmp/err")"
+    done
 }
 
 for part in "$@"; do

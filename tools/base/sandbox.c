@@ -160,20 +160,27 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
         return false;
     if (!temp_dir_open(&out->dir, "sandbox", e))
         return false;
+    const struct path scene = fs_path("%s/probe-scene", out->dir.path);
     /* Without namespaces, other people's programs get through to what is their own, and no further. */
     chmod(out->dir.path, unsafe && out->drop ? 0711 : 0755);
-    if (!write_filter(out, e)) {
+    if (!write_filter(out, e) || !fs_make_dirs(scene.s, e)) {
         sandbox_close(out);
         return false;
     }
     const struct path probe = fs_path("%s/probe", out->dir.path);
     struct sandbox_result r = {0};
-    const struct sandbox_job job = {
-        .argv = (const char *const[]){"true", NULL}, .out = probe.s, .limit = sandbox_default};
+    const struct sandbox_job job = {.argv = (const char *const[]){"true", NULL},
+                                    .scene = scene.s,
+                                    .out = probe.s,
+                                    .limit = sandbox_default};
     struct err why = {""};
-    if (unsafe || (sandbox_run(out, &job, &r, &why) && r.end == SANDBOX_OK))
+    if (sandbox_run(out, &job, &r, &why) && r.end == SANDBOX_OK)
         return true;
     sandbox_close(out);
+    if (unsafe)
+        return err_set(
+            e, "no program can be run in %s (TMPDIR; must all users be able to pass it?): %s",
+            out->dir.path, why.msg[0] != '\0' ? why.msg : r.why);
     return err_set(
         e,
         "no sandbox for other people's programs on this machine: %s (Debian package bubblewrap; user "
@@ -188,8 +195,9 @@ void sandbox_close(struct sandbox *s)
     (void)removed; /* what stays is removed by the next run */
 }
 
-bool sandbox_pack(const char *path, const char *tar, size_t most, struct err *e)
+bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_large, struct err *e)
 {
+    *too_large = false;
     struct stat st;
     if (stat(path, &st) != 0)
         return err_set(e, "%s: %s", path, strerror(errno));
@@ -221,9 +229,13 @@ bool sandbox_pack(const char *path, const char *tar, size_t most, struct err *e)
                                 name,
                                 NULL};
     const struct process p = {.argv = argv, .timeout_s = 120};
+    struct process_usage usage = {0};
     struct err why;
-    if (process_run(&p, NULL, &why))
+    if (process_run(&p, &usage, &why))
         return chmod(tar, 0644) == 0 || err_set(e, "%s: %s", tar, strerror(errno));
     unlink(tar);
-    return err_set(e, "%s: cannot be packed into %zu MiB: %.400s", path, most >> 20, why.msg);
+    *too_large = usage.signal == SIGXFSZ;
+    if (*too_large)
+        return err_set(e, "%s: cannot be packed into %zu MiB", path, most >> 20);
+    return err_set(e, "%s: cannot be packed: %.400s", path, why.msg);
 }

@@ -70,7 +70,7 @@ enum sandbox_end {
     SANDBOX_FILE_SIZE, /* wrote a file that is too large */
     SANDBOX_DISK,      /* failed with /box full */
     SANDBOX_UNPACK,    /* the submission does not fit into /box, or holds what cannot be unpacked */
-    SANDBOX_LOST       /* the machine around it died: out of memory? */
+    SANDBOX_LOST /* the machine around it died, or had no room for what came out: our trouble */
 };
 extern const char *const sandbox_end_name[]; /* "ok", "failed", "wall time", .. */
 
@@ -95,8 +95,9 @@ void sandbox_close(struct sandbox *s);
 bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct sandbox_result *out,
                  struct err *e) __attribute__((warn_unused_result));
 
-/* A tar of a directory (or of one file) for struct sandbox_job, at most `most` bytes: links stay links. */
-bool sandbox_pack(const char *path, const char *tar, size_t most, struct err *e)
+/* A tar of a directory (or of one file) for struct sandbox_job, at most `most` bytes: links stay links. *too_large: it fails because of
+ * that, and of nothing else. */
+bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_large, struct err *e)
     __attribute__((warn_unused_result));
 
 #endif

@@ -129,7 +129,9 @@ static bool unpack(struct bare *b, struct sandbox_result *r, bool *done, struct 
     if (in >= 0)
         close(in);
     if (ok && !*done) {
-        ok = has_room(b, e);
+        FILE *log = job->log != NULL ? fopen(job->log, "w") : NULL; /* an empty one */
+        ok = has_room(b, e) && (job->log == NULL || (log != NULL && fclose(log) == 0) ||
+                                err_set(e, "%s: cannot write: %s", job->log, strerror(errno)));
         sandbox_conclude(job, "unpack", &nothing, r);
     }
     return ok;

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 /* Around the program; its arguments are the command that runs it. What it reports goes to a file that the
- * program cannot see. TREE, SCENE, KEEP_TREE: "" or not; WATCH: KiB. bwrap does not wait for the process that it starts, so the program's processor time is found with
+ * program cannot see; where there is no room for what is handed out, it reports nothing. TREE, SCENE, KEEP_TREE: "" or not; WATCH: KiB. bwrap does not wait for the process that it starts, so the program's processor time is found with
  * the one that inherits it, number 1 of the outer machine: cutime and cstime, fields 16 and 17 of its stat. */
 static const char supervisor[] =
     "set -u\n"
@@ -32,13 +32,13 @@ static const char supervisor[] =
     "[ ! -e \"$OUT/.memory\" ] || word=memory\n"
     "if [ $status -ne 0 ] && [ $word = ended ] && [ \"$(df --output=avail . | tail -n 1)\" -eq 0 ]; then word=disk; fi\n"
     "for name in $KEEP; do\n"
-    "  [ ! -f \"$name\" ] || [ -L \"$name\" ] || head -c $((FILE + 1)) \"./$name\" >\"$OUT/$name\"\n"
+    "  [ ! -f \"$name\" ] || [ -L \"$name\" ] || head -c $((FILE + 1)) \"./$name\" >\"$OUT/$name\" || exit\n"
     "done\n"
     "i=0 cpu=0\n"
     "while [ $i -lt 40 ] && grep -qsE '^NSpid:.*[0-9]\\s+[0-9]' /proc/[0-9]*/status; do sleep 0.05; i=$((i + 1)); done\n"
     "read -r stat </proc/1/stat && set -- ${stat##*)} && cpu=$((${14} + ${15}))\n"
     "rm -rf ./scene\n"
-    "[ -z \"$KEEP_TREE\" ] || tar -cSf - . | head -c $((DISK + 1)) >\"$OUT/tree.tar\"\n"
+    "[ -z \"$KEEP_TREE\" ] || tar -cSf - . | head -c $((DISK + 1)) >\"$OUT/tree.tar\" || exit\n"
     "echo \"$status $word $cpu\" >\"$OUT/.report\"\n"
     "exit $status\n";
 

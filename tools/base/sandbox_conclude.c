@@ -22,7 +22,7 @@ void sandbox_conclude(const struct sandbox_job *job, const char *word, const str
         r->end = r->wall_s >= l->wall_s ? SANDBOX_WALL : SANDBOX_LOST;
         snprintf(what, sizeof what,
                  r->end == SANDBOX_WALL ? "no end after %g s"
-                                        : "the sandbox was killed (out of memory?)",
+                                        : "the sandbox was lost (killed, or no space?)",
                  l->wall_s);
     } else if (strcmp(word, "unpack") == 0) {
         r->end = SANDBOX_UNPACK;

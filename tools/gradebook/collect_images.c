@@ -1,9 +1,12 @@
 #include "collect_images.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static const double step = 1.35; /* between the samples of two runs, at least */
 enum { MOST_RUNS = 12, MOST_ADAPTIVE = 6 };
@@ -17,6 +20,18 @@ static uint64_t image_seed(uint64_t seed, const char *name)
     return hash % 1000000007u;
 }
 
+/* A reader that lacks descriptors says no more than that it cannot read. */
+static bool can_open_more(void)
+{
+    enum { MORE = 8 };
+    int fd[MORE], num = 0;
+    while (num < MORE && (fd[num] = open("/dev/null", O_RDONLY | O_CLOEXEC)) >= 0)
+        num++;
+    for (int i = 0; i < num; i++)
+        close(fd[i]);
+    return num == MORE;
+}
+
 /* `why` says why there is none. Fails only for our own trouble. */
 static bool make_image(const struct collect *c, const struct rubric_image *p, struct made *made,
                        struct submitted_image *image, char why[400], struct err *e)
@@ -27,12 +42,14 @@ static bool make_image(const struct collect *c, const struct rubric_image *p, st
         !submission_image(job->rubric, job->sandbox, c->submission, p, job->stage, c->work, c->out,
                           image_seed(job->seed, p->name), job->threads, made, e))
         return false;
+    if (made->path[0] != '\0' && access(made->path, R_OK) != 0)
+        return err_set(e, "%s: %s", made->path, strerror(errno));
     if (made->path[0] == '\0')
         err_set(&wrong, "%s", made->why);
     else if (submitted_image_read(made->path, job->rubric->curve, p->width, p->height, image,
                                   &wrong))
         wrong.msg[0] = '\0';
-    else if (err_is_of_memory(&wrong)) /* which is our trouble */
+    else if (err_is_of_memory(&wrong) || !can_open_more()) /* which is our trouble */
         return err_set(e, "%s: %s", p->name, wrong.msg);
     image->spp = p->spp;
     snprintf(why, 400, "%.390s", wrong.msg);

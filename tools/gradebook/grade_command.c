@@ -1,6 +1,7 @@
 #include "grade_options.h"
 
 #include "renderer/base/cli.h"
+#include "reference/base/image_oiio.h"
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
@@ -93,6 +94,20 @@ static void tell(void *ctx, int num, const char *path, const json_t *grade)
     fflush(stdout);
 }
 
+/* How many could not be graded, which is ours to mend; the line is of the first. */
+static size_t in_trouble(const json_t *grades, struct err *e)
+{
+    size_t i, num = 0;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        const char *why = json_string_value(json_object_get(g, "trouble"));
+        if (why != NULL && num++ == 0)
+            err_set(e, "%s: %s", member_or_empty(g, "id"), why);
+    }
+    return num;
+}
+
 /* How many do. */
 static size_t need_staff(const json_t *grades)
 {
@@ -171,8 +186,13 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     if (ok)
         warn_of_strangers(s->appeals, &appeals, grades);
     if (ok && grade_write(s->out, r, answers, grades, e)) {
-        size_t need = need_staff(grades);
+        size_t need = need_staff(grades), lost = in_trouble(grades, e);
         code = need > 0 ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
+        if (lost > 0) {
+            code = EXIT_NOT_JUDGED;
+            err_prefix(e, "%zu of %d could not be graded, no points are lost; the first", lost,
+                       s->num);
+        }
         if (need > 0 && !s->quiet)
             printf("%zu of %d need you: %s/index.html\n", need, s->num, s->out);
     }
@@ -189,6 +209,9 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
                  int argc, char **argv, struct err *e)
 {
     char cache[4400], pathtracer[PATH_MAX];
+    /* What every image would be said to be unreadable for. */
+    if (image_oiio_version(e) == NULL)
+        return EXIT_NOT_JUDGED;
     struct answer_key *answers = calloc(1, sizeof *answers);
     struct sandbox box;
     int code = EXIT_NOT_JUDGED;

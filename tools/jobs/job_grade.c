@@ -74,6 +74,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
          plan_input(p, references.s, e) && plan_input(p, s->pathtracer, e) &&
          rubric_inputs(p, s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
+    plan_may_end(p, EXIT_NOT_JUDGED);   /* what a node has trouble with, the batch tries again */
     for (int k = 0; ok && k < s->num; k++)
         ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
     free(words);

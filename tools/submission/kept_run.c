@@ -66,8 +66,6 @@ bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbo
 bool kept_run_write(const char *dir, const struct sandbox_job *job,
                     const struct sandbox_result *result, struct err *e)
 {
-    if (result->end == SANDBOX_LOST)
-        return true;
     json_t *run =
         json_pack("{si, si, sf, sf, ss}", "end", (int)result->end, "status", result->status,
                   "wall_s", result->wall_s, "cpu_s", result->cpu_s, "why", result->why);

@@ -16,7 +16,7 @@ bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
 /* As if the job had been run now: its files are in job->out, its log is at job->log. False: it is not there. */
 bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbox_result *out);
 
-/* Keeps it, unless we lost it (SANDBOX_LOST). */
+/* Keeps it. */
 bool kept_run_write(const char *dir, const struct sandbox_job *job,
                     const struct sandbox_result *result, struct err *e)
     __attribute__((warn_unused_result));

@@ -248,7 +248,10 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
     out->packed = S_ISDIR(st.st_mode) ? !has(out, out->program) : archive;
     if ((size_t)snprintf(out->tree, sizeof out->tree, "%s/tree.tar", work) >= sizeof out->tree)
         return err_set(e, "%s: path too long", work);
-    if (!sandbox_pack(out->path, out->tree, r->limit.disk, &why)) {
+    bool too_large;
+    if (!sandbox_pack(out->path, out->tree, r->limit.disk, &too_large, &why)) {
+        if (!too_large)
+            return err_set(e, "%s", why.msg);
         const char *text = strstr(why.msg, ": "); /* without our path */
         snprintf(out->why, sizeof out->why, "It %.500s", text != NULL ? text + 2 : why.msg);
         out->state = SUBMISSION_NOT_BUILT;

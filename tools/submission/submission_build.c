@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 enum {
+    NO_TOOL = 95,
     NO_UNZIP = 96,
     UNPACK = 97,
     NO_PROGRAM = 98,
@@ -69,7 +70,7 @@ static const char build_script[] =
     "fi\n"
     "find . -newermt now -exec touch -h {} +\n"
     "began=$(date +%s)\n"
-    "LC_ALL=C sh -exc \"$BUILD\" || exit 99\n"
+    "LC_ALL=C sh -exc \"$BUILD\" || { [ $? -ne 127 ] || exit 95; exit 99; }\n"
     "if [ ! -f \"$PROGRAM\" ]; then\n"
     "  echo \"building it made no ${PROGRAM#./}, but\" $(find . -type f -perm -u+x -newermt \"@$began\" \\\n"
     "    ! -path '*/CMakeFiles/*' -printf '%P\\n' | head -n 5)\n"
@@ -145,6 +146,14 @@ static void fails(struct submission *s, enum submission_state state, const char 
     snprintf(s->why, sizeof s->why, "It %s: %.500s", what, why);
 }
 
+/* A run that ended for no reason of the program's is no run. */
+static bool run(const struct sandbox *box, const struct submission *s,
+                const struct sandbox_job *job, struct sandbox_result *out, struct err *e)
+{
+    return sandbox_run(box, job, out, e) &&
+           (out->end != SANDBOX_LOST || err_set(e, "%s: %s", s->id, out->why));
+}
+
 bool submission_run(const struct rubric *r, const struct sandbox *box, const struct submission *s,
                     const struct sandbox_job *job, const char *const *inputs,
                     struct sandbox_result *out, struct err *e)
@@ -152,12 +161,12 @@ bool submission_run(const struct rubric *r, const struct sandbox *box, const str
     char of[3072];
     struct path dir;
     if (s->runs == NULL)
-        return sandbox_run(box, job, out, e);
+        return run(box, s, job, out, e);
     snprintf(of, sizeof of, "%s %s %s %s", s->id, s->sha256,
              s->kind == SUBMISSION_SOURCE ? r->build : "", fs_base(job->log));
     return kept_run_path(s->runs, of, box, job, inputs, &dir, e) &&
            ((!s->runs_again && kept_run_read(dir.s, job, out)) ||
-            (sandbox_run(box, job, out, e) && kept_run_write(dir.s, job, out, e)));
+            (run(box, s, job, out, e) && kept_run_write(dir.s, job, out, e)));
 }
 
 static bool probe(const struct rubric *r, const struct sandbox *box, const char *work,
@@ -174,7 +183,7 @@ static bool probe(const struct rubric *r, const struct sandbox *box, const char 
         .limit = r->limit};
     struct sandbox_result result;
     job.limit.wall_s = job.limit.cpu_s = PROBE_S;
-    if (!sandbox_run(box, &job, &result, e))
+    if (!run(box, s, &job, &result, e))
         return false;
     if (result.end == SANDBOX_FAILED && result.status == NO_PROGRAM)
         fails(s, SUBMISSION_NOT_STARTED, "does not start",
@@ -213,6 +222,13 @@ static bool build(const struct rubric *r, const struct sandbox *box, const char 
         return false;
     if (result.end == SANDBOX_FAILED && result.status == NO_UNZIP)
         return err_set(e, "%s: there is no unzip on this machine", s->path);
+    if (result.end == SANDBOX_FAILED && result.status == NO_TOOL) {
+        reason_in(log, false, why, sizeof why);
+        if (strchr(why, '/') == NULL) /* a word of the rubric's, in no folder of the submission */
+            return err_set(e, "%s: this machine lacks what the rubric builds with: %s", s->path,
+                           why);
+        result.status = BUILD;
+    }
     if (result.end != SANDBOX_OK) {
         bool told =
             result.end == SANDBOX_FAILED && result.status >= UNPACK && result.status <= BUILD;
