@@ -3,6 +3,7 @@
 #include "tools/compare/region.h"
 #include "tools/images/replicate_dir.h"
 #include "tools/stats/noise_estimate.h"
+#include "tools/stats/third_moment.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -189,12 +190,8 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
         return false;
     if (a->kind == INPUT_IMAGE || b->kind == INPUT_IMAGE)
         return pair_images(a, b, notes, e);
-    /* The unknown skewness must add to the other side's in A - B, not cancel it. */
-    if (a->kind == INPUT_VARIANCE)
-        input_bound_skewness(&a->m, b->kind == INPUT_VARIANCE ? 1 : -1);
-    if (b->kind == INPUT_VARIANCE)
-        input_bound_skewness(&b->m, -1);
-    return true;
+    bool lacks_a = a->kind == INPUT_VARIANCE, lacks_b = b->kind == INPUT_VARIANCE;
+    return (!lacks_a && !lacks_b) || third_moment_bound(&a->m, &b->m, lacks_a, lacks_b, e);
 }
 
 void input_limit(const struct input *a, int tile, struct comparison *c)

@@ -16,8 +16,6 @@ bool input_mitsuba(const char *path, char side, const struct image *im,
     __attribute__((warn_unused_result));
 /* R, G, B to X, Y, Z: means, and bounds of the rest for any correlation of the channels. */
 void input_to_xyz(struct input *in);
-/* Skewness of a log-normal law of the same mean and variance, as M3, times sign. */
-void input_bound_skewness(struct moments *m, double sign);
 
 /* Images without moments (plain_image.c). */
 bool plain_image_input(const char *path, char side, const struct input_options *opt,

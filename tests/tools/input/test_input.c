@@ -89,8 +89,8 @@ TEST(test_directory)
 }
 
 /* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.
- * Y: 1, 1: none. Z: 3, 13: 4, M2 = 400. Skewness, log-normal: c = sd/mean = 1/2: 3/2 + 1/8 = 13/8 for
- * X, so M3 = 100 x 13/8; Z: c = 2/3: 2 + 8/27 = 62/27, M3 = 100 x 62/27 x 8. */
+ * Y: 1, 1: none. Z: 3, 13: 4, M2 = 400. v = 1/99 and 4/99. One pixel tells nothing of skewness: the bound is
+ * V^1.5 (third_moment.h). */
 TEST(test_mitsuba_integrator)
 {
     static const char *const names[9] = {"R",      "G",         "B",         "path.X",   "path.Y",
@@ -102,14 +102,14 @@ TEST(test_mitsuba_integrator)
     struct input in =
         read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
     assert_int_equal(in.kind, INPUT_VARIANCE);
-    assert_true(in.is_xyz && has_note(&notes, "log-normal") && has_note(&notes, "box filter"));
+    assert_true(in.is_xyz && has_note(&notes, "no skewness") && has_note(&notes, "box filter"));
     static const double mean[3] = {2, 1, 3}, m2[3] = {100, 0, 400};
     for (int c = 0; c < 3; c++) {
         assert_near(in.m.mean[c], mean[c], 1e-6);
         assert_near(in.m.m2[c], m2[c], 1e-3);
     }
-    /* Paired with moments: M3 is negative on this side, so that it adds to B's. B becomes XYZ: red 1,
-     * M2 4: X = .412453, M2 = .412453^2 4. */
+    /* Paired with moments: k3 = B's and the bound. B becomes XYZ: red 1, M2 4: X = .412453, M2 = .412453^2 4, so
+     * v = M2/90, k3 = M3/720. */
     struct input b = {.kind = INPUT_MOMENTS, .m = new_moments(1, 1, "sample")};
     b.m.n[0] = 10;
     b.m.mean[0] = 1;
@@ -117,17 +117,17 @@ TEST(test_mitsuba_integrator)
     b.m.m3[0] = 8;
     assert_true(input_pair(&in, &b, &notes, &e));
     assert_true(has_note(&notes, "X, Y and Z"));
-    assert_near(in.m.m3[0], -100 * 13.0 / 8, 1e-3);
-    assert_near(in.m.m3[2], -100 * 62.0 / 27 * 8, 1e-2);
+    double moved = pow(0.412453, 2) * 4 / 90, per_k3 = 100 * 99 * 98;
+    assert_near(in.m.m3[0] / per_k3, pow(0.412453, 3) * 8 / 720 + pow(1.0 / 99 + moved, 1.5), 1e-8);
     assert_near(b.m.mean[0], 0.412453, 1e-12);
     assert_near(b.m.m2[0], 0.412453 * 0.412453 * 4, 1e-12);
     assert_near(b.m.m3[0], pow(0.412453, 3) * 8, 1e-12);
     input_free(&b);
-    /* Two of a kind: opposite signs. */
+    /* Two of a kind, V = 2 v: k3A - k3B = V^1.5, and as R = 1, k3A^2 + k3B^2 = V^2 v: half of it each. */
     b = read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
     assert_true(input_pair(&in, &b, &notes, &e));
-    assert_near(in.m.m3[0], 100 * 13.0 / 8, 1e-3);
-    assert_near(b.m.m3[0], -100 * 13.0 / 8, 1e-3);
+    assert_near(in.m.m3[0] / per_k3, pow(2.0 / 99, 1.5) / 2, 1e-8);
+    assert_near(b.m.m3[0] / per_k3, -pow(2.0 / 99, 1.5) / 2, 1e-8);
     input_free(&in);
     input_free(&b);
 
@@ -145,8 +145,8 @@ TEST(test_mitsuba_integrator)
     assert_refused(test_path("pbrt.exr"), (struct input_options){.spp = 9}, "pbrt");
 }
 
-/* Exponential samples (skewness 2; the bound for sd = mean is 4), mean `scale` against 1, M3 forgotten. */
-static enum verdict compare_without_skewness(int n, double scale, uint64_t *state)
+/* Exponential samples, mean `scale` against 1, in the first `pixels` of 32 x 32; in the others none varies. M3 is forgotten. */
+static enum verdict compare_without_skewness(int n, double scale, int pixels, uint64_t *state)
 {
     struct input a = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
     struct input b = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
@@ -158,6 +158,10 @@ static enum verdict compare_without_skewness(int n, double scale, uint64_t *stat
     simulate(&b.m, LAW_EXPONENTIAL, 1, n, true, state);
     for (int i = 0; i < 3 * 32 * 32; i++)
         a.m.m3[i] = b.m.m3[i] = 0;
+    for (int i = 3 * pixels; i < 3 * 32 * 32; i++) {
+        a.m.mean[i] = b.m.mean[i] = 1;
+        a.m.m2[i] = b.m.m2[i] = 0;
+    }
     if (!input_pair(&a, &b, &notes, &e) || !compare_moments(&a.m, &b.m, &opt, &c, &e))
         fail_msg("%s", e.msg);
     enum verdict v = c.verdict;
@@ -167,19 +171,19 @@ static enum verdict compare_without_skewness(int n, double scale, uint64_t *stat
     return v;
 }
 
-/* The image: N n = 1024 n samples a side, tested if (4/sqrt 2)/sqrt(N n) x^3/3 <= 0.2, x about 3.3 at 5 %
- * over four tests: from 3e4 samples on. n = 8 is too few whatever differs; n = 128 finds 3 %: sd
- * sqrt(2/131072) = 0.4 %. Equal: at most 9 of 60 (chance 1e-3 at a true 5 %). */
+/* Of 15 pixels that vary nothing is told: |g| = 1/sqrt 15, far beyond 0.2 x 3/x^3 = 0.02, x about 3.3 at 5 % over four
+ * tests, so 50 % more are not seen. All 1024 of n = 128 find 3 %: sd sqrt(2/131072) = 0.4 %. Equal: at most 9 of 60 (chance
+ * 1e-3 at a true 5 %). */
 TEST(test_unknown_skewness)
 {
     uint64_t seed = 12;
     int different = 0;
-    assert_int_equal(compare_without_skewness(8, 1.5, &seed), VERDICT_INCONCLUSIVE);
+    assert_int_equal(compare_without_skewness(8, 1.5, 15, &seed), VERDICT_INCONCLUSIVE);
     for (int i = 0; i < 60; i++)
-        different += compare_without_skewness(128, 1, &seed) == VERDICT_DIFFERENT;
+        different += compare_without_skewness(128, 1, 1024, &seed) == VERDICT_DIFFERENT;
     assert_true(different <= 9);
     for (int i = 0; i < 10; i++)
-        assert_int_equal(compare_without_skewness(128, 1.03, &seed), VERDICT_DIFFERENT);
+        assert_int_equal(compare_without_skewness(128, 1.03, 1024, &seed), VERDICT_DIFFERENT);
 }
 
 /* A reference and its variance: R, G, B of the variance are the matrix' inverse times Var X, Y, Z. With
