@@ -723,6 +723,17 @@ part tests/browser/run.sh "$build"
 if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"
 fi
+# Installed below /usr, it is nothing that a submission's build could copy.
+installed=/usr/local/assay-installed.$$
+if [ "$(id -u)" = 0 ] && make -s BUILD="$plain" PREFIX="$installed" install >"$tmp/out" 2>&1; then
+    mkdir -p "$tmp/copies" && chmod 711 "$tmp"
+    printf 'pathtracer:\n\tcp %s/bin/pathtracer pathtracer\n' "$installed" >"$tmp/copies/Makefile"
+    sed 's/^command/build make\ncommand/' tests/end_to_end/quick.rubric >"$tmp/copies.rubric"
+    for mode in "" --unsafe-no-sandbox; do
+        expect "installed below /usr, a build cannot copy it $mode" 2 " 0.00 of 8" "$installed/bin/assay" grade $mode -o "$tmp/copied" "$tmp/copies.rubric" "$tmp/copies"
+    done
+else echo "skip installed below /usr: only root can do that"; fi
+rm -rf "$installed"
 cd "$tmp" || exit 1
 expect "the installed programs work" 0 "EQUIVALENT" \
     "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace

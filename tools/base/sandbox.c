@@ -139,24 +139,61 @@ static bool write_filter(struct sandbox *s, struct err *e)
     return ok || err_set(e, "%s: cannot write: %s", s->filter, strerror(errno));
 }
 
-static bool add_hidden(struct sandbox *s, const char *const *hidden, struct err *e)
+static bool is_below(const char *path, const char *dir)
 {
-    for (; hidden != NULL && *hidden != NULL; hidden++) {
-        char real[PATH_MAX];
-        if (realpath(*hidden, real) == NULL || strncmp(real, "/usr/", 5) != 0)
+    size_t n = strlen(dir);
+    return strncmp(path, dir, n) == 0 && (path[n] == '/' || path[n] == '\0');
+}
+
+/* Hides what lies below /usr, but not what programs and builds are made of; what is hidden with something else needs no place of its own. */
+static bool hide(struct sandbox *s, const char *path, struct err *e)
+{
+    static const char *const parts[] = {"bin",  "include", "lib",     "lib32",     "lib64",
+                                        "sbin", "local",   "libexec", "local/bin", "local/lib"};
+    const int most = (int)(sizeof s->hidden / sizeof *s->hidden);
+    char real[PATH_MAX];
+    if (realpath(path, real) == NULL || strncmp(real, "/usr/", 5) != 0)
+        return true;
+    int kept = 0;
+    for (int i = 0; i < s->num_hidden; i++) {
+        if (is_below(real, s->hidden[i]))
+            return true;
+        if (is_below(s->hidden[i], real))
             continue;
-        if (s->num_hidden == (int)(sizeof s->hidden / sizeof *s->hidden) ||
-            strlen(real) >= sizeof *s->hidden)
-            return err_set(e, "%s: cannot be hidden from programs", real);
-        strcpy(s->hidden[s->num_hidden++], real);
+        if (kept != i)
+            strcpy(s->hidden[kept], s->hidden[i]);
+        kept++;
     }
+    s->num_hidden = kept;
+    bool needed = false;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        needed = needed || strcmp(real + 5, parts[i]) == 0;
+    if (needed || strlen(real) >= sizeof *s->hidden || kept == most)
+        return err_set(e, "%s: cannot be hidden from programs", real);
+    strcpy(s->hidden[s->num_hidden++], real);
     return true;
+}
+
+/* What would render in place of a program: ours, and others by the names that they are installed under. */
+static bool hide_renderers(struct sandbox *s, struct err *e)
+{
+    static const char *const dirs[] = {"/usr/bin", "/usr/local/bin", "/usr/games"};
+    static const char *const names[] = {"assay",  "pathtracer", "blender",
+                                        "povray", "mitsuba",    "pbrt"};
+    bool ok = hide(s, "/proc/self/exe", e);
+    for (size_t i = 0; i < sizeof dirs / sizeof *dirs; i++)
+        for (size_t k = 0; ok && k < sizeof names / sizeof *names; k++)
+            ok = hide(s, fs_path("%s/%s", dirs[i], names[k]).s, e);
+    return ok;
 }
 
 bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
 {
     *out = (struct sandbox){.unsafe = unsafe, .drop = geteuid() == 0};
-    if (!add_hidden(out, hidden, e))
+    for (; hidden != NULL && *hidden != NULL; hidden++)
+        if (!hide(out, *hidden, e))
+            return false;
+    if (!hide_renderers(out, e))
         return false;
     if (!temp_dir_open(&out->dir, "sandbox", e))
         return false;

@@ -29,7 +29,7 @@ struct sandbox {
     bool drop;           /* we are root: programs run as somebody else */
     struct temp_dir dir; /* for what runs read and write, readable by everybody */
     char filter[544];    /* a file of it with what seccomp(2) refuses; "": none */
-    char hidden[16]
+    char hidden[48]
                [512]; /* files and directories that must not be seen though they lie below /usr */
     int num_hidden;
 };
@@ -83,8 +83,9 @@ struct sandbox_result {
 };
 
 /* Looks whether the sandbox works here by running `true` in it. Fails with the reason where it does not;
- * with `unsafe` nothing is asked. hidden: directories (NULL at the end) with what no
- * program may read; only those below /usr need it. Makes out->dir. The caller calls sandbox_close(). */
+ * with `unsafe` nothing is asked but that a program can be run. hidden: files and directories (NULL at the end) that no
+ * program may read; only those below /usr need it. Our own programs and other renderers there are hidden besides. Makes out->dir. The
+ * caller calls sandbox_close(). */
 bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
     __attribute__((warn_unused_result));
 /* Removes out->dir. */

@@ -146,6 +146,20 @@ static void add_usr(struct sandbox_line *l, bool tools)
     }
 }
 
+/* Where it would be seen. */
+static void add_hidden(struct sandbox_line *l, const char *path, bool tools)
+{
+    struct stat st;
+    if (lstat(path, &st) != 0 ||
+        (!tools && strncmp(path, "/usr/lib", 8) != 0 && strncmp(path, "/usr/local/lib", 14) != 0))
+        return;
+    if (S_ISDIR(st.st_mode))
+        add_all(l, (const char *const[]){"--size", "4096", "--tmpfs", path, "--remount-ro", path,
+                                         NULL});
+    else
+        add_all(l, (const char *const[]){"--ro-bind", "/dev/null", path, NULL});
+}
+
 /* What both machines have: programs and libraries, no environment, nothing else. */
 static void add_system(struct sandbox_line *l, const struct sandbox *s,
                        const struct sandbox_limits *limit, bool tools)
@@ -157,8 +171,7 @@ static void add_system(struct sandbox_line *l, const struct sandbox *s,
                                   "--new-session", "--clearenv", "--hostname", "box", NULL});
     add_usr(l, tools);
     for (int i = 0; i < s->num_hidden; i++)
-        add_all(l, (const char *const[]){"--size", "4096", "--tmpfs", s->hidden[i], "--remount-ro",
-                                         s->hidden[i], NULL});
+        add_hidden(l, s->hidden[i], tools);
     for (size_t i = 0; i < sizeof roots / sizeof *roots; i++) {
         struct stat st;
         char path[16];

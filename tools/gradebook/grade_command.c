@@ -5,6 +5,7 @@
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
+#include "tools/base/data_dirs.h"
 #include "grade_batch.h"
 #include "grade_change.h"
 #include "grade_needs.h"
@@ -205,6 +206,27 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     return code;
 }
 
+/* With all that no program may see hidden from it. */
+static bool open_box(const struct grade_settings *s, const struct rubric *r, const char *cache,
+                     const char *pathtracer, struct sandbox *box, struct err *e)
+{
+    const struct data_dirs at = data_dirs_find();
+    const char *const ours[] = {
+        at.share.s, s->golden, s->suite, s->catalogue,
+        r->dir,     cache,     s->out,   s->before != NULL ? s->before : s->out,
+        pathtracer};
+    enum { NUM = sizeof ours / sizeof *ours };
+    const char **hidden = calloc((size_t)(NUM + s->num) + 1, sizeof *hidden);
+    if (hidden == NULL)
+        return err_set(e, "out of memory");
+    memcpy(hidden, ours, sizeof ours);
+    memcpy(hidden + NUM, s->submission, (size_t)s->num * sizeof *hidden);
+    bool ok = (s->fill || (fs_make_dirs(s->out, e) && fs_make_dirs(cache, e))) &&
+              sandbox_open(s->unsafe, hidden, box, e);
+    free(hidden);
+    return ok;
+}
+
 static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
                  int argc, char **argv, struct err *e)
 {
@@ -235,8 +257,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
         code = fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
         if (code == 0 && !s->quiet)
             printf("references of %s: %s\n", r->path, cache);
-    } else if (sandbox_open(s->unsafe, (const char *const[]){s->golden, s->suite, r->dir, NULL},
-                            &box, e)) {
+    } else if (open_box(s, r, cache, pathtracer, &box, e)) {
         int num;
         char **word = grade_options_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");

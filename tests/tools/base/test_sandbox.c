@@ -68,6 +68,12 @@ static const char *kept(const char *name)
     return text;
 }
 
+static void only_root(void)
+{
+    if (geteuid() != 0)
+        skip();
+}
+
 static int open_sandbox(void **state)
 {
     (void)state;
@@ -305,6 +311,63 @@ TEST(only_a_build_sees_compilers)
     assert_string_equal(kept("out.png"), "/box/lib\n");
 }
 
+/* Programs that would render in place of a student's, and files below a library folder: a build sees neither, nor does a run. Control:
+ * a neighbour that is not hidden. */
+TEST(what_is_installed_can_be_hidden)
+{
+    only_root();
+    char bin[] = "/usr/local/bin/assay-test.XXXXXX", lib[] = "/usr/local/lib/assay-test.XXXXXX";
+    struct err e;
+    struct sandbox other;
+    int fd = mkstemp(bin);
+    assert_true(fd >= 0 && write(fd, "answer", 6) == 6 && fchmod(fd, 0755) == 0);
+    close(fd);
+    assert_non_null(mkdtemp(lib));
+    const struct path make =
+        fs_path("chmod 755 %s && mkdir %s/a %s/b && echo answer | tee %s/a/x >%s/b/x", lib, lib,
+                lib, lib, lib);
+    assert_int_equal(system(make.s), 0);
+    const struct path a = fs_path("%s/a", lib),
+                      script = fs_path("cat %s %s/a/x; cat %s/b/x >&2", bin, lib, lib),
+                      all = fs_path("{ %s; } >out.png 2>second; true", script.s);
+    for (int k = 0; k < 4; k++) {
+        MUST(sandbox_open(k >= 2, (const char *const[]){bin, a.s, NULL}, &other, &e));
+        const struct sandbox ours = box;
+        box = other;
+        tools = k % 2 == 0;
+        run(all.s);
+        box = ours;
+        tools = false;
+        sandbox_close(&other);
+        assert_string_equal(kept("out.png"), "");
+        assert_non_null(strstr(kept("second"), "answer"));
+    }
+    assert_false(sandbox_open(false, (const char *const[]){"/usr/local", NULL}, &other, &e));
+    assert_non_null(strstr(e.msg, "cannot be hidden"));
+    assert_int_equal(unlink(bin), 0);
+    assert_true(fs_remove_tree(lib, &e));
+}
+
+/* All that a run sees but for libraries, /proc and its shell's programs, of which each has to be of a list. */
+TEST(a_run_sees_what_is_listed_and_nothing_else)
+{
+    static const char list[] =
+        "^/$|^/(bin|box|dev|etc|lib|lib32|lib64|libx32|proc|sbin|tmp|usr)$|^/etc/(ld.so.cache|alternatives)$|^/etc/alternatives/|"
+        "^/usr/(bin|lib|lib32|lib64|libx32|local|local/lib)$|^/box/(out.png|second)$|"
+        "^/dev/(console|core|fd|full|null|ptmx|pts|pts/[0-9]+|pts/ptmx|random|shm|stderr|stdin|stdout|tty|urandom|zero)$|"
+        "^/usr/bin/(\\[|awk|basename|bash|cat|chmod|cp|cut|date|dd|dirname|echo|env|expr|false|find|grep|head|id|ln|ls|mkdir|mkfifo|mktemp|mv|"
+        "nproc|od|printf|prlimit|pwd|python3|rm|sed|seq|setsid|sh|sleep|sort|tail|tee|test|touch|tr|true|truncate|uname|uniq|wc)$";
+    const struct path look = fs_path(
+        "find / -path /proc -prune -o \\( -path '/usr/lib*/*' -o -path '/usr/local/lib/*' \\) -prune -o -print | grep -vE '%s' >out.png;"
+        "find / -name '*.dae' -o -name '*.exr' -o -name 'oiio.so' -o -name '*.rubric' 2>/dev/null >second; true",
+        list);
+    run(look.s);
+    assert_string_equal(kept("out.png"), "");
+    assert_string_equal(kept("second"), "");
+    run("find / -maxdepth 2 | grep -c / >out.png"); /* control: it does look */
+    assert_true(atoi(kept("out.png")) > 30);
+}
+
 /* ccache's own account of hits and misses, and of what its directory holds before and after. */
 TEST(only_staff_fill_the_compiler_cache)
 {
@@ -485,12 +548,6 @@ static struct sandbox_result run_bare(struct sandbox *s, const char *script, con
                                     .limit = small};
     MUST(sandbox_run(s, &job, &r, &e));
     return r;
-}
-
-static void only_root(void)
-{
-    if (geteuid() != 0)
-        skip();
 }
 
 /* A daemon of the first run waits for the second one's folders, and puts links to ours in their place: as root would
