@@ -130,15 +130,15 @@ static void add_view(const struct observation *clue, const struct effect *e, dou
     add_facts(clue, e, amplitude, t);
 }
 
-static double value_of_two(double c, double a, double b, double least, double clip)
+static double value_of_two(double c, double a, double b, double least, bool adds, double clip)
 {
-    bool adds = c <= least || (a > much_light * c && b > much_light * c);
+    adds = adds || c <= least || (a > much_light * c && b > much_light * c);
     double both = adds ? c + a + b : fmax((c + a) * (c + b) / c, 0);
     return (clip > 0 ? fmin(both, clip) : both) - c;
 }
 
-const struct effect *bug_fit_effect(const struct view *v, int bug, int second, double clip,
-                                    struct effect *room)
+const struct effect *bug_fit_effect(const struct view *v, int bug, int second, bool adds,
+                                    double clip, struct effect *room)
 {
     const struct effect *a = v->effect[bug], *b = second >= 0 ? v->effect[second] : NULL;
     const struct signature *c = &v->correct;
@@ -148,12 +148,13 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, d
     *room = (struct effect){.pixels = a->pixels || b->pixels};
     for (int i = 0; i < 3 * c->columns * c->rows; i++) {
         double light = c->mean[i], x = (double)a->mean[i], y = (double)b->mean[i];
-        double both = value_of_two(light, x, y, least, clip);
-        bool is_product = light > least;
+        double both = value_of_two(light, x, y, least, adds, clip);
+        bool is_product = light > least && !adds;
         room->mean[i] = (float)both;
-        room->var[i] = (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
-                               (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1) +
-                               pow(unsure * (both - x - y), 2));
+        room->var[i] =
+            (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
+                    (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1) +
+                    pow(unsure * (value_of_two(light, x, y, least, false, clip) - x - y), 2));
     }
     for (int f = 0; f < NUM_FACTS; f++) {
         room->fact[f] = a->fact[f] + b->fact[f] - c->fact[f];
@@ -189,19 +190,26 @@ static void sum_up(struct tally *to, const struct tally *t)
     to->all += t->all;
 }
 
-/* share: of the inflation, as an exponent. */
+/* share: of the inflation, as an exponent. Two that multiply or add up: the likelier, as both were equally likely beforehand. */
 static struct tally view_with(const struct bug_fit *f, int clue, const struct candidate *b,
                               double share, double *largest)
 {
     struct effect room;
-    struct tally t = {0};
-    const struct effect *e = bug_fit_effect(f->clue[clue].view, b->bug, b->second, f->clip, &room);
-    double factor = fmax(inflation_of(f->c, b->bug, &f->clue[clue]),
-                         inflation_of(f->c, b->second, &f->clue[clue]));
+    struct tally t = {0}, sum = {0};
+    const struct observation *seen = &f->clue[clue];
+    const struct view *v = seen->view;
+    const struct effect *e = bug_fit_effect(v, b->bug, b->second, false, f->clip, &room);
+    double factor = fmax(inflation_of(f->c, b->bug, seen), inflation_of(f->c, b->second, seen));
     *largest = fmax(*largest, factor);
     if (e == NULL && factor == 1 && f->correct != NULL)
         return f->correct[clue];
-    add_view(&f->clue[clue], e, b->amplitude, pow(factor, share), &t);
+    add_view(seen, e, b->amplitude, pow(factor, share), &t);
+    if (e != &room)
+        return t;
+    bug_fit_effect(v, b->bug, b->second, true, f->clip, &room);
+    add_view(seen, &room, b->amplitude, pow(factor, share), &sum);
+    t = sum.log_likelihood > t.log_likelihood ? sum : t;
+    t.log_likelihood -= log(2);
     return t;
 }
 
@@ -259,6 +267,23 @@ static void project_facts(const struct observation *clue, const struct effect *e
     }
 }
 
+/* What two bugs do to a view, whether they multiply or add up. */
+static const struct effect *likelier(const struct bug_fit *f, int clue, int bug, int second,
+                                     struct effect *room)
+{
+    const struct view *v = f->clue[clue].view;
+    struct tally product = {0}, sum = {0};
+    const struct effect *e = bug_fit_effect(v, bug, second, false, f->clip, room);
+    if (e != room)
+        return e;
+    add_view(&f->clue[clue], room, 1, 1, &product);
+    bug_fit_effect(v, bug, second, true, f->clip, room);
+    add_view(&f->clue[clue], room, 1, 1, &sum);
+    if (product.log_likelihood >= sum.log_likelihood)
+        bug_fit_effect(v, bug, second, false, f->clip, room);
+    return room;
+}
+
 /* Least squares with the weights of "correct": norm^-1/2 is the standard deviation of along/norm. given: a bug that
  * is there in any case, of whose effect what bug and second add is judged; -1: none. */
 static void project(const struct bug_fit *f, int bug, int second, int given, double *along,
@@ -268,7 +293,7 @@ static void project(const struct bug_fit *f, int bug, int second, int given, dou
     for (int k = 0; k < f->num_clues; k++) {
         struct effect room;
         const struct view *v = f->clue[k].view;
-        const struct effect *e = bug_fit_effect(v, bug, second, f->clip, &room),
+        const struct effect *e = likelier(f, k, bug, second, &room),
                             *base = given >= 0 ? v->effect[given] : NULL;
         const struct signature *a = &f->clue[k].seen, *c = &v->correct;
         double tiny = bug_fit_rounding * signature_mean(c);

@@ -32,11 +32,11 @@ bool bug_fit_start(const struct catalogue *c, const struct observation *clue, in
     __attribute__((warn_unused_result));
 void bug_fit_end(struct bug_fit *f);
 
-/* What two bugs do to a view: where each changes a cell by a factor, the product of both; where the correct image
- * is dark, or both add more than twice its light, the sum. Half the difference between the two is a standard deviation. second -1: `bug` alone. NULL: nothing at all; else the
+/* What two bugs do to a view: where each changes a cell by a factor, the product of both; with `adds`, where the correct image
+ * is dark, or where both add more than twice its light, the sum. Half the difference between the two is a standard deviation. second -1: `bug` alone. NULL: nothing at all; else the
  * catalogue's, or *room. */
-const struct effect *bug_fit_effect(const struct view *v, int bug, int second, double clip,
-                                    struct effect *room);
+const struct effect *bug_fit_effect(const struct view *v, int bug, int second, bool adds,
+                                    double clip, struct effect *room);
 
 /* The hypothesis at this strength of its effect. */
 struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double amplitude);

@@ -225,7 +225,7 @@ static bool is_needed_beside(const struct bug_fit *f, const struct candidate *tw
 static bool is_nearly_all(const struct bug_fit *f, const struct diagnose_options *opt,
                           const struct candidate *best, const struct candidate *next)
 {
-    static const double least_gone = 0.97, most_left = 0.05, near = 0.1;
+    static const double least_gone = 0.97, most_left = 0.2, near = 0.1;
     int clue;
     return opt->by_likelihood && best->second >= 0 && best->explained >= least_gone &&
            bug_fit_is_full(f, best) && bug_fit_worst(f, best, &clue) <= most_left &&

@@ -148,7 +148,7 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
         int first = bugs & 1 ? w->bug[0] : w->bug[1], second = bugs == 3 ? w->bug[1] : -1;
         const struct signature *s = &seen->seen, *c = &seen->view->correct;
         const struct effect *effect =
-            bug_fit_effect(seen->view, first, second, isfinite(clip) ? clip : 0, room);
+            bug_fit_effect(seen->view, first, second, false, isfinite(clip) ? clip : 0, room);
         bool is_first = out->columns == 0;
         out->columns = s->columns;
         out->rows = s->rows;
