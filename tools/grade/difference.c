@@ -258,8 +258,10 @@ static void measure_tile(const struct pair *p, struct rect r, const struct noise
     }
     struct interval interval;
     *relative = NAN;
-    if (s.used < least_used * r.width * r.height ||
-        !interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &interval))
+    if (s.used < least_used * r.width * r.height)
+        return;
+    bool sure = interval_from(&s, fmax(s.b, floor * s.used), noise.dof, alpha, &interval);
+    if (!sure && interval_distance(&interval) == 0)
         return;
     *relative = interval.value;
     out->tiles++;

@@ -40,8 +40,8 @@ struct difference {
  * several runs and B is a reference, r is the difference of two runs at one pixel, in which no error of both is; and where A
  * has, and B is a reference or has too, intervals need no kappa: variances are those measured pixel by pixel
  * from run to run, at least a quarter of those around a tile, by what light it has of theirs.
- * Skewness is that of our samples; where it may change a tail by more than a factor of e nothing is said of
- * a tile (tools/docs/background/verdict.md, "EQUIVALENT"), and an image's interval is that of tails no longer than exponential.
+ * Skewness is that of our samples; where it may change a tail by more than a factor of e (tools/docs/background/verdict.md,
+ * "EQUIVALENT") an interval is that of tails no longer than exponential, and a tile is judged only if that keeps away from 0.
  *
  * Differences are relative to B's mean in the same place, but to no less than a quarter of the image's luminance.
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails

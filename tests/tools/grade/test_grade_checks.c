@@ -338,6 +338,27 @@ TEST(noise_is_not_bias)
     result_free(&r);
 }
 
+/* Rare bright samples, 200 times the third moment of an exponential law: g = 200 * 2/sqrt(64 * 256) = 3.1 of a tile's mean, and Bernstein's half
+ * width (sqrt(2 t) + g/2 t) sd with t = ln(2 * 52/1e-5) = 16 is (5.7 + 25)/128 = 24 % of it: 95 % darker is not noise. Control: 15 % darker
+ * may be, and all is kept; so are the points of right images. */
+TEST(tiles_of_rare_bright_samples_are_judged)
+{
+    const struct bug dark = {.scale = 1, .square = 0.05, .noise = 1},
+                     dim = {.scale = 1, .square = 0.85, .noise = 1};
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        reference.m3[i] *= 200;
+    struct result wrong = equal(&dark, SPP, 1e-5), unsure = equal(&dim, SPP, 1e-5),
+                  right = equal(&none, SPP, 1e-5);
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        reference.m3[i] /= 200;
+    if (wrong.share > 0 || unsure.share < 1 || right.share < 1)
+        fail_msg("dark %g (%s), dim %g (%s), right %g (%s)", wrong.share, wrong.seen, unsure.share,
+                 unsure.seen, right.share, right.seen);
+    result_free(&wrong);
+    result_free(&unsure);
+    result_free(&right);
+}
+
 /* Points follow bias: variance 0.1 to 100 times ours costs nothing and hides nothing. H0: a right program loses points with at most
  * 1e-5 a check; 48 programs, none may (chance of one below 5e-4). Control: 2.5 times the margin off, or a dark square, all
  * lost; no more runs for programs as noisy as ours. */
