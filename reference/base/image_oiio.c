@@ -12,6 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 bool image_oiio_file(struct path *path, struct err *e)
 {
@@ -39,28 +40,81 @@ static const struct oiio_table *load(struct err *e)
     return table;
 }
 
-/* Whether no chunk of a PNG says that it is longer than what is left of its `size` bytes [PNG 5.3]: the library reserves what a chunk says it is long, up to 2 GiB,
- * before it looks. f: after the signature. */
-static bool png_chunks_fit(FILE *f, long size)
+static unsigned long big_endian(const unsigned char *b)
 {
-    enum { AROUND = 12 }; /* length, name, checksum */
-    unsigned char head[8];
-    for (long at = 8; at <= size - AROUND;) {
-        if (fseek(f, at, SEEK_SET) != 0 || fread(head, 1, sizeof head, f) != sizeof head)
-            return false;
-        long length = (long)head[0] << 24 | (long)head[1] << 16 | (long)head[2] << 8 | head[3];
-        if (length > size - at - AROUND)
-            return false;
+    return (unsigned long)b[0] << 24 | (unsigned long)b[1] << 16 | (unsigned long)b[2] << 8 | b[3];
+}
+
+/* At most how many bytes the pixels of a PNG are before they are deflated: of rows and their filters, twice that for what the passes
+ * of an interlaced one round up [PNG 7.2, 8.1]. ihdr: the chunk's data. */
+static double png_bytes(const unsigned char ihdr[13])
+{
+    static const int samples[] = {1, 0, 3, 1, 2, 0, 4};
+    double width = (double)big_endian(ihdr), height = (double)big_endian(ihdr + 4);
+    int channels = ihdr[9] < sizeof samples / sizeof *samples ? samples[ihdr[9]] : 4;
+    return 2 * height * (width * channels * ihdr[8] / 8 + 2);
+}
+
+/* Deflates `length` bytes of f on from where it is, without keeping any. False: there are more than *left, which shrinks. */
+static bool inflates_within(z_stream *z, FILE *f, long length, double *left)
+{
+    unsigned char in[1 << 14], out[1 << 16];
+    int state = Z_OK;
+    while (length > 0 && state == Z_OK && *left >= 0) {
+        size_t n = fread(in, 1, length < (long)sizeof in ? (size_t)length : sizeof in, f);
+        if (n == 0)
+            return true;
+        length -= (long)n;
+        z->next_in = in;
+        z->avail_in = (unsigned)n;
+        do {
+            z->next_out = out;
+            z->avail_out = sizeof out;
+            state = inflate(z, Z_NO_FLUSH);
+            *left -= (double)(sizeof out - z->avail_out);
+        } while (state == Z_OK && *left >= 0 && z->avail_out == 0);
+        if (state == Z_BUF_ERROR) /* it wants more */
+            state = Z_OK;
+    }
+    return *left >= 0; /* what is damaged the library will say */
+}
+
+/* Why a PNG is not to be read, or NULL. The library reserves what a chunk says it is long, up to 2 GiB, before it looks [PNG 5.3], and
+ * inflates all that a stream holds, a thousandfold of the file, though the pixels are known to be fewer. f: after the signature. */
+static const char *png_refusal(FILE *f, long size)
+{
+    enum { AROUND = 12 /* length, name, checksum */, TEXTS = 1 << 18 };
+    unsigned char head[8 + 13];
+    double left = 0;
+    long texts = 0;
+    z_stream z = {0};
+    const char *why = NULL;
+    if (inflateInit(&z) != Z_OK)
+        return "out of memory";
+    for (long at = 8; why == NULL && at <= size - AROUND;) {
+        bool whole = fseek(f, at, SEEK_SET) == 0 && fread(head, 1, 8, f) == 8;
+        long length = whole ? (long)big_endian(head) : 0;
+        if (!whole || length > size - at - AROUND)
+            why = "the file ends within one of its chunks";
+        else if (memcmp(head + 4, "IHDR", 4) == 0 && length == 13 &&
+                 fread(head + 8, 1, 13, f) == 13)
+            left = png_bytes(head + 8);
+        else if (memcmp(head + 4, "IDAT", 4) == 0 && !inflates_within(&z, f, length, &left))
+            why = "its data are more than its pixels";
+        else if ((memcmp(head + 4, "zTXt", 4) == 0 || memcmp(head + 4, "iTXt", 4) == 0) &&
+                 (texts += length) > TEXTS)
+            why = "its texts are too long";
         at += AROUND + length;
     }
-    return true;
+    inflateEnd(&z);
+    return why;
 }
 
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
 static const char *format_of(const char *path, double *size, struct err *e)
 {
     struct stat st;
-    FILE *f = fopen(path, "rb");
+    FILE *f = fs_open(path);
     if (f == NULL || fstat(fileno(f), &st) != 0 || S_ISDIR(st.st_mode)) {
         err_set(e, "%s: cannot read: %s", path, strerror(f != NULL ? EISDIR : errno));
         if (f != NULL)
@@ -76,9 +130,8 @@ static const char *format_of(const char *path, double *size, struct err *e)
             format = "openexr";
         why = "the file ends within its header";
     } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
-        if (png_chunks_fit(f, (long)st.st_size))
-            format = "png";
-        why = "the file ends within one of its chunks";
+        why = png_refusal(f, (long)st.st_size);
+        format = why == NULL ? "png" : NULL;
     } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
         format = "hdr";
     } else if (n >= 3 && head[0] == 'P' && strchr("123456Ff", head[1]) != NULL &&

@@ -6,6 +6,9 @@
 
 #include <jansson.h>
 
+/* json_load_file() of a regular file; what else there is, as a FIFO, for which it would wait, cannot be opened. */
+json_t *json_read(const char *path, size_t flags, json_error_t *why);
+
 /* Writes by rename, indented, with a final newline; makes the directories above it. */
 bool json_write(const char *path, const json_t *root, struct err *e)
     __attribute__((warn_unused_result));

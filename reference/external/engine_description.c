@@ -1,6 +1,7 @@
 /* Reading an engine's description; engine_run.c does what it says. */
 #include "engine_description.h"
 
+#include "reference/base/json_file.h"
 #include "reference/suite/features.h"
 #include "reference/base/json_node.h"
 
@@ -224,7 +225,7 @@ bool engine_load(const char *path, struct engine *out, struct err *e)
         return err_set(e, "%.64s...: path too long", path);
     strcpy(en.file, full);
     strcpy(en.here, dirname(full));
-    en.json = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
+    en.json = json_read(path, JSON_REJECT_DUPLICATES, &why);
     if (en.json == NULL && why.line < 1)
         return err_set(e, "%s: %s", path, why.text);
     if (en.json == NULL)

@@ -225,7 +225,7 @@ static bool read_dumps(int num, const char *dir, json_t **dumps, struct err *e)
     *dumps = json_array();
     for (int i = 0; i < num; i++) {
         snprintf(path, sizeof path, "%s/import_%04d.json", dir, i);
-        json_t *dump = json_load_file(path, 0, &why);
+        json_t *dump = json_read(path, 0, &why);
         if (dump == NULL || json_array_append_new(*dumps, dump) != 0) {
             json_decref(*dumps);
             return err_set(e, "%s: %s", path, why.text);

@@ -31,7 +31,7 @@ static json_t *load_manifest(const char *path, struct err *e)
     json_error_t je;
     if (access(path, F_OK) != 0)
         return json_object();
-    json_t *all = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
+    json_t *all = json_read(path, JSON_REJECT_DUPLICATES, &je);
     if (all == NULL) {
         err_set(e, "%s:%d: %s", path, je.line, je.text);
     } else if (!json_is_object(all)) {

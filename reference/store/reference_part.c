@@ -129,7 +129,7 @@ static bool add_part(struct gathered *g, const json_t *identity, const char *dir
     json_error_t je;
     if (!part_path(dir, path, e))
         return false;
-    json_t *part = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
+    json_t *part = json_read(path, JSON_REJECT_DUPLICATES, &je);
     if (part == NULL)
         return err_set(e, "%s:%d: %s", path, je.line, je.text);
     const json_t *first = json_object_get(part, "first"), *last = json_object_get(part, "last");

@@ -2,6 +2,7 @@
 
 #include "suite_json.h"
 
+#include "reference/base/json_file.h"
 #include "renderer/collada/collada.h"
 #include "renderer/base/sha256.h"
 
@@ -122,7 +123,7 @@ static bool load_scene(const char *dir, const char *name, struct suite_scene *s,
         return err_set(e, "%s: path too long", name);
     snprintf(s->dae, sizeof s->dae, "%s/%s.dae", dir, name);
     json_error_t why;
-    s->json = json_load_file(file, JSON_REJECT_DUPLICATES, &why);
+    s->json = json_read(file, JSON_REJECT_DUPLICATES, &why);
     if (s->json == NULL && why.line < 1)
         return err_set(e, "%s: %s", file, why.text);
     if (s->json == NULL)

@@ -82,6 +82,29 @@ bool fs_make_dirs(const char *path, struct err *e)
     return true;
 }
 
+int fs_open_fd(const char *path)
+{
+    struct stat st;
+    int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0)
+        return -1;
+    if (fstat(fd, &st) != 0 || (!S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode))) {
+        close(fd);
+        errno = ENOTSUP;
+        return -1;
+    }
+    return fd;
+}
+
+FILE *fs_open(const char *path)
+{
+    int fd = fs_open_fd(path);
+    FILE *f = fd >= 0 ? fdopen(fd, "rb") : NULL;
+    if (f == NULL && fd >= 0)
+        close(fd);
+    return f;
+}
+
 bool fs_make_parent_dirs(const char *path, struct err *e)
 {
     const char *slash = strrchr(path, '/');

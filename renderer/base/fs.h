@@ -30,6 +30,12 @@ bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_re
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);
 
+/* A regular file, or a directory, for reading; NULL with errno: a FIFO would be waited for, a device may have no end (ENOTSUP). The
+ * caller closes it. */
+FILE *fs_open(const char *path);
+/* The same as a descriptor; -1. */
+int fs_open_fd(const char *path);
+
 /* mkdir -p. */
 bool fs_make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
 /* mkdir -p of the directory part of path. */

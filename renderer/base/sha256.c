@@ -1,5 +1,7 @@
 #include "sha256.h"
 
+#include "renderer/base/fs.h"
+
 #include <errno.h>
 #include <nettle/base16.h>
 #include <nettle/sha2.h>
@@ -17,7 +19,7 @@ static void finish(struct sha256_ctx *ctx, char hex[65])
 
 bool sha256_file(const char *path, char hex[65], struct err *e)
 {
-    FILE *f = fopen(path, "rb");
+    FILE *f = fs_open(path);
     if (f == NULL)
         return err_set(e, "%s: %s", path, strerror(errno));
     struct sha256_ctx ctx;

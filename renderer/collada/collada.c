@@ -1,5 +1,7 @@
 #include "collada_internal.h"
 
+#include "renderer/base/fs.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -306,7 +308,7 @@ bool collada_parse(const char *text, size_t size, const char *path, enum dialect
 
 bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
 {
-    struct text_input in = {.file = fopen(path, "rb")};
+    struct text_input in = {.file = fs_open(path)};
     if (in.file == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     bool ok = load(&in, path, dialect, out, e);

@@ -337,7 +337,7 @@ static exr_result_t read_tiles(exr_context_t f, struct image *im)
 /* The pixels too, or the header alone. */
 static bool read_exr(const char *path, bool pixels, struct image *out, bool *half, struct err *e)
 {
-    struct stream s = {.fd = open(path, O_RDONLY | O_CLOEXEC)};
+    struct stream s = {.fd = fs_open_fd(path)};
     if (s.fd < 0)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     exr_context_initializer_t init = initializer(&s);

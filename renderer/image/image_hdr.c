@@ -2,6 +2,8 @@
  * for black pixels. Format: G. Ward, Real pixels, in Graphics Gems II, 1991. */
 #include "image.h"
 
+#include "renderer/base/fs.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -67,7 +69,7 @@ bool image_read_hdr(const char *path, struct image *out, struct err *e)
     struct image im = {0};
     uint8_t rgbe[4 * IMAGE_MAX_SIDE];
     int width, height;
-    FILE *f = fopen(path, "rb");
+    FILE *f = fs_open(path);
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     struct stat st;

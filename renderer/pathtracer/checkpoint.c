@@ -147,7 +147,7 @@ bool checkpoint_open(struct checkpoint *s, const char *path, const struct render
     if (strlen(path) >= sizeof s->path)
         return err_set(e, "%.64s...: path too long", path);
     strcpy(s->path, path);
-    s->f = fopen(path, "rb");
+    s->f = fs_open(path);
     if (s->f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     sha256_init(&ctx);
@@ -188,7 +188,7 @@ bool checkpoint_rows(struct checkpoint *s, int y, int num, struct film *f, int a
     int n = body_arrays(a, f);
     assert(at_x + s->width <= f->m.width && at_y + num <= f->m.height && y + num <= s->height);
     assert((f->first != NULL) == s->first_hits && (f->target == NULL || s->has_target));
-    if (s->f == NULL && (s->f = fopen(s->path, "rb")) == NULL)
+    if (s->f == NULL && (s->f = fs_open(s->path)) == NULL)
         return err_set(e, "%s: cannot read: %s", s->path, strerror(errno));
     for (int i = 0; i < n; i++) {
         long at = s->body + (long)(before + a[i].each * width * (size_t)y);

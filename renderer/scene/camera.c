@@ -1,5 +1,7 @@
 #include "camera.h"
 
+#include "renderer/base/fs.h"
+
 #include "camera_simd.h"
 
 #include <errno.h>
@@ -71,7 +73,7 @@ bool camera_init(struct camera *c, const struct scene *s, int width, int height,
 
 bool camera_read_file(struct camera *c, const char *path, struct err *e)
 {
-    FILE *f = fopen(path, "r");
+    FILE *f = fs_open(path);
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     /* hFov vFov aspect near far / pos target / phi theta r minR maxR / c2w by rows / screenW

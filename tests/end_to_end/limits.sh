@@ -59,6 +59,47 @@ for kind in exr hdr; do
     render "a sky of 10^6 x 10^6, $kind" "big.$kind: cannot read" -e "$tmp/big.$kind"
 done
 
+# 2 MB that inflate to 2 GB behind the 64 x 64 pixels of a PNG, and the same in its texts. Controls: what is asked for, and no more, is read.
+png() { # FILE BYTES TEXTS: an image with so many bytes in its stream, and texts of a MB each
+    python3 - "$@" <<'END'
+import struct, sys, zlib
+def chunk(name, data): return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+stream, c = b"", zlib.compressobj(9)
+rest = int(sys.argv[2])
+while rest > 0:
+    stream += c.compress(bytes(min(rest, 1 << 20)))
+    rest -= 1 << 20
+stream += c.flush()
+text = chunk(b"zTXt", b"a\0\0" + zlib.compress(bytes(7 << 20), 9))
+open(sys.argv[1], "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 64, 64, 8, 2, 0, 0, 0)) +
+                              text * int(sys.argv[3]) + chunk(b"IDAT", stream) + chunk(b"IEND", b""))
+END
+}
+if png "$tmp/right.png" $((64 * 193)) 1; then
+    png "$tmp/bomb.png" 2000000000 0
+    png "$tmp/texts.png" $((64 * 193)) 300
+    "$assay" compare --curve srgb "$tmp/right.png" "$tmp/right.png" >"$tmp/said" 2>&1 </dev/null
+    grep -q "every pixel is saturated" "$tmp/said" && echo "ok limits: a PNG of just its pixels" ||
+        { echo "not ok limits: a PNG of just its pixels: $(cat "$tmp/said")" && failures=$((failures + 1)); }
+    ulimit -S -t 4
+    refused "a PNG that inflates to 2 GB" "its data are more than its pixels" "$assay" compare --curve srgb "$tmp/bomb.png" "$tmp/right.png"
+    refused "a PNG whose texts inflate to 2 GB" "its texts are too long" "$assay" compare --curve srgb "$tmp/texts.png" "$tmp/right.png"
+    ulimit -S -t unlimited
+else echo "skip limits: PNG files that inflate to more: no python3"; fi
+
+# What would be waited for, or has no end, wherever a file is read; a results.json may name it.
+mkfifo "$tmp/fifo.exr" "$tmp/fifo.png" "$tmp/fifo.json" "$tmp/fifo.rubric" "$tmp/fifo.dae" "$tmp/fifo.info"
+refused "a FIFO as EXR" "fifo.exr: cannot read: Operation not supported" "$assay" compare "$tmp/fifo.exr" "$tmp/fifo.exr"
+refused "a FIFO as PNG" "fifo.png: cannot read: Operation not supported" "$assay" compare --curve srgb "$tmp/fifo.png" "$tmp/fifo.png"
+refused "a FIFO as results" "Operation not supported" "$assay" report "$tmp/fifo.json"
+refused "a FIFO to be made again" "Operation not supported\|not " "$assay" reproduce "$tmp/fifo.json"
+refused "a FIFO as a rubric" "fifo.rubric: cannot read: Operation not supported" "$assay" grade --check-rubric "$tmp/fifo.rubric"
+refused "a FIFO as an engine" "Operation not supported" "$assay" validate --only 12_point_plane -o "$tmp/out.d" --engine "$tmp/fifo.json"
+refused "a FIFO as a scene" "fifo.dae: cannot read: Operation not supported" "$pathtracer" -q -f "$tmp/out.exr" "$tmp/fifo.dae"
+render "a FIFO as a camera" "fifo.info: cannot read: Operation not supported" -c "$tmp/fifo.info"
+refused "a device as a scene" "zero: cannot read: Operation not supported" "$pathtracer" -q -f "$tmp/out.exr" /dev/zero
+refused "a FIFO as appeals" "fifo.info: Operation not supported" "$assay" grade --unsafe-no-sandbox -q -o "$tmp/grades" --appeals "$tmp/fifo.info" tests/end_to_end/quick.rubric "$tmp"
+
 # Nesting, and texts without end.
 head -c 100000 /dev/zero | tr '\0' '[' >"$tmp/deep.json"
 refused "results nested 10^5 deep" "deep.json:1: maximum parsing depth" "$assay" report "$tmp/deep.json"

@@ -213,11 +213,13 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
     struct err why = {""};
     if (sandbox_run(out, &job, &r, &why) && r.end == SANDBOX_OK)
         return true;
+    const struct path temp =
+        fs_path("%.*s", (int)(fs_base(out->dir.path) - out->dir.path), out->dir.path);
     sandbox_close(out);
     if (unsafe)
         return err_set(
             e, "no program can be run in %s (TMPDIR; must all users be able to pass it?): %s",
-            out->dir.path, why.msg[0] != '\0' ? why.msg : r.why);
+            temp.s, why.msg[0] != '\0' ? why.msg : r.why);
     return err_set(
         e,
         "no sandbox for other people's programs on this machine: %s (Debian package bubblewrap; user "

@@ -470,7 +470,7 @@ bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
     json_error_t why;
     *out = (struct catalogue){0};
     const struct path path = fs_path("%s/manifest.json", dir);
-    json_t *root = json_load_file(path.s, JSON_REJECT_DUPLICATES, &why);
+    json_t *root = json_read(path.s, JSON_REJECT_DUPLICATES, &why);
     if (root == NULL)
         return err_set(e, "%s:%d: %s", path.s, why.line, why.text);
     bool ok = fill(dir, out, root, e);

@@ -1,5 +1,6 @@
 #include "appeals.h"
 
+#include "renderer/base/fs.h"
 #include "reference/base/json_node.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/sha256.h"
@@ -61,7 +62,7 @@ static bool append(struct appeals *a, const struct appeal *one, struct err *e)
 
 bool appeals_read(const char *path, const struct rubric *r, struct appeals *out, struct err *e)
 {
-    FILE *f = fopen(path, "r");
+    FILE *f = fs_open(path);
     char *line = NULL;
     size_t room = 0;
     bool ok = true;

@@ -165,7 +165,7 @@ bool plan_read(const char *dir, struct plan *out, struct err *e)
         return err_set(e, "%s: %s", dir, strerror(errno));
     strcpy(p.dir, full);
     const struct path path = fs_path("%s/plan.jsonl", p.dir);
-    FILE *f = fopen(path.s, "r");
+    FILE *f = fs_open(path.s);
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path.s, strerror(errno));
     bool ok = read_lines(f, &p, e);

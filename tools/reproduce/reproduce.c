@@ -1,6 +1,7 @@
 #include "reproduce.h"
 
 #include "reproduce_internal.h"
+#include "renderer/base/fs.h"
 #include "tools/base/temp_dir.h"
 
 #include <stdio.h>
@@ -15,7 +16,7 @@ void reproduced_free(struct reproduced *r)
 /* Told from an EXR by its first byte. */
 static bool is_results(const char *path)
 {
-    FILE *f = fopen(path, "rb");
+    FILE *f = fs_open(path);
     int first = f != NULL ? getc(f) : EOF;
     if (f != NULL)
         fclose(f);

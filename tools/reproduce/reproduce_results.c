@@ -194,7 +194,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
     char product[MAX_PATH];
     json_error_t je;
     int num = 0;
-    json_t *now = NULL, *then = json_load_file(path, JSON_REJECT_DUPLICATES, &je);
+    json_t *now = NULL, *then = json_read(path, JSON_REJECT_DUPLICATES, &je);
     if (then == NULL)
         return err_set(e, "%s:%d: %s", path, je.line, je.text);
     const char *command = member_text(then, "command"), *version = member_text(then, "version");
@@ -207,7 +207,7 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
     if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     ok = ok && run_again(path, opt, then, num, word, dir, product, out, e);
-    if (ok && (now = json_load_file(product, 0, &je)) == NULL)
+    if (ok && (now = json_read(product, 0, &je)) == NULL)
         ok = err_set(e, "%s: made again: %s:%d: %s", path, product, je.line, je.text);
     if (ok && results_lack_time(now))
         ok = err_set(e, "%s: made again: its --budget was over before all was decided", path);

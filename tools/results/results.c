@@ -1,5 +1,6 @@
 #include "results.h"
 
+#include "reference/base/json_file.h"
 #include "reference/suite/suite.h"
 #include "stated_error_results.h"
 #include "convergence_results.h"
@@ -313,7 +314,7 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
 bool results_read(const char *path, json_t **out, struct err *e)
 {
     json_error_t parse;
-    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &parse);
+    json_t *root = json_read(path, JSON_REJECT_DUPLICATES, &parse);
     if (root == NULL)
         return parse.line > 0 ? err_set(e, "%s:%d: %s", path, parse.line, parse.text)
                               : err_set(e, "%s: %s", path, parse.text);

@@ -1,5 +1,6 @@
 #include "rubric_internal.h"
 
+#include "renderer/base/fs.h"
 #include "tools/images/tone_curve.h"
 #include "renderer/base/cli.h"
 
@@ -420,7 +421,7 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
     snprintf(out->path, sizeof out->path, "%s", path);
     snprintf(out->dir, sizeof out->dir, "%.*s", slash != NULL ? (int)(slash - path) : 1,
              slash != NULL ? path : ".");
-    FILE *f = fopen(path, "r");
+    FILE *f = fs_open(path);
     if (f == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     struct statement s = {.r = out, .m = m};

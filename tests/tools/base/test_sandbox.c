@@ -205,6 +205,18 @@ TEST(memory_is_bounded_for_one_process_and_for_all)
     assert_true(r.wall_s < 20);
     r = run("(head -c 100M /dev/zero; sleep 1) | tail -n 1 >/dev/null");
     assert_int_equal(r.end, SANDBOX_OK);
+    /* Pages that belong to no process are not to be had: */
+    static const char uncounted[] =
+        "python3 -c 'import os; f = os.memfd_create(\"x\"); os.truncate(f, 1 << 20); print(\"memfd\")' 2>/dev/null;"
+        "ipcmk -M 1048576 2>/dev/null; true";
+    assert_int_equal(system("python3 -c 'import os; os.memfd_create(\"x\")'"), 0);
+    const struct path script = fs_path("{ %s; } >out.png", uncounted);
+    for (int k = 0; k < 2; k++) {
+        tools = k == 1; /* has ipcmk */
+        run(script.s);
+        tools = false;
+        assert_string_equal(kept("out.png"), "");
+    }
 }
 
 /* A file of ours outside, that everybody may read. */
