@@ -1,59 +1,23 @@
 #include "shared_features.h"
 
-#include "reference/suite/features.h"
-#include "reference/suite/suite.h"
-#include "tools/results/results.h"
+#include "claim_traits.h"
 
+#include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-enum {
-    TRAIT_BOUNCED = NUM_FEATURES,
-    TRAIT_SEVERAL_LIGHTS,
-    TRAIT_MANY_TRIANGLES,
-    TRAIT_NOT_SQUARE,
-    NUM_FIXED,
-    MAX_TRAITS = 64,
-    MANY_TRIANGLES = 1000,
-    MOST_TOLD = 3
-};
+enum { MOST_KEPT = 16, MOST_TOLD = 3, MOST_NAMED = 6 };
 
-static const char *const fixed_names[NUM_FIXED] = {
-    [FEATURE_DIFFUSE] = "matt surfaces",
-    [FEATURE_MIRROR] = "a mirror",
-    [FEATURE_GLASS] = "glass",
-    [FEATURE_REFRACTION] = "a boundary that only refracts",
-    [FEATURE_SCHLICK] = "glass by Schlick's approximation",
-    [FEATURE_MICROFACET] = "rough metal (GGX)",
-    [FEATURE_BECKMANN] = "rough metal (Beckmann)",
-    [FEATURE_AREA] = "glowing surfaces",
-    [FEATURE_TWO_SIDED] = "surfaces that glow on both sides",
-    [FEATURE_POINT] = "a point light",
-    [FEATURE_SPOT] = "a spot light",
-    [FEATURE_FALLOFF] = "a light without inverse square falloff",
-    [FEATURE_DIRECTIONAL] = "a directional light",
-    [FEATURE_ENVIRONMENT] = "a sky",
-    [FEATURE_SPHERE] = "spheres",
-    [FEATURE_SMOOTH] = "shading normals",
-    [FEATURE_LENS] = "a lens",
-    [FEATURE_CLIP] = "a near or far plane",
-    [TRAIT_BOUNCED] = "light of more than one bounce",
-    [TRAIT_SEVERAL_LIGHTS] = "several lights",
-    [TRAIT_MANY_TRIANGLES] = "many triangles",
-    [TRAIT_NOT_SQUARE] = "an image that is not square",
-};
+/* By how much another place to look may be less likely and still be told. */
+static const double tie = 20;
+/* Chance that a claim without the feature differs. */
+static const double astray = 1e-3;
 
-struct claim_traits {
+/* Where it may be wrong: all that has both traits, which may be the same; no trait: everywhere. */
+struct place {
     uint64_t bits;
-    bool differs;
-};
-
-struct traits {
-    char name[MAX_TRAITS][128];
-    int num;
-    struct claim_traits *claim;
-    int num_claims, num_differ;
+    double log_likelihood;
 };
 
 static uint64_t bit(int trait)
@@ -61,169 +25,173 @@ static uint64_t bit(int trait)
     return (uint64_t)1 << trait;
 }
 
-/* Of a reference or a variant. Those beyond the last that has room are not told apart. */
-static uint64_t named_trait(struct traits *t, const char *what, const char *name)
+static bool has(const struct claim_traits *c, uint64_t bits)
 {
-    char full[sizeof *t->name];
-    snprintf(full, sizeof full, "%s %s", what, name);
-    for (int i = NUM_FIXED; i < t->num; i++)
-        if (strcmp(t->name[i], full) == 0)
-            return bit(i);
-    if (t->num == MAX_TRAITS)
-        return 0;
-    strcpy(t->name[t->num], full);
-    return bit(t->num++);
+    return (c->bits & bits) == bits;
 }
 
-static bool scene_traits(const struct suite_scene *s, uint64_t *bits, struct err *e)
+/* A claim of the place differs with a chance of which nothing is known: integrated over it from 0 to 1; another one
+ * next to never. Places are as likely beforehand as there are others of as many traits. */
+static double log_likelihood(const struct traits *t, uint64_t bits, int num_traits)
 {
-    struct scene scene;
-    struct camera camera;
-    if (!suite_open(s, &scene, &camera, e))
-        return false;
-    *bits = features_of_scene(&scene, &camera);
-    *bits |= s->depth > 1 ? bit(TRAIT_BOUNCED) : 0;
-    *bits |= scene.num_lights > 1 ? bit(TRAIT_SEVERAL_LIGHTS) : 0;
-    *bits |= scene.num_triangles > MANY_TRIANGLES ? bit(TRAIT_MANY_TRIANGLES) : 0;
-    *bits |= s->width != s->height ? bit(TRAIT_NOT_SQUARE) : 0;
-    scene_free(&scene);
-    return true;
-}
-
-static bool is_verdict(const json_t *claim, const char *member, enum verdict v)
-{
-    const char *text = member_text(claim, member);
-    return text != NULL && strcmp(text, verdict_name(v)) == 0;
-}
-
-static bool is_wrongly_different(const json_t *claim)
-{
-    return is_verdict(claim, "expected", VERDICT_EQUIVALENT) &&
-           is_verdict(claim, "verdict", VERDICT_DIFFERENT);
-}
-
-static bool collect(const json_t *claims, const struct suite *suite, struct traits *t,
-                    struct err *e)
-{
-    const struct suite_scene *last = NULL;
-    uint64_t bits = 0;
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const json_t *c = json_array_get(claims, i);
-        const struct suite_scene *s = suite_find(suite, member_text(c, "scene"));
-        bool differs = is_verdict(c, "verdict", VERDICT_DIFFERENT);
-        if (s == NULL || !is_verdict(c, "expected", VERDICT_EQUIVALENT) ||
-            (!differs && !is_verdict(c, "verdict", VERDICT_EQUIVALENT)))
-            continue;
-        if (s != last && !scene_traits(s, &bits, e))
-            return false;
-        last = s;
-        t->claim[t->num_claims++] =
-            (struct claim_traits){bits | named_trait(t, "the side", member_text(c, "a")) |
-                                      named_trait(t, "the reference", member_text(c, "b")),
-                                  differs};
-        t->num_differ += differs;
-    }
-    return true;
-}
-
-/* Of the claims that agree, how many have all of these; -1 if a claim that differs lacks one. */
-static int agreeing(const struct traits *t, uint64_t bits)
-{
-    int num = 0;
+    double differ = 0, all = 0, outside = 0;
     for (int i = 0; i < t->num_claims; i++) {
-        bool has = (t->claim[i].bits & bits) == bits;
-        if (t->claim[i].differs && !has)
-            return -1;
-        num += !t->claim[i].differs && has;
+        const struct claim_traits *c = &t->claim[i];
+        double w = c->weight;
+        all += has(c, bits) ? w : 0;
+        differ += has(c, bits) && c->differs ? w : 0;
+        outside += !has(c, bits) && c->differs ? w : 0;
     }
-    return num;
+    return lgamma(differ + 1) + lgamma(all - differ + 1) - lgamma(all + 2) + outside * log(astray) -
+           num_traits * log(t->num);
 }
 
-/* Single features, or pairs, of all that differ: the first few of those that fewest of the others have. Returns how many
- * there are. */
-static int find_rarest(const struct traits *t, bool pairs, uint64_t found[MOST_TOLD], int *others)
+/* The likeliest, in order. */
+static void keep(struct place best[MOST_KEPT], struct place p)
 {
-    int num = 0;
-    *others = t->num_claims - t->num_differ;
-    for (int i = 0; i < t->num; i++)
-        for (int k = pairs ? 0 : i; pairs ? k < i : k == i; k++) {
-            int n = agreeing(t, bit(i) | bit(k));
-            if (n < 0 || n > *others)
-                continue;
-            if (n < *others)
-                num = 0;
-            *others = n;
-            if (num < MOST_TOLD)
-                found[num] = bit(i) | bit(k);
-            num++;
+    for (int i = 0; i < MOST_KEPT; i++)
+        if (p.log_likelihood > best[i].log_likelihood) {
+            struct place swap = best[i];
+            best[i] = p;
+            p = swap;
         }
-    return num;
 }
 
-static void name_traits(const struct traits *t, uint64_t bits, char *text, size_t size)
+static void find_places(const struct traits *t, struct place best[MOST_KEPT])
 {
-    size_t used = strlen(text);
+    for (int i = 0; i < MOST_KEPT; i++)
+        best[i].log_likelihood = -INFINITY;
+    keep(best, (struct place){0, log_likelihood(t, 0, 0)});
+    for (int i = 0; i < t->num; i++)
+        for (int k = 0; k <= i; k++) {
+            uint64_t bits = bit(i) | bit(k);
+            keep(best, (struct place){bits, log_likelihood(t, bits, i == k ? 1 : 2)});
+        }
+}
+
+struct text {
+    char *s;
+    size_t size, used;
+};
+
+static __attribute__((format(printf, 2, 3))) void append(struct text *to, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    if (to->used < to->size)
+        to->used += (size_t)vsnprintf(to->s + to->used, to->size - to->used, format, args);
+    va_end(args);
+}
+
+static void name_place(const struct traits *t, uint64_t bits, struct text *to)
+{
     const char *between = "";
     for (int i = 0; i < t->num; i++)
-        if (bits & bit(i) && used < size) {
-            used += (size_t)snprintf(text + used, size - used, "%s%s", between, t->name[i]);
+        if (bits & bit(i)) {
+            append(to, "%s%s", between, t->name[i]);
             between = " with ";
         }
 }
 
-static void tell(const struct traits *t, char *text, size_t size)
+/* Those that differ inside a place, and of all that agree those that are inside. */
+static void count(const struct traits *t, uint64_t bits, int *differ, int *agree)
 {
-    uint64_t found[MOST_TOLD], pair[MOST_TOLD];
-    int all = t->num_claims - t->num_differ, others, of_pairs;
-    int num = find_rarest(t, false, found, &others), pairs = find_rarest(t, true, pair, &of_pairs);
-    if (pairs > 0 && of_pairs < others) {
-        memcpy(found, pair, sizeof found);
-        num = pairs;
-        others = of_pairs;
+    *differ = *agree = 0;
+    for (int i = 0; i < t->num_claims; i++) {
+        *differ += t->claim[i].differs && has(&t->claim[i], bits);
+        *agree += !t->claim[i].differs && has(&t->claim[i], bits);
     }
-    if (num == 0 || 2 * others >= all) {
-        snprintf(
-            text, size,
-            "The claims that differ have nothing in common that those that agree lack: look at "
-            "what all scenes need, such as the camera, the loader, the film.");
+}
+
+static void name_scenes(const struct traits *t, struct text *to)
+{
+    const char *last = "", *between = " Scenes: ";
+    int num = 0;
+    for (int i = 0; i < t->num_claims; i++) {
+        const struct claim_traits *c = &t->claim[i];
+        if (!c->differs || strcmp(c->scene, last) == 0)
+            continue;
+        last = c->scene;
+        if (++num <= MOST_NAMED)
+            append(to, "%s%s", between, c->scene);
+        between = ", ";
+    }
+    if (num > MOST_NAMED)
+        append(to, " and %d more", num - MOST_NAMED);
+    append(to, ".");
+}
+
+static void tell_place(const struct traits *t, uint64_t bits, struct text *to)
+{
+    int all = t->num_claims - t->num_differ, differ, agree;
+    count(t, bits, &differ, &agree);
+    if (differ < t->num_differ)
+        append(to, "Of the %d claims that differ %d have ", t->num_differ, differ);
+    else if (differ == 1)
+        append(to, "The claim that differs has ");
+    else
+        append(to, "All %d claims that differ have ", differ);
+    name_place(t, bits, to);
+    if (agree == 0)
+        append(to, "; none of the %d that agree has.", all);
+    else
+        append(to, "; %d of the %d that agree have, too.", agree, all);
+}
+
+static void tell(const struct traits *t, struct text *to)
+{
+    struct place best[MOST_KEPT];
+    find_places(t, best);
+    if (best[0].bits == 0 && t->num_differ == t->num_claims)
+        append(to,
+               "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
+               "loader, the film.",
+               t->num_claims);
+    else if (best[0].bits == 0)
+        append(
+            to,
+            "The %d claims that differ have nothing in common that the %d that agree lack: look at "
+            "what all scenes need, such as the camera, the loader, the film.",
+            t->num_differ, t->num_claims - t->num_differ);
+    if (best[0].bits == 0) {
+        name_scenes(t, to);
         return;
     }
-    if (t->num_differ == 1)
-        snprintf(text, size, "The claim that differs has ");
-    else
-        snprintf(text, size, "All %d claims that differ have ", t->num_differ);
-    for (int i = 0; i < num && i < MOST_TOLD; i++) {
-        if (i > 0)
-            strncat(text, ", and ", size - strlen(text) - 1);
-        name_traits(t, found[i], text, size);
+    tell_place(t, best[0].bits, to);
+    int told = 1;
+    for (int i = 1; i < MOST_KEPT && told <= MOST_TOLD &&
+                    best[0].log_likelihood - best[i].log_likelihood <= log(tie);
+         i++) {
+        int differ, agree;
+        count(t, best[i].bits, &differ, &agree);
+        /* A part of what has been told already, unless that makes the difference. */
+        if ((best[i].bits & best[0].bits) == best[0].bits && agree > 0)
+            continue;
+        append(to, told++ == 1 ? " Nearly as likely: " : "; or ");
+        if (told > MOST_TOLD) {
+            append(to, "others");
+            break;
+        }
+        if (best[i].bits == 0) {
+            append(to, "nothing that they share");
+            continue;
+        }
+        name_place(t, best[i].bits, to);
+        append(to, " (%d of those that differ, %d of the others)", differ, agree);
     }
-    size_t used = strlen(text);
-    if (others == 0)
-        snprintf(text + used, size - used, "; none of the %d that agree has.", all);
-    else
-        snprintf(text + used, size - used, "; %d of the %d that agree have, too.", others, all);
+    append(to, told > 1 ? "." : "");
+    name_scenes(t, to);
 }
 
 bool shared_features_tell(const json_t *results, const char *suite_dir, char *text, size_t size,
                           struct err *e)
 {
-    const json_t *claims = json_object_get(results, "claims");
-    struct traits t = {.num = NUM_FIXED};
-    struct suite suite = {0};
-    bool differs = false;
+    struct traits t;
     *text = '\0';
-    for (size_t i = 0; i < json_array_size(claims); i++)
-        differs = differs || is_wrongly_different(json_array_get(claims, i));
-    if (!differs)
-        return true;
-    for (int i = 0; i < NUM_FIXED; i++)
-        strcpy(t.name[i], fixed_names[i]);
-    t.claim = calloc(json_array_size(claims), sizeof *t.claim);
-    bool ok = (t.claim != NULL || err_set(e, "out of memory")) &&
-              suite_load(suite_dir, &suite, e) && collect(claims, &suite, &t, e);
-    if (ok && t.num_differ > 0)
-        tell(&t, text, size);
-    suite_free(&suite);
-    free(t.claim);
-    return ok;
+    if (!claim_traits_collect(results, suite_dir, &t, e))
+        return false;
+    if (t.num_differ > 0)
+        tell(&t, &(struct text){text, size, 0});
+    claim_traits_free(&t);
+    return true;
 }

@@ -6,9 +6,10 @@
 
 #include <jansson.h>
 
-/* One sentence about the claims that are DIFFERENT and should be EQUIVALENT: the feature of a scene (features.h, light
- * of more than one bounce, a reference, a variant of ours), or two of them, that all of these have and fewest of those
- * that came out EQUIVALENT. Empty if none differs; else the suite of results (results.json) is opened. */
+/* What the claims that are DIFFERENT and should be EQUIVALENT share: the likeliest trait (claim_traits.h), or two of them,
+ * how many of those that came out EQUIVALENT have it too, what is nearly as likely, and their scenes; or that they share
+ * nothing. How: tools/docs/background/diagnosis.md. Empty if none differs; else the suite of results (results.json) is
+ * opened. */
 bool shared_features_tell(const json_t *results, const char *suite_dir, char *text, size_t size,
                           struct err *e) __attribute__((warn_unused_result));
 

@@ -1,0 +1,297 @@
+#include "claim_traits.h"
+
+#include "reference/suite/features.h"
+#include "reference/suite/suite.h"
+#include "renderer/shading/light.h"
+#include "tools/results/results.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    TRAIT_SPECULAR = NUM_FEATURES,
+    TRAIT_BOUNDARY,
+    TRAIT_ROUGH,
+    TRAIT_CONDUCTOR,
+    TRAIT_LAMP_TRIANGLES,
+    TRAIT_LAMP_SPHERE,
+    TRAIT_POINTLIKE,
+    TRAIT_DELTA_LIGHT,
+    TRAIT_SKY_IMAGE,
+    TRAIT_SEVERAL_LIGHTS,
+    TRAIT_CHOSEN_LIGHTS,
+    TRAIT_TRIANGLES,
+    TRAIT_MANY_TRIANGLES,
+    TRAIT_BOUNCED,
+    TRAIT_DEEP,
+    TRAIT_NOT_SQUARE,
+    TRAIT_PART_TILES,
+    TRAIT_ROTATE,
+    TRAIT_SCALE,
+    TRAIT_LOOKAT,
+    NUM_FIXED,
+    MANY_TRIANGLES = 1000,
+    TILE_SIDE = 16
+};
+
+static const char *const fixed_names[NUM_FIXED] = {
+    [FEATURE_DIFFUSE] = "matt surfaces",
+    [FEATURE_MIRROR] = "a mirror",
+    [FEATURE_GLASS] = "glass",
+    [FEATURE_REFRACTION] = "a boundary that only refracts",
+    [FEATURE_SCHLICK] = "glass by Schlick's approximation",
+    [FEATURE_MICROFACET] = "rough metal (GGX)",
+    [FEATURE_BECKMANN] = "rough metal (Beckmann)",
+    [FEATURE_AREA] = "glowing surfaces",
+    [FEATURE_TWO_SIDED] = "surfaces that glow on both sides",
+    [FEATURE_POINT] = "a point light",
+    [FEATURE_SPOT] = "a spot light",
+    [FEATURE_FALLOFF] = "a light without inverse square falloff",
+    [FEATURE_DIRECTIONAL] = "a directional light",
+    [FEATURE_ENVIRONMENT] = "a sky",
+    [FEATURE_SPHERE] = "spheres",
+    [FEATURE_SMOOTH] = "shading normals",
+    [FEATURE_LENS] = "a lens",
+    [FEATURE_CLIP] = "a near or far plane",
+    [TRAIT_SPECULAR] = "a mirror, glass or refraction",
+    [TRAIT_BOUNDARY] = "glass or refraction",
+    [TRAIT_ROUGH] = "rough metal",
+    [TRAIT_CONDUCTOR] = "a metal's index of refraction",
+    [TRAIT_LAMP_TRIANGLES] = "glowing triangles",
+    [TRAIT_LAMP_SPHERE] = "glowing spheres",
+    [TRAIT_POINTLIKE] = "a point or spot light",
+    [TRAIT_DELTA_LIGHT] = "a point, spot or directional light",
+    [TRAIT_SKY_IMAGE] = "an image of the sky",
+    [TRAIT_SEVERAL_LIGHTS] = "several lights",
+    [TRAIT_CHOSEN_LIGHTS] = "so many lights that one is chosen",
+    [TRAIT_TRIANGLES] = "triangles",
+    [TRAIT_MANY_TRIANGLES] = "many triangles",
+    [TRAIT_BOUNCED] = "light of more than one bounce",
+    [TRAIT_DEEP] = "light of more than two bounces",
+    [TRAIT_NOT_SQUARE] = "an image that is not square",
+    [TRAIT_PART_TILES] = "sides that are no multiple of 16",
+    [TRAIT_ROTATE] = "<rotate> in its file",
+    [TRAIT_SCALE] = "<scale> in its file",
+    [TRAIT_LOOKAT] = "<lookat> in its file",
+};
+
+/* What classes stand for. */
+static const struct {
+    int trait;
+    unsigned of;
+} classes[] = {
+    {TRAIT_SPECULAR,
+     1u << FEATURE_MIRROR | 1u << FEATURE_GLASS | 1u << FEATURE_REFRACTION | 1u << FEATURE_SCHLICK},
+    {TRAIT_BOUNDARY, 1u << FEATURE_GLASS | 1u << FEATURE_REFRACTION | 1u << FEATURE_SCHLICK},
+    {TRAIT_ROUGH, 1u << FEATURE_MICROFACET | 1u << FEATURE_BECKMANN},
+    {TRAIT_POINTLIKE, 1u << FEATURE_POINT | 1u << FEATURE_SPOT},
+    {TRAIT_DELTA_LIGHT, 1u << FEATURE_POINT | 1u << FEATURE_SPOT | 1u << FEATURE_DIRECTIONAL},
+};
+
+static uint64_t bit(int trait)
+{
+    return (uint64_t)1 << trait;
+}
+
+/* Of a reference or a variant. Those beyond the last that has room are not told apart. */
+static uint64_t named_trait(struct traits *t, const char *what, const char *name)
+{
+    char full[sizeof *t->name];
+    if (name == NULL)
+        return 0;
+    snprintf(full, sizeof full, "%s %s", what, name);
+    for (int i = NUM_FIXED; i < t->num; i++)
+        if (strcmp(t->name[i], full) == 0)
+            return bit(i);
+    if (t->num == MAX_TRAITS)
+        return 0;
+    strcpy(t->name[t->num], full);
+    return bit(t->num++);
+}
+
+static bool file_traits(const char *path, uint64_t *bits, struct err *e)
+{
+    static const struct {
+        int trait;
+        const char *word;
+    } words[] = {{TRAIT_ROTATE, "<rotate"}, {TRAIT_SCALE, "<scale"}, {TRAIT_LOOKAT, "<lookat"}};
+    char line[4096];
+    FILE *f = fopen(path, "r");
+    if (f == NULL)
+        return err_set(e, "%s: cannot read", path);
+    while (fgets(line, sizeof line, f) != NULL)
+        for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+            *bits |= strstr(line, words[i].word) != NULL ? bit(words[i].trait) : 0;
+    fclose(f);
+    return true;
+}
+
+static bool scene_traits(const struct suite_scene *s, uint64_t *bits, struct err *e)
+{
+    struct scene scene;
+    struct camera camera;
+    if (!suite_open(s, &scene, &camera, e))
+        return false;
+    const unsigned features = features_of_scene(&scene, &camera);
+    *bits = features;
+    for (size_t i = 0; i < sizeof classes / sizeof *classes; i++)
+        *bits |= features & classes[i].of ? bit(classes[i].trait) : 0;
+    for (uint32_t i = 0; i < scene.num_materials; i++)
+        *bits |= scene.materials[i].conductor ? bit(TRAIT_CONDUCTOR) : 0;
+    for (uint32_t i = 0; i < scene.num_lights; i++) {
+        enum light_kind kind = scene.lights[i].kind;
+        *bits |= kind == LIGHT_TRIANGLES ? bit(TRAIT_LAMP_TRIANGLES)
+                 : kind == LIGHT_SPHERE  ? bit(TRAIT_LAMP_SPHERE)
+                                         : 0;
+    }
+    const struct {
+        int trait;
+        bool is;
+    } more[] = {
+        {TRAIT_SKY_IMAGE, s->environment[0] != '\0'},
+        {TRAIT_SEVERAL_LIGHTS, scene.num_lights > 1},
+        {TRAIT_CHOSEN_LIGHTS, scene.num_lights > MANY_LIGHTS},
+        {TRAIT_TRIANGLES, scene.num_triangles > 0},
+        {TRAIT_MANY_TRIANGLES, scene.num_triangles > MANY_TRIANGLES},
+        {TRAIT_BOUNCED, s->depth > 1},
+        {TRAIT_DEEP, s->depth > 2},
+        {TRAIT_NOT_SQUARE, s->width != s->height},
+        {TRAIT_PART_TILES, s->width % TILE_SIDE != 0 || s->height % TILE_SIDE != 0},
+    };
+    for (size_t i = 0; i < sizeof more / sizeof *more; i++)
+        *bits |= more[i].is ? bit(more[i].trait) : 0;
+    scene_free(&scene);
+    return file_traits(s->dae, bits, e);
+}
+
+static bool is_verdict(const json_t *claim, const char *member, enum verdict v)
+{
+    const char *text = member_text(claim, member);
+    return text != NULL && strcmp(text, verdict_name(v)) == 0;
+}
+
+static bool is_wrongly_different(const json_t *claim)
+{
+    return is_verdict(claim, "expected", VERDICT_EQUIVALENT) &&
+           is_verdict(claim, "verdict", VERDICT_DIFFERENT);
+}
+
+/* With those of consistency, if any of them differs, as ones of a side of their own. */
+static json_t *all_claims(const json_t *results)
+{
+    json_t *all = json_array(), *more = json_array();
+    const json_t *c;
+    size_t i;
+    bool differs = false;
+    json_array_extend(all, json_object_get(results, "claims"));
+    json_array_foreach(json_object_get(results, "consistency"), i, c)
+    {
+        char side[160];
+        snprintf(side, sizeof side, "%s-consistency", member_text(c, "engine"));
+        differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
+        json_array_append_new(more,
+                              json_pack("{ss,ss,ss,ss*}", "scene", member_text(c, "scene"), "a",
+                                        side, "expected", verdict_name(VERDICT_EQUIVALENT),
+                                        "verdict", member_text(c, "verdict")));
+    }
+    if (differs)
+        json_array_extend(all, more);
+    json_decref(more);
+    return all;
+}
+
+/* The program that most claims that differ are about: "pathtracer" of "pathtracer-adaptive". */
+static const char *accused(const json_t *claims, size_t *length)
+{
+    const char *best = "";
+    size_t i, k;
+    json_t *c, *other;
+    int most = 0;
+    json_array_foreach(claims, i, c)
+    {
+        const char *a = member_text(c, "a");
+        if (a == NULL)
+            continue;
+        size_t n = strcspn(a, "-");
+        int num = 0;
+        json_array_foreach(claims, k, other)
+        {
+            const char *b = member_text(other, "a");
+            num += b != NULL && is_wrongly_different(other) && strcspn(b, "-") == n &&
+                   strncmp(a, b, n) == 0;
+        }
+        if (num > most) {
+            most = num;
+            best = a;
+            *length = n;
+        }
+    }
+    return best;
+}
+
+static bool collect(const struct suite *suite, struct traits *t, struct err *e)
+{
+    const struct suite_scene *last = NULL;
+    uint64_t bits = 0;
+    size_t length = 0;
+    const char *program = accused(t->json, &length);
+    for (size_t i = 0; i < json_array_size(t->json); i++) {
+        const json_t *c = json_array_get(t->json, i);
+        const struct suite_scene *s = suite_find(suite, member_text(c, "scene"));
+        const char *a = member_text(c, "a");
+        bool differs = is_verdict(c, "verdict", VERDICT_DIFFERENT);
+        if (s == NULL || a == NULL || !is_verdict(c, "expected", VERDICT_EQUIVALENT) ||
+            (!differs && !is_verdict(c, "verdict", VERDICT_EQUIVALENT)) ||
+            strncmp(a, program, length) != 0)
+            continue;
+        if (s != last && !scene_traits(s, &bits, e))
+            return false;
+        last = s;
+        t->claim[t->num_claims++] =
+            (struct claim_traits){.bits = bits | named_trait(t, "the side", a) |
+                                          named_trait(t, "the reference", member_text(c, "b")),
+                                  .differs = differs,
+                                  .scene = member_text(c, "scene"),
+                                  .a = a};
+        t->num_differ += differs;
+    }
+    for (int i = 0; i < t->num_claims; i++) {
+        int same = 0;
+        for (int k = 0; k < t->num_claims; k++)
+            same += strcmp(t->claim[i].scene, t->claim[k].scene) == 0 &&
+                    strcmp(t->claim[i].a, t->claim[k].a) == 0;
+        t->claim[i].weight = 1.0 / same;
+    }
+    return true;
+}
+
+bool claim_traits_collect(const json_t *results, const char *suite_dir, struct traits *out,
+                          struct err *e)
+{
+    struct suite suite = {0};
+    bool differs = false;
+    *out = (struct traits){.num = NUM_FIXED, .json = all_claims(results)};
+    if (out->json == NULL)
+        return err_set(e, "out of memory");
+    for (size_t i = 0; i < json_array_size(out->json); i++)
+        differs = differs || is_wrongly_different(json_array_get(out->json, i));
+    if (!differs)
+        return true;
+    for (int i = 0; i < NUM_FIXED; i++)
+        strcpy(out->name[i], fixed_names[i]);
+    out->claim = calloc(json_array_size(out->json), sizeof *out->claim);
+    bool ok = (out->claim != NULL || err_set(e, "out of memory")) &&
+              suite_load(suite_dir, &suite, e) && collect(&suite, out, e);
+    suite_free(&suite);
+    if (!ok)
+        claim_traits_free(out);
+    return ok;
+}
+
+void claim_traits_free(struct traits *t)
+{
+    free(t->claim);
+    json_decref(t->json);
+    *t = (struct traits){0};
+}
