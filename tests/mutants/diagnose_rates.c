@@ -151,11 +151,11 @@ static bool judge_bug(const struct rate_image *r, const struct claim_run *t, int
     print_named(r, &d);
     if (d.finding == FINDING_UNKNOWN && d.num_candidates > 0)
         printf(" (best: %s, %.0f %%, %.1f sd)", r->c.bug[d.candidate[0].bug].name,
-               100 * d.candidate[0].explained, d.candidate[0].excess);
+               100 * fmax(0, d.candidate[0].explained), d.candidate[0].excess);
     printf(" | ");
     print_named(r, &w);
     if (w.finding == FINDING_BUG)
-        printf(" (%.1f %%)", 100 * w.candidate[0].explained);
+        printf(" (%.1f %%)", 100 * fmax(0, w.candidate[0].explained));
     puts(" |");
     return true;
 }

@@ -79,6 +79,25 @@ static bool gather(const struct settings *s, const struct diagnose_gather_option
     return diagnose_gather_image(g, s->view, s->input, clue, e);
 }
 
+/* Where nothing has a name. */
+static bool tell_place(const struct settings *s, struct err *e)
+{
+    if (s->input == NULL) {
+        printf("where: assay validate --pathtracer %s says what the claims that "
+               "differ have in common\n",
+               s->pathtracer);
+        return true;
+    }
+    json_t *results;
+    if (!results_read(s->input, &results, e))
+        return false;
+    const char *located = member_text(results, "located");
+    if (located != NULL)
+        printf("where: %s\n", located);
+    json_decref(results);
+    return true;
+}
+
 static bool run(const struct settings *s, const struct diagnose_gather_options *g,
                 struct observation *clue, struct diagnosis *d, struct err *e)
 {
@@ -89,6 +108,8 @@ static bool run(const struct settings *s, const struct diagnose_gather_options *
          diagnose(g->catalogue, clue, num, &s->diagnose, d, e);
     if (ok && !s->quiet)
         diagnose_print(stdout, g->catalogue, clue, num, d, skipped);
+    if (ok && !s->quiet && s->view == NULL && d->finding == FINDING_UNKNOWN)
+        ok = tell_place(s, e);
     if (ok && s->json != NULL) {
         json_t *root = diagnose_print_json(g->catalogue, clue, num, d, skipped);
         ok = (root != NULL || err_set(e, "out of memory")) && json_write(s->json, root, e);

@@ -12,6 +12,8 @@ static const double fact_dof = 30;
 const double bug_fit_model_error = 0.01;
 static const double fact_error[NUM_FACTS] = {
     [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
+/* Where all pixels take as many samples, as with a rule that never stops: that they do not, too, speaks against it. */
+static const double exact_samples = 1e-3;
 /* What floats, stored and rendered, are good for. */
 const double bug_fit_rounding = 1e-5;
 /* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
@@ -105,7 +107,11 @@ static void add_facts(const struct observation *clue, const struct effect *e, do
             fact += amplitude * (bug - fact);
             sd = e->fact_sd[f];
         }
+        bool is_full = e == NULL || amplitude == 1 || e->fact[f] == c->fact[f];
+        bool is_exact = f == FACT_SAMPLES && sd == 0 && is_full;
         double var = pow(clue->seen.fact_sd[f], 2) + sd * sd + fact_error[f] * fact_error[f];
+        if (is_exact)
+            var = exact_samples * exact_samples;
         double z2 = pow(clue->seen.fact[f] - fact, 2) / var;
         double all = pow(clue->seen.fact[f] - c->fact[f], 2) / var;
         t->log_likelihood += student(z2, var, fact_dof);
@@ -360,7 +366,7 @@ struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double
     project(f, bug, second, -1, &along, &norm);
     out.log_likelihood =
         t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
-    out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
+    out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : NAN;
     out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
     out.strength = norm > 0 ? along / norm : 0;
     out.t = norm > 0 ? along / sqrt(norm) : 0;

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* In images that state an error of their own: what is left is noise, or this share is explained. */
-static const double least_explained = 0.95;
 /* Bugs this many times less likely than the best are still named with it. */
 static const double tie = 20;
 /* A number of samples has to be off by so many standard deviations. */
@@ -196,21 +194,22 @@ static bool gate_lead(const struct bug_fit *f, const struct candidate *best, dou
     if (best->log_likelihood < diagnose_bound(f->c, alpha))
         return false;
     if (out->gate[0] == '\0')
-        snprintf(out->gate, sizeof out->gate,
-                 "a known bug explains the images 10^%.0f times better than no bug",
-                 best->log_likelihood / log(10));
+        snprintf(
+            out->gate, sizeof out->gate,
+            "with the effect of a known bug the images are 10^%.0f times likelier than without",
+            best->log_likelihood / log(10));
     return true;
 }
 
-/* Images that state no error are those of other people's programs: what is told has to explain all of them. */
+/* Put in at its full strength, a bug, or two at once, has to leave noise, and half of what is clear has to be gone. Where
+ * nothing is, and images state their error, its own sum over all views says enough. */
 static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
                            const struct candidate *c)
 {
     static const double least_gone = 0.5, most_left = 0.5, most_excess = 4;
+    bool is_gone = isnan(c->explained) ? !opt->by_likelihood : c->explained >= least_gone;
     int clue;
-    if (!opt->by_likelihood)
-        return c->excess <= bug_fit_largest_excess || c->explained >= least_explained;
-    return c->excess <= most_excess && c->explained >= least_gone && bug_fit_is_full(f, c) &&
+    return c->amplitude == 1 && c->excess <= most_excess && is_gone && bug_fit_is_full(f, c) &&
            bug_fit_worst(f, c, &clue) <= (c->second >= 0 ? 0 : most_left);
 }
 
@@ -218,7 +217,8 @@ static bool is_explanation(const struct bug_fit *f, const struct diagnose_option
 static bool is_needed_beside(const struct bug_fit *f, const struct candidate *two, int one)
 {
     static const double most_left = 0.1;
-    return 1 - two->explained <= most_left * (1 - bug_fit_at(f, one, -1, 1).explained);
+    double alone = bug_fit_at(f, one, -1, 1).explained;
+    return 1 - two->explained <= most_left * (1 - (isnan(alone) ? 0 : alone));
 }
 
 /* Effects of two do not quite multiply: more than noise may be left if it is little of each view, and no others come near. */

@@ -19,7 +19,7 @@ struct diagnose_options {
         *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
     bool
         by_likelihood; /* no other test says that something is wrong, as for images that state no error: a bug has
-                         * to lead by diagnose_bound(), to explain every view, at its full strength */
+                        * to lead by diagnose_bound(), and to explain what is clear */
     bool pairs;  /* where no single one explains: two bugs at once, with by_likelihood */
     double clip; /* radiance at which views are cut off; 0: none */
 };
@@ -30,9 +30,10 @@ struct candidate {
     int bug, second;       /* second: at the same time; -1: none */
     double amplitude;      /* 1: its full effect; else the factor that fits best */
     double log_likelihood; /* natural logarithm, over that of "correct" */
-    double explained;      /* share of the difference from the correct renderer, at most 1 */
-    double excess;         /* chi^2 of what is left over its mean, in its standard deviations */
-    double t, strength;    /* directed statistic over all views; the factor by least squares */
+    double
+        explained; /* share of what is clear of the difference from the correct renderer, at most 1; NAN if nothing is */
+    double excess; /* chi^2 of what is left over its mean, in its standard deviations */
+    double t, strength; /* directed statistic over all views; the factor by least squares */
 };
 
 /* How a bug explains one view. */
@@ -53,7 +54,7 @@ struct diagnosis {
     double largest_lead; /* of any bug at full strength over "correct", natural logarithm */
     double
         log_likelihood; /* of "correct": to hold catalogues of the same cells against each other */
-    int num_named;      /* the first so many cannot be told apart here; 0 unless FINDING_BUG */
+    int num_named; /* the first so many explain the images and cannot be told apart; 0 unless FINDING_BUG */
     double probability; /* of those together, among all known bugs, equally likely beforehand */
 };
 

@@ -5,6 +5,8 @@
 #define LN10 2.302585092994046
 
 enum { NEXT = 3 };
+/* Less than this share of the difference is not worth a look. */
+static const double least_told = 0.1;
 
 static double log10_of(double natural)
 {
@@ -42,12 +44,17 @@ static void print_views(FILE *f, const struct catalogue *c, const struct observa
 static void print_bugs(FILE *f, const struct catalogue *c, const struct diagnosis *d)
 {
     const struct candidate *best = &d->candidate[0];
-    fputs(d->num_named == 1 ? "likely bug:\n" : "likely one of these, which look the same here:\n",
+    fputs(d->num_named == 1 ? "likely bug, or one that gives the same images:\n"
+                            : "likely one of these, which look the same here:\n",
           f);
     for (int i = 0; i < d->num_named; i++)
         print_bug(f, c, &d->candidate[i]);
-    fprintf(f, "  probability %.4g among %d known bugs; explains %.1f %% of the difference",
-            d->probability, c->num_bugs, 100 * best->explained);
+    fprintf(f, "  probability %.4g among %d known bugs; ", d->probability, c->num_bugs);
+    if (isnan(best->explained))
+        fprintf(f, "no view is clear by itself, all together show it by %.0f standard deviations",
+                best->t);
+    else
+        fprintf(f, "explains %.1f %% of the difference", 100 * best->explained);
     if (d->num_candidates > d->num_named)
         fprintf(f, "; 10^%.1f times likelier than the next",
                 log10_of(best->log_likelihood - d->candidate[d->num_named].log_likelihood));
@@ -60,6 +67,8 @@ static void print_next(FILE *f, const struct catalogue *c, const struct diagnosi
     fputs("\nnext candidates (log10 likelihood under the best, explained)\n", f);
     for (int i = d->num_named; i < last; i++) {
         const struct candidate *k = &d->candidate[i];
+        if (!(k->explained >= least_told))
+            continue;
         fprintf(f, "  %8.1f %6.1f %%  %s (%s)",
                 log10_of(k->log_likelihood - d->candidate[0].log_likelihood), 100 * k->explained,
                 c->bug[k->bug].what, c->bug[k->bug].name);

@@ -15,7 +15,7 @@ void diagnose_print(FILE *f, const struct catalogue *c, const struct observation
  *   "known_bugs": 100, "probability": 0.999 (bug only),
  *   "named": ["NAME"],                    bugs that cannot be told apart, first the likeliest
  *   "candidates": [{"name": , "bug": , "where": , "amplitude": 1, "log10_likelihood": (over "correct"),
- *                   "explained": .99}],
+ *                   "explained": .99 | null}],
  *   "views": [{"view": , "t": , "log10_lead": , "explained": .99 | null,
  *              "region": {"x": , "y": , "width": , "height": , "change": } | null}],  of the likeliest
  *   "skipped": [{"view": , "reason": }] }

@@ -3,6 +3,7 @@
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose_gather.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -101,8 +102,9 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
                          *other = one->second >= 0 ? &c->bug[one->second] : NULL;
         char name[64];
         catalogue_mistake(b, name);
-        json_t *entry = json_pack("{ss, ss, ss, sf}", "name", name, "bug", b->what, "where",
-                                  b->where, "explained", one->explained);
+        json_t *explained = isnan(one->explained) ? json_null() : json_real(one->explained);
+        json_t *entry = json_pack("{ss, ss, ss, so}", "name", name, "bug", b->what, "where",
+                                  b->where, "explained", explained);
         if (other != NULL) {
             catalogue_mistake(other, name);
             json_object_update_new(entry, json_pack("{ss, ss, ss}", "and", name, "and_bug",
