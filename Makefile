@@ -153,7 +153,8 @@ $(BUILD)/commit: FORCE
 FORCE:
 
 # Asks dpkg what is missing and apt for just that, as root or through sudo. Where there is no dpkg the
-# packages are taken to be there, under whatever names.
+# packages are taken to be there, under whatever names. Who else installs something meanwhile is waited for, ten minutes: apt's own
+# DPkg::Lock::Timeout knows nothing of the lock of its lists.
 define install_missing
 	$(Q)mkdir -p $(@D); \
 	if command -v dpkg-query >/dev/null; then \
@@ -164,9 +165,16 @@ define install_missing
 	  if [ -n "$$missing" ]; then \
 	    echo "installing:$$missing"; \
 	    [ "$$(id -u)" = 0 ] && sudo= || sudo=sudo; \
-	    $$sudo apt-get update -qq && \
-	    $$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >$@.log 2>&1 \
-	      || { tail -n 5 $@.log; echo "cannot install:$$missing" >&2; exit 1; }; \
+	    tries=200; \
+	    for step in update "install -y --no-install-recommends $$missing"; do \
+	      until $$sudo env DEBIAN_FRONTEND=noninteractive apt-get -qq $$step >$@.log 2>&1; do \
+	        tries=$$((tries - 1)); \
+	        grep -q 'Could not get lock' $@.log && [ $$tries -gt 0 ] \
+	          || { tail -n 5 $@.log; echo "cannot install:$$missing" >&2; exit 1; }; \
+	        [ $$tries -lt 199 ] || echo "waiting: $$(grep -m 1 'Could not get lock' $@.log)"; \
+	        sleep 3; \
+	      done; \
+	    done; \
 	  fi; \
 	fi; touch $@
 endef

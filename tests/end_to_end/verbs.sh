@@ -129,4 +129,22 @@ if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer"
 else
     echo "skip grade: $(tail -n 1 "$tmp/out")"
 fi
+# make waits for who else installs packages, and for nothing else.
+mkdir "$tmp/stub"
+printf '#!/bin/sh\nexit 1\n' >"$tmp/stub/dpkg-query"
+printf '#!/bin/sh\nexec "$@"\n' >"$tmp/stub/sudo"
+cat >"$tmp/stub/apt-get" <<END
+#!/bin/sh
+echo "\$*" >>"$tmp/asked"
+[ \$(wc -l <"$tmp/asked") -gt 2 ] && exit 0
+echo "E: \$REASON" >&2
+exit 100
+END
+chmod +x "$tmp/stub"/*
+locked="Could not get lock /var/lib/apt/lists/lock. It is held by process 123 (apt-get)"
+REASON=$locked expect "make: a package lock is waited for" 0 "waiting: E: $locked" env PATH="$tmp/stub:$PATH" make BUILD="$tmp/b" "$tmp/b/deps"
+right "make: then it installs" grep -q -- '-qq install -y --no-install-recommends .*gcc' "$tmp/asked"
+rm "$tmp/asked"
+REASON="Unable to locate package" expect "make: another fault ends it" 2 "cannot install: .*gcc" env PATH="$tmp/stub:$PATH" make BUILD="$tmp/c" "$tmp/c/deps"
+right "make: at once" test "$(wc -l <"$tmp/asked")" = 1
 [ $failures -eq 0 ]

@@ -218,6 +218,11 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
     json_int_t tiles_y = json_integer_value(json_object_get(claim, "tiles_y"));
     if (tiles_x < 1 || tiles_y < 1 || tiles_x > 65536 || tiles_y > 65536)
         return err_set(e, "%s: 'tiles_x' or 'tiles_y' is not from 1 to 65536", where);
+    if (json_integer_value(json_object_get(claim, "tile")) < 1)
+        return err_set(e, "%s: 'tile' is not 1 or more", where);
+    if (json_number_value(json_object_get(claim, "margin_global")) < 0 ||
+        json_number_value(json_object_get(claim, "margin_tile")) < 0)
+        return err_set(e, "%s: a margin is below 0", where);
     size_t num_tiles = (size_t)tiles_x * (size_t)tiles_y;
     if (!check_tiles(claim, "tile_log10_p", num_tiles, where, e) ||
         !check_tiles(claim, "tile_t", num_tiles, where, e))

@@ -430,6 +430,8 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
         size_t n = strlen(line);
         read += n;
         s.line++;
+        if (s.line == 1 && strncmp(line, "\xef\xbb\xbf", 3) == 0) /* which some editors put first */
+            memset(line, ' ', 3);
         if (n == sizeof line - 1 && line[n - 1] != '\n') {
             rubric_mistake(m, s.line, "longer than %d characters", MAX_LINE - 2);
             for (int c; (c = getc(f)) != EOF && c != '\n';)

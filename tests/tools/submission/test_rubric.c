@@ -102,6 +102,15 @@ TEST(what_is_carried_on)
     assert_true(rubric->check[1].carried.full == 0.15 && rubric->check[1].carried.none == 0.5);
 }
 
+TEST(an_editors_mark_of_utf8_is_passed_over)
+{
+    char text[64];
+    snprintf(text, sizeof text, "\xef\xbb\xbf%s", "rubric A course");
+    read_text(with(1, text));
+    assert_int_equal(mistakes.num, 0);
+    assert_string_equal(rubric->title, "A course");
+}
+
 TEST(images_by_their_old_word)
 {
     read_text(with(2, "picture p"));
