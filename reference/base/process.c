@@ -181,7 +181,7 @@ struct run {
     pid_t guard, child;
     int out, log; /* -1: closed */
     size_t logged, log_most;
-    bool log_full;
+    bool log_full, clean;
     int log_errno; /* of the first failed write */
     struct tail tail;
 };
@@ -212,6 +212,17 @@ static void log_write(struct run *r, const char *data, size_t n)
         write_all(r, full, sizeof full - 1);
 }
 
+/* But for ends of lines and tabs; a carriage return ends a line, too. Bytes of UTF-8 stay. */
+static void hide_controls(char *text, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        unsigned char c = (unsigned char)text[i];
+        text[i] = c == '\r'                                         ? '\n'
+                  : (c < ' ' && c != '\n' && c != '\t') || c == 127 ? '?'
+                                                                    : text[i];
+    }
+}
+
 /* Takes what the pipe holds, at most about 1 MiB at a time so that a flood cannot hide the clock.
  */
 static void drain(struct run *r)
@@ -220,6 +231,8 @@ static void drain(struct run *r)
     for (int i = 0; i < 16 && r->out >= 0; i++) {
         ssize_t n = read(r->out, buffer, sizeof buffer);
         if (n > 0) {
+            if (r->clean)
+                hide_controls(buffer, (size_t)n);
             tail_add(&r->tail, buffer, (size_t)n);
             log_write(r, buffer, (size_t)n);
         } else if (n == 0) {
@@ -312,8 +325,10 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     if (!process_find(p->argv[0], path, sizeof path))
         return err_set(e, "%s: no such program%s", p->argv[0],
                        strchr(p->argv[0], '/') != NULL ? "" : " in PATH");
-    struct run r = {
-        .out = -1, .log = -1, .log_most = p->log_most > 0 ? p->log_most : (size_t)LOG_MAX};
+    struct run r = {.out = -1,
+                    .log = -1,
+                    .clean = p->log_most > 0,
+                    .log_most = p->log_most > 0 ? p->log_most : (size_t)LOG_MAX};
     if (p->log != NULL &&
         (r.log = open(p->log, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666)) < 0)
         return err_set(e, "%s: cannot write: %s", p->log, strerror(errno));

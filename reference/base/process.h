@@ -10,7 +10,8 @@ struct process {
     const char *const *argv; /* argv[0] looked up in PATH; NULL-terminated */
     const char *cwd;         /* NULL: the current one */
     const char *log;         /* file that receives stdout and stderr, at most 64 MiB; NULL: none */
-    size_t log_most;         /* bytes of it, instead; 0: those */
+    size_t
+        log_most; /* bytes of it, instead, in which control characters become '?', as nobody vouches for them; 0: as it comes */
     /* Called in the new process before it becomes the program, with calls that may follow fork() alone; false, with
      * errno: it is not started. May be NULL. */
     bool (*before)(const void *ctx);

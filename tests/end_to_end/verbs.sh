@@ -129,6 +129,18 @@ if "$assay" grade -q -o "$tmp/probe" tests/end_to_end/quick.rubric "$pathtracer"
 else
     echo "skip grade: $(tail -n 1 "$tmp/out")"
 fi
+# One run at a time in a directory of outputs. A kill gives it back.
+mkdir -p "$tmp/taken"
+"$assay" validate -q -o "$tmp/taken" --only 45_many_lights >/dev/null 2>&1 &
+pid=$!
+for i in $(seq 200); do [ -s "$tmp/taken/.assay-lock" ] && break || sleep 0.05; done
+kill -STOP $pid # it stays there, however fast this machine is
+expect "two validations in one directory" 3 "another run writes there: process $pid on" "$assay" validate -q -o "$tmp/taken" --only 12_point_plane
+expect "a grading in it" 3 "another run writes there: process $pid on" "$assay" grade --unsafe-no-sandbox -o "$tmp/taken" tests/end_to_end/quick.rubric "$pathtracer"
+kill -9 $pid && wait $pid 2>/dev/null
+expect "after a kill it is free" 0 "EQUIVALENT" "$assay" validate -q -o "$tmp/taken" --only 11_furnace
+right "and no lock stays" test ! -e "$tmp/taken/.assay-lock"
+
 # make waits for who else installs packages, and for nothing else.
 mkdir "$tmp/stub"
 printf '#!/bin/sh\nexit 1\n' >"$tmp/stub/dpkg-query"

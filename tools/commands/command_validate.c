@@ -1,3 +1,4 @@
+#include "tools/base/dir_lock.h"
 #include "tools/results/results.h"
 #include "tools/validate/validate_command.h"
 #include "commands.h"
@@ -5,6 +6,7 @@
 int command_validate(int argc, char **argv, struct err *e)
 {
     struct validate_command c;
+    struct dir_lock lock = {0};
     json_t *results = NULL;
     int code = EXIT_NOT_JUDGED;
     if (!validate_command_read(argc, argv, &c, e))
@@ -13,8 +15,9 @@ int command_validate(int argc, char **argv, struct err *e)
         code = 0;
     else if (c.slurm)
         code = slurm_command(NULL, argc, argv, NULL, e);
-    else if (validate(&c.opt, argc, argv, &results, e))
+    else if (dir_lock_take(&lock, c.opt.out_dir, e) && validate(&c.opt, argc, argv, &results, e))
         code = validate_command_finish(&c, results, e);
+    dir_lock_release(&lock);
     json_decref(results);
     engine_free(&c.engine);
     return code;

@@ -6,6 +6,7 @@
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
 #include "tools/base/data_dirs.h"
+#include "tools/base/dir_lock.h"
 #include "grade_batch.h"
 #include "grade_change.h"
 #include "grade_needs.h"
@@ -280,6 +281,7 @@ int grade_command(const struct grade_settings *s, int argc, char **argv, struct 
     struct suite suite = {0};
     struct rubric *r = calloc(1, sizeof *r);
     struct rubric_mistakes m;
+    struct dir_lock lock = {0};
     int code = EXIT_NOT_JUDGED;
     if (r == NULL) {
         err_set(e, "out of memory");
@@ -288,7 +290,12 @@ int grade_command(const struct grade_settings *s, int argc, char **argv, struct 
         if (s->only_check)
             printf("%s: %d checks in %d parts, %g points\n", r->path, r->num_checks, r->num_parts,
                    rubric_points(r));
-        code = s->only_check ? 0 : grade(s, r, &suite, argc, argv, e);
+        /* --fill-build-cache writes elsewhere */
+        if (s->only_check)
+            code = 0;
+        else if (s->fill || dir_lock_take(&lock, s->out, e))
+            code = grade(s, r, &suite, argc, argv, e);
+        dir_lock_release(&lock);
     }
     suite_free(&suite);
     free(r);

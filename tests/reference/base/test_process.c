@@ -69,7 +69,7 @@ static int count_fds(void)
 TEST(success_leaves_the_error_untouched)
 {
     struct err e = {"untouched"};
-    struct process_usage u = {-1, -1, -1};
+    struct process_usage u = {.wall_s = -1, .cpu_s = -1, .exit_status = -1};
     assert_true(sh("echo hello", NULL, 60, &u, &e));
     assert_string_equal(e.msg, "untouched");
     assert_true(u.wall_s > 0 && u.wall_s < 60);

@@ -120,6 +120,36 @@ TEST(a_crash_is_told_with_its_last_words)
     assert_int_equal(r.end, SANDBOX_FAILED);
 }
 
+/* 2 MiB of bells and escapes: the log keeps one, and none of them. Control: what is no control character comes as it was. */
+TEST(a_log_is_cut_and_cleaned)
+{
+    if (!has_sandbox)
+        skip();
+    const struct path
+        log = fs_path("%s/log", box.dir.path),
+        seen = fs_path(
+            "[ $(wc -c <%s) -lt 1100000 ] && head -c 30 %s | grep -q 'fine \303\251?\\[31m' && ! grep -aq \"$(printf '[\\001\\033]')\" %s && tail -n 1 %s | grep -q 'more output'",
+            log.s, log.s, log.s, log.s);
+    struct err e;
+    struct sandbox_result r;
+    for (int k = 0; k < 2; k++) {
+        struct sandbox s = box;
+        s.unsafe = k == 1;
+        const struct sandbox_job job = {
+            .argv =
+                (const char *const[]){
+                    "sh", "-c",
+                    "printf 'fine \303\251\033[31m\\n'; head -c 2M /dev/zero | tr '\\0' '\\001'",
+                    NULL},
+            .out = out_dir,
+            .log = log.s,
+            .limit = small};
+        MUST(sandbox_run(&s, &job, &r, &e));
+        assert_int_equal(r.end, SANDBOX_OK);
+        assert_int_equal(system(seen.s), 0);
+    }
+}
+
 /* Ignores SIGTERM, and so does its child in a session of its own. */
 TEST(a_hang_ends_with_all_its_processes)
 {
