@@ -1,5 +1,6 @@
 #include "rubric_bugs.h"
 
+#include "rate_image.h"
 #include "stopping_rule.h"
 
 #include "renderer/base/fs.h"
@@ -135,6 +136,29 @@ static bool is_clipped(const struct submitted_image *s)
     return (double)clipped > most * (double)values;
 }
 
+/* A sum divided by all samples, wherever it stopped: by how much depends on the program's own counts, which it has written. */
+static bool expect_mean_over_all(const struct rubric_image *p, const char *rates,
+                                 const struct signature *correct, struct effect *mine,
+                                 struct err *e)
+{
+    struct err why;
+    double *count = calloc((size_t)p->width * (size_t)p->height, sizeof *count);
+    if (count == NULL)
+        return err_set(e, "out of memory");
+    bool known = rate_image_counts(rates, p->width, p->height, p->spp, count, &why);
+    for (int i = 0; known && i < correct->columns * correct->rows; i++) {
+        int x0 = i % correct->columns * correct->cell, y0 = i / correct->columns * correct->cell;
+        double taken = 0;
+        for (int k = 0; k < correct->cell * correct->cell; k++)
+            taken += count[(y0 + k / correct->cell) * p->width + x0 + k % correct->cell];
+        double share = taken / ((double)p->spp * correct->cell * correct->cell);
+        for (int c = 3 * i; c < 3 * i + 3; c++)
+            mine->mean[c] = (float)((share - 1) * correct->mean[c]);
+    }
+    free(count);
+    return true;
+}
+
 /* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
  * what each rule takes with these replaces what the catalogue's bugs took with ours. */
 static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
@@ -181,6 +205,9 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
         for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
             mine->fact[f] = mine->fact_sd[f] = NAN;
         set_samples(p, &by[kind], clue->seen.fact[FACT_SAMPLES], mine->fact, mine->fact_sd);
+        if (strcmp(b->catalogue.bug[k].name, "adaptive_mean_over_all") == 0 &&
+            !expect_mean_over_all(p, h->made[image].rates, &own->correct, mine, e))
+            return false;
     }
     clue->view = own;
     return true;
