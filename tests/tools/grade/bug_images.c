@@ -93,14 +93,15 @@ int bug_images_number(const struct bug_images *b, const char *name)
     return bug;
 }
 
-/* What one or two bugs make of a value: two that change light by factors multiply. */
-static double wrong_value(const struct view *v, int bug, int second, int at)
+/* What one or two bugs make of a value. */
+static double wrong_value(const struct bug_images *of, const struct view *v, int bug, int second,
+                          int at)
 {
     const struct effect *a = bug >= 0 ? v->effect[bug] : NULL,
                         *b = second >= 0 ? v->effect[second] : NULL;
     double c = v->correct.mean[at], x = a != NULL ? (double)a->mean[at] : 0,
            y = b != NULL ? (double)b->mean[at] : 0;
-    return x == 0 || y == 0 ? c + x + y : (c + x) * (c + y) / c;
+    return x == 0 || y == 0 ? c + x + y : fmax(0, c + x + y + (1 - of->apart) * x * y / c);
 }
 
 struct submitted_images *bug_images_hand_in(const struct bug_images *b, int set, int bug,
@@ -119,7 +120,7 @@ struct submitted_images *bug_images_hand_in(const struct bug_images *b, int set,
         const struct view *v = &b->bugs.catalogue.view[b->bugs.view[set][i]];
         for (size_t k = 0; k < 3 * (size_t)p->width * (size_t)p->height; k++) {
             int at = value_at(v, k / 3) + (int)(k % 3);
-            double mean = wrong_value(v, bug, second, at), right = v->correct.mean[at];
+            double mean = wrong_value(b, v, bug, second, at), right = v->correct.mean[at];
             double sd = sqrt(noise * variance_at(v, p->spp, at));
             if (mean < right) /* what is darker is less noisy */
                 sd *= fmax(0, mean / right);

@@ -15,6 +15,7 @@ struct bug_images {
     struct answer_key *
         answers; /* flat cells too; with several deviations the light grows by up to 30 % from left to right */
     struct rubric_bugs bugs;
+    double apart; /* of two bugs: 0 where their factors multiply, 1 where what they add adds up */
 };
 
 /* False, with nothing said, where the rubric has mistakes or no catalogue. */

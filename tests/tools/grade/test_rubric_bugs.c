@@ -113,6 +113,34 @@ TEST(two_bugs_have_both_names)
     }
 }
 
+/* Whether both, and no others, are named where their effects are that far apart (struct bug_images). */
+static bool both_are_named(const char *one, const char *two, double apart, double *excess)
+{
+    const int a = bug_images_number(&of, one), b = bug_images_number(&of, two);
+    int with;
+    of.apart = apart;
+    struct diagnosis found = find(0, a, b, 1, 0, NULL, &with);
+    of.apart = 0;
+    const struct candidate *c = &found.candidate[0];
+    *excess = c->excess;
+    return found.num_named == 1 &&
+           ((c->bug == a && c->second == b) || (c->bug == b && c->second == a));
+}
+
+/* Light that bounces find by themselves adds to what is left of direct light; a wider view shows another part of a floor, so that
+ * more than noise is left. Controls: neither of that, nor near. */
+TEST(two_bugs_that_do_not_multiply_have_both_names)
+{
+    static const char *const adds[] = {"hemisphere_in_world_frame-direct", "emission_twice-mesh"},
+                             *const near[] = {"cosine_missing-light", "angle_not_halved-each"};
+    double excess;
+    (void)state;
+    assert_true(both_are_named(adds[0], adds[1], 1, &excess) && excess < 4);
+    assert_false(both_are_named(adds[0], adds[1], 4, &excess));
+    assert_true(both_are_named(near[0], near[1], -1.5, &excess) && excess > 6);
+    assert_false(both_are_named(near[0], near[1], 3, &excess));
+}
+
 /* A bug that is not in the catalogue is not called by the name of a relative: each of these has some that look like it. */
 TEST(an_unknown_bug_has_no_name)
 {
