@@ -190,13 +190,15 @@ else
     echo "skip slurm: replicates of a reference: no blender in PATH: NOT TESTED"
 fi
 
-# A job that cannot be made: its input is another one as soon as it is planned.
+# A job that cannot be made: its input is another one once it is planned, and before any node may begin.
 why=""
 cp "$scene" "$tmp/other.dae"
+scontrol update PartitionName=all State=DOWN || why="the partition does not close"
 "$assay" slurm --plan "$tmp/other" --parts 1 pathtracer -q -r 32 32 -s 1 -f "$tmp/z.exr" "$tmp/other.dae" >"$tmp/out" 2>"$tmp/err" &
 follower=$!
 until_so 30 test -e "$tmp/other/plan.jsonl"
 printf ' ' >>"$tmp/other.dae"
+scontrol update PartitionName=all State=UP
 wait $follower
 status=$?
 [ $status -eq 3 ] && grep -q "job 0 came back 3 times without its artefact: .*other.dae is not what was planned with" "$tmp/err" || why="status $status: $(tail -n 2 "$tmp/err")"

@@ -572,7 +572,8 @@ TEST(unsafe_is_as_unsafe_as_it_says)
         assert_in_range(atoi(kept("out.png")), 60578, 61183);
     snprintf(script, sizeof script, "cat %s >out.png", secret);
     assert_true(sandbox_run(&s, &job, &r, &e));
-    assert_int_equal(r.end, geteuid() == 0 ? SANDBOX_FAILED : SANDBOX_OK);
+    bool landlock = syscall(SYS_landlock_create_ruleset, NULL, 0, 1) >= 1;
+    assert_int_equal(r.end, geteuid() == 0 || landlock ? SANDBOX_FAILED : SANDBOX_OK);
     sandbox_close(&s);
     assert_int_not_equal(access(s.dir.path, F_OK), 0);
     snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
