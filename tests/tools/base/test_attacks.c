@@ -213,7 +213,7 @@ static void try_all(bool unsafe, bool tools)
     bool no_landlock = unsafe && syscall(SYS_landlock_create_ruleset, NULL, 0, 1) < 1;
     bool no_seccomp = prctl(PR_GET_SECCOMP) < 0;
     for (int i = 0; i < NUM; i++) {
-        char word[16];
+        char word[32];
         snprintf(word, sizeof word, "won %d.", i);
         bool may = (marked(i, 's') && !unsafe) || (marked(i, 'l') && no_landlock) ||
                    (marked(i, 'u') && unsafe && geteuid() != 0) || (marked(i, 'p') && no_seccomp);
