@@ -59,7 +59,7 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
         if (to[i].whole)
             continue;
         struct measured m = region_measure(j, &coarse->cell[i], pyramid_rect(p, l, i));
-        if (region_testable(j, &m))
+        if (region_is_normal(j, &m))
             to[i] = part_of(&m);
     }
 }
@@ -72,7 +72,7 @@ static void test(struct judge *j, const struct pyramid *p, int channel, int firs
     struct part *from = part, *to = part + regions;
     for (size_t i = 0; i < regions; i++) {
         struct measured m = region_measure(j, &p->level[first].cell[i], pyramid_rect(p, first, i));
-        from[i] = region_testable(j, &m) ? part_of(&m) : (struct part){0};
+        from[i] = region_is_normal(j, &m) ? part_of(&m) : (struct part){0};
     }
     for (int l = first, next; (next = next_level(p, l)) >= 0; l = next) {
         merge(j, p, l, next, from, to);

@@ -29,6 +29,20 @@ static void set_guards(struct judge *j, size_t regions)
             j->z_guard[s] = stats_normal_quantile(j->opt.alpha * j->share[s] / (2 * tests[s]));
 }
 
+/* A region, and what is around it: that of four times its side, or the image. */
+static struct measured measure_in(const struct judge *j, const struct pyramid *p, int level,
+                                  size_t i)
+{
+    struct measured m = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
+    int around = level + 2 < p->num_levels ? level + 2 : p->num_levels - 1;
+    /* Below tiles whose side is no power of 2 it is the image. */
+    if (p->level[around].side % p->level[level].side != 0)
+        around = p->num_levels - 1;
+    if (level < around)
+        region_look_around(j, &m, &p->level[around].cell[pyramid_parent(p, level, around, i)]);
+    return m;
+}
+
 /* The region with the smallest p so far. */
 struct worst {
     struct cell cell;
@@ -46,14 +60,14 @@ static void scan(struct judge *j, const struct pyramid *p, int channel, struct w
         size_t regions = (size_t)level->nx * (size_t)level->ny, tested = 0;
         for (size_t i = 0; i < regions; i++) {
             struct rect r = pyramid_rect(p, l, i);
-            struct measured m = region_measure(j, &level->cell[i], r);
+            struct measured m = measure_in(j, p, l, i);
             if (!region_testable(j, &m))
                 continue;
             tested++;
             /* An exact p only for what may be the smallest: noise-free regions and those whose
              * normal equivalent, good to 3 %, comes near the largest. */
             struct worst *worst = &worst_of[m.statistic];
-            double z = m.noise_free ? INFINITY : stats_z_of_t(region_excess_t(&m), m.dof);
+            double z = m.noise_free ? INFINITY : region_rank(j, &m);
             if (!m.noise_free && (z <= 0 || z < 0.94 * worst->z))
                 continue;
             double log10_p = region_log10_p(j, &m, channel);
@@ -105,7 +119,7 @@ static double mdb_of(const struct judge *j, const struct pyramid *p, int level, 
     struct measured own = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
     for (int l = level; l < p->num_levels; l++) {
         size_t at = pyramid_parent(p, level, l, i);
-        struct measured m = region_measure(j, &p->level[l].cell[at], pyramid_rect(p, l, at));
+        struct measured m = measure_in(j, p, l, at);
         if (region_testable(j, &m))
             return fmin(region_mdb_none, region_mdb(j, &m, CHANNEL_LUMINANCE) * m.unit / own.unit);
     }
@@ -243,6 +257,7 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     } else {
         struct measured m = region_measure(&j, &w->cell, w->rect);
         out->worst = region_fill(&j, &w->cell, w->rect, w->channel);
+        out->worst.log10_p = w->log10_p;
         out->worst.mdb = region_mdb(&j, &m, w->channel);
     }
     verdict_decide(out, opt, tiles);

@@ -123,6 +123,7 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
     if (!check_options(opt, e))
         return false;
     *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
+    j->is_pooled = is_image(a);
     set_shares(a, b, j);
     if (!check_side(a, j, e))
         return err_prefix(e, "A");

@@ -67,7 +67,7 @@ bool matched_filter_test(const struct moments *a, const struct moments *b, struc
             continue;
         struct sums s = sum_up(j, &base, k);
         struct measured m = region_measure_weighted(j, &s.cell, s.unit, s.size);
-        if (m.noise_free || !region_testable(j, &m))
+        if (m.noise_free || !region_is_normal(j, &m))
             continue;
         j->num_tests[STATISTIC_MATCHED_FILTER]++;
         double p = region_log10_p(j, &m, CHANNEL_LUMINANCE);

@@ -6,7 +6,9 @@
 #include <stdio.h>
 
 static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
-static const double skew_limit_widened = 1; /* of ln p, where the interval makes up for it */
+static const double skew_limit_raised = 4;  /* of ln p, where p makes up for it */
+static const double largest_gx = 0.3;       /* |g| x there, as the next term has (g x)^2 */
+static const double skew_limit_widened = 1; /* of ln p, where the interval does */
 static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;
@@ -39,6 +41,11 @@ static double margin_of(const struct judge *j, struct rect r)
     return opt->margin_tile + f * (opt->margin_global - opt->margin_tile);
 }
 
+static double skew_of(const struct cell *cell, double v)
+{
+    return (fabs(cell->k3) + sqrt(cell->var_k3)) / (v * sqrt(v));
+}
+
 static struct measured measure(const struct cell *cell, double unit, double size, double margin,
                                int statistic)
 {
@@ -46,6 +53,7 @@ static struct measured measure(const struct cell *cell, double unit, double size
                          .unit = unit,
                          .margin = margin,
                          .tolerance = float_tolerance * size + cell->tolerance,
+                         .skew_around = INFINITY,
                          .log10_alike = cell->log10_alike,
                          .statistic = statistic};
     m.v = cell->va + cell->vb;
@@ -54,15 +62,26 @@ static struct measured measure(const struct cell *cell, double unit, double size
     if (!m.noise_free) {
         m.dof = stats_dof(m.v, cell->var_v);
         m.dof_normal = stats_dof(m.v, cell->var_v_normal);
-        m.skew = (fabs(cell->k3) + sqrt(cell->var_k3)) / (m.v * sqrt(m.v));
+        m.skew = skew_of(cell, m.v);
     }
     return m;
 }
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
 {
-    return measure(cell, fmax(cell->b, j->floor * r.width * r.height), fmax(cell->a, cell->b),
-                   margin_of(j, r), is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID);
+    struct measured m =
+        measure(cell, fmax(cell->b, j->floor * r.width * r.height), fmax(cell->a, cell->b),
+                margin_of(j, r), is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID);
+    if (is_image(j, r) || j->is_pooled)
+        m.skew_around = m.skew;
+    return m;
+}
+
+void region_look_around(const struct judge *j, struct measured *m, const struct cell *around)
+{
+    double v = around->va + around->vb;
+    if (!m->noise_free && !j->is_pooled)
+        m->skew_around = skew_of(around, v) * sqrt(v / m->v);
 }
 
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
@@ -72,18 +91,31 @@ struct measured region_measure_weighted(const struct judge *j, const struct cell
 }
 
 /* ln of the factor by which a tail probability at x may be off [Shao99]. */
-static double skew_factor(const struct measured *m, double x)
+static double skew_factor(double skew, double x)
 {
-    return m->skew * x * x * x / 3;
+    return skew * x * x * x / 3;
+}
+
+/* t is beyond z: most small regions fail already there. */
+static bool is_within(const struct judge *j, const struct measured *m, double skew, double limit,
+                      double gx)
+{
+    double z = j->z_guard[m->statistic];
+    if (skew_factor(skew, z) > limit)
+        return false;
+    double t = stats_t_of_z(z, m->dof);
+    return skew_factor(skew, t) <= limit && skew * t <= gx;
+}
+
+bool region_is_normal(const struct judge *j, const struct measured *m)
+{
+    return m->noise_free || is_within(j, m, m->skew, skew_limit, INFINITY);
 }
 
 bool region_testable(const struct judge *j, const struct measured *m)
 {
-    double z = j->z_guard[m->statistic];
-    if (m->noise_free)
-        return true;
-    /* t is beyond z: most small regions fail already there. */
-    return skew_factor(m, z) <= skew_limit && skew_factor(m, stats_t_of_z(z, m->dof)) <= skew_limit;
+    return region_is_normal(j, m) ||
+           is_within(j, m, fmax(m->skew, m->skew_around), skew_limit_raised, largest_gx);
 }
 
 double region_excess_t(const struct measured *m)
@@ -112,11 +144,35 @@ static double log10_p_noise_free(const struct judge *j, const struct measured *m
     return fmin(0, log10(2) + fmin(missed, m->log10_alike));
 }
 
+/* ln of what skewness may put on the p of t. Beyond x = 1/g the expansion behind it has turned round. */
+static double skew_at(double skew, double t)
+{
+    return skew_factor(skew, fmin(t, 1 / skew));
+}
+
+/* By which p is raised; 0 where it is trusted as it is. */
+static double skew_of_p(const struct judge *j, const struct measured *m)
+{
+    return region_is_normal(j, m) ? 0 : fmax(m->skew, m->skew_around);
+}
+
+static double raised_log10_p(const struct measured *m, double t, double skew)
+{
+    double log10_p = stats_t_log10_p(t, m->dof) + skew_at(skew, t) / log(10);
+    return fmin(0, fmax(region_smallest_log10_p, log10_p));
+}
+
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
 {
     if (m->noise_free)
         return log10_p_noise_free(j, m, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
-    return fmax(region_smallest_log10_p, stats_t_log10_p(fmax(0, region_excess_t(m)), m->dof));
+    return raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
+}
+
+double region_rank(const struct judge *j, const struct measured *m)
+{
+    double t = fmax(0, region_excess_t(m)), z = stats_z_of_t(t, m->dof);
+    return sqrt(fmax(0, z * z - 2 * skew_at(skew_of_p(j, m), t)));
 }
 
 double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel)
@@ -124,10 +180,7 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
     double excess = fmax(0, fabs(m->d) - m->tolerance);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
-    double t = excess / sqrt(m->v);
-    /* Beyond x = 1/g the expansion behind the factor has turned round. */
-    double factor = skew_factor(m, fmin(t, 1 / m->skew)) / log(10);
-    return fmin(0, fmax(region_smallest_log10_p, stats_t_log10_p(t, m->dof) + factor));
+    return raised_log10_p(m, excess / sqrt(m->v), m->skew);
 }
 
 double region_t(const struct measured *m)
@@ -137,17 +190,29 @@ double region_t(const struct measured *m)
     return fmin(largest_t, fmax(-largest_t, m->d / sqrt(m->v)));
 }
 
+/* *x: quantile of alpha less the factor that skewness may put on it; false if that factor is too large to be trusted. */
+static bool raised_quantile(double skew, double alpha, double dof, double limit, double *x)
+{
+    double factor = 0;
+    for (int i = 0; i < 4; i++) {
+        *x = stats_t_quantile(alpha * exp(-factor), dof);
+        factor = fmin(limit, skew_factor(skew, *x));
+    }
+    return factor < limit;
+}
+
 double region_mdb(const struct judge *j, const struct measured *m, int channel)
 {
-    double tests = (double)j->num_tests[m->statistic], reach;
+    double tests = (double)j->num_tests[m->statistic], reach, x = 0;
     double level = j->opt.alpha * j->share[m->statistic] / tests;
-    if (m->noise_free)
+    if (m->noise_free) {
         reach = m->log10_alike + log10(2) <= log10(level)
                     ? 0
                     : j->event[channel] / j->n_min * -log(level);
-    else
-        reach = sqrt(m->v_margin) *
-                (stats_t_quantile(level / 2, m->dof) + stats_t_quantile(0.05, m->dof));
+    } else {
+        raised_quantile(skew_of_p(j, m), level / 2, m->dof, 2 * skew_limit_raised, &x);
+        reach = sqrt(m->v_margin) * (x + stats_t_quantile(0.05, m->dof));
+    }
     return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
 }
 
@@ -167,16 +232,11 @@ double region_reach(const struct region *r)
     return fmax(fabs(r->ci_lo), fabs(r->ci_hi));
 }
 
-/* Half the width of the 1 - 2 alpha interval, in standard errors. alpha is first divided by the
- * factor that skewness may put on it; false if that factor is too large to be trusted. */
+/* Half the width of the 1 - 2 alpha interval, in standard errors. */
 static bool half_width(const struct judge *j, const struct measured *m, double *x)
 {
-    double factor = 0;
-    for (int i = 0; i < 4; i++) {
-        *x = stats_t_quantile(j->opt.alpha * exp(-factor), fmax(least_dof, m->dof));
-        factor = fmin(skew_limit_widened, skew_factor(m, *x));
-    }
-    return factor < skew_limit_widened && m->dof >= least_dof;
+    return raised_quantile(m->skew, j->opt.alpha, fmax(least_dof, m->dof), skew_limit_widened, x) &&
+           m->dof >= least_dof;
 }
 
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size)

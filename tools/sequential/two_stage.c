@@ -75,6 +75,12 @@ static bool region_again(const struct region *found, const struct moments *a,
     struct rect r = {found->x, found->y, found->width, found->height};
     struct cell cell = cell_of(a, b, r, found->channel);
     struct measured m = region_measure(&j, &cell, r);
+    struct rect wide = {r.x > 2 * r.width ? r.x - 2 * r.width : 0,
+                        r.y > 2 * r.height ? r.y - 2 * r.height : 0, 5 * r.width, 5 * r.height};
+    wide.width = wide.x + wide.width < a->width ? wide.width : a->width - wide.x;
+    wide.height = wide.y + wide.height < a->height ? wide.height : a->height - wide.y;
+    struct cell around = cell_of(a, b, wide, found->channel);
+    region_look_around(&j, &m, &around);
     *difference = m.d / m.unit;
     *log10_p = 0;
     if (region_testable(&j, &m) && m.d * found->difference > 0)
