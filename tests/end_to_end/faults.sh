@@ -350,7 +350,8 @@ ours_to_mend() {
             umount "$dir/temp"
             tell "TMPDIR of 1 to 13 MB takes no points${mode:+, $mode}" "$([ $n -lt 7 ] || echo 'there was room every time')"
         else echo "skip TMPDIR of 1 to 13 MB: cannot mount one"; fi
-        for k in 1 2 3 4 5 6; do
+        # Without the sandbox there is none to kill: the process is the program, which may have killed itself.
+        for k in $([ -n "$mode" ] || echo 1 2 3 4 5 6); do
             "${grade[@]}" >/dev/null 2>&1 &
             pid=$! && sleep 0.$k
             while kill -0 $pid 2>/dev/null; do
@@ -363,7 +364,7 @@ ours_to_mend() {
                 tell "a killed supervisor${mode:+, $mode}" "status $n: $(cat "$dir/grades/grades.csv")"
             rm -rf "$dir/grades"
         done
-        tell "6 killed supervisors take no points${mode:+, $mode}" ""
+        [ -n "$mode" ] || tell "6 killed supervisors take no points" ""
         for k in 8 12 16 20 24 32; do
             judge "$k descriptors${mode:+, $mode}" bash -c 'ulimit -n '$k'; exec "$@"' bash "${grade[@]}"
         done

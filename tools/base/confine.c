@@ -186,7 +186,8 @@ bool confine_enter(const void *ctx)
 {
     const struct confine *c = ctx;
     unsigned char filter[CONFINE_FILTER];
-    if ((c->in >= 0 && dup2(c->in, 0) < 0) || (c->out >= 0 && dup2(c->out, 1) < 0))
+    if (!memory_group_enter(&c->group) || (c->in >= 0 && dup2(c->in, 0) < 0) ||
+        (c->out >= 0 && dup2(c->out, 1) < 0))
         return false;
     /* The C library's own would tell threads that are not there. */
     if (c->user != 0 && (syscall(SYS_setgroups, 0, NULL) != 0 ||

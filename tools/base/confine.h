@@ -3,6 +3,8 @@
 #ifndef ASSAY_CONFINE_H
 #define ASSAY_CONFINE_H
 
+#include "memory_group.h"
+
 #include "renderer/base/err.h"
 
 #include <stddef.h>
@@ -10,7 +12,8 @@
 struct confine {
     unsigned user; /* and group; 0: stays who it is */
     int in, out;   /* stdin and stdout, borrowed; -1: as they are */
-    int files;     /* a Landlock ruleset; -1: none. The caller closes it */
+    struct memory_group group;
+    int files; /* a Landlock ruleset; -1: none. The caller closes it */
 };
 
 enum { CONFINE_FILTER = 512 /* bytes of a filter, at most */ };

@@ -2,6 +2,7 @@
 #include "sandbox_internal.h"
 
 #include "confine.h"
+#include "memory_group.h"
 
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
@@ -42,9 +43,9 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
     return true;
 }
 
-/* What the supervisor says it was; without a word of it, the clock or the machine. */
-static void read_report(const char *out, const struct sandbox_job *job, const struct err *last,
-                        struct sandbox_result *r)
+/* What the supervisor says it was; without a word of it, the clock or the machine. no_memory: the kernel has killed somebody. */
+static void read_report(const char *out, const struct sandbox_job *job, bool no_memory,
+                        const struct err *last, struct sandbox_result *r)
 {
     char path[MAX_PATH], word[16] = "";
     snprintf(path, sizeof path, "%s/.report", out);
@@ -58,7 +59,10 @@ static void read_report(const char *out, const struct sandbox_job *job, const st
     unlink(path);
     snprintf(path, sizeof path, "%s/.memory", out);
     unlink(path);
-    sandbox_conclude(job, known ? word : NULL, last, r);
+    if (no_memory && (!known || r->status != 0))
+        sandbox_conclude(job, "memory", last, r);
+    else
+        sandbox_conclude(job, known ? word : NULL, last, r);
 }
 
 /* Files that are too large are no output. */
@@ -100,17 +104,22 @@ static bool run_boxed(const struct sandbox *s, const struct sandbox_job *job,
     }
     if (ok) {
         struct process_usage usage = {0};
+        struct memory_group group;
         struct err last = {""};
         const struct process p = {.argv = l->arg,
                                   .log = job->log,
                                   .log_most = SANDBOX_LOG,
-                                  .timeout_s = job->limit.wall_s};
+                                  .timeout_s = job->limit.wall_s,
+                                  .before = memory_group_enter,
+                                  .before_ctx = &group};
+        memory_group_open(&group, sandbox_all_memory(&job->limit));
         if (!process_run(&p, &usage, &last) && usage.wall_s == 0)
             ok = err_set(e, "%.500s", last.msg);
+        bool no_memory = memory_group_close(&group);
         out->wall_s = usage.wall_s;
         out->cpu_s = usage.cpu_s;
         if (ok)
-            read_report(job->out, job, &last, out);
+            read_report(job->out, job, no_memory, &last, out);
         drop_large(job->out, job);
     }
     free(l);

@@ -8,14 +8,13 @@
  * bounded size, never through a link that leads outside, as there is nothing outside. Whoever runs us as root
  * has the programs run by "nobody", since the kernel does not count root's processes.
  *
- * Limits of this: no filter of system calls (a hole in the kernel is a way out); memory is watched five times
- * a second, not reserved, beyond what each process may have for itself; System V shared memory that no process
- * has attached is not seen. A machine that forbids user namespaces (many containers) has no sandbox.
+ * Limits of this: a filter refuses a few system calls, no more (a hole in the kernel is a way out); memory of all together is
+ * watched five times a second where no control group can be made, not reserved, beyond what each process may have for itself. A machine that forbids user namespaces (many containers) has no sandbox.
  *
  * Unsafe, as it is called, where namespaces are forbidden: as root, each run is made by a user of its own (run_user.h), of whom
  * nothing stays: all its processes are ended, its files removed; unpacking, copying and packing are done as that user, so that no link is
  * followed by root. System calls for what no limit counts, the network and other processes are refused by seccomp, files that are not the
- * system's or its own by Landlock (confine.h), where the kernel has these. Not kept: the limits of disk and of memory of all processes together.
+ * system's or its own by Landlock (confine.h), where the kernel has these. Not kept: the limit of disk, and that of memory of all processes together where no control group (memory_group.h) can be made.
  * As another user, only the last two and the limits of a process hold. */
 #ifndef ASSAY_SANDBOX_H
 #define ASSAY_SANDBOX_H

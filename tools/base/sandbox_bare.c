@@ -92,7 +92,7 @@ static bool as_user(struct bare *b, const char *script, const char *word, size_t
     char limit[48];
     struct process_usage usage = {0};
     struct err why = {""};
-    struct confine c = b->c;
+    struct confine c = b->c; /* in no group: none is open */
     c.in = in;
     c.out = out;
     snprintf(limit, sizeof limit, "--fsize=%zu", fsize);
@@ -153,14 +153,22 @@ static bool run_program(struct bare *b, struct sandbox_result *r, struct err *e)
                               .before = confine_enter,
                               .before_ctx = &b->c};
     bool ok = !l->overflow || err_set(e, "%s: the command is too long", b->job->argv[0]);
+    memory_group_open(&b->c.group, sandbox_all_memory(&b->job->limit));
     if (ok && !process_run(&p, &usage, &last) && usage.wall_s == 0)
         ok = err_set(e, "%.500s", last.msg);
+    if (b->user.id != 0) /* what runs on could change what is handed out */
+        ok = run_user_end(&b->user, e) && ok;
+    bool no_memory = memory_group_close(&b->c.group);
     free(l);
     r->wall_s = usage.wall_s;
     r->cpu_s = usage.cpu_s;
     r->status = usage.signal > 0 ? 128 + usage.signal : usage.exit_status;
     if (ok)
-        sandbox_conclude(b->job, r->status >= 0 ? "ended" : NULL, &last, r);
+        sandbox_conclude(b->job,
+                         no_memory && r->status != 0 ? "memory"
+                         : r->status >= 0            ? "ended"
+                                                     : NULL,
+                         &last, r);
     return ok && (r->end == SANDBOX_OK || has_room(b, e));
 }
 
@@ -212,8 +220,6 @@ static bool run_made(struct bare *b, struct sandbox_result *r, struct err *e)
     if (!unpack(b, r, &done, e) || !done)
         return e->msg[0] == '\0';
     bool ok = run_program(b, r, e);
-    if (b->user.id != 0) /* what runs on could change what is handed out */
-        ok = run_user_end(&b->user, e) && ok;
     for (const char *const *name = b->job->keep; ok && name != NULL && *name != NULL; name++)
         ok = hand_out(b, *name, e);
     return ok && (!b->job->keep_tree || hand_out_tree(b, e));
@@ -222,7 +228,8 @@ static bool run_made(struct bare *b, struct sandbox_result *r, struct err *e)
 bool sandbox_run_bare(const struct sandbox *s, const struct sandbox_job *job,
                       struct sandbox_result *out, struct err *e)
 {
-    struct bare b = {.s = s, .job = job, .c = {.in = -1, .out = -1, .files = -1}};
+    struct bare b = {
+        .s = s, .job = job, .c = {.in = -1, .out = -1, .files = -1, .group = {.procs = -1}}};
     struct err why = {""};
     if (s->drop && !run_user_take(&b.user, e))
         return false;

@@ -12,6 +12,12 @@ const char *const sandbox_end_name[] = {
     [SANDBOX_LOST] = "lost",
 };
 
+size_t sandbox_all_memory(const struct sandbox_limits *limit)
+{
+    enum { OURS = 64 << 20 };
+    return limit->memory + 3 * limit->disk + OURS;
+}
+
 void sandbox_conclude(const struct sandbox_job *job, const char *word, const struct err *last,
                       struct sandbox_result *r)
 {

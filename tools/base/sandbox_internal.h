@@ -22,6 +22,9 @@ void sandbox_line_boxed(struct sandbox_line *l, const struct sandbox *s,
 void sandbox_line_bare(struct sandbox_line *l, const struct sandbox_job *job, const char *box,
                        const char *temp);
 
+/* What a run may have of memory, files in it included, where the kernel counts it (memory_group.h). */
+size_t sandbox_all_memory(const struct sandbox_limits *limit);
+
 /* Fills in r->end and r->why from r->status, r->wall_s and r->cpu_s. word: what else is known ("memory", "disk", "unpack"); NULL: it was killed
  * before it ended. last: of process_run(). */
 void sandbox_conclude(const struct sandbox_job *job, const char *word, const struct err *last,

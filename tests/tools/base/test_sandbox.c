@@ -4,6 +4,7 @@
 #define _GNU_SOURCE
 
 #include "renderer/base/fs.h"
+#include "tools/base/memory_group.h"
 #include "tools/base/sandbox.h"
 #include "tests/support/test.h"
 
@@ -649,6 +650,26 @@ TEST(nothing_of_a_run_without_namespaces_is_left)
     snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
 }
 
+/* Eight with 100 MB each, which no process may not have, and no namespaces in which somebody counts them: the kernel does. Control: two. */
+TEST(memory_of_all_is_bounded_without_namespaces)
+{
+    only_root();
+    struct memory_group group;
+    memory_group_open(&group, MIB);
+    if (group.path[0] == '\0')
+        skip();
+    memory_group_close(&group);
+    struct sandbox s;
+    struct err e;
+    MUST(sandbox_open(true, NULL, &s, &e));
+    static const char fill[] =
+        "set --; for i in %s; do (head -c 100M /dev/zero; sleep 2) | tail -n 1 >/dev/null & set -- $@ $!; done;"
+        "for p; do wait $p || exit 1; done";
+    assert_int_equal(run_bare(&s, fs_path(fill, "1 2 3 4 5 6 7 8").s, NULL).end, SANDBOX_MEMORY);
+    assert_int_equal(run_bare(&s, fs_path(fill, "1 2").s, NULL).end, SANDBOX_OK);
+    sandbox_close(&s);
+}
+
 /* What a run sees and reaches where there are no namespaces; every line of the script that works says its number. Control: outside, the
  * first six do. */
 TEST(a_run_without_namespaces_reaches_only_its_own)
@@ -676,7 +697,7 @@ TEST(a_run_without_namespaces_reaches_only_its_own)
     const char *said = kept("out.png");
     assert_non_null(said);
     for (int i = 1; i <= 9; i++) {
-        char word[8];
+        char word[24];
         snprintf(word, sizeof word, "ok %d", i);
         bool by_landlock = i == 1 || i == 2 || i == 8;
         if (strstr(said, word) != NULL &&
