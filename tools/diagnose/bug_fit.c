@@ -257,9 +257,23 @@ static struct tally total(const struct bug_fit *f, const struct candidate *b)
     return sum;
 }
 
+/* norm^-1/2 is the standard deviation of along/norm. The catalogue's own noise adds to the squares of an effect and not to
+ * the product with what is seen, so along/signal is the strength. */
+struct projection {
+    double along, norm, signal;
+};
+
+static void project_value(struct projection *p, double effect, double effect_var, double seen,
+                          double var)
+{
+    p->along += effect * seen / var;
+    p->norm += effect * effect / var;
+    p->signal += (effect * effect - effect_var) / var;
+}
+
 /* base: the effect that is there in any case; NULL: none. */
 static void project_facts(const struct observation *clue, const struct effect *e,
-                          const struct effect *base, double *along, double *norm)
+                          const struct effect *base, struct projection *p)
 {
     const struct signature *a = &clue->seen, *c = &clue->view->correct;
     for (int f = 0; f < NUM_FACTS; f++) {
@@ -268,8 +282,7 @@ static void project_facts(const struct observation *clue, const struct effect *e
         double var = pow(a->fact_sd[f], 2) + pow(e->fact_sd[f], 2) + pow(fact_error[f], 2);
         if (isnan(a->fact[f]) || isnan(effect))
             continue;
-        *along += effect * (a->fact[f] - there) / var;
-        *norm += effect * effect / var;
+        project_value(p, effect, 0, a->fact[f] - there, var);
     }
 }
 
@@ -290,12 +303,11 @@ static const struct effect *likelier(const struct bug_fit *f, int clue, int bug,
     return room;
 }
 
-/* Least squares with the weights of "correct": norm^-1/2 is the standard deviation of along/norm. given: a bug that
- * is there in any case, of whose effect what bug and second add is judged; -1: none. */
-static void project(const struct bug_fit *f, int bug, int second, int given, double *along,
-                    double *norm)
+/* Least squares with the weights of "correct". given: a bug that is there in any case, of whose effect what bug and second
+ * add is judged; -1: none. */
+static struct projection project(const struct bug_fit *f, int bug, int second, int given)
 {
-    *along = *norm = 0;
+    struct projection p = {0};
     for (int k = 0; k < f->num_clues; k++) {
         struct effect room;
         const struct view *v = f->clue[k].view;
@@ -308,36 +320,39 @@ static void project(const struct bug_fit *f, int bug, int second, int given, dou
             double effect = (double)e->mean[i] - there;
             double var = variance_of(&f->clue[k], i, 1) + (double)e->var[i] + tiny * tiny +
                          pow(bug_fit_model_error * (double)e->mean[i], 2);
-            *along += effect * (a->mean[i] - c->mean[i] - there) / var;
-            *norm += effect * effect / var;
+            double noise = f->states_error && base == NULL ? (double)e->var[i] : 0;
+            project_value(&p, effect, noise, a->mean[i] - c->mean[i] - there, var);
         }
         if (e != NULL)
-            project_facts(&f->clue[k], e, base, along, norm);
+            project_facts(&f->clue[k], e, base, &p);
     }
+    return p;
 }
 
-static bool is_full_strength(double along, double norm)
+static double strength_of(const struct projection *p)
+{
+    return p->signal > 0 ? p->along / p->signal : 0;
+}
+
+static bool is_full_strength(const struct projection *p)
 {
     static const double least_t = 8, strength_error = 0.1, deviations = 3;
-    return norm > 0 && along / sqrt(norm) >= least_t &&
-           fabs(along / norm - 1) <= strength_error + deviations / sqrt(norm);
+    return p->signal > 0 && p->along / sqrt(p->norm) >= least_t &&
+           fabs(strength_of(p) - 1) <= strength_error + deviations * sqrt(p->norm) / p->signal;
 }
 
 bool bug_fit_is_full(const struct bug_fit *f, const struct candidate *c)
 {
-    double along, norm;
     bool is_pair = c->second >= 0;
-    project(f, c->bug, c->second, is_pair ? c->bug : -1, &along, &norm);
-    bool full = is_full_strength(along, norm);
-    project(f, c->bug, c->second, is_pair ? c->second : -1, &along, &norm);
-    return full && is_full_strength(along, norm);
+    struct projection first = project(f, c->bug, c->second, is_pair ? c->bug : -1),
+                      other = project(f, c->bug, c->second, is_pair ? c->second : -1);
+    return is_full_strength(&first) && is_full_strength(&other);
 }
 
 double bug_fit_amplitude(const struct bug_fit *f, int bug)
 {
-    double along, norm;
-    project(f, bug, -1, -1, &along, &norm);
-    return norm > 0 ? fmin(fmax(along / norm, least_amplitude), largest_amplitude) : 1;
+    struct projection p = project(f, bug, -1, -1);
+    return p.signal > 0 ? fmin(fmax(strength_of(&p), least_amplitude), largest_amplitude) : 1;
 }
 
 /* Golden section. */
@@ -360,16 +375,15 @@ struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double
 {
     struct candidate out = {.bug = bug, .second = second, .amplitude = amplitude};
     struct tally t = total(f, &out), none = {0};
-    double along, norm;
+    const struct projection p = project(f, bug, second, -1);
     for (int k = 0; k < f->num_clues; k++)
         sum_up(&none, &f->correct[k]);
-    project(f, bug, second, -1, &along, &norm);
     out.log_likelihood =
         t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
     out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : NAN;
     out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
-    out.strength = norm > 0 ? along / norm : 0;
-    out.t = norm > 0 ? along / sqrt(norm) : 0;
+    out.strength = strength_of(&p);
+    out.t = p.norm > 0 ? p.along / sqrt(p.norm) : 0;
     return out;
 }
 
@@ -395,8 +409,11 @@ double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *cl
 bool bug_fit_start(const struct catalogue *c, const struct observation *clue, int num_clues,
                    double clip, struct bug_fit *out, struct err *e)
 {
-    *out =
-        (struct bug_fit){c, clue, num_clues, clip, calloc((size_t)num_clues, sizeof(struct tally))};
+    *out = (struct bug_fit){.c = c,
+                            .clue = clue,
+                            .num_clues = num_clues,
+                            .clip = clip,
+                            .correct = calloc((size_t)num_clues, sizeof(struct tally))};
     if (out->correct == NULL)
         return err_set(e, "out of memory");
     for (int k = 0; k < num_clues; k++)

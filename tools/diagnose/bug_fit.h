@@ -19,6 +19,8 @@ struct bug_fit {
     int num_clues;
     double clip;           /* radiance of the brightest code; 0: none */
     struct tally *correct; /* of each clue, without a bug; NULL: made anew */
+    bool
+        states_error; /* set after the start: strengths are those without the noise of the stored effect */
 };
 
 /* How well an effect is known to be the same at another size, and what floats, stored and rendered, are good for: relative. */

@@ -336,6 +336,7 @@ bool diagnose(const struct catalogue *c, const struct observation *clue, int num
     ok = ok && (all != NULL || err_set(e, "out of memory")) &&
          bug_fit_start(c, clue, num_clues, opt->clip, &f, e) &&
          (opt->by_likelihood || gate(clue, num_clues, opt->alpha, &differs, out, e));
+    f.states_error = !opt->by_likelihood;
     for (int k = 0; ok && k < num_clues; k++)
         out->log_likelihood += f.correct[k].log_likelihood;
     int num = ok ? rank_full(&f, opt, all) : 0;
