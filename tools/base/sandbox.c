@@ -213,6 +213,7 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
         sandbox_close(out);
         return false;
     }
+    chmod(scene.s, 0755); /* whatever the umask */
     const struct path probe = fs_path("%s/probe", out->dir.path);
     struct sandbox_result r = {0};
     const struct sandbox_job job = {.argv = (const char *const[]){"true", NULL},

@@ -20,6 +20,7 @@ static bool has_sandbox;
 static char out_dir[700];
 /* Of the next runs: a build, with a compiler cache. */
 static bool tools, fill_cache;
+static bool too_large; /* what was packed last */
 static const char *cache, *library;
 
 static const struct sandbox_limits small = {.wall_s = 60,
@@ -280,7 +281,7 @@ TEST(links_lead_nowhere)
              "mkdir %s && ln -s %s %s/out.png && ln -s / %s/scene && echo own >%s/second", dir,
              secret, dir, dir, dir);
     assert_int_equal(system(command), 0);
-    assert_true(sandbox_pack(dir, tree, MIB, &(bool){false}, &e));
+    assert_true(sandbox_pack(dir, tree, MIB, &too_large, &e));
     assert_int_equal(run_with("cat out.png", small, tree).end, SANDBOX_FAILED);
     assert_null(kept("out.png"));
     assert_string_equal(kept("second"), "own\n");
@@ -530,9 +531,8 @@ TEST(a_tree_goes_from_one_run_to_the_next)
              box.dir.path, box.dir.path);
     assert_int_equal(system(command), 0);
     snprintf(command, sizeof command, "%s/large", box.dir.path);
-    assert_true(sandbox_pack(command, moved, (size_t)64 * MIB, &(bool){false}, &e));
+    assert_true(sandbox_pack(command, moved, (size_t)64 * MIB, &too_large, &e));
     assert_int_equal(run_with("true", small, moved).end, SANDBOX_UNPACK);
-    bool too_large;
     REFUSES(sandbox_pack(command, moved, MIB, &too_large, &e), "cannot be packed into 1 MiB");
     assert_true(too_large);
     REFUSES(sandbox_pack(command, "/nowhere/x.tar", MIB, &too_large, &e), "cannot be packed");
@@ -610,7 +610,7 @@ TEST(a_folder_that_is_swapped_leads_nowhere)
         "mkdir -p %s/d %s/w %s && cd %s/d && seq 2000 | xargs touch && cd %s && seq 5000 9000 | xargs touch",
         dir.s, s.dir.path, victim.s, dir.s, victim.s);
     assert_int_equal(system(make.s), 0);
-    MUST(sandbox_pack(dir.s, tree.s, 16 * MIB, &(bool){false}, &e));
+    MUST(sandbox_pack(dir.s, tree.s, 16 * MIB, &too_large, &e));
     const struct path script = fs_path(
         "setsid sh -c 'while [ ! -e %s/stop ]; do [ -L d ] || ! mv d was 2>/dev/null || ln -s %s d; cd %s/w/box; done' "
         ">/dev/null 2>&1 & sleep 0.2",
