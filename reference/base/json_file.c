@@ -10,14 +10,13 @@
 json_t *json_read(const char *path, size_t flags, json_error_t *why)
 {
     FILE *f = fs_open(path);
-    json_error_t ignored, *at = why != NULL ? why : &ignored;
     if (f == NULL) {
-        *at = (json_error_t){.line = -1, .column = -1};
-        snprintf(at->text, sizeof at->text, "unable to open %.60s%s: %s", path,
+        *why = (json_error_t){.line = -1, .column = -1};
+        snprintf(why->text, sizeof why->text, "unable to open %.60s%s: %s", path,
                  strlen(path) > 60 ? "..." : "", strerror(errno));
         return NULL;
     }
-    json_t *root = json_loadf(f, flags, at);
+    json_t *root = json_loadf(f, flags, why);
     fclose(f);
     return root;
 }
