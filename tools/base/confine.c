@@ -143,8 +143,8 @@ static bool allow_around(int ruleset, const char *path, const char *const *hidde
         return allow(ruleset, path, READ, e);
     DIR *d = opendir(path);
     struct dirent *entry;
-    bool ok = true;
-    while (ok && d != NULL && (entry = readdir(d)) != NULL)
+    bool ok = d != NULL || err_set(e, "%s: cannot be shown to programs: %s", path, strerror(errno));
+    while (ok && (entry = readdir(d)) != NULL)
         if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0 &&
             entry->d_type != DT_LNK)
             ok = allow_around(ruleset, fs_path("%s/%s", path, entry->d_name).s, hidden, e);

@@ -29,8 +29,8 @@ static const char lock_dir[] = "/run/assay-users";
 /* Does any process run as it? Zombies do not: in a container nobody may ever wait for them. */
 static bool has_processes(unsigned id)
 {
-    bool found = false;
     DIR *d = opendir("/proc");
+    bool found = d == NULL; /* nobody knows */
     struct dirent *entry;
     while (d != NULL && !found && (entry = readdir(d)) != NULL) {
         char line[256];
@@ -121,6 +121,8 @@ static bool remove_files(unsigned id, struct err *e)
     for (size_t i = 0; i < sizeof shared / sizeof *shared; i++) {
         DIR *d = opendir(shared[i]);
         struct dirent *entry;
+        if (d == NULL && errno != ENOENT)
+            ok = err_set(e, "%s: %s", shared[i], strerror(errno));
         while (d != NULL && (entry = readdir(d)) != NULL) {
             struct stat st;
             if (fstatat(dirfd(d), entry->d_name, &st, AT_SYMLINK_NOFOLLOW) == 0 && st.st_uid == id)
