@@ -52,8 +52,11 @@ static bool read_report(const char *log, json_t **report, struct err *e)
     while (*report == NULL && getline(&line, &size, f) > 0)
         if (strncmp(line, mark, sizeof mark - 1) == 0)
             *report = json_loads(line + sizeof mark - 1, 0, NULL);
+    bool no_memory = *report == NULL && !feof(f) && !ferror(f);
     free(line);
     fclose(f);
+    if (no_memory)
+        return err_set(e, "%s: out of memory", log);
     const char *version = json_string_value(json_object_get(*report, "version"));
     if (version != NULL && json_is_object(json_object_get(*report, "settings")))
         return true;

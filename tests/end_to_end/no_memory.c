@@ -353,7 +353,8 @@ static bool may_be_left(const char *path)
     if (end - path < 7)
         return false;
     /* Of the last program that ran, one of several. */
-    if (strcmp(end - 4, ".log") == 0 || strstr(path, "/consistency.exr") != NULL)
+    if (strcmp(end - 4, ".log") == 0 || strstr(path, "/consistency.exr") != NULL ||
+        strstr(path, "/.assay-lock") != NULL)
         return true;
     return strstr(line, strrchr(path, '/') + 1) != NULL
                ? end[-7] == '-'

@@ -13,6 +13,7 @@ plain=$(realpath "${PLAIN_BUILD:-$build}")/no_memory/pathtracer
 root=$PWD scenes=$PWD/reference/scenes seeds=$PWD/tests/fuzz/seeds
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
+chmod 711 "$tmp"
 failures=0
 mkdir "$tmp/bin" "$tmp/in"
 export PATH=$tmp/bin:$PATH NO_MEMORY_DONE=$tmp/done

@@ -4,7 +4,9 @@
 #include "renderer/base/fs.h"
 #include "tools/base/temp_dir.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <string.h>
 #include <stdlib.h>
 
 void reproduced_free(struct reproduced *r)
@@ -14,19 +16,24 @@ void reproduced_free(struct reproduced *r)
 }
 
 /* Told from an EXR by its first byte. */
-static bool is_results(const char *path)
+static bool is_results(const char *path, bool *is, struct err *e)
 {
     FILE *f = fs_open(path);
-    int first = f != NULL ? getc(f) : EOF;
-    if (f != NULL)
-        fclose(f);
-    return first == '{' || first == '[';
+    if (f == NULL)
+        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    int first = getc(f);
+    fclose(f);
+    *is = first == '{' || first == '[';
+    return true;
 }
 
 static bool make_again(const char *path, const struct reproduce_options *opt, const char *dir,
                        struct reproduced *out, struct err *e)
 {
-    if (!is_results(path))
+    bool is = false;
+    if (!is_results(path, &is, e))
+        return false;
+    if (!is)
         return rerender(path, opt, dir, out, e);
     if (opt->scene != NULL || opt->pathtracer != NULL)
         return err_set(e, "%s: --scene and --pathtracer are for renders", path);
