@@ -62,7 +62,7 @@ struct maker {
 };
 
 /* The correct renderer's batches, kept while a view's bugs are rendered. */
-struct error_modes_base {
+struct base {
     struct diagnose_job job;
     struct signature batch[BATCHES];
 };
@@ -101,8 +101,8 @@ static bool is_same_view(const struct view *a, const struct view *b)
            a->seed == b->seed;
 }
 
-static bool render(const struct error_modes_base *base, const char *program, int batch,
-                   struct signature *out, struct err *e)
+static bool render(const struct base *base, const char *program, int batch, struct signature *out,
+                   struct err *e)
 {
     struct diagnose_job job = base->job;
     job.program = program;
@@ -130,7 +130,7 @@ static int repeat(const struct signature *s, int times, struct signature *all)
     return times;
 }
 
-static bool make_batches(struct error_modes_base *base, const char *program, struct err *e)
+static bool make_batches(struct base *base, const char *program, struct err *e)
 {
     for (int k = 0; k < BATCHES; k++)
         if (!render(base, program, k, &base->batch[k], e))
@@ -139,8 +139,7 @@ static bool make_batches(struct error_modes_base *base, const char *program, str
 }
 
 /* A mean that depends on the number of samples asked for needs more renders instead of longer ones. */
-static bool make_correct(struct error_modes_base *base, const char *program, struct view *v,
-                         struct err *e)
+static bool make_correct(struct base *base, const char *program, struct view *v, struct err *e)
 {
     struct signature all[BATCHES + LONG_FACTOR * LONG], s;
     int num = BATCHES, times = v->fixed_spp ? 1 : LONG_FACTOR;
@@ -166,8 +165,8 @@ static bool make_correct(struct error_modes_base *base, const char *program, str
     return true;
 }
 
-static bool make_effect(const struct maker *m, const struct error_modes_base *base, struct view *v,
-                        int b, struct err *e)
+static bool make_effect(const struct maker *m, const struct base *base, struct view *v, int b,
+                        struct err *e)
 {
     struct signature bug[BATCHES];
     char program[4400];
@@ -212,7 +211,7 @@ static void take_over(struct maker *m, struct view *v, bool *missing)
 /* Bugs of one view that are missing. */
 struct effects {
     const struct maker *m;
-    const struct error_modes_base *base;
+    const struct base *base;
     struct view *view;
     const bool *missing;
 };
@@ -220,7 +219,7 @@ struct effects {
 static bool make_missing(void *arg, int b, struct err *e)
 {
     const struct effects *x = arg;
-    struct error_modes_base base = *x->base;
+    struct base base = *x->base;
     char dir[300];
     snprintf(dir, sizeof dir, "%s/%d", x->m->work, b);
     base.job.work_dir = dir;
@@ -230,7 +229,7 @@ static bool make_missing(void *arg, int b, struct err *e)
 static bool make_view(struct maker *m, int i, struct err *e)
 {
     struct view *v = &m->made.view[m->made.num_views];
-    struct error_modes_base *base = calloc(1, sizeof *base);
+    struct base *base = calloc(1, sizeof *base);
     bool *missing = calloc((size_t)m->made.num_bugs, sizeof *missing), any = false;
     bool ok = (base != NULL && missing != NULL) || err_set(e, "out of memory");
     ok = ok && set_view(m, i, v, e);
