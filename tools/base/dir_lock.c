@@ -35,7 +35,7 @@ bool dir_lock_take(struct dir_lock *l, const char *dir, struct err *e)
 {
     char host[HOST_NAME_MAX + 1] = "";
     e->msg[0] = '\0';
-    *l = (struct dir_lock){.fd = 0};
+    *l = (struct dir_lock){.fd = 0, .made = access(dir, F_OK) != 0};
     if (!fs_make_dirs(dir, e))
         return false;
     snprintf(l->path, sizeof l->path, "%.4000s/.assay-lock", dir);
@@ -71,6 +71,9 @@ void dir_lock_release(struct dir_lock *l)
     if (l->fd > 0) {
         unlink(l->path);
         close(l->fd);
+        *strrchr(l->path, '/') = '\0';
+        if (l->made)
+            rmdir(l->path);
     }
     l->fd = 0;
 }

@@ -7,13 +7,15 @@
 #include <sys/types.h>
 
 struct dir_lock {
-    int fd; /* of DIR/.assay-lock, in which the process is named; 0: none is held */
+    int fd;    /* of DIR/.assay-lock, in which the process is named; 0: none is held */
+    bool made; /* the directory was not there */
     char path[4096];
 };
 
 /* Makes the directory and takes it. Refuses after two seconds, with a line that names its process and host, where another run has it. The lock
  * ends with the process, however that ends. Where nothing can be locked (some network file systems) it is taken all the
- * same. The caller calls dir_lock_release(); a lock that is zero may be released, too. */
+ * same. The caller calls dir_lock_release(), which removes a directory that was made here and has stayed empty; a lock that is
+ * zero may be released, too. */
 bool dir_lock_take(struct dir_lock *l, const char *dir, struct err *e)
     __attribute__((warn_unused_result));
 void dir_lock_release(struct dir_lock *l);
