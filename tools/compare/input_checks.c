@@ -56,8 +56,9 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 {
     bool exact = strcmp(m->unit, "exact") == 0, replicates = strcmp(m->unit, "replicate") == 0;
     if (strcmp(m->unit, "stratified") == 0)
-        return err_set(e, "its samples depend on each other (--sampler sobol), so its variance is "
-                          "unknown: only replicates with seeds of their own may be compared");
+        return err_set(e,
+                       "its samples depend on each other (--sampler sobol), so its variance is "
+                       "unknown: compare directories of 16 renders each, made with --seed 1 to 16");
     if (!exact && !replicates && !is_image(m) && strcmp(m->unit, "sample") != 0)
         return err_set(e, "unknown unit '%s' of an observation", m->unit);
     bool varies = false;

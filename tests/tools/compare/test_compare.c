@@ -661,8 +661,9 @@ TEST(test_hygiene)
     expect(&tall, right, "A is 4 x 4 pixels, B is 4 x 8");
     static const char *const units[][2] = {
         {"frame", "B: unknown unit 'frame' of an observation"},
-        {"stratified", "B: its samples depend on each other (--sampler sobol), so its variance "
-                       "is unknown: only replicates with seeds of their own may be compared"},
+        {"stratified",
+         "B: its samples depend on each other (--sampler sobol), so its variance "
+         "is unknown: compare directories of 16 renders each, made with --seed 1 to 16"},
         {"exact", "B: pixel 0,0 is called exact but has variance"}};
     for (size_t i = 0; i < COUNT(units); i++) {
         strcpy(b.unit, units[i][0]);
