@@ -154,13 +154,13 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, b
     *room = (struct effect){.pixels = a->pixels || b->pixels};
     for (int i = 0; i < 3 * c->columns * c->rows; i++) {
         double light = c->mean[i], x = (double)a->mean[i], y = (double)b->mean[i];
-        double both = value_of_two(light, x, y, least, adds, clip);
+        double product = value_of_two(light, x, y, least, false, clip),
+               both = adds ? value_of_two(light, x, y, least, true, clip) : product;
         bool is_product = light > least && !adds;
         room->mean[i] = (float)both;
-        room->var[i] =
-            (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
-                    (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1) +
-                    pow(unsure * (value_of_two(light, x, y, least, false, clip) - x - y), 2));
+        room->var[i] = (float)((double)a->var[i] * (is_product ? pow(1 + y / light, 2) : 1) +
+                               (double)b->var[i] * (is_product ? pow(1 + x / light, 2) : 1) +
+                               pow(unsure * (product - x - y), 2));
     }
     for (int f = 0; f < NUM_FACTS; f++) {
         room->fact[f] = a->fact[f] + b->fact[f] - c->fact[f];
@@ -196,26 +196,42 @@ static void sum_up(struct tally *to, const struct tally *t)
     to->all += t->all;
 }
 
-/* share: of the inflation, as an exponent. Two that multiply or add up: the likelier, as both were equally likely beforehand. */
+/* What bugs do to a view: of two the likelier of product and sum, in *t with its likelihood, and in `room`; of a single one *t
+ * is left alone. */
+static const struct effect *likelier(const struct bug_fit *f, int clue, const struct candidate *b,
+                                     double factor, struct effect room[2], struct tally *t)
+{
+    const struct observation *seen = &f->clue[clue];
+    struct tally sum = {0};
+    const struct effect *e =
+        bug_fit_effect(seen->view, b->bug, b->second, false, f->clip, &room[0]);
+    if (e != &room[0])
+        return e;
+    add_view(seen, &room[0], b->amplitude, factor, t);
+    bug_fit_effect(seen->view, b->bug, b->second, true, f->clip, &room[1]);
+    add_view(seen, &room[1], b->amplitude, factor, &sum);
+    if (t->log_likelihood >= sum.log_likelihood)
+        return &room[0];
+    *t = sum;
+    return &room[1];
+}
+
+/* share: of the inflation, as an exponent. */
 static struct tally view_with(const struct bug_fit *f, int clue, const struct candidate *b,
                               double share, double *largest)
 {
-    struct effect room;
-    struct tally t = {0}, sum = {0};
+    struct effect room[2];
+    struct tally t = {0};
     const struct observation *seen = &f->clue[clue];
-    const struct view *v = seen->view;
-    const struct effect *e = bug_fit_effect(v, b->bug, b->second, false, f->clip, &room);
     double factor = fmax(inflation_of(f->c, b->bug, seen), inflation_of(f->c, b->second, seen));
+    const struct effect *e = likelier(f, clue, b, pow(factor, share), room, &t);
     *largest = fmax(*largest, factor);
-    if (e == NULL && factor == 1 && f->correct != NULL)
+    if (e == &room[0] || e == &room[1])
+        t.log_likelihood -= log(2); /* both were equally likely beforehand */
+    else if (e == NULL && factor == 1 && f->correct != NULL)
         return f->correct[clue];
-    add_view(seen, e, b->amplitude, pow(factor, share), &t);
-    if (e != &room)
-        return t;
-    bug_fit_effect(v, b->bug, b->second, true, f->clip, &room);
-    add_view(seen, &room, b->amplitude, pow(factor, share), &sum);
-    t = sum.log_likelihood > t.log_likelihood ? sum : t;
-    t.log_likelihood -= log(2);
+    else
+        add_view(seen, e, b->amplitude, pow(factor, share), &t);
     return t;
 }
 
@@ -286,32 +302,17 @@ static void project_facts(const struct observation *clue, const struct effect *e
     }
 }
 
-/* What two bugs do to a view, whether they multiply or add up. */
-static const struct effect *likelier(const struct bug_fit *f, int clue, int bug, int second,
-                                     struct effect *room)
-{
-    const struct view *v = f->clue[clue].view;
-    struct tally product = {0}, sum = {0};
-    const struct effect *e = bug_fit_effect(v, bug, second, false, f->clip, room);
-    if (e != room)
-        return e;
-    add_view(&f->clue[clue], room, 1, 1, &product);
-    bug_fit_effect(v, bug, second, true, f->clip, room);
-    add_view(&f->clue[clue], room, 1, 1, &sum);
-    if (product.log_likelihood >= sum.log_likelihood)
-        bug_fit_effect(v, bug, second, false, f->clip, room);
-    return room;
-}
-
 /* Least squares with the weights of "correct". given: a bug that is there in any case, of whose effect what bug and second
  * add is judged; -1: none. */
 static struct projection project(const struct bug_fit *f, int bug, int second, int given)
 {
     struct projection p = {0};
     for (int k = 0; k < f->num_clues; k++) {
-        struct effect room;
+        struct effect room[2];
+        struct tally t = {0};
         const struct view *v = f->clue[k].view;
-        const struct effect *e = likelier(f, k, bug, second, &room),
+        const struct candidate both = {.bug = bug, .second = second, .amplitude = 1};
+        const struct effect *e = likelier(f, k, &both, 1, room, &t),
                             *base = given >= 0 ? v->effect[given] : NULL;
         const struct signature *a = &f->clue[k].seen, *c = &v->correct;
         double tiny = bug_fit_rounding * signature_mean(c);
