@@ -594,6 +594,20 @@ static struct sandbox_result run_bare(struct sandbox *s, const char *script, con
     return r;
 }
 
+/* A box of its own for programs without namespaces, and a place in it for what they hand out. */
+static void open_bare(struct sandbox *s)
+{
+    struct err e;
+    MUST(sandbox_open(true, NULL, s, &e));
+    snprintf(out_dir, sizeof out_dir, "%.600s", fs_path("%s/o", s->dir.path).s);
+}
+
+static void close_bare(struct sandbox *s)
+{
+    sandbox_close(s);
+    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
+}
+
 /* A daemon of the first run waits for the second one's folders, and puts links to ours in their place: as root would
  * unpack or remove by path, it would write and remove where they lead. 2000 files leave it time. */
 TEST(a_folder_that_is_swapped_leads_nowhere)
@@ -601,11 +615,10 @@ TEST(a_folder_that_is_swapped_leads_nowhere)
     only_root();
     struct sandbox s;
     struct err e;
-    assert_true(sandbox_open(true, NULL, &s, &e));
+    open_bare(&s);
     const struct path dir = fs_path("%s/sub", s.dir.path),
                       tree = fs_path("%s/w/tree.tar", s.dir.path),
-                      victim = fs_path("%s/victim", s.dir.path), out = fs_path("%s/o", s.dir.path);
-    snprintf(out_dir, sizeof out_dir, "%.600s", out.s);
+                      victim = fs_path("%s/victim", s.dir.path);
     const struct path make = fs_path(
         "mkdir -p %s/d %s/w %s && cd %s/d && seq 2000 | xargs touch && cd %s && seq 5000 9000 | xargs touch",
         dir.s, s.dir.path, victim.s, dir.s, victim.s);
@@ -620,8 +633,7 @@ TEST(a_folder_that_is_swapped_leads_nowhere)
     const struct path count =
         fs_path("touch %s/stop; [ $(ls %s | wc -l) = 4001 ]", s.dir.path, victim.s);
     assert_int_equal(system(count.s), 0);
-    sandbox_close(&s);
-    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
+    close_bare(&s);
 }
 
 /* Processes, files where everybody may write, System V objects. Control: of another user they stay. */
@@ -629,10 +641,7 @@ TEST(nothing_of_a_run_without_namespaces_is_left)
 {
     only_root();
     struct sandbox s;
-    struct err e;
-    assert_true(sandbox_open(true, NULL, &s, &e));
-    const struct path out = fs_path("%s/o", s.dir.path);
-    snprintf(out_dir, sizeof out_dir, "%.600s", out.s);
+    open_bare(&s);
     const struct path script = fs_path(
         "setsid sleep 98766.%d & for d in /tmp /var/tmp /dev/shm; do mkdir -p $d/assay-left-%d/in; done;"
         "ipcmk -M 4096; ipcmk -S 2; ipcmk -Q; id -u >out.png; id -G >>out.png",
@@ -646,8 +655,7 @@ TEST(nothing_of_a_run_without_namespaces_is_left)
         "/dev/shm/assay-left-%d 2>/dev/null && ipcs -a | grep -c ^0x | cmp - %s/before",
         getpid(), getpid(), getpid(), getpid(), s.dir.path);
     assert_int_equal(system(look.s), 0);
-    sandbox_close(&s);
-    snprintf(out_dir, sizeof out_dir, "%s/out", box.dir.path);
+    close_bare(&s);
 }
 
 /* Eight with 100 MB each, which no process may not have, and no namespaces in which somebody counts them: the kernel does. Control: two. */
