@@ -257,7 +257,7 @@ expect "compare: a PNG without its curve" 3 "what light is a code" \
     "$san_assay" compare "$tmp/a.png" "$tmp/two.exr"
 expect "compare: other size" 3 "32" "$san_assay" compare "$tmp/a.exr" "$tmp/two.exr"
 "$pathtracer" $small --sampler sobol -f "$tmp/sobol.exr" $scene >/dev/null
-expect "compare: samples that are not independent" 3 "only replicates" \
+expect "compare: samples that are not independent" 3 "compare directories of 16 renders each, made with --seed 1" \
     "$san_assay" compare "$tmp/sobol.exr" "$tmp/sobol.exr"
 expect "compare: json" 0 "EQUIVALENT" "$san_assay" compare --margin 0.02 --margin-tile 0.08 \
     --json "$tmp/cmp/results.json" "$tmp/one.exr" "$tmp/two.exr"
