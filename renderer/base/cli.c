@@ -38,10 +38,28 @@ static int num_args(const struct cli_option *o)
     return num;
 }
 
+/* "480x360" for an option of W H. */
+static bool take_size(struct cli *c, const struct cli_option *o, const char *word)
+{
+    size_t w = strspn(word, "0123456789");
+    if (o->args == NULL || strcmp(o->args, "W H") != 0 || w == 0 || word[w] != 'x' ||
+        w + 1 == strlen(word) || strlen(word) >= sizeof c->size)
+        return false;
+    strcpy(c->size, word);
+    c->size[w] = '\0';
+    c->value[0] = c->size;
+    c->value[1] = c->size + w + 1;
+    return true;
+}
+
 /* The option's arguments are the words that follow. */
 static int take_words(struct cli *c, int i, const char *arg, struct err *e)
 {
     const struct cli_option *o = &c->options[i];
+    if (c->next < c->argc && take_size(c, o, c->argv[c->next])) {
+        c->next++;
+        return i;
+    }
     if (c->argc - c->next < num_args(o)) {
         err_set(e, "option '%s' needs %s", arg, o->args);
         return CLI_ERROR;
@@ -60,6 +78,8 @@ static int next_long(struct cli *c, const char *arg, struct err *e)
     const struct cli_option *o = &c->options[i];
     if (equals == NULL)
         return take_words(c, i, arg, e);
+    if (take_size(c, o, equals + 1))
+        return i;
     if (num_args(o) != 1) {
         err_set(e, "option --%s takes %d arguments, not '='", o->long_name, num_args(o));
         return CLI_ERROR;
@@ -173,6 +193,10 @@ bool cli_int(const char *what, const char *text, long lo, long hi, int *out, str
     char *end;
     errno = 0;
     long v = strtol(text, &end, 10);
+    if (end != text && (*end == 'e' || *end == 'E')) { /* 1e3 */
+        double whole = strtod(text, &end);
+        v = whole == floor(whole) && fabs(whole) < 1e15 ? (long)whole : lo - 1;
+    }
     if (end == text || *end != '\0' || errno != 0 || v < lo || v > hi)
         return err_set(e, "%s: '%s' is not a whole number from %ld to %ld", what, text, lo, hi);
     *out = (int)v;

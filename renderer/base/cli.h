@@ -1,5 +1,6 @@
 /* Command lines: a table of options that is the --help text and says where each value goes and what it may be, and strict
- * number parsing. Shared by both programs. An option may take several arguments, as the assignment's -r W H does. */
+ * number parsing. Shared by both programs. An option may take several arguments, as the assignment's -r W H does; those of
+ * W H may be one word, 480x360. */
 #ifndef ASSAY_CLI_H
 #define ASSAY_CLI_H
 
@@ -82,6 +83,7 @@ struct cli {
     bool only_positional; /* after "--" */
     const char *value[4]; /* the arguments of the option just returned */
     const char *name;     /* the option as the user wrote it, for messages */
+    char size[16];        /* W and H of "480x360", which value points into */
     const char *letters;  /* short options left in that word, NULL: none */
 };
 
@@ -100,7 +102,7 @@ char **cli_apart(const struct cli_option *options, int argc, char **argv)
 /* Prints the text and then the table in two columns on stdout. */
 void cli_print_help(const char *usage, const struct cli_option *options);
 
-/* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. */
+/* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one may be written as 1e3. */
 bool cli_int(const char *what, const char *text, long lo, long hi, int *out, struct err *e)
     __attribute__((warn_unused_result));
 bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e)

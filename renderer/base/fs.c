@@ -59,6 +59,18 @@ void out_abandon(struct out_file *o)
     unlink(o->temp);
 }
 
+bool out_check(const char *path, struct err *e)
+{
+    struct out_file o;
+    struct stat st;
+    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
+        return err_set(e, "%s: cannot write: %s", path, strerror(EISDIR));
+    if (!out_open(&o, path, e))
+        return false;
+    out_abandon(&o);
+    return true;
+}
+
 bool fs_make_dirs(const char *path, struct err *e)
 {
     char p[4096];

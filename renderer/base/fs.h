@@ -29,6 +29,9 @@ bool out_open(struct out_file *o, const char *path, struct err *e)
 bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_result));
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);
+/* Whether a file could be begun at path, for who asks before hours of work: false with the line of out_open(), or where a
+ * directory has the name. Leaves nothing. */
+bool out_check(const char *path, struct err *e) __attribute__((warn_unused_result));
 
 /* A regular file, or a directory, for reading; NULL with errno: a FIFO would be waited for, a device may have no end (ENOTSUP). The
  * caller closes it. */

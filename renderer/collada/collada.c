@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Where the walk is: one per level, so that a node that contains itself is seen. */
 struct place {
@@ -209,6 +210,23 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
     return true;
 }
 
+/* Adds a sentence to the scene's note. */
+static void add_note(struct loader *ld, const char *text)
+{
+    char *note = ld->scene.note;
+    size_t n = strlen(note);
+    snprintf(note + n, sizeof ld->scene.note - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+static void note_dialect(struct loader *ld)
+{
+    if (ld->is_course_export)
+        add_note(ld, "written by Blender 2.72 or 2.74, so read as a scene of CS184 (--dialect "
+                     "collada: as any other file)");
+    if (ld->num_specular > 0)
+        add_note(ld, "specular terms are left out, as the assignment does");
+}
+
 /* Libraries that hold nothing are common in exported files; otherwise the file means to do
  * something that would be missing from the image. */
 static bool check_libraries(struct loader *ld, const xmlNode *root)
@@ -271,6 +289,7 @@ static bool read_scene(struct loader *ld)
     vec3 lo, hi;
     bool has_frame = build_find_bounds(ld, false, &lo, &hi);
     build_drop_twin_lamps(ld);
+    note_dialect(ld);
     if (!scene_finish(&ld->scene, ld->path, ld->err))
         return false;
     if (has_frame) {
@@ -306,11 +325,28 @@ bool collada_parse(const char *text, size_t size, const char *path, enum dialect
     return load(&in, path, dialect, out, e);
 }
 
+/* What people try first, by its ending. */
+static bool is_other_format(const char *path)
+{
+    static const char *const ENDINGS[] = {".obj",  ".gltf", ".glb", ".usd", ".usda",
+                                          ".usdc", ".usdz", ".fbx", ".ply", ".blend",
+                                          ".stl",  ".pbrt", ".pov"};
+    const char *dot = strrchr(path, '.');
+    for (size_t i = 0; dot != NULL && i < sizeof ENDINGS / sizeof *ENDINGS; i++)
+        if (strcasecmp(dot, ENDINGS[i]) == 0)
+            return true;
+    return false;
+}
+
 bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
 {
     struct text_input in = {.file = fs_open(path)};
     if (in.file == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
+    if (is_other_format(path)) {
+        fclose(in.file);
+        return err_set(e, "%s: only COLLADA (.dae) is read", path);
+    }
     bool ok = load(&in, path, dialect, out, e);
     fclose(in.file);
     return ok;

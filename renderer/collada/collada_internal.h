@@ -72,6 +72,8 @@ struct loader {
     struct err *err;
     bool parse_failed;
     enum dialect dialect;
+    bool is_course_export; /* taken for a file of the assignment by the program that wrote it */
+    unsigned num_specular; /* materials in use whose highlight the dialect leaves out */
     xmlDoc *doc;
     struct id_entry *ids; /* sorted by id */
     size_t num_ids;

@@ -91,6 +91,16 @@ static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
     return check_opaque(ld, shader);
 }
 
+/* What the assignment does not look at may be anything; only for the note. */
+static bool has_highlight(const struct loader *ld, const xmlNode *shader)
+{
+    struct err ignored;
+    struct loader quiet = *ld;
+    rgb specular = grey(0);
+    quiet.err = &ignored;
+    return !read_channel(&quiet, shader, "specular", &specular, NULL) || !rgb_is_zero(specular);
+}
+
 static bool read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
 {
     bool is_constant = element_is(shader, "constant");
@@ -114,6 +124,7 @@ static bool read_shader(struct loader *ld, const xmlNode *shader, struct materia
         return fail_at(ld, element_child_named(shader, "emission"),
                        "the assignment has no emission in profile_COMMON: use a technique of "
                        "profile CGL");
+    ld->num_specular += has_highlight(ld, shader);
     return true;
 }
 

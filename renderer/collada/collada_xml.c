@@ -241,12 +241,29 @@ static bool check_root(struct loader *ld)
     return true;
 }
 
+/* The course's scenes without CGL extras (meshedit, keenan, simple) are as Blender 2.72 and 2.74 wrote them, which no other
+ * program of these days does. */
+static bool is_course_export(const struct loader *ld)
+{
+    static const char *const TOOLS[] = {"Blender 2.72", "Blender 2.74"};
+    const xmlNode *asset = element_child_named(xmlDocGetRootElement(ld->doc), "asset"),
+                  *by = asset != NULL ? element_child_named(asset, "contributor") : NULL,
+                  *tool = by != NULL ? element_child_named(by, "authoring_tool") : NULL;
+    const xmlNode *text = tool != NULL ? tool->children : NULL;
+    for (size_t i = 0; text != NULL && text->content != NULL && i < 2; i++)
+        if (strncmp((const char *)text->content, TOOLS[i], strlen(TOOLS[i])) == 0)
+            return true;
+    return false;
+}
+
 bool xml_open(struct loader *ld, struct text_input *in)
 {
     bool has_cgl = false;
     if (!parse(ld, in) || !check_root(ld) || !survey(ld, &has_cgl))
         return false;
-    if (ld->dialect == DIALECT_AUTO)
-        ld->dialect = has_cgl ? DIALECT_CGL : DIALECT_COLLADA;
+    if (ld->dialect == DIALECT_AUTO) {
+        ld->is_course_export = !has_cgl && is_course_export(ld);
+        ld->dialect = has_cgl || ld->is_course_export ? DIALECT_CGL : DIALECT_COLLADA;
+    }
     return true;
 }

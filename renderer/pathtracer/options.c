@@ -173,7 +173,7 @@ static const struct cli_option options[] = {
      "PNG of the BVH nodes that the ray through each pixel's\n"
      "centre visits",
      .read = read_heatmap},
-    {'r', "resolution", "W H", "pixels (800 600)", TO(width), 1, 65535},
+    {'r', "resolution", "W H", "pixels, also as WxH (800 600)", TO(width), 1, 65535},
     {'p', "cell", "X Y DX DY", "render only this cell, origin at the bottom left",
      .read = read_cell},
     {'c', "camera", "FILE", "camera settings as the assignment's GUI writes them", TO(camera_file)},

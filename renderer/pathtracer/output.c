@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 void rate_colour(double rate, uint8_t rgb8[3])
 {
@@ -15,6 +16,16 @@ void rate_colour(double rate, uint8_t rgb8[3])
     rgb8[0] = (uint8_t)(rate <= 0.5 ? 0 : 255 * (2 * rate - 1));
     rgb8[1] = (uint8_t)(255 * green);
     rgb8[2] = (uint8_t)(rate <= 0.5 ? 255 * (1 - 2 * rate) : 0);
+}
+
+static bool is_adaptive(const struct options *o)
+{
+    return o->adaptive_batch > 0 || o->pilot_tolerance >= 0;
+}
+
+static struct path rates_path(const char *png)
+{
+    return fs_path("%.*s_rate.png", (int)(strlen(png) - strlen(".png")), png);
 }
 
 enum { NUM_TEXTS = 13 };
@@ -76,7 +87,7 @@ struct output_writer *output_open(const struct output *o, int width, int height,
                                   struct err *e)
 {
     struct output_writer *w = calloc(1, sizeof *w);
-    bool adaptive = o->opt->adaptive_batch > 0 || o->opt->pilot_tolerance >= 0, png = false;
+    bool adaptive = is_adaptive(o->opt), png = false;
     size_t bytes = 3 * (size_t)width * (size_t)height;
     if (w == NULL) {
         err_set(e, "out of memory");
@@ -155,12 +166,6 @@ static bool write_png(const struct output_writer *w, const char *path, const uin
                                  e);
 }
 
-static bool write_rates(const struct output_writer *w, const char *png, struct err *e)
-{
-    int stem = (int)(strlen(png) - strlen(".png"));
-    return write_png(w, fs_path("%.*s_rate.png", stem, png).s, w->rates, e);
-}
-
 bool output_close(struct output_writer *w, struct err *e)
 {
     const struct options *opt = w->o->opt;
@@ -172,7 +177,7 @@ bool output_close(struct output_writer *w, struct err *e)
             continue;
         }
         ok = write_png(w, opt->output[i], w->rgb8, e) &&
-             (w->rates == NULL || write_rates(w, opt->output[i], e));
+             (w->rates == NULL || write_png(w, rates_path(opt->output[i]).s, w->rates, e));
     }
     output_abandon(w);
     return ok;
@@ -196,6 +201,45 @@ bool output_images(const struct output *o, const struct film *f, const struct re
     if (output_rows(w, f, e))
         return output_close(w, e);
     output_abandon(w);
+    return false;
+}
+
+bool output_check(const struct output *o, struct err *e)
+{
+    char state[CHECKPOINT_PATH];
+    bool ok = output_state_path(o, NULL, state, e);
+    for (int i = 0; ok && i < o->opt->num_outputs; i++) {
+        const char *path = o->opt->output[i];
+        ok = out_check(path, e) &&
+             (image_is_exr(path) || !is_adaptive(o->opt) || out_check(rates_path(path).s, e));
+    }
+    return ok && out_check(state, e) && (o->opt->heatmap == NULL || out_check(o->opt->heatmap, e));
+}
+
+bool output_rescue(const struct output *o, const struct film *f, const struct render_stats *stats,
+                   struct err *e)
+{
+    const char *first = o->opt->output[0], *tmp = getenv("TMPDIR");
+    const struct path dirs[] = {fs_beside_file(first, ""),
+                                {""},
+                                fs_path("%s/", tmp != NULL && *tmp != '\0' ? tmp : "/tmp")};
+    const size_t num = strlen(e->msg);
+    struct path name[MAX_OUTPUTS];
+    struct options opt = *o->opt;
+    struct output there = *o;
+    there.opt = &opt;
+    for (size_t d = 0; d < sizeof dirs / sizeof *dirs; d++) {
+        struct err again;
+        for (int i = 0; i < opt.num_outputs; i++) {
+            name[i] =
+                fs_path("%srescued-%ld-%s", dirs[d].s, (long)getpid(), fs_base(o->opt->output[i]));
+            opt.output[i] = name[i].s;
+        }
+        if (!output_images(&there, f, stats, &again))
+            continue;
+        snprintf(e->msg + num, sizeof e->msg - num, "; the render is in %s instead", name[0].s);
+        return false;
+    }
     return false;
 }
 
@@ -234,6 +278,14 @@ void output_print_summary(const struct output *o, const struct film *f,
             stats->samples, (double)stats->rays.rays, stats->wall_seconds, stats->cpu_seconds,
             (double)stats->rays.box_tests / rays, (double)stats->rays.primitive_tests / rays,
             o->accel);
+    fputs("written:", stderr);
+    for (int i = 0; i < o->opt->num_outputs; i++) {
+        const char *path = o->opt->output[i];
+        fprintf(stderr, " %s", path);
+        if (!image_is_exr(path) && is_adaptive(o->opt))
+            fprintf(stderr, " %s", rates_path(path).s);
+    }
+    fputc('\n', stderr);
     if (stats->end == RENDER_TIME || stats->end == RENDER_ERROR)
         fprintf(stderr, "stopped by --%s after %lu samples per pixel, relative error %.3g %%\n",
                 stats->end == RENDER_TIME ? "time" : "error", (unsigned long)f->num_samples,

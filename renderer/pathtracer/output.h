@@ -20,7 +20,16 @@ struct output {
 bool output_images(const struct output *o, const struct film *f, const struct render_stats *stats,
                    struct err *e) __attribute__((warn_unused_result));
 
-/* The same for a film that is never in memory as a whole: its rows come from the top as films of whole rows, IMAGE_BAND
+/* Whether all of these, and the state, could be begun: asked before the render starts. */
+bool output_check(const struct output *o, struct err *e) __attribute__((warn_unused_result));
+
+/* For a film that output_images() could not write, for the reason in e: writes all images under names that no
+ * file has, beside the first, else in the current directory, else in TMPDIR or /tmp, and adds to the line where they are.
+ * Always false. */
+bool output_rescue(const struct output *o, const struct film *f, const struct render_stats *stats,
+                   struct err *e);
+
+/* output_images() for a film that is never in memory as a whole: its rows come from the top as films of whole rows, IMAGE_BAND
  * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the images of the whole film. */
 struct output_writer;
 /* num_samples: film.num_samples of the whole. NULL with a line on failure. */
@@ -41,7 +50,7 @@ bool output_state_path(const struct output *o, const char *image, char path[CHEC
 /* The assignment's colours of a sampling rate n/most: blue (0) through green (1/2) to red (1). */
 void rate_colour(double rate, uint8_t rgb8[3]);
 
-/* The image mean with its standard error, on stdout; what it cost, on stderr. */
+/* The image mean with its standard error, on stdout; what it cost, and the files that were written, on stderr. */
 void output_print_summary(const struct output *o, const struct film *f,
                           const struct render_stats *stats);
 

@@ -55,7 +55,9 @@ static bool signal_came(void *arg)
 static bool write_meanwhile(void *arg, const struct film *f, struct err *e)
 {
     const struct session *s = arg;
-    return output_images(&s->out, f, NULL, e) && checkpoint_write(s->state_path, s->out.id, f, e);
+    if (!output_images(&s->out, f, NULL, e))
+        return !err_is_of_memory(e) && output_rescue(&s->out, f, NULL, e);
+    return checkpoint_write(s->state_path, s->out.id, f, e);
 }
 
 static bool setup_camera(const struct options *o, const struct scene *scene, struct camera *c,
@@ -97,7 +99,7 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)
-        return err_set(e, "%s: the scene has no light", o->scene);
+        return err_set(e, "%s: the scene has no light (-e FILE: an environment)", o->scene);
     return true;
 }
 
@@ -150,7 +152,7 @@ static bool finish(struct session *s, const struct film *f, const struct render_
 {
     const struct options *o = s->out.opt;
     if (!output_images(&s->out, f, stats, e))
-        return false;
+        return !err_is_of_memory(e) && output_rescue(&s->out, f, stats, e);
     if (stats->end == RENDER_ASKED || o->keep_state)
         return checkpoint_write(s->state_path, s->out.id, f, e);
     unlink(s->state_path);
@@ -177,8 +179,8 @@ static bool run(struct session *s, struct err *e)
     struct film film = {0};
     struct bvh *bvh = NULL;
     bool ok = false;
-    if (!load_scene(o, &scene, e) || !setup_camera(o, &scene, &camera, e) ||
-        !render_id_make(o, &id, e))
+    if (!load_scene(o, &scene, e) || !output_check(&s->out, e) ||
+        !setup_camera(o, &scene, &camera, e) || !render_id_make(o, &id, e))
         goto done;
     double start = now_seconds();
     bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);

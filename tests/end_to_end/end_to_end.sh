@@ -58,6 +58,14 @@ expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere
 expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
 expect "unwritable output" 3 "/nonexistent/x.exr" \
     "$san_pathtracer" $small -f /nonexistent/x.exr $scene
+# Found before the render, which would take days.
+expect "unwritable output: at once" 3 "/nonexistent/x.png: cannot write" \
+    timeout 60 "$pathtracer" -q -r 4000x4000 -s 1e7 -f "$tmp/x.exr" -f /nonexistent/x.png $scene
+for ending in obj gltf glb usd usdz fbx; do
+    cp $scene "$tmp/x.$ending"
+    expect "only COLLADA: .$ending" 3 "x.$ending: only COLLADA (.dae) is read" "$san_pathtracer" $small -f "$tmp/x.exr" "$tmp/x.$ending"
+    rm "$tmp/x.$ending"
+done
 for bad in tests/bad/*.dae; do
     case $bad in
     */00_valid.dae) continue ;; # what the others are faults of
@@ -87,7 +95,20 @@ if tests/mutants/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "
 fi
 rm -f "$tmp/mutants.out"
 
+# A directory that goes while its image is rendered: the image is saved in the current one.
+mkdir "$tmp/gone" "$tmp/here"
+(cd "$tmp/here" && exec "$pathtracer" -q -r 32x32 --time 1 -f "$tmp/gone/x.exr" "$OLDPWD/$scene" >/dev/null 2>"$tmp/saved") &
+run=$!
+sleep 0.4
+rm -r "$tmp/gone"
+wait $run
+tell "a finished render is saved" "$([ $? = 3 ] && [ -s "$tmp"/here/rescued-*-x.exr ] && [ "$(wc -l <"$tmp/saved")" = 1 ] &&
+    grep -q "gone/x.exr: cannot write: .*; the render is in rescued-[0-9]*-x.exr instead" "$tmp/saved" || cat "$tmp/saved")"
+rm -r "$tmp/here" "$tmp/saved"
+
 # Images.
+expect "files are named" 0 "written: $tmp/n.exr $tmp/n.png $tmp/n_rate.png" \
+    "$san_pathtracer" -r 16x16 -s 2e1 -a 8 0.1 -f "$tmp/n.exr" -f "$tmp/n.png" $scene
 expect "render" 0 "mean radiance" \
     "$san_pathtracer" $small --seed 1 -f "$tmp/a.exr" -f "$tmp/a.png" $scene
 expect "environment map" 0 "mean radiance" \
@@ -424,6 +445,13 @@ expect "export: what pbrt has not" 3 "no environment image" \
     "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene
 if ls "$tmp"/d.pbrt* >/dev/null 2>&1; then not_ok "a refused export leaves no file" "it does"; else
     ok "a refused export leaves no file"
+fi
+expect "export: a sky that is missing" 0 "warning.*give -e reference/scenes/46_sky.exr" \
+    "$san_assay" export -o "$tmp/sky.json" reference/scenes/46_sky.dae
+expect "export: the sky that was missing" 0 "^$tmp/sky.json$" \
+    "$san_assay" export -o "$tmp/sky.json" -e reference/scenes/46_sky.exr reference/scenes/46_sky.dae
+if grep -q warning "$tmp/err"; then not_ok "export: with its sky there is no warning" "$(cat "$tmp/err")"; else
+    ok "export: with its sky there is no warning"
 fi
 expect "export: unknown kind" 3 "ends in none of" "$san_assay" export -o "$tmp/c.txt" $scene
 

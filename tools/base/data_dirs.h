@@ -1,4 +1,5 @@
-/* Where the program's own files are: in the checkout that one stands in, else where it is installed. */
+/* Where the program's own files are: in the checkout that one stands in, else in that of the
+ * program (build/assay), else where it is installed. */
 #ifndef ASSAY_DATA_DIRS_H
 #define ASSAY_DATA_DIRS_H
 

@@ -13,6 +13,8 @@ int command_export(int argc, char **argv, struct err *e)
         return 0;
     if (!export_job_run(&s, e))
         return EXIT_NOT_JUDGED;
+    if (s.note[0] != '\0')
+        fprintf(stderr, "assay: warning: %s: %s\n", s.out, s.note);
     printf("%s\n", s.out);
     return 0;
 }

@@ -1,6 +1,8 @@
 #include "export_job.h"
 
 #include "reference/external/engine_bindings.h"
+#include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 #include "renderer/base/cli.h"
 #include "renderer/collada/collada.h"
 #include "renderer/base/fs.h"
@@ -63,7 +65,25 @@ bool export_job_parse(int argc, char **argv, struct export_job *s, struct err *e
                    s->out);
 }
 
-bool export_job_run(const struct export_job *s, struct err *e)
+static void note_missing_light(struct export_job *s, const struct scene *scene)
+{
+    const char *ending = strrchr(s->scene, '.');
+    json_error_t why;
+    json_t *description =
+        ending != NULL
+            ? json_read(fs_path("%.*s.json", (int)(ending - s->scene), s->scene).s, 0, &why)
+            : NULL;
+    const char *sky = member_text(description, "environment");
+    s->note[0] = '\0';
+    if (s->environment == NULL && sky != NULL)
+        snprintf(s->note, sizeof s->note, "without its sky: give -e %.400s",
+                 fs_beside_file(s->scene, sky).s);
+    else if (s->environment == NULL && scene->num_lights == 0)
+        snprintf(s->note, sizeof s->note, "the scene has no light (-e FILE: an environment)");
+    json_decref(description);
+}
+
+bool export_job_run(struct export_job *s, struct err *e)
 {
     struct scene scene = {0};
     struct camera camera;
@@ -72,6 +92,7 @@ bool export_job_run(const struct export_job *s, struct err *e)
     if (ok && !camera_init(&camera, &scene, s->width, s->height, e))
         ok = err_prefix(e, "%s", s->scene);
     if (ok) {
+        note_missing_light(s, &scene);
         camera.lens_radius = (float)s->lens_radius;
         camera.focal_distance = (float)s->focal_distance;
         ok = engine_export(s->engine, &scene, &camera, s->depth, s->out, e);

@@ -124,6 +124,7 @@ static void announce(struct validation *v, struct claim_run *t)
 {
     const char *verdict = member_text(t->result, "verdict"),
                *error = member_text(t->result, "error");
+    char line[1024];
     v->done++;
     for (int i = 0; error != NULL && i < v->num_tasks; i++) {
         const json_t *other = v->task[i].result;
@@ -131,7 +132,12 @@ static void announce(struct validation *v, struct claim_run *t)
             json_equal(json_object_get(other, "error"), json_object_get(t->result, "error")))
             error = "not judged, for the reason above";
     }
-    validate_log(v, t->scene->name, error != NULL ? error : verdict);
+    if (t->a != NULL)
+        snprintf(line, sizeof line, "%s against %s: %s", t->a->name, t->ref.engine,
+                 error != NULL ? error : verdict);
+    else
+        snprintf(line, sizeof line, "stated errors: %s", error != NULL ? error : verdict);
+    validate_log(v, t->scene->name, line);
     if (t->a != NULL) {
         release(t->a);
         release(t->b);

@@ -126,6 +126,7 @@ static const struct cli_option bound[] = {
     {'f', "flag", "", "", TO(flag)},
     {'n', "number", "N", "", TO(number), -3, 7},
     {0, "pair", "A B", "", TO(pair), 0, 9},
+    {0, "size", "W H", "", TO(pair), 1, 4000},
     {0, "range", "A:B", "", CLI_TO_RANGE(struct settings, first), 0, 8, .noun = "sample"},
     {0, "choice", "X", "", TO(choice), 5, .names = names},
     {0, "kind", "X", "", TO(kind), .names = names},
@@ -192,6 +193,11 @@ TEST(values_go_where_the_table_says)
     assert_int_equal(s.num_list, 2);
     assert_string_equal(s.list[1], "2");
     assert_int_equal(s.read, 32);
+    assert_true(read_bound("--size 480x360 -f -n 3e0", words, &s, &e));
+    assert_true(s.flag && s.pair[0] == 480 && s.pair[1] == 360);
+    assert_int_equal(s.number, 3);
+    assert_true(read_bound("--size=1x2", words, &s, &e));
+    assert_true(s.pair[0] == 1 && s.pair[1] == 2);
     assert_true(read_bound("-f --stop --nonsense", words, &s, &e));
     assert_true(s.flag && s.stop);
 }
@@ -201,6 +207,12 @@ TEST(values_are_checked)
     static const char *const cases[][2] = {
         {"-n 8", "--number: '8' is not a whole number from -3 to 7"},
         {"-n -4", "--number: '-4' is not a whole number from -3 to 7"},
+        {"-n 25e-1", "--number: '25e-1' is not a whole number from -3 to 7"},
+        {"-n 1e1", "--number: '1e1' is not a whole number from -3 to 7"},
+        {"-n 1e", "--number: '1e' is not a whole number from -3 to 7"},
+        {"--size 4x 3", "--size: '4x' is not a whole number from 1 to 4000"},
+        {"--size 4x5000", "--size: '5000' is not a whole number from 1 to 4000"},
+        {"--pair 1x2", "option '--pair' needs A B"},
         {"--pair 1 10", "--pair: '10' is not a whole number from 0 to 9"},
         {"--range 3", "--range: '3' is not a range A:B"},
         {"--range 3:3", "--range: no sample in '3:3'"},

@@ -324,7 +324,7 @@ TEST(geometry)
 }
 TEST(materials)
 {
-    run_file("tests/renderer/collada/look.cases", 37);
+    run_file("tests/renderer/collada/look.cases", 40);
 }
 TEST(lights_and_cameras)
 {
