@@ -183,7 +183,7 @@ EOF
         IFS='|' read -r status cpu scene against why <"$build/mutants/$name.result"
         [ "$status" = caught ] || scene="**not found**"
         printf '| %s (`%s`) | %s | %s | %s | %s | %.0f |\n' "$(sed -n 's/^Bug: //p' "tests/mutants/$name.patch")" "$name" \
-            "$(sed -n 's/^Where: //p' "tests/mutants/$name.patch")" "$scene" "$against" "${why%%, p = *}" "$cpu"
+            "$(sed -n 's/^Where: //p' "tests/mutants/$name.patch")" "$scene" "$against" "${why%%, p [=<] *}" "$cpu"
     done
 }
 if [ -n "$table" ]; then

@@ -102,6 +102,9 @@ static const struct cli_option options[] = {
      "what exit code 0 stands for (EQUIVALENT; with --accept-mdb\n"
      "NO DIFFERENCE FOUND)",
      TO(expect), .names = verdict_names},
+    {0, "title", "TEXT", "heading of the page", TO(job.title)},
+    {0, "name-a", "NAME", "what page and results call A (its path)", TO(job.name[0])},
+    {0, "name-b", "NAME", "the same for B", TO(job.name[1])},
     {0, "json", "FILE", "write the claim as results.json", TO(json)},
     {'r', "report", "FILE", "write the claim as one HTML page with its images", TO(report)},
     {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},

@@ -127,6 +127,16 @@ static void judge_variance(struct comparison *c, const struct compare_options *o
     c->verdict = VERDICT_INCONCLUSIVE;
 }
 
+struct verdict_p verdict_p(double log10_p)
+{
+    struct verdict_p p;
+    if (log10_p < -12)
+        snprintf(p.s, sizeof p.s, "p < 1e-12");
+    else
+        snprintf(p.s, sizeof p.s, "p = %.1g", pow(10, log10_p));
+    return p;
+}
+
 static bool rejects(const struct comparison *c, const struct compare_options *opt, int s)
 {
     const struct statistic *st = &c->statistic[s];
@@ -152,23 +162,23 @@ static void judge_different(struct comparison *c, const struct compare_options *
         place(c, &c->worst, where, sizeof where);
         snprintf(c->reason, size,
                  "%s: difference %+.3g %% (standard error %.2g %%) is beyond the margin of %.3g "
-                 "%%, p = 10^%.1f",
+                 "%%, %s",
                  where, 100 * c->worst.difference, 100 * c->worst.std_error, 100 * c->worst.margin,
-                 c->worst.log10_p);
+                 verdict_p(c->worst.log10_p).s);
     } else if (first == STATISTIC_CHI_SQUARE) {
         snprintf(c->reason, size,
                  "many differences, each too small to be found alone: %s are together beyond "
-                 "their margins, p = 10^%.1f",
-                 st->what, st->log10_p);
+                 "their margins, %s",
+                 st->what, verdict_p(st->log10_p).s);
     } else if (first == STATISTIC_MATCHED_FILTER) {
-        snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, p = 10^%.1f",
-                 st->what, st->log10_p);
+        snprintf(c->reason, size, "a difference like %s beyond the margin of a tile, %s", st->what,
+                 verdict_p(st->log10_p).s);
     } else {
         snprintf(c->reason, size,
                  "the variance of a path is %.3g times that of B [%.3g, %.3g], beyond the margin "
-                 "of %.3g %%, p = 10^%.1f",
+                 "of %.3g %%, %s",
                  c->variance.ratio, c->variance.lo, c->variance.hi, 100 * opt->margin_variance,
-                 st->log10_p);
+                 verdict_p(st->log10_p).s);
     }
 }
 

@@ -9,6 +9,11 @@
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles);
 
+/* "p = 3e-05"; what is smaller than anybody can mean is "p < 1e-12". */
+struct verdict_p {
+    char s[24];
+} verdict_p(double log10_p);
+
 /* The largest extra_factor; it stands for more. */
 extern const double verdict_largest_factor;
 /* What extra_factor says: "about 2.5 times the samples would decide", or what else can be done. */

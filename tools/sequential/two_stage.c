@@ -1,5 +1,7 @@
 #include "two_stage.h"
 
+#include "tools/compare/verdict.h"
+
 #include "tools/compare/input_checks.h"
 #include "tools/compare/pyramid.h"
 #include "tools/compare/region.h"
@@ -139,15 +141,14 @@ bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
         second->verdict = VERDICT_DIFFERENT;
         second->extra_factor = 1;
         snprintf(text, sizeof text,
-                 "%s%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): p = "
-                 "10^%.1f",
-                 what, seen, stage, level, flagged, log10_p);
+                 "%s%s; found at %.2g and, with fresh seeds, confirmed at %.2g (%d flagged): "
+                 "%s",
+                 what, seen, stage, level, flagged, verdict_p(log10_p).s);
     } else {
         if (second->verdict == VERDICT_DIFFERENT)
             second->verdict = VERDICT_INCONCLUSIVE;
-        snprintf(text, sizeof text,
-                 "%s%s; fresh seeds did not confirm it (p = 10^%.1f); they say: %s", what, seen,
-                 log10_p, second->reason);
+        snprintf(text, sizeof text, "%s%s; fresh seeds did not confirm it (%s); they say: %s", what,
+                 seen, verdict_p(log10_p).s, second->reason);
     }
     snprintf(second->reason, sizeof second->reason, "%.255s", text);
     return true;

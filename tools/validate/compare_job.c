@@ -318,8 +318,8 @@ static bool side_file(const struct compared *c, int side, const char *json, char
 
 static struct claim_context context_of(const struct compare_job *job)
 {
-    return (struct claim_context){.a = job->path[0],
-                                  .b = job->path[1],
+    return (struct claim_context){.a = job->name[0] != NULL ? job->name[0] : job->path[0],
+                                  .b = job->name[1] != NULL ? job->name[1] : job->path[1],
                                   .expected = job->expected,
                                   .opt = job->opt,
                                   .accept_mdb = {job->accept_mdb[0], job->accept_mdb[1]}};
@@ -356,6 +356,8 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     if (ok && !c->is_guessed)
         ok = claim_result_add_observations(claim, "a", &c->m[0]) &&
              claim_result_add_observations(claim, "b", &c->m[1]);
+    if (ok && job->title != NULL)
+        ok = json_object_set_new(claim, "title", json_string(job->title)) == 0;
     if (ok && c->notes.num > 0)
         ok = json_object_set_new(claim, "notes", notes_json(&c->notes)) == 0;
     if (ok && job->exchangeable)

@@ -8,6 +8,8 @@
 
 struct compare_job {
     const char *path[2];  /* A is tested, B the reference */
+    const char *title;    /* of the page; NULL: none */
+    const char *name[2];  /* what results and the page call the sides; NULL: their paths */
     const char *again[2]; /* fresh renders of both for a second stage, or NULL */
     struct input_options input[2];
     struct compare_options opt;

@@ -13,15 +13,18 @@
 static void rerun_command(const struct validation *v, const struct claim_run *t, char *out,
                           size_t size)
 {
-    char live[64] = "", engine[4200] = "", how[96] = "";
+    char live[64] = "", engine[4300] = "", how[96] = "", spp[32] = "", replicates[40] = "";
     const struct validate_options *o = v->opt;
     if (o->live)
         snprintf(live, sizeof live, " --live --reference-seed %u", o->reference_seed);
     if (o->engine != NULL && !o->live)
         snprintf(live, sizeof live, " --reference-seed %u", o->reference_seed);
+    if (o->engine_spp > 0)
+        snprintf(spp, sizeof spp, " --engine-spp %d", o->engine_spp);
+    if (o->engine_replicates > 0)
+        snprintf(replicates, sizeof replicates, " --engine-replicates %d", o->engine_replicates);
     if (o->engine != NULL)
-        snprintf(engine, sizeof engine, " --engine %s --engine-spp %d --engine-replicates %d",
-                 o->engine->file, o->engine_spp, o->engine_replicates);
+        snprintf(engine, sizeof engine, " --engine %s%s%s", o->engine->file, spp, replicates);
     if (o->budget_s > 0)
         snprintf(how, sizeof how, " --budget %gs", o->budget_s);
     else if (v->sequence != &alpha_spending_single)

@@ -1,5 +1,7 @@
 #include "same_program.h"
 
+#include "tools/compare/verdict.h"
+
 #include "tools/compare/region.h"
 #include "tools/images/image_file.h"
 #include "tools/images/replicate_dir.h"
@@ -133,14 +135,13 @@ void same_program_decide(const struct sign_flip *f, double alpha, struct compari
         r->verdict = VERDICT_DIFFERENT;
         region_name(f->width, f->height, f->rect, f->channel, where, sizeof where);
         if (f->score == SIGN_FLIP_SPREAD)
-            snprintf(r->reason, size, "the law changed: %s: A is %s, p <= 10^%.1f", where, noise,
-                     f->log10_p);
+            snprintf(r->reason, size, "the law changed: %s: A is %s, %s", where, noise,
+                     verdict_p(f->log10_p).s);
         else
-            snprintf(
-                r->reason, size,
-                "the law changed: %s: A is %s in %.0f %% of the pixels, mean %+.3g %%, p <= 10^%.1f",
-                where, more, 100 * (f->t > 0 ? f->larger : 1 - f->larger), 100 * f->difference,
-                f->log10_p);
+            snprintf(r->reason, size,
+                     "the law changed: %s: A is %s in %.0f %% of the pixels, mean %+.3g %%, %s",
+                     where, more, 100 * (f->t > 0 ? f->larger : 1 - f->larger), 100 * f->difference,
+                     verdict_p(f->log10_p).s);
     } else if (f->mdb_global < region_mdb_none) {
         r->verdict = VERDICT_NOTHING_FOUND;
         snprintf(

@@ -2,6 +2,7 @@
 
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
+#include "tools/results/plain_words.h"
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
 #include "tools/results/results_table.h"
@@ -137,9 +138,10 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
         import_result_print(stdout, loader);
     }
     print_not_expressible(results);
+    fflush(stdout); /* else what follows may stand in the middle of a table */
     if (!quiet)
         render_cost_print(stderr, results);
-    printf("\n%s\n", html.s);
+    plain_words_print(stdout, results, html.s);
     return true;
 }
 

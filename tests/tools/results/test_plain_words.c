@@ -1,0 +1,81 @@
+/* What sentences say of claims made by hand; amounts are the claim's difference, rounded by hand. */
+#include "tools/results/plain_words.h"
+#include "tests/support/test.h"
+
+/* Margins are 0.2 % of the image and 1 % of a tile; the worst tile and region are at 32,16. */
+static json_t *claim_of(const char *verdict, const char *expected, double image, double tile,
+                        double worst, int channel)
+{
+    json_t *c = json_pack(
+        "{ss ss ss ss ss sb sf sf sf s[ff] s{sf sf sf sf sf s[ff]} s{sf sf sf sf si sf} sf sf}",
+        "scene", "12_point_plane", "a", "mine", "b", "truth", "verdict", verdict, "expected",
+        expected, "passed", strcmp(verdict, expected) == 0, "margin_global", 0.002, "margin_tile",
+        0.01, "difference", image, "ci", image - 0.001, image + 0.001, "worst_tile", "x", 32., "y",
+        16., "width", 16., "height", 16., "difference", tile, "ci", tile - 0.002, tile + 0.002,
+        "worst", "x", 32., "y", 16., "width", 2., "height", 2., "channel", channel, "difference",
+        worst, "extra_factor", 2.5, "mdb_global", 0.0123);
+    assert_non_null(c);
+    return c;
+}
+
+static void assert_says(json_t *claim, const char *sentence)
+{
+    assert_string_equal(plain_words_claim(claim).s, sentence);
+    json_decref(claim);
+}
+
+TEST(who_how_much_and_where)
+{
+    assert_says(claim_of("DIFFERENT", "EQUIVALENT", 0.0101, 0.03, 0.5, 3),
+                "mine is 1.0 % too bright on 12_point_plane (against truth)");
+    assert_says(claim_of("DIFFERENT", "EQUIVALENT", -0.0042, 0.03, 0.5, 3),
+                "mine is 0.42 % too dark on 12_point_plane (against truth)");
+    assert_says(claim_of("DIFFERENT", "EQUIVALENT", 19, 0.03, 0.5, 3),
+                "mine is 20 times as bright on 12_point_plane (against truth)");
+    /* The image's interval reaches into the margin, the tile's does not. */
+    assert_says(
+        claim_of("DIFFERENT", "EQUIVALENT", 0.0025, -0.013, 0.5, 3),
+        "mine is 1.3 % too dark in the 16 x 16 pixels at 32,16 on 12_point_plane (against truth)");
+    assert_says(
+        claim_of("DIFFERENT", "EQUIVALENT", 0, 0.011, 0.5, 0),
+        "mine is 50.0 % too bright red in the 2 x 2 pixels at 32,16 on 12_point_plane (against truth)");
+    assert_says(claim_of("EQUIVALENT", "DIFFERENT", 0, 0, 0, 3),
+                "mine is the same on 12_point_plane (as truth), within 0.2 %");
+    assert_says(
+        claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),
+        "mine is too noisy to tell on 12_point_plane (against truth): about 2.5 times the samples would decide");
+    assert_says(
+        claim_of("NO DIFFERENCE FOUND", "EQUIVALENT", 0, 0, 0, 3),
+        "no difference of mine was found on 12_point_plane (against truth); 1.23 % would have been");
+}
+
+static char *printed(json_t *claims)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    json_t *results = json_pack("{so}", "claims", claims);
+    plain_words_print(f, results, "page.html");
+    fclose(f);
+    json_decref(results);
+    return text;
+}
+
+TEST(three_lines)
+{
+    char *text = printed(json_pack("[oo]", claim_of("EQUIVALENT", "EQUIVALENT", 0, 0, 0, 3),
+                                   claim_of("DIFFERENT", "DIFFERENT", 1, 0, 0, 3)));
+    assert_string_equal(
+        text,
+        "\njudged: mine on 1 scene against truth: 2 comparisons\n"
+        "result: all as it should be, 1 the same within their margins, 1 deliberate mistake found\n"
+        "look:   page.html\n");
+    free(text);
+    /* Worst first: what is the opposite of what was expected before what is undecided. */
+    text = printed(json_pack("[oo]", claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),
+                             claim_of("DIFFERENT", "EQUIVALENT", 0.0101, 0, 0, 3)));
+    assert_non_null(strstr(
+        text, "result: 2 of 2 not as it should be: mine is 1.0 % too bright on 12_point_plane "
+              "(against truth); mine is too noisy to tell"));
+    free(text);
+}

@@ -1,0 +1,195 @@
+#include "plain_words.h"
+
+#include "stated_error_results.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { MOST_FAILURES = 3, MOST_NAMES = 16 };
+
+/* The interval lies beyond the margin on one side: that side's sign, else 0. */
+static int outside(const json_t *object, const char *key, double margin)
+{
+    const json_t *ci = json_object_get(object, key);
+    const double lo = json_number_value(json_array_get(ci, 0)),
+                 hi = json_number_value(json_array_get(ci, 1));
+    return lo > margin ? 1 : hi < -margin ? -1 : 0;
+}
+
+/* "1.3 % too bright", or by a factor where per cent would be a large number. */
+static struct plain_words amount(double difference)
+{
+    struct plain_words w;
+    const double percent = 100 * fabs(difference);
+    if (difference > 9)
+        snprintf(w.s, sizeof w.s, "%.3g times as bright", 1 + difference);
+    else
+        snprintf(w.s, sizeof w.s, "%.*f %% too %s",
+                 percent < 0.095  ? 3
+                 : percent < 0.95 ? 2
+                                  : 1,
+                 percent, difference > 0 ? "bright" : "dark");
+    return w;
+}
+
+static struct plain_words place(const json_t *region)
+{
+    struct plain_words w;
+    snprintf(w.s, sizeof w.s, "in the %.0f x %.0f pixels at %.0f,%.0f",
+             member_number(region, "width"), member_number(region, "height"),
+             member_number(region, "x"), member_number(region, "y"));
+    return w;
+}
+
+static struct plain_words too_bright(const json_t *claim)
+{
+    static const char *const channels[] = {"red ", "green ", "blue ", ""};
+    const json_t *tile = json_object_get(claim, "worst_tile"),
+                 *worst = json_object_get(claim, "worst");
+    if (outside(claim, "ci", member_number(claim, "margin_global")) != 0)
+        return amount(member_number(claim, "difference"));
+    struct plain_words w;
+    if (outside(tile, "ci", member_number(claim, "margin_tile")) != 0) {
+        snprintf(w.s, sizeof w.s, "%.64s %.64s", amount(member_number(tile, "difference")).s,
+                 place(tile).s);
+        return w;
+    }
+    const double difference = member_number(worst, "difference");
+    const int channel = (int)member_number(worst, "channel");
+    if (difference == 0 || member_number(worst, "width") == 0)
+        snprintf(w.s, sizeof w.s, "not the same, most of all %.64s", place(tile).s);
+    else
+        snprintf(w.s, sizeof w.s, "%.64s %s%.64s", amount(difference).s,
+                 channel >= 0 && channel < 3 ? channels[channel] : "", place(worst).s);
+    return w;
+}
+
+/* " on SCENE": a comparison of two files has none. */
+static struct plain_words on_scene(const json_t *claim)
+{
+    const char *scene = member_or_empty(claim, "scene");
+    struct plain_words w = {""};
+    if (strcmp(scene, "files") != 0)
+        snprintf(w.s, sizeof w.s, " on %.100s", scene);
+    return w;
+}
+
+struct plain_words plain_words_claim(const json_t *claim)
+{
+    struct plain_words w;
+    const char *a = member_or_empty(claim, "a"), *b = member_or_empty(claim, "b"),
+               *verdict = member_or_empty(claim, "verdict"), *error = member_text(claim, "error");
+    const struct plain_words scene = on_scene(claim);
+    const enum outcome outcome = results_claim_outcome(claim);
+    if (outcome == OUTCOME_NOT_JUDGED)
+        snprintf(w.s, sizeof w.s, "%.100s could not be judged%.110s against %.100s: %.250s", a,
+                 scene.s, b, error != NULL ? error : "");
+    else if (strcmp(verdict, "DIFFERENT") == 0)
+        snprintf(w.s, sizeof w.s, "%.100s is %.200s%.110s (against %.100s)", a, too_bright(claim).s,
+                 scene.s, b);
+    else if (strcmp(verdict, "EQUIVALENT") == 0)
+        snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%", a,
+                 scene.s, b, 100 * member_number(claim, "margin_global"));
+    else if (strcmp(verdict, "INCONCLUSIVE") == 0)
+        snprintf(w.s, sizeof w.s,
+                 "%.100s is too noisy to tell%.110s (against %.100s): about %.2g times the samples "
+                 "would decide",
+                 a, scene.s, b, fmax(1, member_number(claim, "extra_factor")));
+    else
+        snprintf(
+            w.s, sizeof w.s,
+            "no difference of %.100s was found%.110s (against %.100s); %.3g %% would have been", a,
+            scene.s, b, 100 * member_number(claim, "mdb_global"));
+    return w;
+}
+
+/* The different texts of a key, "a, b and c"; beyond a few only how many. */
+static struct plain_words names(const json_t *claims, const char *key, const char *noun)
+{
+    const char *name[MOST_NAMES + 1];
+    struct plain_words w = {""};
+    size_t num = 0, at = 0;
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const char *text = member_or_empty(json_array_get(claims, i), key);
+        size_t k = 0;
+        while (k < num && strcmp(name[k], text) != 0)
+            k++;
+        if (k == num && num < MOST_NAMES)
+            name[num++] = text;
+    }
+    for (size_t k = 0; k < num && k < 6 && at < sizeof w.s - 1; k++)
+        at += (size_t)snprintf(w.s + at, sizeof w.s - at, "%s%.80s",
+                               k == 0                     ? ""
+                               : k + 1 == num && num <= 6 ? " and "
+                                                          : ", ",
+                               name[k]);
+    if (num > 6 && at < sizeof w.s)
+        snprintf(w.s + at, sizeof w.s - at, " and other %s", noun);
+    return w;
+}
+
+static size_t num_scenes(const json_t *claims)
+{
+    size_t num = 0;
+    for (size_t i = 0; i < json_array_size(claims); i++) {
+        const char *scene = member_or_empty(json_array_get(claims, i), "scene");
+        bool seen = false;
+        for (size_t k = 0; k < i && !seen; k++)
+            seen = strcmp(member_or_empty(json_array_get(claims, k), "scene"), scene) == 0;
+        num += !seen;
+    }
+    return num;
+}
+
+static void print_failures(FILE *f, const json_t *claims, const json_t *stated, size_t bad)
+{
+    size_t said = 0;
+    for (int k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
+        for (size_t i = 0; i < json_array_size(claims) && said < MOST_FAILURES; i++) {
+            const json_t *claim = json_array_get(claims, i);
+            if ((int)results_claim_outcome(claim) == k)
+                fprintf(f, "%s%s", said++ == 0 ? ": " : "; ", plain_words_claim(claim).s);
+        }
+    for (size_t i = 0; i < json_array_size(stated) && said < MOST_FAILURES; i++) {
+        const json_t *c = json_array_get(stated, i);
+        if (stated_error_outcome(c) != OUTCOME_AS_EXPECTED)
+            fprintf(f, "%sthe errors that renders of %s state are not those they have",
+                    said++ == 0 ? ": " : "; ", member_or_empty(c, "scene"));
+    }
+    if (bad > said)
+        fprintf(f, "; and %zu more", bad - said);
+}
+
+void plain_words_print(FILE *f, const json_t *results, const char *page)
+{
+    const json_t *claims = json_object_get(results, "claims"),
+                 *stated = json_object_get(results, "consistency");
+    const size_t num = json_array_size(claims), num_stated = json_array_size(stated);
+    size_t good = 0, good_stated = 0, mistakes = 0;
+    for (size_t i = 0; i < num; i++) {
+        const json_t *claim = json_array_get(claims, i);
+        const bool expected = results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
+        good += expected;
+        mistakes += expected && strcmp(member_or_empty(claim, "expected"), "DIFFERENT") == 0;
+    }
+    for (size_t i = 0; i < num_stated; i++)
+        good_stated += stated_error_outcome(json_array_get(stated, i)) == OUTCOME_AS_EXPECTED;
+    const size_t bad = num + num_stated - good - good_stated, scenes = num_scenes(claims);
+    fprintf(f, "\njudged: %s on %zu scene%s against %s: %zu comparison%s",
+            names(claims, "a", "programs").s, scenes, scenes == 1 ? "" : "s",
+            names(claims, "b", "references").s, num, num == 1 ? "" : "s");
+    if (num_stated > 0)
+        fprintf(f, ", and the stated errors of %zu scene%s", num_stated,
+                num_stated == 1 ? "" : "s");
+    if (bad == 0) {
+        fputs("\nresult: all as it should be", f);
+        if (num > mistakes)
+            fprintf(f, ", %zu the same within their margins", num - mistakes);
+        if (mistakes > 0)
+            fprintf(f, ", %zu deliberate mistake%s found", mistakes, mistakes == 1 ? "" : "s");
+    } else {
+        fprintf(f, "\nresult: %zu of %zu not as it should be", bad, num + num_stated);
+        print_failures(f, claims, stated, bad);
+    }
+    fprintf(f, "\nlook:   %s\n", page);
+}
