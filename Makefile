@@ -69,11 +69,16 @@ deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
 
 share := $(DESTDIR)$(PREFIX)/share/assay
-install: all
+install: all library
 	install -d $(DESTDIR)$(PREFIX)/bin $(share)/cycles $(share)/import_check $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
 	install -D -m 755 $(BUILD)/oiio.so $(DESTDIR)$(PREFIX)/lib/assay/oiio.so
+	install -D -m 644 tools/library/assay.h $(DESTDIR)$(PREFIX)/include/assay.h
+	install -m 755 $(BUILD)/libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib
+	ln -sf libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib/libassay.so
+	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig
+	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(DESTDIR)$(PREFIX)/lib/pkgconfig/assay.pc
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
 	cp -R reference/scenes reference/engines golden tools/rubrics $(share)
@@ -93,6 +98,7 @@ help:
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
 	@echo 'make report     make the page of the last validation again'
 	@echo 'make autograder BUILD/autograder.zip for Gradescope (RUBRIC=$(RUBRIC))'
+	@echo 'make library    build/libassay.so (tools/library/assay.h); from Python: pip install --no-build-isolation tools/python'
 	@echo 'make install    into PREFIX=$(PREFIX); make deps: install the Debian packages that building needs'
 	@sed -n 's/^#: //p' tests/tests.mk
 
@@ -124,6 +130,18 @@ $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
 
+# libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere.
+LIBRARY_ABI     := 1
+LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
+  $(addprefix tools/,images stats compare exact input sequential results html plots report library)) tools/base/temp_dir.c \
+  tools/validate/compare_job.c tools/validate/same_program.c)
+$(BUILD)/pic/%: CFLAGS += -fPIC
+$(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD)/pic,$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
+	$(call say,LINK,$@)
+	$(Q)$(CXX) $(OPT) -shared -Wl,-soname,$(@F) -Wl,--version-script=tools/library/assay.map -Wl,-z,defs -Wl,--gc-sections \
+	  -o $@ $(filter %.o,$^) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
+library: $(BUILD)/libassay.so.$(LIBRARY_ABI)
+
 # Everything below one directory, with the compiler and the flags that are set for it: $(call tree,DIRECTORY,PACKAGES).
 define tree
 $(1)/%.c.o: %.c | $(2)
@@ -147,6 +165,7 @@ $(1)/renderer/base/version.c.o: $(BUILD)/commit
 $(1)/renderer/base/version.c.o: CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
 endef
 $(eval $(call tree,$(BUILD),$(BUILD)/deps))
+$(eval $(call tree,$(BUILD)/pic,$(BUILD)/deps))
 
 $(BUILD)/commit: FORCE
 	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
@@ -186,7 +205,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 # Not there where a grader of submissions builds the programs (tools/autograder/pack.sh).
 -include tests/tests.mk
 
-.PHONY: all validate golden report autograder deps deps-live install format clean help FORCE
+.PHONY: all validate golden report autograder library deps deps-live install format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -2,6 +2,7 @@
 
 SECONDS_EACH ?= 60
 DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch openimageio-tools chromium \
+  python3-numpy python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_SLURM := slurm-wlm munge
@@ -83,7 +84,7 @@ $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browse
 	  mv lock.json package-lock.json && { npm ci --silent --ignore-scripts --no-audit --no-fund || \
 	    echo "npm finds no registry: pages will not be looked at in a browser" >&2; }
 
-END_TO_END := $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a
+END_TO_END := $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a library
 check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz programs-no-memory $(CHECKED) $(END_TO_END)
 	tests/run.sh $(BUILD) $(CHECKED)
 

@@ -16,8 +16,10 @@
 
 bool image_oiio_file(struct path *path, struct err *e)
 {
-    /* Beside the programs; beside the directory of the tests; where `make install` puts it. */
-    static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so"};
+    /* Beside the programs; beside the directory of the tests; where `make install` puts it; where Debian's packages do, from
+     * /usr/lib/TRIPLET. */
+    static const char *const places[] = {"oiio.so", "../oiio.so", "../lib/assay/oiio.so",
+                                         "../assay/oiio.so"};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
         *path = fs_beside_program(places[i]);
         if (access(path->s, R_OK) == 0)

@@ -2,9 +2,12 @@
 #include "fs.h"
 
 #include <dirent.h>
+#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -207,9 +210,15 @@ struct path fs_beside_file(const char *path, const char *name)
 
 struct path fs_beside_program(const char *name)
 {
-    char self[3072];
+    char self[PATH_MAX];
+    Dl_info library;
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
     self[n > 0 ? n : 0] = '\0';
+    /* In libassay.so the program is somebody else's. */
+    if (dladdr((const void *)fs_beside_program, &library) != 0 &&
+        strstr(fs_base(library.dli_fname), ".so") != NULL)
+        if (realpath(library.dli_fname, self) == NULL)
+            self[0] = '\0';
     char *slash = strrchr(self, '/');
     if (slash != NULL)
         *slash = '\0';

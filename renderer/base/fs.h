@@ -53,7 +53,7 @@ const char *fs_base(const char *path);
 /* The file `name` in the directory of the file `path`. */
 struct path fs_beside_file(const char *path, const char *name);
 
-/* The file `name` beside the program that runs, or in the current directory if that cannot be known. */
+/* The file `name` beside the program that runs (where this is a part of libassay.so: beside that), or in the current directory if that cannot be known. */
 struct path fs_beside_program(const char *name);
 
 #endif

@@ -111,43 +111,16 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .usage = usage},
     {.args = "two images", CLI_TO_LIST(struct settings, job.path, num_paths)}};
 
-/* Rules between options. */
 static bool check(struct settings *s, struct err *e)
 {
-    struct compare_options *opt = &s->job.opt;
     if (s->num_paths != 2)
         return err_set(e, "compare needs two images (see --help)");
-    if (opt->margin_tile < 0)
-        opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
-    if (s->job.paired && s->job.exchangeable)
-        return err_set(e, "--paired and --exchangeable: sides with one seed cannot be exchanged");
-    double *accept = s->job.accept_mdb;
-    if (accept[0] > 0 && opt->margin_tile > 0 && !s->job.same_program)
-        return err_set(e, "--accept-mdb is for a search without --margin");
-    if (!(accept[0] > 0) && accept[1] > 0)
-        return err_set(e, "--accept-mdb-tile goes with --accept-mdb");
-    if (!(accept[1] > 0))
-        accept[1] = 4 * accept[0];
-    if (accept[1] < accept[0])
-        return err_set(e, "--accept-mdb-tile must be at least --accept-mdb");
-    s->job.expected = accept[0] > 0 ? VERDICT_NOTHING_FOUND : VERDICT_EQUIVALENT;
+    if (!compare_job_check(&s->job, e))
+        return false;
     if (s->expect != NULL && !verdict_parse(s->expect, &s->job.expected))
         return err_set(e, "--expect: '%s' is no verdict", s->expect);
-    if (s->job.expected == VERDICT_NOTHING_FOUND && !(accept[0] > 0))
+    if (s->job.expected == VERDICT_NOTHING_FOUND && !(s->job.accept_mdb[0] > 0))
         return err_set(e, "--expect '%s' goes with --accept-mdb", s->expect);
-    if (s->job.exchangeable && (opt->margin_tile > 0 || opt->margin_variance > 0))
-        return err_set(e, "--exchangeable asks if anything differs at all: it takes no margin");
-    if (s->job.exchangeable &&
-        (s->job.input[0].curve != NULL || s->job.input[0].spp > 0 || s->job.input[1].spp > 0))
-        return err_set(e, "--exchangeable takes directories of replicates, to which --curve and "
-                          "--spp-a do not apply");
-    if (s->job.same_program && (s->job.exchangeable || s->job.paired || s->job.again[0] != NULL))
-        return err_set(e, "--same-program is exact from one pair of renders with seeds of their "
-                          "own: it takes neither --exchangeable nor --again nor --paired");
-    if (!s->job.same_program && s->job.filter_width > 0)
-        return err_set(e, "--filter-width is for --same-program");
-    if (!s->job.exchangeable && s->job.min_side > 0)
-        return err_set(e, "--min-side is for --exchangeable");
     return true;
 }
 

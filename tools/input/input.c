@@ -13,15 +13,21 @@
 static const double most_censored = 0.05;     /* of the image, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
 
+static bool take_replicates(const char *path, const struct replicate_dir *r, struct input *out,
+                            struct notes *notes, struct err *e)
+{
+    out->kind = INPUT_REPLICATES;
+    input_notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own",
+                    path, r->num);
+    return replicate_dir_moments(r, &out->m, e);
+}
+
 static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
 {
     struct replicate_dir r;
     if (!replicate_dir_read(path, &r, e))
         return false;
-    out->kind = INPUT_REPLICATES;
-    bool ok = replicate_dir_moments(&r, &out->m, e);
-    input_notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own",
-                    path, r.num);
+    bool ok = take_replicates(path, &r, out, notes, e);
     replicate_dir_free(&r);
     return ok;
 }
@@ -96,6 +102,46 @@ bool input_read(const char *path, char side, const struct input_options *opt, st
         ok = read_directory(path, out, notes, e);
     else
         ok = read_file(path, side, opt, out, notes, e);
+    if (!ok)
+        input_free(out);
+    return ok;
+}
+
+static bool copy_moments(const struct moments *from, struct moments *to, struct err *e)
+{
+    size_t pixels = (size_t)from->width * (size_t)from->height;
+    if (!moments_alloc(to, from->width, from->height, e))
+        return false;
+    memcpy(to->n, from->n, pixels * sizeof *to->n);
+    memcpy(to->mean, from->mean, 3 * pixels * sizeof *to->mean);
+    memcpy(to->m2, from->m2, 3 * pixels * sizeof *to->m2);
+    memcpy(to->m3, from->m3, 3 * pixels * sizeof *to->m3);
+    memcpy(to->unit, from->unit, sizeof to->unit);
+    to->spp = from->spp;
+    return true;
+}
+
+bool input_take(const struct input_memory *memory, const char *name, char side,
+                const struct input_options *opt, struct input *out, struct notes *notes,
+                struct err *e)
+{
+    const struct replicate_dir *r = &memory->renders;
+    const struct image_file pic = {
+        r->width, r->height, r->num > 0 ? r->rgb[0] : NULL, {.type = memory->type}, 0};
+    *out = (struct input){0};
+    bool ok = true;
+    if (opt->spp > 0 && (memory->moments != NULL || r->num > 1)) {
+        ok = err_set(e, "%s: how many samples it has is known", name);
+    } else if (memory->moments != NULL) {
+        out->kind = memory->has_m3 ? INPUT_MOMENTS : INPUT_VARIANCE;
+        ok = copy_moments(memory->moments, &out->m, e);
+    } else if (r->num > 1) {
+        ok = r->num >= 3
+                 ? take_replicates(name, r, out, notes, e)
+                 : err_set(e, "%s: has %d images, at least 3 replicates are needed", name, r->num);
+    } else {
+        ok = plain_image_take(name, side, &pic, opt, out, notes, e);
+    }
     if (!ok)
         input_free(out);
     return ok;

@@ -7,6 +7,8 @@
 #define ASSAY_INPUT_H
 
 #include "tools/compare/compare.h"
+#include "tools/images/image_file.h"
+#include "tools/images/replicate_dir.h"
 
 struct notes {
     int num;
@@ -39,9 +41,22 @@ struct input {
     bool is_guessed; /* by input_pair(): n, unit and spp stand for nothing that was observed */
 };
 
+/* A side that is in memory; nothing of it is changed or kept. */
+struct input_memory {
+    const struct moments *moments; /* or NULL, and renders */
+    bool has_m3;                   /* false: M3 of the moments is not known */
+    struct replicate_dir
+        renders; /* one image, or at least 3 replicates, of finite numbers; names are not looked at */
+    enum image_type type; /* what the renders' numbers were rounded to; replicates: IMAGE_FLOAT */
+};
+
 /* Reads one side; `side` is 'a' or 'b', for messages. The caller frees with input_free(). */
 bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,
                 struct notes *notes, struct err *e) __attribute__((warn_unused_result));
+/* The same of one in memory; `name` is for messages and notes. */
+bool input_take(const struct input_memory *memory, const char *name, char side,
+                const struct input_options *opt, struct input *out, struct notes *notes,
+                struct err *e) __attribute__((warn_unused_result));
 void input_free(struct input *in);
 
 /* Makes both fit for compare_moments(): the same colour space, censored pixels out of both (0, exact,

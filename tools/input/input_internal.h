@@ -21,5 +21,9 @@ void input_to_xyz(struct input *in);
 bool plain_image_input(const char *path, char side, const struct input_options *opt,
                        struct input *out, struct notes *notes, struct err *e)
     __attribute__((warn_unused_result));
+/* The same of one that is read; `path` is for messages. */
+bool plain_image_take(const char *path, char side, const struct image_file *pic,
+                      const struct input_options *opt, struct input *out, struct notes *notes,
+                      struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -88,28 +88,27 @@ static bool check_options(const char *path, char side, const struct image_file *
     return true;
 }
 
-bool plain_image_input(const char *path, char side, const struct input_options *opt,
-                       struct input *out, struct notes *notes, struct err *e)
+bool plain_image_take(const char *path, char side, const struct image_file *pic,
+                      const struct input_options *opt, struct input *out, struct notes *notes,
+                      struct err *e)
 {
-    struct image_file pic;
     struct curve curve = {.kind = CURVE_LINEAR};
-    if (!image_file_read(path, &pic, e))
+    size_t pixels = (size_t)pic->width * (size_t)pic->height;
+    bool rounded = pic->info.type != IMAGE_FLOAT || strcmp(pic->info.format, "hdr") == 0;
+    if (!check_options(path, side, pic, opt, e) ||
+        (is_coded(pic) && !tone_curve_parse(opt->curve, &curve, e)) ||
+        !moments_alloc(&out->m, pic->width, pic->height, e))
         return false;
-    size_t pixels = (size_t)pic.width * (size_t)pic.height;
-    bool rounded = pic.info.type != IMAGE_FLOAT || strcmp(pic.info.format, "hdr") == 0;
-    bool ok = check_options(path, side, &pic, opt, e);
-    ok = ok && (!is_coded(&pic) || tone_curve_parse(opt->curve, &curve, e));
-    ok = ok && moments_alloc(&out->m, pic.width, pic.height, e);
-    if (ok && rounded) {
+    if (rounded) {
         out->m.tolerance = calloc(3 * pixels, sizeof *out->m.tolerance);
         out->rounding = calloc(3 * pixels, sizeof *out->rounding);
-        out->censored = is_coded(&pic) ? calloc(pixels, 1) : NULL;
-        ok = (out->m.tolerance != NULL && out->rounding != NULL &&
-              (out->censored != NULL || !is_coded(&pic))) ||
-             err_set(e, "%s: out of memory for %zu pixels", path, pixels);
+        out->censored = is_coded(pic) ? calloc(pixels, 1) : NULL;
+        if (out->m.tolerance == NULL || out->rounding == NULL ||
+            (out->censored == NULL && is_coded(pic)))
+            return err_set(e, "%s: out of memory for %zu pixels", path, pixels);
     }
-    for (size_t i = 0; ok && i < 3 * pixels; i++) {
-        struct bin b = bin_of(&pic, &curve, pic.rgb + i / 3 * 3, pic.rgb[i]);
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        struct bin b = bin_of(pic, &curve, pic->rgb + i / 3 * 3, pic->rgb[i]);
         out->m.mean[i] = b.mean;
         if (rounded) {
             out->m.tolerance[i] = b.tolerance;
@@ -119,8 +118,17 @@ bool plain_image_input(const char *path, char side, const struct input_options *
             out->censored[i / 3] = 1;
     }
     out->kind = INPUT_IMAGE;
-    if (ok)
-        tell(path, &pic, opt->curve, notes);
+    tell(path, pic, opt->curve, notes);
+    return true;
+}
+
+bool plain_image_input(const char *path, char side, const struct input_options *opt,
+                       struct input *out, struct notes *notes, struct err *e)
+{
+    struct image_file pic;
+    if (!image_file_read(path, &pic, e))
+        return false;
+    bool ok = plain_image_take(path, side, &pic, opt, out, notes, e);
     image_file_free(&pic);
     return ok;
 }

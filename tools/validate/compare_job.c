@@ -16,6 +16,39 @@
 #include <stdlib.h>
 #include <string.h>
 
+bool compare_job_check(struct compare_job *job, struct err *e)
+{
+    struct compare_options *opt = &job->opt;
+    double *accept = job->accept_mdb;
+    if (opt->margin_tile < 0)
+        opt->margin_tile = fmin(4 * opt->margin_global, 0.99);
+    if (job->paired && job->exchangeable)
+        return err_set(e, "--paired and --exchangeable: sides with one seed cannot be exchanged");
+    if (accept[0] > 0 && opt->margin_tile > 0 && !job->same_program)
+        return err_set(e, "--accept-mdb is for a search without --margin");
+    if (!(accept[0] > 0) && accept[1] > 0)
+        return err_set(e, "--accept-mdb-tile goes with --accept-mdb");
+    if (!(accept[1] > 0))
+        accept[1] = 4 * accept[0];
+    if (accept[1] < accept[0])
+        return err_set(e, "--accept-mdb-tile must be at least --accept-mdb");
+    job->expected = accept[0] > 0 ? VERDICT_NOTHING_FOUND : VERDICT_EQUIVALENT;
+    if (job->exchangeable && (opt->margin_tile > 0 || opt->margin_variance > 0))
+        return err_set(e, "--exchangeable asks if anything differs at all: it takes no margin");
+    if (job->exchangeable &&
+        (job->input[0].curve != NULL || job->input[0].spp > 0 || job->input[1].spp > 0))
+        return err_set(e, "--exchangeable takes directories of replicates, to which --curve and "
+                          "--spp-a do not apply");
+    if (job->same_program && (job->exchangeable || job->paired || job->again[0] != NULL))
+        return err_set(e, "--same-program is exact from one pair of renders with seeds of their "
+                          "own: it takes neither --exchangeable nor --again nor --paired");
+    if (!job->same_program && job->filter_width > 0)
+        return err_set(e, "--filter-width is for --same-program");
+    if (!job->exchangeable && job->min_side > 0)
+        return err_set(e, "--min-side is for --exchangeable");
+    return true;
+}
+
 /* Two sides as compare_moments() wants them. */
 struct pair {
     struct input in[2];
@@ -48,12 +81,16 @@ static void make_pairs(struct pair *p, struct notes *notes)
                                 : "--paired: the noise is that of A - B, whatever the sides state");
 }
 
-static bool pair_read(const struct compare_job *job, const char *const path[2], struct pair *p,
+static bool pair_read(const struct compare_job *job, const char *const path[2],
+                      const struct input_memory *const memory[2], struct pair *p,
                       struct notes *notes, struct err *e)
 {
     *p = (struct pair){0};
-    bool ok = input_read(path[0], 'a', &job->input[0], &p->in[0], notes, e) &&
-              input_read(path[1], 'b', &job->input[1], &p->in[1], notes, e);
+    bool ok = true;
+    for (int i = 0; ok && i < 2; i++)
+        ok = memory[i] != NULL
+                 ? input_take(memory[i], path[i], "ab"[i], &job -> input[i], &p -> in[i], notes, e)
+                 : input_read(path[i], "ab"[i], &job -> input[i], &p -> in[i], notes, e);
     for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
              p->in[1].censored != NULL ||
@@ -68,14 +105,16 @@ static bool pair_read(const struct compare_job *job, const char *const path[2], 
 }
 
 /* The pair's moments become the result's; what is left of it is freed. */
-static void keep_pair(const char *const path[2], struct pair *p, struct compared *out)
+static void keep_pair(const char *const path[2], const struct input_memory *const memory[2],
+                      struct pair *p, struct compared *out)
 {
     for (int i = 0; i < 2; i++) {
         moments_free(&out->m[i]);
         out->m[i] = p->in[i].m;
         p->in[i].m = (struct moments){0};
-        out->is_file[i] = p->in[i].kind == INPUT_MOMENTS && !p->in[i].is_guessed &&
-                          p->in[i].censored == NULL && !p->in[i].is_xyz;
+        out->is_stated[i] = p->in[i].kind == INPUT_MOMENTS && !p->in[i].is_guessed &&
+                            p->in[i].censored == NULL && !p->in[i].is_xyz;
+        out->is_file[i] = out->is_stated[i] && memory[i] == NULL;
         out->path[i] = path[i];
     }
     out->is_guessed = p->in[0].is_guessed;
@@ -96,7 +135,7 @@ static bool second_stage(const struct compare_job *job, const struct compare_opt
 {
     struct pair again;
     struct comparison first = out->r, second = {0};
-    if (!pair_read(job, job->again, &again, &out->notes, e))
+    if (!pair_read(job, job->again, job->memory_again, &again, &out->notes, e))
         return false;
     bool ok = check_fresh(job->again, out->m, &again, e) &&
               two_stage_confirm(&first, &again.in[0].m, &again.in[1].m, opt, &second, e);
@@ -104,7 +143,7 @@ static bool second_stage(const struct compare_job *job, const struct compare_opt
         input_limit(&again.in[0], opt->tile, &second);
         comparison_free(&first);
         out->r = second;
-        keep_pair(job->again, &again, out);
+        keep_pair(job->again, job->memory_again, &again, out);
     } else {
         pair_free(&again);
     }
@@ -115,7 +154,7 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
 {
     struct pair p;
     struct compare_options opt = job->opt;
-    if (!pair_read(job, job->path, &p, &out->notes, e))
+    if (!pair_read(job, job->path, job->memory, &p, &out->notes, e))
         return false;
     bool two = job->again[0] != NULL;
     double seen = variance_ratio_of_difference(&p.in[0].m, &p.in[1].m);
@@ -129,7 +168,7 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
     if (ok)
         input_limit(&p.in[0], opt.tile, &out->r);
-    keep_pair(job->path, &p, out);
+    keep_pair(job->path, job->memory, &p, out);
     if (ok && two && out->r.verdict != VERDICT_DIFFERENT)
         input_notes_add(&out->notes, "nothing was flagged: %s and %s were not needed",
                         job->again[0], job->again[1]);
@@ -149,8 +188,26 @@ static bool same_image(const struct replicate_dir *r, const struct replicate_dir
                 return err_set(e,
                                "%s: %s is also in the first render: a second stage needs fresh "
                                "seeds",
-                               dir, s->name[j]);
+                               dir, s->name != NULL ? s->name[j] : "one of it");
     return true;
+}
+
+/* Its replicates; those in memory stay whose they are. */
+static bool replicates_read(const char *path, const struct input_memory *memory,
+                            struct replicate_dir *out, struct err *e)
+{
+    if (memory == NULL)
+        return replicate_dir_read(path, out, e);
+    if (memory->moments != NULL || memory->renders.num < 3 || memory->type != IMAGE_FLOAT)
+        return err_set(e, "%s: a permutation needs replicates, at least 3 images of floats", path);
+    *out = memory->renders;
+    return true;
+}
+
+static void replicates_free(const struct input_memory *memory, struct replicate_dir *r)
+{
+    if (memory == NULL)
+        replicate_dir_free(r);
 }
 
 static bool permute_again(const struct compare_job *job, const struct replicate_dir first[2],
@@ -161,11 +218,11 @@ static bool permute_again(const struct compare_job *job, const struct replicate_
     struct permutation found = out->perm;
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
-        ok = replicate_dir_read(job->again[i], &again[i], e) &&
+        ok = replicates_read(job->again[i], job->memory_again[i], &again[i], e) &&
              same_image(&first[i], &again[i], job->again[i], e);
     ok = ok && permutation_confirm(&found, &again[0], &again[1], stage, &out->perm, e);
-    replicate_dir_free(&again[0]);
-    replicate_dir_free(&again[1]);
+    replicates_free(job->memory_again[0], &again[0]);
+    replicates_free(job->memory_again[1], &again[1]);
     return ok;
 }
 
@@ -177,8 +234,8 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     bool two = job->again[0] != NULL;
     struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha, job->min_side,
                                         opt.tile};
-    bool ok =
-        replicate_dir_read(job->path[0], &r[0], e) && replicate_dir_read(job->path[1], &r[1], e);
+    bool ok = replicates_read(job->path[0], job->memory[0], &r[0], e) &&
+              replicates_read(job->path[1], job->memory[1], &r[1], e);
     for (int i = 0; ok && i < 2; i++) {
         ok = replicate_dir_moments(&r[i], &out->m[i], e);
         out->path[i] = job->path[i];
@@ -201,8 +258,8 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
             "those of the moments",
             r[0].num, r[1].num, out->perm.smallest_p);
     }
-    replicate_dir_free(&r[0]);
-    replicate_dir_free(&r[1]);
+    replicates_free(job->memory[0], &r[0]);
+    replicates_free(job->memory[1], &r[1]);
     return ok;
 }
 
@@ -225,8 +282,9 @@ static bool run_same_program(const struct compare_job *job, struct compared *out
         compare_job_free(out);
         out->notes = (struct notes){0};
     }
-    const struct moments *m = out->has_means && out->is_file[0] && out->is_file[1] ? out->m : NULL;
-    if (!same_program_judge(job->path, m, &opt, &out->flip, e))
+    const struct moments *m =
+        out->has_means && out->is_stated[0] && out->is_stated[1] ? out->m : NULL;
+    if (!same_program_judge(job->path, job->memory, m, &opt, &out->flip, e))
         return false;
     out->mean_verdict = out->r.verdict;
     snprintf(out->mean_reason, sizeof out->mean_reason, "%s", out->r.reason);

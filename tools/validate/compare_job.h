@@ -11,6 +11,8 @@ struct compare_job {
     const char *title;    /* of the page; NULL: none */
     const char *name[2];  /* what results and the page call the sides; NULL: their paths */
     const char *again[2]; /* fresh renders of both for a second stage, or NULL */
+    /* NULL, or a side that is in memory: of path, of again, which then only name it. */
+    const struct input_memory *memory[2], *memory_again[2];
     struct input_options input[2];
     struct compare_options opt;
     bool paired;       /* both sides share their noise: it is taken from A - B */
@@ -25,7 +27,8 @@ struct compare_job {
 struct compared {
     struct moments m[2];     /* what was compared last: the first pair or, flagged, the second */
     bool is_guessed;         /* their n and unit are not of observations (input.h) */
-    bool is_file[2];         /* the side is a moments EXR, path[] */
+    bool is_stated[2];       /* the side's moments are what it states, for the whole image */
+    bool is_file[2];         /* and in a moments EXR, path[] */
     const char *path[2];     /* of that pair; the job's */
     struct comparison r;     /* its verdict and reason are the claim's, whoever reached it */
     struct permutation perm; /* of an exchangeable job; of the last stage */
@@ -37,6 +40,10 @@ struct compared {
     char mean_reason[256];
     struct notes notes;
 };
+
+/* Fills in what follows from other options (margin_tile below 0, accept_mdb[1] 0: four times the image's; what is expected) and
+ * fails with a line where two do not go together, in the words of the command. */
+bool compare_job_check(struct compare_job *job, struct err *e) __attribute__((warn_unused_result));
 
 /* Reads, compares, and, with a second pair, confirms. The caller frees with compare_job_free(). */
 bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)

@@ -28,9 +28,34 @@ static void renders_free(struct renders *r)
     free(r->mean);
 }
 
-static bool renders_read(const char *path, struct renders *r, struct err *e)
+static bool renders_take(const struct moments *m, struct renders *r, struct err *e)
+{
+    size_t values = 3 * (size_t)m->width * (size_t)m->height;
+    r->mean = malloc(values * sizeof *r->mean);
+    if (r->mean == NULL)
+        return err_set(e, "out of memory for an image");
+    for (size_t i = 0; i < values; i++)
+        r->mean[i] = (float)m->mean[i];
+    r->num = 1;
+    r->width = m->width;
+    r->height = m->height;
+    r->rgb = &r->mean;
+    return true;
+}
+
+static bool renders_read(const char *path, const struct input_memory *memory, struct renders *r,
+                         struct err *e)
 {
     struct stat st;
+    if (memory != NULL && memory->moments != NULL)
+        return renders_take(memory->moments, r, e);
+    if (memory != NULL) {
+        r->num = memory->renders.num;
+        r->width = memory->renders.width;
+        r->height = memory->renders.height;
+        r->rgb = memory->renders.rgb;
+        return true;
+    }
     if (stat(path, &st) == 0 && S_ISDIR(st.st_mode)) {
         if (!replicate_dir_read(path, &r->dir, e))
             return false;
@@ -46,21 +71,6 @@ static bool renders_read(const char *path, struct renders *r, struct err *e)
     r->width = r->file.width;
     r->height = r->file.height;
     r->rgb = &r->file.rgb;
-    return true;
-}
-
-static bool renders_take(const struct moments *m, struct renders *r, struct err *e)
-{
-    size_t values = 3 * (size_t)m->width * (size_t)m->height;
-    r->mean = malloc(values * sizeof *r->mean);
-    if (r->mean == NULL)
-        return err_set(e, "out of memory for an image");
-    for (size_t i = 0; i < values; i++)
-        r->mean[i] = (float)m->mean[i];
-    r->num = 1;
-    r->width = m->width;
-    r->height = m->height;
-    r->rgb = &r->mean;
     return true;
 }
 
@@ -91,14 +101,15 @@ static float *stated_error(const struct moments *m)
     return error;
 }
 
-bool same_program_judge(const char *const path[2], const struct moments *m,
-                        const struct sign_flip_options *opt, struct sign_flip *out, struct err *e)
+bool same_program_judge(const char *const path[2], const struct input_memory *const memory[2],
+                        const struct moments *m, const struct sign_flip_options *opt,
+                        struct sign_flip *out, struct err *e)
 {
     struct renders r[2] = {{.num = 0}};
     float *error = NULL;
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
-        ok = m != NULL ? renders_take(&m[i], &r[i], e) : renders_read(path[i], &r[i], e);
+        ok = m != NULL ? renders_take(&m[i], &r[i], e) : renders_read(path[i], memory[i], &r[i], e);
     if (ok && (r[0].width != r[1].width || r[0].height != r[1].height))
         ok = err_set(e, "A is %d x %d pixels, B is %d x %d", r[0].width, r[0].height, r[1].width,
                      r[1].height);

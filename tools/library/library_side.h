@@ -1,0 +1,20 @@
+/* A side as the library's caller gives it, made one that compare_job.h takes. */
+#ifndef ASSAY_LIBRARY_SIDE_H
+#define ASSAY_LIBRARY_SIDE_H
+
+#include "assay.h"
+#include "tools/input/input.h"
+
+struct library_side {
+    const char *name;           /* or the path */
+    struct input_memory memory; /* of a side without a path */
+    struct moments moments;
+};
+
+/* Checks what compare_moments() does not: that sizes and counts make sense and numbers of images are finite. Copies, as three
+ * channels. `name`: where the side has none. Fails with a line that begins with the name. The caller closes, also after a failure. */
+bool library_side_open(struct library_side *out, const struct assay_side *side, const char *name,
+                       struct err *e) __attribute__((warn_unused_result));
+void library_side_close(struct library_side *s);
+
+#endif
