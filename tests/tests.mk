@@ -16,7 +16,7 @@ $(BUILD)/deps-slurm: | $(BUILD)/deps
 # Sources of the tests, and of programs that measure or make what is stored. Names are unique in the tree, so that
 # all programs stand side by side, in BUILD/tests and BUILD/san/tests.
 TESTS    := $(wildcard tests/*/test_*.c tests/*/*/test_*.c)
-PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c \
+PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c tests/mutants/machine/image_change.c \
   tests/end_to_end/student_tracer.c tests/studies/bench/bench.c
 BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
 # What several tests share: a library, of which each takes what it wants.
@@ -84,7 +84,7 @@ $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browse
 	  mv lock.json package-lock.json && { npm ci --silent --ignore-scripts --no-audit --no-fund || \
 	    echo "npm finds no registry: pages will not be looked at in a browser" >&2; }
 
-END_TO_END := $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a library
+END_TO_END := $(BUILD)/tests/image_change $(BUILD)/tests/test_camera $(BUILD)/tests/student_tracer $(BUILD)/tests/bench $(BUILD)/browser/package-lock.json $(BUILD)/libassay.a library
 check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang programs-fuzz programs-no-memory $(CHECKED) $(END_TO_END)
 	tests/run.sh $(BUILD) $(CHECKED)
 
@@ -171,6 +171,13 @@ scale: $(BUILD)/tests/make_scale
 #: make mutants    build each known bug into a renderer and see the suite find it (many minutes; ONLY="NAME ...")
 mutants: all $(BUILD)/libassay.a
 	tests/mutants/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
+#: make machine-mutants  the next mutants of a sample drawn by machine (SAMPLE=1; SECONDS_EACH=60: for so long)
+MUTANT_TESTS = $(call program,$(BUILD),$(wildcard tests/renderer/*/test_*.c tests/reference/*/test_*.c)) $(BUILD)/tests/image_change
+machine-mutants: all $(BUILD)/libassay.a $(BUILD)/deps-test
+	$(MAKE) -k WERROR= $(MUTANT_TESTS)
+	tests/mutants/machine/run.py --build $(BUILD) prepare
+	tests/mutants/machine/run.py --build $(BUILD) go $(or $(SAMPLE),1) --seconds $(SECONDS_EACH)
+	tests/mutants/machine/run.py page
 #: make catalogue  bring what assay diagnose knows of these bugs up to date (golden/diagnose)
 catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
 	tests/mutants/mutants.sh --build-only $(BUILD)
@@ -207,5 +214,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants catalogue diagnose-rates calibrate anchors \
+.PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

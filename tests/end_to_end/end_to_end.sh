@@ -94,6 +94,8 @@ if tests/mutants/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "
     not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
 fi
 rm -f "$tmp/mutants.out"
+# Those made by machine: what the mutator makes, and who finds planted ones.
+tests/mutants/machine/check.py "$plain" || not_ok "mutants by machine" "check.py ended early"
 
 # A directory that goes while its image is rendered: the image is saved in the current one.
 mkdir "$tmp/gone" "$tmp/here"
