@@ -58,6 +58,10 @@ golden: all $(BUILD)/deps-live
 	  $(addprefix --only ,$(ONLY))
 	$(BUILD)/assay golden approve --all --new --golden golden --from $(BUILD)/golden-candidate $(ONLY)
 
+# tools/RESULTS.md from the last `make validate` (and assay converge -o $(BUILD)/converge).
+results: all
+	tools/results.sh $(BUILD) >$(BUILD)/RESULTS.md && cp $(BUILD)/RESULTS.md tools/RESULTS.md
+
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
 
@@ -96,7 +100,7 @@ help:
 	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests, lint, fuzzers'
 	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
 	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
-	@echo 'make report     make the page of the last validation again'
+	@echo 'make report     make the page of the last validation again; make results: its table, tools/RESULTS.md'
 	@echo 'make autograder BUILD/autograder.zip for Gradescope (RUBRIC=$(RUBRIC))'
 	@echo 'make library    build/libassay.so (tools/library/assay.h); from Python: pip install --no-build-isolation tools/python'
 	@echo 'make install    into PREFIX=$(PREFIX); make deps: install the Debian packages that building needs'
@@ -205,7 +209,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 # Not there where a grader of submissions builds the programs (tools/autograder/pack.sh).
 -include tests/tests.mk
 
-.PHONY: all validate golden report autograder library deps deps-live install format clean help FORCE
+.PHONY: all validate golden results report autograder library deps deps-live install format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

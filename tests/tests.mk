@@ -206,6 +206,12 @@ rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubr
 	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)
 	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRICS)
 
+#: make pictures   the two images that README shows (tools/docs/images)
+pictures: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
+	$(BUILD)/assay validate -q --out $(BUILD)/pictures --only 12_point_plane --only 41_cornell --only 42_cornell_glass --only 46_sky --only 95_one_bounce_less
+	$(BUILD)/pathtracer -q -r 360x360 -s 1024 -f $(BUILD)/pictures/render.png reference/scenes/42_cornell_glass.dae
+	node tests/browser/pictures.mjs $(BUILD)/browser $(BUILD)/pictures/index.html $(BUILD)/pictures/render.png tools/docs/images
+
 # For tests/mutants/mutants.sh.
 print-compile:
 	@echo $(CC) $(filter-out -g,$(cflags))
@@ -215,4 +221,4 @@ print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 .PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table rubric-bugs print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
+  bench bench-rays bvh-table rubric-bugs pictures print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

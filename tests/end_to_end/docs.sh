@@ -1,6 +1,6 @@
 #!/bin/bash
 # tests/end_to_end/docs.sh BUILD: every relative link of every Markdown file of the repository leads to a file that is there, and to a
-# heading that it has; sources that pages name are there, and pages that sources name; the five-minute walk is walked; what programs write has the keys of its manual (tools/docs/formats; what
+# heading that it has; sources that pages name are there, and pages that sources name; the commands of README and guides run in an empty folder; what programs write has the keys of its manual (tools/docs/formats; what
 # they read: test_formats.c). Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/docs.sh BUILD}")
@@ -60,16 +60,33 @@ tell "control: a name that is not there is seen" "$(missing_names "$tmp/three.md
 top=$PWD
 cd "$tmp" || exit 1
 ln -s "$build" build
-ln -s "$top/tools" "$top/reference" "$top/tests" .
+ln -s "$top/tools" "$top/reference" "$top/tests" "$top/golden" .
 
 # Code in a page: indented lines below a heading; or lines that begin with "$ ".
 code_below() { # PAGE HEADING
     awk -v head="$2" '/^#/ { on = $0 == head } on && sub(/^    /, "")' "$1"
 }
+# The commands of a page in their order: indented lines outside fences, without what programs print (judged:, result:, look:) and
+# blocks behind a comment "not run: WHY". `make TARGET` is only looked up, and lines that say "minutes" are left out.
+page_commands() { # PAGE
+    awk '/^```/ { fence = !fence } /^<!-- not run: / { skip = 1; next } /^[^ ]/ { skip = 0 } !fence && !skip && sub(/^    /, "")' "$1" |
+        grep -vE '^(judged|result|look):|^\[|^ |# .*minutes$'
+}
+# Runs them in one shell and prints what is wrong: a status that is not a verdict's, or a target of make that is none.
+run_page() { # PAGE
+    page_commands "$1" >page.sh
+    grep -q . page.sh || echo "no command in $1"
+    sed -n 's/^make \([a-z-]*\).*/\1/p' page.sh | while read -r target; do
+        grep -qE "^[a-z -]*\b$target\b.*:" "$top/Makefile" "$top/tests/tests.mk" || echo "make $target: no such target;"
+    done
+    # shellcheck disable=SC2016
+    { echo 'trap '\''s=$?; [ $s -le 2 ] || echo "$BASH_COMMAND: $s;" >&3'\'' ERR'; grep -v '^make' page.sh; } >run.sh
+    bash run.sh 3>&1 >page.out 2>&1 </dev/null
+}
 walk() {
-    code_below tools/docs/guide-course.md "## A graded submission in five minutes" | grep -v '^make$' >walk.sh
-    bash -e walk.sh >walk.out 2>&1 || head -c 1000 walk.out
-    grep -q '^"ada",10.00,10,' grades/grades.csv && grep -q '^"bob",4.00,10,' grades/grades.csv || cat grades/grades.csv
+    run_page tools/docs/guide-course.md
+    cp page.out walk.out
+    grep -q '^"ada",10.00,10,' grades/grades.csv && grep -q '^"bob",4.00,10,' grades/grades.csv || [ "$(grep -c '^"bob",7.00' grades/grades.csv)" = 1 ] || cat grades/grades.csv walk.out
 }
 
 # Names in the first cells of a page's tables of keys; keys of JSON.
@@ -99,6 +116,29 @@ else
     json_keys grades/*/grade.json grades/*/results.json >keys
     tell "keys of grades" "$(differ keys $formats/grades.md)"
 fi
+
+# The other guides and the doors of the README, each in a folder that is empty but for the checkout's names.
+cp reference/scenes/41_cornell.dae scene.dae
+cp "$top/README.md" .
+for page in tools/docs/guide-renderer.md tools/docs/guide-report.md README.md; do
+    case $page in
+    *renderer*) pattern="^result: all as it should be, 9 the same" ;;
+    *) pattern="^DIFFERENT: " ;;
+    esac
+    case $page:$(head -c 300 walk.out) in
+    README.md:*"no sandbox"*) sed -i '/assay grade -o/d' README.md ;;
+    esac
+    tell "commands of ${page##*/}" "$(run_page $page; grep -q "$pattern" page.out || head -c 1000 page.out)"
+done
+[ -s page.html ] || tell "the page of the guide" "is not there"
+printf '    false\n    bash -c "exit 3"\n    make no-such-target\n' >bad.md
+tell "control: a command that fails is seen" "$(run_page bad.md | diff - <(printf 'make no-such-target: no such target;\nbash -c "exit 3": 3;\n'))"
+# RESULTS.md is what the program prints: the differences of a scene, which no other scene moves, and a row for every scene.
+tell "rows of RESULTS.md" "$(sed -n 's/^| \([0-9][0-9]_[a-z0-9_]*\) | .*/\1/p' tools/RESULTS.md | sort -u |
+    diff <(cd reference/scenes && ls [0-9]*.json | sed 's/.json//') -)"
+build/assay validate -q --only 12_point_plane --only 31_spot_plane -o suite >out 2>&1
+differences() { grep -E '^\| (12_point_plane|31_spot_plane) ' | grep -oE '[-+][0-9.]+ ±|^\| [0-9a-z_]+'; }
+tell "RESULTS.md is what assay report --matrix prints" "$(build/assay report --matrix suite/results.json | differences | diff - <(differences <tools/RESULTS.md))"
 
 scene=reference/scenes/13_square_patch.dae
 for seed in 1 2; do build/pathtracer -q -r 16 16 -s 16 --seed $seed -f $seed.exr $scene >out 2>&1; done

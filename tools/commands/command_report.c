@@ -5,6 +5,7 @@
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
 #include "tools/results/history.h"
+#include "tools/results/plain_words.h"
 #include "tools/report/report.h"
 #include "tools/results/results_table.h"
 #include "tools/results/results_matrix.h"
@@ -61,6 +62,20 @@ static bool print_markdown(FILE *f, const char *path, bool headline, struct err 
         putc('\n', f);
     if (convergence != NULL)
         convergence_results_print_markdown(f, convergence);
+    json_decref(results);
+    return true;
+}
+
+/* What `assay validate` says at its end; of convergence alone, only where the page is. */
+static bool print_words(const char *path, const char *page, struct err *e)
+{
+    json_t *results;
+    if (!results_read(path, &results, e))
+        return false;
+    if (json_array_size(json_object_get(results, "claims")) > 0)
+        plain_words_print(stdout, results, page);
+    else
+        printf("%s\n", page);
     json_decref(results);
     return true;
 }
@@ -169,6 +184,5 @@ int command_report(int argc, char **argv, struct err *e)
     }
     if (!report_write_with(s.results, s.converge, s.out, e))
         return EXIT_NOT_JUDGED;
-    printf("%s\n", s.out);
-    return 0;
+    return print_words(s.results, s.out, e) ? 0 : EXIT_NOT_JUDGED;
 }

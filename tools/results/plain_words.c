@@ -82,8 +82,8 @@ struct plain_words plain_words_claim(const json_t *claim)
     const struct plain_words scene = on_scene(claim);
     const enum outcome outcome = results_claim_outcome(claim);
     if (outcome == OUTCOME_NOT_JUDGED)
-        snprintf(w.s, sizeof w.s, "%.100s could not be judged%.110s against %.100s: %.250s", a,
-                 scene.s, b, error != NULL ? error : "");
+        snprintf(w.s, sizeof w.s, "%.100s could not be judged: %.400s", a,
+                 error != NULL ? error : "");
     else if (strcmp(verdict, "DIFFERENT") == 0)
         snprintf(w.s, sizeof w.s, "%.100s is %.200s%.110s (against %.100s)", a, too_bright(claim).s,
                  scene.s, b);
@@ -103,7 +103,14 @@ struct plain_words plain_words_claim(const json_t *claim)
     return w;
 }
 
-/* The different texts of a key, "a, b and c"; beyond a few only how many. */
+/* "pathtracer-light", a variant of "pathtracer". */
+static bool is_variant_of(const char *text, const char *name)
+{
+    const size_t n = strlen(name);
+    return strncmp(text, name, n) == 0 && (text[n] == '\0' || text[n] == '-');
+}
+
+/* The different texts of a key without variants, "a, b and c"; beyond a few only that there are more. */
 static struct plain_words names(const json_t *claims, const char *key, const char *noun)
 {
     const char *name[MOST_NAMES + 1];
@@ -112,7 +119,7 @@ static struct plain_words names(const json_t *claims, const char *key, const cha
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const char *text = member_or_empty(json_array_get(claims, i), key);
         size_t k = 0;
-        while (k < num && strcmp(name[k], text) != 0)
+        while (k < num && !is_variant_of(text, name[k]))
             k++;
         if (k == num && num < MOST_NAMES)
             name[num++] = text;
@@ -143,21 +150,26 @@ static size_t num_scenes(const json_t *claims)
 
 static void print_failures(FILE *f, const json_t *claims, const json_t *stated, size_t bad)
 {
-    size_t said = 0;
+    size_t said = 0, covered = 0;
     for (int k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
         for (size_t i = 0; i < json_array_size(claims) && said < MOST_FAILURES; i++) {
             const json_t *claim = json_array_get(claims, i);
-            if ((int)results_claim_outcome(claim) == k)
-                fprintf(f, "%s%s", said++ == 0 ? ": " : "; ", plain_words_claim(claim).s);
+            const size_t same = k == OUTCOME_NOT_JUDGED ? results_num_with_error(claims, i) : 1;
+            if ((int)results_claim_outcome(claim) != k || same == 0)
+                continue;
+            fprintf(f, "%s%s", said++ == 0 ? ": " : "; ", plain_words_claim(claim).s);
+            covered += same;
         }
     for (size_t i = 0; i < json_array_size(stated) && said < MOST_FAILURES; i++) {
         const json_t *c = json_array_get(stated, i);
-        if (stated_error_outcome(c) != OUTCOME_AS_EXPECTED)
-            fprintf(f, "%sthe errors that renders of %s state are not those they have",
-                    said++ == 0 ? ": " : "; ", member_or_empty(c, "scene"));
+        if (stated_error_outcome(c) == OUTCOME_AS_EXPECTED)
+            continue;
+        fprintf(f, "%sthe errors that renders of %s state are not those they have",
+                said++ == 0 ? ": " : "; ", member_or_empty(c, "scene"));
+        covered++;
     }
-    if (bad > said)
-        fprintf(f, "; and %zu more", bad - said);
+    if (bad > covered)
+        fprintf(f, "; and %zu more", bad - covered);
 }
 
 void plain_words_print(FILE *f, const json_t *results, const char *page)
