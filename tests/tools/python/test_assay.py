@@ -1,7 +1,7 @@
-"""The package assay (tools/python) as a renderer's tests use it. Run by tests/end_to_end/library.sh with Debian's pytest; ASSAY is
-the command, for its figures of the same files.
+"""The package assay (tools/python) as a renderer's tests use it. Run by end_to_end/library.sh with Debian's pytest;
+ASSAY is the command, for its figures of the same files.
 
-Noise is from a law of mean 1 and known variance, seeds are fixed, no test is run again. Claims here are of alpha 1e-3 or less."""
+Noise is from a law of mean 1 and known variance, seeds are fixed, no test is run again. Claims are of alpha 1e-3."""
 
 import json
 import os
@@ -163,18 +163,18 @@ def test_threads():
 
 
 def test_what_a_failing_test_says(tmp_path):
-    """pytest on a test that must fail and one that must pass: the verdict, the worst region, and a page that is there."""
+    """pytest on tests that must fail and one that must pass: the verdict, worst region, and a page that is there."""
     (tmp_path / "test_mine.py").write_text(
         "import numpy as np, assay\n"
-        "def render(seed, f=1): return (np.random.default_rng(seed).gamma(4, .25, (8, 32, 32, 3)) * f).astype(np.float32)\n"
+        "def render(seed): return np.random.default_rng(seed).gamma(4, .25, (8, 32, 32, 3)).astype(np.float32)\n"
         "def test_good(): assay.assert_equivalent(render(1), render(2), margin=.05)\n"
         "def test_bad():\n"
         "    wrong = render(3)\n"
         "    wrong[:, 8:24, 16:] *= 1.5\n"
         "    assay.assert_equivalent(wrong, render(4), margin=.05)\n"
         "def test_too_few(): assay.assert_equivalent(render(5)[:3], render(6)[:3], margin=.01)\n")
-    run = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"], cwd=tmp_path,
-                         capture_output=True, text=True)
+    line = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"]
+    run = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True)
     assert "2 failed, 1 passed" in run.stdout
     assert "DIFFERENT: " in run.stdout and "INCONCLUSIVE: " in run.stdout and "worst: " in run.stdout
     page = tmp_path / "assay-reports" / "test_mine.py_test_bad.html"

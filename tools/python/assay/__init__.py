@@ -9,7 +9,7 @@
 
 A side is
   a path                  whatever the command `assay compare` takes: moments EXR, image, directory of replicates
-  an array (H, W[, C])    one image, C = 3 (R, G, B) or 1; its noise is then told by its neighbours. Floats are radiance;
+  an array (H, W[, C])    one image, C = 3 (R, G, B) or 1; noise is then told by neighbours. Floats are radiance;
                           uint8 and uint16 are codes and need curve="srgb" or another
   an array (K, H, W, C)   K >= 3 replicates, each with a seed of its own
   assay.Moments           running sums over samples or replicates: the sharpest

@@ -152,15 +152,16 @@ def _side(x, name):
 def compare(a, b, *, margin=None, margin_tile=None, margin_variance=None, accept_mdb=None, accept_mdb_tile=None,
             alpha=1e-3, tile=16, again=None, paired=False, exchangeable=False, same_program=False, filter_width=0,
             min_side=0, curve=None, spp_a=0, spp_b=0, name_a=None, name_b=None):
-    """Judges a (tested) against b (reference); the sides are described in the package. Returns a Result, raises NotJudged.
+    """Judges a (tested) against b (reference); sides as in the package. Returns a Result, raises NotJudged.
 
     margin: largest relative difference of the image's mean that counts as equal; margin_tile: of a tile's (4 x margin);
       without one nothing is EQUIVALENT: any difference is looked for
     margin_variance: the same for the variance of one sample or replicate; without it variances are not judged
-    accept_mdb, accept_mdb_tile: without a margin: passes if nothing is found and an error of so much could not be missed
+    accept_mdb, accept_mdb_tile: without a margin: passes if nothing is found and such an error could not be missed
     alpha: chance of a wrong DIFFERENT, and of a wrong EQUIVALENT; tile: side of a reporting tile, pixels
     again=(a2, b2): fresh renders of both: DIFFERENT only if they confirm what a and b show
-    paired: both share their noise (one seed, two versions); exchangeable: exact test by permutation of replicates
+    paired: both share their noise (one seed, two versions)
+    exchangeable: exact test by permutation of replicates
     same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: of that
     curve: of integer images: "srgb", "linear", "gamma=2.2", "cgl"; spp_a, spp_b: of files with a variance only
     """

@@ -14,7 +14,10 @@ class Moments:
     """
 
     def __init__(self, width, height, unit="sample", spp=0):
-        """Without observations. Sizes in pixels; unit: what one observation is, "sample" or "replicate"; spp: paths in it, if known."""
+        """Without observations. Sizes in pixels.
+
+        unit: what one observation is, "sample" or "replicate"; spp: paths in it, if known.
+        """
         self._handle = lib.assay_moments_new(width, height, unit.encode(), spp)
         if not self._handle:
             raise ValueError(f"no moments of {width} x {height} pixels, unit {unit}")
@@ -22,9 +25,10 @@ class Moments:
 
     @classmethod
     def of(cls, n, mean, m2, m3=None, unit="sample", spp=0):
-        """Of arrays: n (H, W) or one number; mean and m2 = sum (x - mean)^2, m3 = sum (x - mean)^3, if known, (H, W, C).
+        """Of arrays: n (H, W) or a number; mean, m2 = sum (x - mean)^2 and, if known, m3 = sum (x - mean)^3: (H, W, C).
 
-        unit: what one observation is: "sample", "replicate" or "exact" (a closed form: n = 1, m2 = 0). spp: paths in it, if known.
+        unit: what one observation is, "sample", "replicate" or "exact" (a closed form: n = 1, m2 = 0)
+        spp: paths in it, if known
         """
         self = cls.__new__(cls)
         self._handle = None
@@ -34,11 +38,9 @@ class Moments:
         if mean.ndim != 3 or mean.shape[2] not in (1, 3):
             raise ValueError(f"mean has shape {mean.shape}, not (H, W, 3) or (H, W)")
         self.shape = mean.shape
-        self._arrays = [
-            None if x is None else np.ascontiguousarray(np.broadcast_to(np.asarray(x, np.float64).reshape(np.shape(x) or (1,)), s), np.float64)
-            for x, s in ((n, mean.shape[:2]), (mean, mean.shape), (self._like(m2, mean), mean.shape),
-                         (None if m3 is None else self._like(m3, mean), mean.shape))
-        ]
+        parts = [np.broadcast_to(n, mean.shape[:2]), mean, self._like(m2, mean)]
+        parts.append(None if m3 is None else self._like(m3, mean))
+        self._arrays = [None if x is None else np.ascontiguousarray(x, np.float64) for x in parts]
         self._unit, self._spp = unit.encode(), spp
         return self
 

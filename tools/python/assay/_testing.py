@@ -8,7 +8,7 @@ from ._compare import compare
 
 
 def _page(report):
-    """Where the page goes: as asked, else assay-reports/TEST.html (or below ASSAY_REPORTS) by the running test's name."""
+    """Where the page goes: as asked, else assay-reports/TEST.html (or below ASSAY_REPORTS) by the test's name."""
     if report is not None:
         return Path(report)
     test = os.environ.get("PYTEST_CURRENT_TEST", "comparison").rsplit(" ", 1)[0]
@@ -38,16 +38,16 @@ def _check(result, report):
 def assert_equivalent(render, reference, *, margin, report=None, **options):
     """Fails unless both are shown to be equal within the margin: DIFFERENT and INCONCLUSIVE both fail.
 
-    The margin is yours to declare: the largest relative difference of the image's mean that does not matter (tiles: 4 times
-    that). Other options as of compare(). report: where the page of a failure goes. Returns the Result.
+    The margin is yours to declare: the largest relative difference of the image's mean that does not matter (tiles:
+    4 times that). Other options as of compare(). report: where the page of a failure goes. Returns the Result.
     """
     __tracebackhide__ = True
     return _check(compare(render, reference, margin=margin, **options), report)
 
 
 def assert_unchanged(render, previous, *, accept_mdb, report=None, **options):
-    """For two versions of one program with equally many samples and seeds of their own: fails if the law of any pixel has
-    changed, or if a change of accept_mdb (relative; tiles: 4 times that) of the image could have been missed.
+    """For two versions of one program with equally many samples and seeds of their own: fails if the law of any pixel
+    has changed, or if a change of accept_mdb (relative; tiles: 4 times that) of the image could have been missed.
     """
     __tracebackhide__ = True
     return _check(compare(render, previous, same_program=True, accept_mdb=accept_mdb, **options), report)
