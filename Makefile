@@ -76,6 +76,11 @@ share := $(DESTDIR)$(PREFIX)/share/assay
 install: all library
 	install -d $(DESTDIR)$(PREFIX)/bin $(share)/cycles $(share)/import_check $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 renderer/pathtracer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	tools/packaging/manual.sh $(BUILD) $(BUILD)/manual
+	install -m 644 $(BUILD)/manual/man1/* $(DESTDIR)$(PREFIX)/share/man/man1
+	install -d $(DESTDIR)$(PREFIX)/share/bash-completion/completions $(DESTDIR)$(PREFIX)/share/zsh/site-functions
+	install -m 644 $(BUILD)/manual/bash-completion/* $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+	install -m 644 $(BUILD)/manual/zsh/* $(DESTDIR)$(PREFIX)/share/zsh/site-functions
 	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
 	install -D -m 755 $(BUILD)/oiio.so $(DESTDIR)$(PREFIX)/lib/assay/oiio.so
 	install -D -m 644 tools/library/assay.h $(DESTDIR)$(PREFIX)/include/assay.h
@@ -86,6 +91,10 @@ install: all library
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
 	cp -R reference/scenes reference/engines golden tools/rubrics $(share)
+
+# Debian packages into BUILD/deb.
+deb: all library
+	tools/packaging/deb.sh $(BUILD) $(VERSION) $(BUILD)/deb
 
 format:
 	clang-format -i $(wildcard renderer/*/*.[ch] reference/*/*.[ch] tools/*/*.[ch] tests/*/*.[ch] tests/*/*/*.[ch])
@@ -103,6 +112,7 @@ help:
 	@echo 'make report     make the page of the last validation again; make results: its table, tools/RESULTS.md'
 	@echo 'make autograder BUILD/autograder.zip for Gradescope (RUBRIC=$(RUBRIC))'
 	@echo 'make library    build/libassay.so (tools/library/assay.h); from Python: pip install --no-build-isolation tools/python'
+	@echo 'make deb        Debian packages into BUILD/deb'
 	@echo 'make install    into PREFIX=$(PREFIX); make deps: install the Debian packages that building needs'
 	@sed -n 's/^#: //p' tests/tests.mk
 
@@ -209,7 +219,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 # Not there where a grader of submissions builds the programs (tools/autograder/pack.sh).
 -include tests/tests.mk
 
-.PHONY: all validate golden results report autograder library deps deps-live install format clean help FORCE
+.PHONY: all validate golden results report autograder library deb deps deps-live install format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -24,9 +24,57 @@ static int find_short(const struct cli_option *options, char name)
     return CLI_ERROR;
 }
 
-static int unknown(const char *arg, struct err *e)
+/* Letters to change, insert, leave out or exchange with the next [Damerau64], of words within 31 letters. */
+static int distance(const char *a, size_t n, const char *b)
 {
-    err_set(e, "unknown option '%s' (see --help)", arg);
+    enum { MOST = 32 };
+    int d[MOST][MOST];
+    size_t m = strlen(b);
+    if (n >= MOST || m >= MOST)
+        return MOST;
+    for (size_t i = 0; i <= n; i++)
+        for (size_t j = 0; j <= m; j++) {
+            if (i == 0 || j == 0) {
+                d[i][j] = (int)(i + j);
+                continue;
+            }
+            int least = d[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+            least = d[i - 1][j] + 1 < least ? d[i - 1][j] + 1 : least;
+            least = d[i][j - 1] + 1 < least ? d[i][j - 1] + 1 : least;
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] &&
+                d[i - 2][j - 2] + 1 < least)
+                least = d[i - 2][j - 2] + 1;
+            d[i][j] = least;
+        }
+    return d[n][m];
+}
+
+const char *cli_nearest(const char *word, const char *(*next)(const void *list, size_t i),
+                        const void *list)
+{
+    const char *nearest = NULL, *other;
+    size_t length = strcspn(word, "=");
+    int least = (int)length / 3 + 1;
+    for (size_t i = 0; (other = next(list, i)) != NULL; i++)
+        if (distance(word, length, other) < least) {
+            least = distance(word, length, other);
+            nearest = other;
+        }
+    return nearest;
+}
+
+static const char *long_name(const void *options, size_t i)
+{
+    return ((const struct cli_option *)options)[i].long_name;
+}
+
+static int unknown(const struct cli_option *options, const char *arg, struct err *e)
+{
+    const char *meant = arg[1] == '-' ? cli_nearest(arg + 2, long_name, options) : NULL;
+    if (meant != NULL)
+        err_set(e, "unknown option '%s', did you mean --%s? (see --help)", arg, meant);
+    else
+        err_set(e, "unknown option '%s' (see --help)", arg);
     return CLI_ERROR;
 }
 
@@ -74,7 +122,7 @@ static int next_long(struct cli *c, const char *arg, struct err *e)
     const char *equals = strchr(arg, '=');
     int i = find_long(c->options, arg + 2, equals ? (size_t)(equals - arg - 2) : strlen(arg + 2));
     if (i == CLI_ERROR)
-        return unknown(arg, e);
+        return unknown(c->options, arg, e);
     const struct cli_option *o = &c->options[i];
     if (equals == NULL)
         return take_words(c, i, arg, e);
@@ -99,7 +147,7 @@ static int next_short(struct cli *c, const char *arg, const char *at, struct err
         return CLI_ERROR;
     }
     if (i == CLI_ERROR)
-        return unknown(arg, e);
+        return unknown(c->options, arg, e);
     const struct cli_option *o = &c->options[i];
     if (at[1] == '\0')
         return take_words(c, i, arg, e);

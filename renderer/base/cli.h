@@ -114,6 +114,11 @@ bool cli_double(const char *what, const char *text, double lo, double hi, double
 bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                 struct err *e) __attribute__((warn_unused_result));
 
+/* Of the words that `next` gives for 0, 1, .. until NULL the one that was probably meant: the fewest letters to change, insert,
+ * leave out or exchange with their neighbours, at most a third of them; NULL: none. */
+const char *cli_nearest(const char *word, const char *(*next)(const void *list, size_t i),
+                        const void *list);
+
 /* What --threads is where nobody says: the processors of the machine, at most 1024. */
 int cli_processors(void);
 

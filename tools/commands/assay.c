@@ -2,6 +2,7 @@
 #include "reference/base/gsl_errors.h"
 #include "reference/base/image_oiio.h"
 #include "renderer/image/image.h"
+#include "renderer/base/cli.h"
 #include "renderer/base/version.h"
 #include "tools/results/results.h"
 #include "commands.h"
@@ -55,6 +56,21 @@ static void *json_memory(size_t size)
     return p;
 }
 
+static const char *verb_name(const void *list, size_t i)
+{
+    (void)list;
+    return i < sizeof verbs / sizeof verbs[0] ? verbs[i].name : NULL;
+}
+
+static void tell_unknown(const char *verb, struct err *e)
+{
+    const char *meant = cli_nearest(verb, verb_name, NULL);
+    if (meant != NULL)
+        err_set(e, "unknown verb '%s', did you mean %s? (see --help)", verb, meant);
+    else
+        err_set(e, "unknown verb '%s' (see --help)", verb);
+}
+
 int main(int argc, char **argv)
 {
     json_set_alloc_funcs(json_memory, free);
@@ -81,7 +97,7 @@ int main(int argc, char **argv)
     if (argc < 2)
         err_set(&e, "no verb given (see --help)");
     else if (!found)
-        err_set(&e, "unknown verb '%s' (see --help)", argv[1]);
+        tell_unknown(argv[1], &e);
     if (fflush(stdout) != 0 && e.msg[0] == '\0') {
         err_set(&e, "cannot write to standard output");
         code = EXIT_NOT_JUDGED;

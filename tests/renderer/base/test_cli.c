@@ -61,7 +61,10 @@ TEST(words_are_read_as_by_getopt)
         {"-qj", NULL, "option '-qj' needs N"},
         {"-j", NULL, "option '-j' needs N"},
         {"--quiet=1", NULL, "takes 0 arguments"},
-        {"--sed", NULL, "unknown option '--sed'"},
+        {"--sed", NULL, "unknown option '--sed', did you mean --seed? (see --help)"},
+        {"--qiuet", NULL, "did you mean --quiet?"},
+        {"--jobss=4", NULL, "did you mean --jobs?"},
+        {"--jbxs", NULL, "unknown option '--jbxs' (see --help)"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char words[128], out[512];
