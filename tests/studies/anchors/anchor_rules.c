@@ -2,6 +2,7 @@
 
 #include "tools/stats/distributions.h"
 
+#include <gsl/gsl_sf_erf.h>
 #include <math.h>
 
 void anchor_xyz(const double light[3], double xyz[3])
@@ -102,6 +103,38 @@ double welch_log10_p(const struct moments *a, const struct moments *b)
     if (smallest < -15) /* 1 - (1-p)^n = n p to the last digit */
         return smallest + log10((double)tested);
     return log10(-expm1((double)tested * log1p(-pow(10, smallest))));
+}
+
+double tiles_log10_p(const struct moments *a, const struct moments *b, int side)
+{
+    double largest = 0, tested = 0;
+    for (int y0 = 0; y0 < a->height; y0 += side)
+        for (int x0 = 0; x0 < a->width; x0 += side)
+            for (int c = 0; c < 3; c++) {
+                double d = 0, v = 0;
+                for (int y = y0; y < y0 + side && y < a->height; y++)
+                    for (int x = x0; x < x0 + side && x < a->width; x++) {
+                        size_t p = (size_t)y * (size_t)a->width + (size_t)x;
+                        d += a->mean[3 * p + (size_t)c] - b->mean[3 * p + (size_t)c];
+                        v += moments_var_of_mean(a, p, c) + moments_var_of_mean(b, p, c);
+                    }
+                if (!(v > 0))
+                    continue;
+                tested++;
+                largest = fmax(largest, fabs(d) / sqrt(v));
+            }
+    return tested > 0 ? fmin(0, gsl_sf_log_erfc(largest * M_SQRT1_2) * M_LOG10E + log10(tested)) : 0;
+}
+
+double relative_rmse(const struct moments *a, const struct moments *b)
+{
+    size_t values = 3 * (size_t)a->width * (size_t)a->height;
+    double square = 0, sum = 0;
+    for (size_t i = 0; i < values; i++) {
+        square += (a->mean[i] - b->mean[i]) * (a->mean[i] - b->mean[i]);
+        sum += b->mean[i];
+    }
+    return sqrt(square * (double)values) / sum;
 }
 
 int idiff_fail_score(const size_t count[256], size_t pixels, double percent)

@@ -46,6 +46,15 @@ double mitsuba_score(double *z, size_t pixels, size_t allowed);
 /* log10 of the family p of all pixels and channels; 0 if nothing can be tested. */
 double welch_log10_p(const struct moments *a, const struct moments *b);
 
+/* The plain z-test of tiles: in each tile of side x side pixels (less at the border), of which there are whole
+ * ones from the top left, and each channel, the sum of A - B over the root of the sum of the variances of both
+ * sides' means, normal law, two-sided; log10 of the smallest p times the number of tiles and channels tested, at
+ * most 0. Tiles without noise are left out. */
+double tiles_log10_p(const struct moments *a, const struct moments *b, int side);
+
+/* Root of the mean square of A - B over all values, over the mean of B. */
+double relative_rmse(const struct moments *a, const struct moments *b);
+
 /* The smallest difference in 1/255 such that no more than `percent` of the pixels differ by more: the
  * image passes with any `fail` of at least that. */
 int idiff_fail_score(const size_t count[256], size_t pixels, double percent);

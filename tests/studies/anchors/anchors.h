@@ -28,14 +28,20 @@ extern const char *const anchor_error_id[NUM_ANCHOR_ERRORS]; /* "global", ... */
 enum anchor_rule {
     RULE_GATE_STRICT, /* compare_moments(), margins 0, alpha 1e-6 */
     RULE_GATE,        /* alpha 1e-3 */
+    RULE_SAME_STRICT, /* sign_flip_test(), what --same-program does, alpha 1e-6 */
     RULE_MITSUBA,
     RULE_WELCH,        /* family level 0.01 */
     RULE_WELCH_STRICT, /* 1e-6 */
+    RULE_TILES,        /* z of tiles, 1e-6 */
     RULE_IDIFF,
     RULE_GATE_TUNED,          /* the alpha */
+    RULE_SAME_TUNED,          /* the alpha */
     RULE_MITSUBA_LEVEL_TUNED, /* the z at which a channel fails; 99.75 % must pass */
     RULE_MITSUBA_SHARE_TUNED, /* the share that may fail, at the published z */
     RULE_WELCH_TUNED,         /* the level */
+    RULE_TILES_TUNED,         /* the level */
+    RULE_RMSE_TUNED,          /* RMSE over the mean */
+    RULE_FLIP_TUNED,          /* mean LDR-FLIP of both clamped to [0, 1] */
     RULE_IDIFF_FAIL_TUNED,    /* -fail, with -failpercent 1 */
     RULE_IDIFF_PERCENT_TUNED, /* -failpercent, with -fail 0.016 */
     NUM_ANCHOR_RULES

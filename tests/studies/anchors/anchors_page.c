@@ -175,6 +175,13 @@ static void method(FILE *f, const struct anchor_results *r)
         "the variances of both;\n  the smallest p, corrected after Sidak, must be above the level. "
         "Student's law with Welch's degrees of freedom stands\n  where Eradiate has the normal law, "
         "and a pixel without noise on either side, 0/0 there, is left out.\n"
+        "- **Ours, same program**: what `assay compare --same-program` does "
+        "([procedure](../../../tools/docs/background/verdict.md)): the signs of pixel\n  differences are flipped; any "
+        "change of the law is rejected, and here the noise of A grows with it.\n"
+        "- **z of tiles**: the sum of A - B over each tile of 16 x 16 pixels and channel over its standard error, normal "
+        "law,\n  the smallest p times their number: what one writes in an afternoon.\n"
+        "- **RMSE** of A - B over the mean of B, and the mean of **FLIP** (LDR, both images clamped to [0, 1]): no threshold "
+        "is\n  published that holds at every noise, so they are only shown with one that was set.\n"
         "- **idiff as Blender**, `tests/python/modules/render_report.py`: `idiff -fail 0.016 "
         "-failpercent 1` on 8-bit sRGB PNG.\n  More than 1 % of the pixels differing by more than "
         "0.016 in any channel fail. Blender renders both sides with one\n  fixed seed, so that noise "
@@ -214,8 +221,8 @@ static void tables(FILE *f, const struct anchor_results *r)
 {
     fprintf(f,
             "## False alarms\n\nOf %d equal pairs, with 95 %% Clopper-Pearson interval in percent. "
-            "\"at\": the threshold that was set (-log10 p, z,\nfailing channels, -log10 p, 1/255, "
-            "percent).\n\n",
+            "\"at\": the threshold that was set, in the rule's own unit\n(-log10 p, z, failing channels, "
+            "relative RMSE, FLIP, 1/255, percent).\n\n",
             r->settings.num_pairs);
     header(f, r, "rule");
     for (int k = 0; k < NUM_ANCHOR_RULES; k++)

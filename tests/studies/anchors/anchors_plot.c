@@ -13,8 +13,11 @@ static const struct {
     const char *label;
 } lanes[] = {
     {RULE_GATE_STRICT, "ours, alpha 1e-6"},
+    {RULE_SAME_STRICT, "ours, same program, 1e-6"},
+    {RULE_TILES, "z of 16 x 16 tiles, 1e-6"},
     {RULE_MITSUBA, "Mitsuba 3 as published"},
     {RULE_WELCH, "Welch per pixel, 0.01"},
+    {RULE_FLIP_TUNED, "FLIP, set to 1 % false alarms"},
     {RULE_IDIFF_FAIL_TUNED, "idiff, set to 1 % false alarms"},
 };
 enum { NUM_LANES = sizeof lanes / sizeof lanes[0] };

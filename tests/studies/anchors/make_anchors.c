@@ -8,6 +8,8 @@
 #include "renderer/base/progress.h"
 #include "renderer/base/version.h"
 #include "tools/compare/compare.h"
+#include "tools/exact/sign_flip.h"
+#include "tools/images/flip.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,6 +24,7 @@ struct bench {
     double *z;
     uint8_t *a8, *b8;
     const struct moments *in_b8; /* whose image b8 is */
+    float *a32, *b32, *error;
 };
 
 struct measurement {
@@ -85,6 +88,34 @@ static double gate(const struct moments *a, const struct moments *b, double alph
     return score;
 }
 
+/* -log10 p of flips, as `assay compare --same-program` has it: nothing where it declines. */
+static double same_program(struct bench *t, const struct moments *a, const struct moments *b,
+                           double alpha)
+{
+    size_t values = 3 * (size_t)a->width * (size_t)a->height;
+    for (size_t i = 0; i < values; i++) {
+        t->a32[i] = (float)a->mean[i];
+        t->b32[i] = (float)b->mean[i];
+        t->error[i] = (float)sqrt(moments_var_of_mean(a, i / 3, (int)(i % 3)) +
+                                  moments_var_of_mean(b, i / 3, (int)(i % 3)));
+    }
+    const struct sign_flip_images in = {1, a->width, a->height, &t->a32, &t->b32, t->error};
+    const struct sign_flip_options opt = {.alpha = alpha, .filter_width = 0, .tile = 16};
+    struct sign_flip out;
+    struct err e;
+    if (!sign_flip_test(&in, &opt, &out, &e))
+        die("flips cannot judge", &e);
+    return out.shares_noise ? 0 : -out.log10_p;
+}
+
+static double flip(struct bench *t, const struct moments *a, const struct moments *b)
+{
+    struct err e;
+    if (!flip_ldr(b->mean, a->mean, a->width, a->height, FLIP_PPD, t->error, &e))
+        die("FLIP cannot judge", &e);
+    return flip_mean(t->error, (size_t)a->width * (size_t)a->height);
+}
+
 static double score(const struct measurement *m, struct bench *t, enum anchor_rule rule,
                     const struct moments *a, const struct moments *b)
 {
@@ -93,6 +124,12 @@ static double score(const struct measurement *m, struct bench *t, enum anchor_ru
     case RULE_GATE_STRICT: return gate(a, b, 1e-6);
     case RULE_GATE: return gate(a, b, 1e-3);
     case RULE_GATE_TUNED: return gate(a, b, m->set->tuned);
+    case RULE_SAME_STRICT: return same_program(t, a, b, 1e-6);
+    case RULE_SAME_TUNED: return same_program(t, a, b, m->set->tuned);
+    case RULE_TILES:
+    case RULE_TILES_TUNED: return -tiles_log10_p(a, b, 16);
+    case RULE_RMSE_TUNED: return relative_rmse(a, b);
+    case RULE_FLIP_TUNED: return flip(t, a, b);
     case RULE_MITSUBA:
     case RULE_MITSUBA_SHARE_TUNED:
         mitsuba_z(a, &m->pool.reference, t->z);
@@ -126,12 +163,18 @@ static bool published_threshold(enum anchor_rule rule, size_t pixels, double *th
     case RULE_GATE: *threshold = 3; return true;
     case RULE_MITSUBA: *threshold = (double)mitsuba_allowed(MITSUBA_SHARE, pixels); return true;
     case RULE_WELCH: *threshold = -log10(WELCH_LEVEL); return true;
+    case RULE_SAME_STRICT:
+    case RULE_TILES:
     case RULE_WELCH_STRICT: *threshold = 6; return true;
     case RULE_IDIFF: *threshold = BLENDER_PERCENT; return true;
     case RULE_GATE_TUNED:
+    case RULE_SAME_TUNED:
     case RULE_MITSUBA_LEVEL_TUNED:
     case RULE_MITSUBA_SHARE_TUNED:
     case RULE_WELCH_TUNED:
+    case RULE_TILES_TUNED:
+    case RULE_RMSE_TUNED:
+    case RULE_FLIP_TUNED:
     case RULE_IDIFF_FAIL_TUNED:
     case RULE_IDIFF_PERCENT_TUNED:
     case NUM_ANCHOR_RULES: break;
@@ -370,6 +413,9 @@ static void measure_scene(const struct anchor_settings *set, int scene, const ch
         m.bench[t].z = calloc(values, sizeof(double));
         m.bench[t].a8 = calloc(values, 1);
         m.bench[t].b8 = calloc(values, 1);
+        m.bench[t].a32 = calloc(values, sizeof(float));
+        m.bench[t].b32 = calloc(values, sizeof(float));
+        m.bench[t].error = calloc(values, sizeof(float));
     }
     snprintf(out->scene, sizeof out->scene, "%s", anchor_scenes[scene]);
     snprintf(out->title, sizeof out->title, "%s", m.pool.title);
@@ -382,6 +428,9 @@ static void measure_scene(const struct anchor_settings *set, int scene, const ch
         free(m.bench[t].z);
         free(m.bench[t].a8);
         free(m.bench[t].b8);
+        free(m.bench[t].a32);
+        free(m.bench[t].b32);
+        free(m.bench[t].error);
     }
     free(m.bench);
     free(m.alarm);
