@@ -123,7 +123,8 @@ double tiles_log10_p(const struct moments *a, const struct moments *b, int side)
                 tested++;
                 largest = fmax(largest, fabs(d) / sqrt(v));
             }
-    return tested > 0 ? fmin(0, gsl_sf_log_erfc(largest * M_SQRT1_2) * M_LOG10E + log10(tested)) : 0;
+    return tested > 0 ? fmin(0, gsl_sf_log_erfc(largest * M_SQRT1_2) * M_LOG10E + log10(tested))
+                      : 0;
 }
 
 double relative_rmse(const struct moments *a, const struct moments *b)

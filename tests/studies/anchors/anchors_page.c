@@ -219,11 +219,12 @@ static void reading(FILE *f, const struct anchor_results *r)
 
 static void tables(FILE *f, const struct anchor_results *r)
 {
-    fprintf(f,
-            "## False alarms\n\nOf %d equal pairs, with 95 %% Clopper-Pearson interval in percent. "
-            "\"at\": the threshold that was set, in the rule's own unit\n(-log10 p, z, failing channels, "
-            "relative RMSE, FLIP, 1/255, percent).\n\n",
-            r->settings.num_pairs);
+    fprintf(
+        f,
+        "## False alarms\n\nOf %d equal pairs, with 95 %% Clopper-Pearson interval in percent. "
+        "\"at\": the threshold that was set, in the rule's own unit\n(-log10 p, z, failing channels, "
+        "relative RMSE, FLIP, 1/255, percent).\n\n",
+        r->settings.num_pairs);
     header(f, r, "rule");
     for (int k = 0; k < NUM_ANCHOR_RULES; k++)
         false_alarm_row(f, r, k);

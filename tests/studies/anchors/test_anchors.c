@@ -110,6 +110,54 @@ TEST(test_welch)
     moments_free(&b);
 }
 
+/* Values with variance of the mean 1 on both sides. In the second tile of 16 x 16 green of A is larger by 1/2 in
+ * every pixel: sum 128, variance 512, z = 5.657, and p its normal tail (GSL) times 48 tiles and channels. Shifted by
+ * half a tile the same sum is spread over four. The borders: a tile of 48 cuts 64 x 64 into 48 and 16, so that one
+ * corner of 16 x 16 has all of it. Without noise nothing is tested. */
+TEST(test_tiles)
+{
+    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    constant(&a, 5, 4);
+    constant(&b, 5, 4);
+    a.mean[7] = 6;
+    assert_near(tiles_log10_p(&a, &b, 16), 0, 0);
+    a.mean[7] = 5;
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        a.m2[i] = b.m2[i] = 12;
+    assert_near(tiles_log10_p(&a, &b, 16), 0, 0);
+    for (int y = 0; y < 16; y++)
+        for (int x = 16; x < 32; x++)
+            a.mean[3 * (y * SIDE + x) + 1] = 5.5;
+    double zt = 128 / sqrt(512);
+    assert_near(tiles_log10_p(&a, &b, 16), log10(48 * 2 * gsl_cdf_ugaussian_Q(zt)), 1e-9);
+    assert_near(tiles_log10_p(&b, &a, 16), log10(48 * 2 * gsl_cdf_ugaussian_Q(zt)), 1e-9);
+    assert_near(tiles_log10_p(&a, &b, 8), log10(192 * 2 * gsl_cdf_ugaussian_Q(zt / 2)), 1e-9);
+    constant(&a, 5, 4);
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        a.m2[i] = 12;
+    for (int y = 48; y < 64; y++)
+        for (int x = 48; x < 64; x++)
+            a.mean[3 * (y * SIDE + x)] = 4;
+    assert_near(tiles_log10_p(&a, &b, 48), log10(12 * 2 * gsl_cdf_ugaussian_Q(256 / sqrt(512))),
+                1e-9);
+    moments_free(&a);
+    moments_free(&b);
+}
+
+/* 256 of 12288 values differ by 1 of 5: sqrt(1/48)/5. */
+TEST(test_rmse)
+{
+    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    constant(&a, 5, 4);
+    constant(&b, 5, 4);
+    assert_near(relative_rmse(&a, &b), 0, 0);
+    for (size_t i = 0; i < 256; i++)
+        a.mean[7 * i] += i % 2 == 0 ? 1 : -1;
+    assert_near(relative_rmse(&a, &b), sqrt(1.0 / 48) / 5, 1e-12);
+    moments_free(&a);
+    moments_free(&b);
+}
+
 /* sRGB of 0.5 is 1.055 0.5^(1/2.4) - 0.055 = 0.73536, times 255 is 187.5; of 0.002 12.92 0.002 =
  * 0.02584, 6.6. 4/255 = 0.01569 is not over 0.016, 5/255 is. 1 % of 4096 is 40.96: 40 may fail. */
 TEST(test_idiff_boundary)
