@@ -4,7 +4,8 @@
 # Builds each bug of DIR (tests/mutants; or those named) into a renderer of its own,
 # BUILD/mutants/NAME/pathtracer (A+B: both in one), and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
-# as there are processors. Mutants follow one path at a time; "none" is the renderer as it is, of which nothing may differ.
+# as there are processors. Mutants follow eight paths at a time, in the widest instructions of this machine, as users do; bugs of
+# the binary hierarchy and of its shapes run with --accel sah. "none" is the renderer as it is, of which nothing may differ.
 #   --build-only   builds, and that is all
 #   --quick        three bugs of different kinds and "none", on two scenes: for `make check`
 #   --table FILE   writes the results as Markdown
@@ -37,6 +38,7 @@ fi
 # The flags that make compiled the renderer with.
 compile=$(make -s --no-print-directory BUILD="$build" print-compile)
 libs=$(make -s --no-print-directory BUILD="$build" print-libs)
+grep -q avx512dq /proc/cpuinfo && isa=avx512 || { grep -q avx2 /proc/cpuinfo && isa=avx2 || isa=sse42; }
 # "object source flags" of what is compiled once for each instruction set.
 kernels=$(make -s --no-print-directory BUILD="$build" print-kernels)
 
@@ -60,9 +62,9 @@ build_mutant() {
         *) changed+=" $file" ;;
         esac
     done
-    # A kernel is as many objects as there are instruction sets; those of eight lanes never run.
+    # A kernel is as many objects as there are instruction sets, of which one runs.
     changed=$(for file in $changed; do
-        awk -v file="$file" '$1 == file || $2 == file { found = 1; if (!/-DLANES/) print $1 } END { if (!found) print file }' <<<"$kernels"
+        awk -v file="$file" -v isa="_$isa.c" '$1 == file || $2 == file { found = 1; if (index($1, isa)) print $1 } END { if (!found) print file }' <<<"$kernels"
     done | sort -u)
     [ -n "$changed" ] || return 1
     case " $(echo $changed) " in
@@ -75,8 +77,10 @@ build_mutant() {
         objects+=("$dir/$(basename "$file").o")
     done
     g++ -o "$dir/mutant" "${objects[@]}" "$build/libassay.a" $libs || return 1
-    # One path at a time, as a student's program; only that width has been compiled with the bug.
-    printf '#!/bin/sh\nexec "${0%%/*}/mutant" --accel sah --isa scalar "$@"\n' >"$dir/pathtracer"
+    # Only the instructions of this machine have been compiled with the bug.
+    local options="--isa ${isa/sse42/sse4.2}"
+    grep -q '^+++ b/renderer/\(bvh/bvh\|scene/shape\)\.c' "${files[@]}" && options+=" --accel sah"
+    printf '#!/bin/sh\nexec "${0%%/*}/mutant" %s "$@"\n' "$options" >"$dir/pathtracer"
     chmod +x "$dir/pathtracer"
 }
 
@@ -129,7 +133,7 @@ one_and_tell() {
 }
 
 mkdir -p "$build/mutants"
-export build build_only patches compile libs kernels
+export build build_only patches compile libs kernels isa
 export only_scenes="${only[*]:-}" budget="--until-different --budget ${seconds}s"
 [ -n "$quick" ] && export budget=''
 export -f build_mutant find_claim run_mutant one_and_tell
@@ -183,7 +187,7 @@ EOF
         IFS='|' read -r status cpu scene against why <"$build/mutants/$name.result"
         [ "$status" = caught ] || scene="**not found**"
         printf '| %s (`%s`) | %s | %s | %s | %s | %.0f |\n' "$(sed -n 's/^Bug: //p' "tests/mutants/$name.patch")" "$name" \
-            "$(sed -n 's/^Where: //p' "tests/mutants/$name.patch")" "$scene" "$against" "${why%%, p [=<] *}" "$cpu"
+            "$(sed -n 's/^Where: //p' "tests/mutants/$name.patch")" "$scene" "$against" "${why%%, p = *}" "$cpu"
     done
 }
 if [ -n "$table" ]; then

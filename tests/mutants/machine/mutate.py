@@ -46,6 +46,8 @@ CALLS = {"vf_min": "vf_max", "vf_max": "vf_min", "vf_lt": "vf_le", "vf_le": "vf_
          "mul_sub": "mul_add", "ceilf": "floorf", "floorf": "ceilf", "ceil": "floor", "floor": "ceil"}
 # What decides no pixel: messages, and memory and files given back.
 IDLE = re.compile(r"(err_\w*|v?f?printf|perror|free|\w+_free|fclose|unlink|remove|element_fail\w*)$")
+# Calls whose arguments may stand in either order.
+EITHER = re.compile(r"((vf|vi|rgb|d3)_)?(min|max|eq|add|dot|mul)[vf]?$|v(min|max)$|f(min|max)f?$|_mm\w*_mul_epu32$")
 SETS = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
 OPENING, CLOSING = {"(": ")", "[": "]", "{": "}"}, {")", "]", "}"}
 
@@ -99,6 +101,14 @@ def changeable(tokens, pair, header):
             if j < len(tokens) and tokens[j].text == "{" and j in pair:
                 for k in range(i, pair[j] + 1):
                     inside[k] = False
+        elif (t.kind == "name" and t.text not in WORDS and i + 1 < len(tokens) and tokens[i + 1].text == "[" and i + 1 in pair and i > 0
+              and (tokens[i - 1].kind == "name" and tokens[i - 1].text not in ("return", "case", "else")
+                   or tokens[i - 1].text == "*" and tokens[i - 1].end == t.at and tokens[i - 2].kind == "name")):
+            j = i + 1  # the sizes of an array that is declared
+            while j in pair and tokens[j].text == "[":
+                for k in range(j, pair[j] + 1):
+                    inside[k] = False
+                j = pair[j] + 1
         elif (t.text in ("__attribute__", "sizeof", "_Static_assert", "_Alignas", "__builtin_expect") or IDLE.match(t.text)) and i + 1 in pair:
             for k in range(i, pair[i + 1] + 1):
                 inside[k] = False
@@ -198,11 +208,11 @@ def proposals(source, tokens, pair, inside):
         if t.kind == "name" and after.text == "(" and t.text in CALLS:
             yield "call", i, i, CALLS[t.text]
         if (t.kind == "name" and after.text == "(" and i + 1 in pair and t.text not in WORDS
-                and before.text not in ("struct", "union", "enum")
+                and not EITHER.match(t.text) and before.text not in ("struct", "union", "enum")
                 and (before.kind != "name" or before.text in ("return", "else", "case"))):
             args = arguments(tokens, pair, i + 1)
             for p, q in zip(args, args[1:]):
-                if text(*p) != text(*q):
+                if text(*p) != text(*q) and not (t.text in ("mul_add", "mul_sub") and p == args[0]):
                     yield "swapped", p[0], q[1], text(*q) + source[tokens[p[1]].end:tokens[q[0]].at] + text(*p)
         starts = before.text in (";", "{", "}", "else", "do") or (
             before.text == ")" and i - 1 in pair and tokens[pair[i - 1] - 1].text in ("if", "for", "while", "switch"))

@@ -11,282 +11,26 @@ Results are appended to DIR/machine/sampleN.tsv, a line for each mutant; `page` 
 what is stored there. Every beginning of a sample is a sample stratified by file.
 """
 import argparse
-import hashlib
 import json
 import os
 import re
-import resource
 import shutil
 import subprocess
 import sys
 import time
-from collections import Counter, defaultdict
 
 sys.dont_write_bytecode = True  # nothing is written beside the sources
 import mutate
 from page import COLUMNS, write_page
-from pool import pool
+from prepare import Preparation
+from workshop import POOL_SPP, SMOKE_SPP, Workshop, cpu_now, limited, run
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-SMOKE_SPP, POOL_SPP = 8, 16
+QUICK = 1.0  # seconds; longer unit tests are asked only where neither those nor validate find it
 VALIDATE_CPU = 25  # seconds that a mutant may spend with validate, after which it counts as not found
-TEST_CPU = 10  # unit tests that take longer are left out
-STRICT = ["-w", "-Werror=int-conversion", "-Werror=incompatible-pointer-types", "-Werror=implicit-function-declaration"]
 
 
-def cpu_now():
-    u = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return u.ru_utime + u.ru_stime
-
-
-def limited(cpu_s, memory=4 << 30):
-    def limits():
-        resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s) + 1, int(cpu_s) + 2))
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 28, 1 << 28))
-    return limits
-
-
-def run(argv, cpu_s=600, cwd=None, **more):
-    """Exit status; negative or 124 if it died or took longer than it may."""
-    try:
-        return subprocess.run(argv, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=cwd,
-                              preexec_fn=limited(cpu_s), timeout=20 * cpu_s + 20, **more).returncode
-    except subprocess.TimeoutExpired:
-        return 124
-
-
-def source_hash():
-    h = hashlib.sha256()
-    for d, _, fs in sorted(os.walk("renderer")):
-        for f in sorted(fs):
-            if f.endswith((".c", ".h")):
-                with open(os.path.join(d, f), "rb") as source:
-                    h.update(f.encode() + source.read())
-    return h.hexdigest()[:12]
-
-
-def make_says(build, target):
-    return subprocess.run(["make", "-s", "--no-print-directory", "BUILD=" + build, target], check=True, capture_output=True,
-                          text=True).stdout.strip()
-
-
-class Runner:
-    def __init__(self, build, name="machine", tests=None, scenes=None, shard=(0, 1)):
-        """Results below BUILD/name. With tests and scenes: those alone, all of them for every mutant."""
-        self.build = os.path.abspath(build)
-        self.dir = os.path.join(self.build, name)
-        self.some_tests, self.scenes = tests, scenes
-        self.shard = shard
-        self.tree = os.path.join(self.dir, "tree%d" % shard[0])
-        self.work = os.path.join(self.dir, "work%d" % shard[0])
-        self.sources = source_hash()
-        self.base = os.path.join(self.dir, "base", self.sources)
-        for d in (self.dir, self.tree, self.work):
-            os.makedirs(d, exist_ok=True)
-        self.cc = [w for w in make_says(build, "print-compile").split()]
-        self.libs = make_says(build, "print-libs").split()
-        self.kernels = {}  # object's name without .o: (source, flags)
-        for line in make_says(build, "print-kernels").splitlines():
-            words = line.rstrip(";").split()
-            self.kernels[words[0]] = (words[1], words[2:])
-        with open("/proc/cpuinfo") as f:
-            flags = f.read().split()
-        self.widest = "avx512" if "avx512dq" in flags else "avx2" if "avx2" in flags else "sse42"
-        self.cs184 = os.environ.get("ASSAY_CS184", "../shared/scenes/cs184")
-        self.gold = ["-fuse-ld=gold"] if shutil.which("ld.gold") else []
-        self.kills = Counter()
-        self.read_dependencies()
-
-    # What is compiled from what.
-
-    def read_dependencies(self):
-        self.depends = defaultdict(set)  # a file: objects of renderer, and tests, that see it
-        for d, _, fs in os.walk(self.build):
-            if d.startswith(self.dir) or "/renderer" not in d and "/tests" not in d or d[len(self.build):].split("/")[1] not in ("renderer", "tests"):
-                continue
-            for f in fs:
-                if f.endswith(".c.d"):
-                    name = os.path.relpath(os.path.join(d, f), self.build)[:-2]
-                    with open(os.path.join(d, f)) as h:
-                        for word in h.read().split():
-                            if word.startswith(("renderer/", "./renderer/")) or "/../" in word:
-                                self.depends[os.path.normpath(word)].add(name)
-
-    def is_narrow(self, name):
-        """A kernel of another instruction set than the one that this machine renders with."""
-        return name in self.kernels and not name.endswith("_%s.c" % self.widest)
-
-    def fresh_tree(self):
-        shutil.rmtree(self.tree)
-        os.makedirs(self.tree)
-        shutil.copytree("renderer", os.path.join(self.tree, "renderer"))
-        for d in ("reference", "tools", "tests"):
-            os.symlink(os.path.abspath(d), os.path.join(self.tree, d))
-
-    def compile(self, name, out, extra=()):
-        source, flags = self.kernels.get(name, (name, []))
-        return run(self.cc + STRICT + flags + list(extra) + ["-c", "-o", out, source], 120, cwd=self.tree) == 0
-
-    def base_object(self, name):
-        """Of the sources as they are, compiled in the same way as mutants; to be asked for while the tree is not changed."""
-        path = os.path.join(self.base, name + ".o")
-        if not os.path.exists(path):
-            os.makedirs(os.path.dirname(path), exist_ok=True)
-            if not self.compile(name, path):
-                raise SystemExit("run.py: %s does not compile" % name)
-        return path
-
-    def mutated(self, names, fresh):
-        """Compiles; None if one does not compile, else the objects that are not the same."""
-        changed = {}
-        for name in names:
-            out = os.path.join(fresh, name.replace("/", "_") + ".o")
-            if not self.compile(name, out):
-                return None
-            with open(out, "rb") as a, open(os.path.join(self.base, name + ".o"), "rb") as b:
-                if a.read() != b.read():
-                    changed[name] = out
-        return changed
-
-    def link(self, out, objects, archives, more=()):
-        return run(["g++"] + self.gold + ["-o", out] + objects + [os.path.join(self.build, a) for a in archives] + self.libs + list(more), 60) == 0
-
-    # What there is to run.
-
-    def suite_runs(self):
-        """Renders of the suite: (name, scene, arguments)."""
-        runs = []
-        for f in sorted(os.listdir("reference/scenes")):
-            if not f.endswith(".json") or f.startswith("9") or self.scenes is not None and f[:-5] not in self.scenes:
-                continue
-            with open("reference/scenes/" + f) as h:
-                s = json.load(h)
-            scene = f[:-5]
-            dae = "reference/scenes/" + s.get("scene", scene + ".dae")
-            if not os.path.exists(dae):
-                continue
-            args = ["-r", str(s["width"]), str(s["height"]), "-m", str(s["depth"])]
-            if "environment" in s:
-                args += ["-e", "reference/scenes/" + s["environment"]]
-            if "lens_radius" in s:
-                args += ["-b", str(s["lens_radius"]), "-d", str(s["focal_distance"])]
-            runs.append((scene, scene, args + [dae]))
-            for v in s.get("variants", []):
-                runs.append((scene + "/" + v["name"], scene, args + v["options"] + [dae]))
-            adaptive = s.get("consistency", {}).get("adaptive")
-            if adaptive:
-                runs.append((scene + "/consistency", scene, args + ["-a", str(adaptive["batch"]), str(adaptive["tolerance"]), dae]))
-        return runs
-
-    def tests(self):
-        found = {os.path.basename(p)[:-4]: os.path.relpath(p, self.build)[:-2]
-                for folder in ("renderer", "reference") for d, _, fs in os.walk(os.path.join(self.build, "tests", folder)) for p in
-                [os.path.join(d, f) for f in fs if f.startswith("test_") and f.endswith(".c.o")]}
-        return {t: o for t, o in found.items() if self.some_tests is None or t in self.some_tests}
-
-    # Once.
-
-    def prepare(self, keep=None):
-        """Baselines, times, and which line is run by which test and which render."""
-        self.fresh_tree()
-        base = os.path.join(self.dir, "validate")
-        if not os.path.exists(base + "/results.json") or not os.path.exists(self.base):
-            os.makedirs(self.base, exist_ok=True)
-            run([self.build + "/assay", "validate", "--threads", "1", "-q", "-o", base] + [w for x in self.scenes or () for w in ("--only", x)], 3600)
-        with open(base + "/results.json") as f:
-            r = json.load(f)
-        cost, sides = Counter(), set()
-        for c in r["claims"] + r["consistency"]:
-            side = (c["scene"], c.get("a", "consistency"))
-            if side not in sides and side[1].startswith(("pathtracer", "consistency")):
-                sides.add(side)
-                cost[c["scene"]] += c.get("seconds_a", 0) + c.get("seconds", 0)
-        info = {"claims": len(r["claims"]) + len(r["consistency"]), "cost": cost, "tests": {}, "runs": {}, "lines": {}, "sources": self.sources}
-        if os.path.exists(self.dir + "/info.json"):
-            with open(self.dir + "/info.json") as f:
-                before = json.load(f)
-            info = before if before["sources"] == self.sources else info
-        self.base_images()
-        if self.scenes is not None:
-            for name in [n for n, _, _ in self.suite_runs()] + [n for n, _ in self.pool_runs()] + list(self.tests()):
-                info["runs"][name] = {"lines": None, "objects": []}
-            info["tests"] = {t: 0.1 for t in self.tests()}
-            return self.store(info)
-        cov = os.path.join(self.dir, "cov")
-        subprocess.run(["make", "-s", "-k", "-j2", "BUILD=" + cov, "WERROR=", "CC=gcc", "OPT=-O1 -fno-math-errno -fno-trapping-math --coverage",
-                        cov + "/pathtracer"] + [cov + "/tests/" + t for t in self.tests()], stdout=subprocess.DEVNULL)
-        for name, args in [(n, a) for n, _, a in self.suite_runs()] + self.pool_runs():
-            spp = [] if "-s" in args else ["-s", "64" if "-a" in args else "2"]
-            self.cover(info, name, cov, [cov + "/pathtracer", "-q", "-t", "1"] + spp + args + ["-f", self.work + "/cov.exr"])
-        for name in sorted(self.tests()):
-            program = os.path.join(self.build, "tests", name)
-            if name in info["runs"] or not os.path.exists(program) or not os.path.exists(cov + "/tests/" + name):
-                continue
-            before = cpu_now()
-            if run([program], TEST_CPU) == 0:
-                cost = round(cpu_now() - before, 2)
-                self.cover(info, name, cov, [cov + "/tests/" + name])
-                if info["runs"][name]["lines"]:
-                    info["tests"][name] = cost
-            else:
-                info["runs"][name] = {"lines": {}, "objects": []}
-            self.store(info)
-        self.store(info)
-
-    def store(self, info):
-        with open(self.dir + "/info.new", "w") as f:
-            json.dump(info, f)
-        os.replace(self.dir + "/info.new", self.dir + "/info.json")
-
-    def cover(self, info, name, cov, argv):
-        if name in info["runs"]:
-            return
-        found = [os.path.join(d, f) for d, _, fs in os.walk(cov + "/renderer") for f in fs if f.endswith(".gcda")]
-        for f in found:
-            os.unlink(f)
-        run(argv, 300)
-        found = [os.path.join(d, f) for d, _, fs in os.walk(cov + "/renderer") for f in fs if f.endswith(".gcda")]
-        lines, objects = defaultdict(set), [os.path.relpath(f, cov)[:-5] for f in found]
-        told = subprocess.run(["gcov", "-j", "-t"] + found, capture_output=True, text=True).stdout if found else ""
-        ran = set()
-        for text in told.splitlines():
-            data = json.loads(text)
-            for f in data["files"]:
-                path = os.path.normpath(f["file"])
-                if path.startswith("renderer/"):
-                    known = info["lines"].setdefault(path, {})
-                    for l in f["lines"]:
-                        known[str(l["line_number"])] = 1
-                        if l["count"] > 0:
-                            lines[path].add(l["line_number"])
-                            ran.add(data["data_file"])
-        objects = sorted({os.path.relpath(os.path.join(cov, o), cov)[:-5] if o.endswith(".gcda") else o for o in objects
-                          if any(o.split("/")[-1] in r for r in ran)})
-        info["runs"][name] = {"lines": {f: sorted(l) for f, l in lines.items()}, "objects": objects}
-
-    def base_images(self):
-        os.makedirs(self.dir + "/images", exist_ok=True)
-        for name, _, args in self.suite_runs():
-            self.render(self.build + "/pathtracer", name, args, self.image(name), SMOKE_SPP)
-        for name, args in self.pool_runs():
-            self.render(self.build + "/pathtracer", name, args, self.image(name), POOL_SPP)
-
-    def image(self, name):
-        return os.path.join(self.dir, "images", name.replace("/", "+").replace(" ", "_") + ".exr")
-
-    def pool_runs(self):
-        return pool(self.cs184, self.dir + "/pool")
-
-    def render(self, program, name, args, out, spp):
-        spp = [] if "-s" in args else ["-s", str(64 if "-a" in args else spp)]
-        if os.path.exists(out):
-            os.unlink(out)
-        return run([program, "-q", "-t", "1"] + spp + args + ([] if "-f" in args else ["-f", out]), 1)
-
-    # One mutant.
-
+class Runner(Workshop):
     def load(self):
         with open(os.path.join(self.dir, "info.json")) as f:
             self.info = json.load(f)
@@ -387,32 +131,31 @@ class Runner:
             return "DIED", scene
         return worst
 
-    def judge_tests(self, m, first, rest, fresh):
-        """The first unit test that fails, or "-". `rest`: kernels of other instruction sets, compiled when only tests are left that use
-        them; returns None if those do not compile."""
+    def judge_tests(self, m, objects, rest, fresh, below=None):
+        """The first unit test that fails, or "-"; "?" if only those were asked that take less than `below` seconds and need no kernel of
+        `rest`: those of other instruction sets, which are compiled when only tests are left that run them. None if they do not compile."""
         tests, sources = self.info["tests"], self.tests()
-        order = [t for t in tests if self.executes(t, m)]
+        order = [t for t in tests if t not in self.asked and self.executes(t, m)]
         stem = os.path.splitext(os.path.basename(m.file))[0]
 
         def price(t):
             own = 3 if t[5:] in stem or stem.split("_")[0] in t else 0
             return (tests[t] + 0.4) / (0.2 + own + 3 * self.kills[(m.file, t)] + 0.2 * self.kills[t])
 
-        order.sort(key=price)
-        late = [t for t in order if rest and self.runs[t][1] & set(rest)] if rest is not None else []
-        objects = dict(first)
-        for t in [t for t in order if t not in late]:
+        late = {t for t in order if self.runs[t][1] & set(rest)}
+        left = set() if below is None else {t for t in order if tests[t] >= below or t in late}
+        order = [t for t in order if t not in left]
+        for t in sorted(order, key=lambda t: (t in late, price(t))):
+            if t in late and rest:
+                for name in rest:
+                    objects[name] = os.path.join(fresh, name.replace("/", "_") + ".o")
+                    if not self.compile(name, objects[name], ["-O1"]):
+                        return None
+                rest = []
+            self.asked.add(t)
             if self.test_fails(t, sources[t], m, objects, fresh):
                 return t
-        if late:
-            more = self.mutated(rest, fresh)
-            if more is None:
-                return None
-            objects.update(more)
-            for t in late:
-                if self.test_fails(t, sources[t], m, objects, fresh):
-                    return t
-        return "-"
+        return "?" if left else "-"
 
     def test_fails(self, test, source, m, objects, fresh):
         own = os.path.join(self.build, source + ".o")
@@ -466,6 +209,7 @@ class Runner:
         return dict(zip(COLUMNS, map(str, values)))
 
     def classify(self, m, fresh):
+        self.asked = set()
         names = sorted(o for o in self.depends[m.file] if o.startswith("renderer/"))
         now, rest = [n for n in names if not self.is_narrow(n)], [n for n in names if self.is_narrow(n)]
         first = self.mutated(now, fresh)
@@ -477,14 +221,19 @@ class Runner:
                 return "stillborn", "", "", "", ""
             if not more:
                 return "equivalent", "", "", "", ""
-            return "mutant", self.judge_tests(m, more, None, fresh), "-", "not run", "0"
+            return "mutant", self.judge_tests(m, more, [], fresh), "-", "not run", "0"
         program = os.path.join(fresh, "pathtracer")
         own = first.get("renderer/pathtracer/pathtracer.c", os.path.join(self.build, "renderer/pathtracer/pathtracer.c.o"))
         if not self.link(program, [own] + [o for n, o in first.items() if n != "renderer/pathtracer/pathtracer.c"], ["libassay.a"]):
             return "stillborn", "", "", "", ""
+        first.pop("renderer/pathtracer/pathtracer.c", None)
         image = self.judge_pool(program, m)
+        unit = self.judge_tests(m, first, rest, fresh, QUICK)
+        if unit not in ("?", "-") and image == "0":
+            return "mutant", unit, "?", "not asked", image
         verdict, by = self.judge_validate(program, m)
-        unit = self.judge_tests(m, {n: o for n, o in first.items() if n != "renderer/pathtracer/pathtracer.c"}, rest, fresh)
+        if unit == "?" and verdict == "-":
+            unit = self.judge_tests(m, first, rest, fresh)
         if unit is None:
             return "stillborn", "", "", "", ""
         return "mutant", unit, verdict, by, image
@@ -537,10 +286,11 @@ def main():
         write_page(HERE)
         return
     shard, shards = map(int, a.shard.split("/"))
-    r = Runner(a.build, shard=(shard - 1, shards))
     if a.what == "prepare":
-        r.prepare()
-    elif a.what == "go":
+        Preparation(a.build).prepare()
+        return
+    r = Runner(a.build, shard=(shard - 1, shards))
+    if a.what == "go":
         r.go(int(a.more[0]), a.seconds)
     else:
         r.load()
