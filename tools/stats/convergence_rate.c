@@ -221,31 +221,48 @@ bool convergence_rate_rung(const float *images, int count, double spp,
     return ok;
 }
 
+/* What the slope takes of rung i's logarithm. */
+static double slope_coefficient(const struct rung *rung, int num, int i)
+{
+    double mean_v = 0, sw = 0, sx = 0, sxx = 0;
+    for (int k = 0; k < num; k++)
+        mean_v += rung[k].log_mse.se * rung[k].log_mse.se / num;
+    for (int k = 0; k < num; k++) {
+        double w = 1 / (rung[k].log_mse.se * rung[k].log_mse.se + mean_v);
+        sw += w;
+        sx += w * log(rung[k].spp);
+    }
+    for (int k = 0; k < num; k++) {
+        double w = 1 / (rung[k].log_mse.se * rung[k].log_mse.se + mean_v);
+        sxx += w * pow(log(rung[k].spp) - sx / sw, 2);
+    }
+    double se = rung[i].log_mse.se, w = 1 / (se * se + mean_v);
+    /* 1/2: ln RMSE is half of ln MSE. */
+    return 0.5 * w * (log(rung[i].spp) - sx / sw) / sxx;
+}
+
 struct estimate convergence_rate_slope(const struct rung *rung, int num)
 {
     assert(num >= 2);
-    double mean_v = 0, sw = 0, sx = 0, sxx = 0;
-    for (int i = 0; i < num; i++)
-        mean_v += rung[i].log_mse.se * rung[i].log_mse.se / num;
-    for (int i = 0; i < num; i++) {
-        double w = 1 / (rung[i].log_mse.se * rung[i].log_mse.se + mean_v);
-        sw += w;
-        sx += w * log(rung[i].spp);
-    }
-    for (int i = 0; i < num; i++) {
-        double w = 1 / (rung[i].log_mse.se * rung[i].log_mse.se + mean_v);
-        sxx += w * pow(log(rung[i].spp) - sx / sw, 2);
-    }
     double slope = 0, v = 0, dof = INFINITY;
     for (int i = 0; i < num; i++) {
-        double se = rung[i].log_mse.se, w = 1 / (se * se + mean_v);
-        /* 1/2: ln RMSE is half of ln MSE. */
-        double c = 0.5 * w * (log(rung[i].spp) - sx / sw) / sxx;
+        double c = slope_coefficient(rung, num, i), se = rung[i].log_mse.se;
         slope += c * rung[i].log_mse.value;
         v += c * c * se * se;
         dof = fmin(dof, rung[i].log_mse.dof);
     }
     return (struct estimate){slope, sqrt(v), dof};
+}
+
+double convergence_rate_slope_dof(const struct rung *rung, int num)
+{
+    double v = 0, var = 0;
+    for (int i = 0; i < num; i++) {
+        double one = pow(slope_coefficient(rung, num, i) * rung[i].log_mse.se, 2);
+        v += one;
+        var += 2 * one * one / rung[i].log_mse.dof;
+    }
+    return stats_dof(v, var);
 }
 
 enum verdict convergence_rate_slope_verdict(struct estimate slope, double alpha, double half_width)

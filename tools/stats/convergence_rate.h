@@ -67,6 +67,9 @@ bool convergence_rate_rung(const float *images, int count, double spp,
  * freedom are the smallest of any rung, not the larger number that their sum would have: squared errors are
  * skewed, and that makes up for it (tests/tools/stats/test_converge.c). */
 struct estimate convergence_rate_slope(const struct rung *rung, int num);
+/* The degrees of freedom that its sum has [Satterthwaite46], where those of rungs are cautious themselves
+ * (variance_ladder.h). */
+double convergence_rate_slope_dof(const struct rung *rung, int num);
 
 /* Is the slope -1/2, as of independent samples? DIFFERENT if the 1 - alpha interval does not contain it,
  * INCONCLUSIVE if it does but is wider than +-half_width, else EQUIVALENT. */
