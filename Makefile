@@ -56,6 +56,8 @@ validate: all $(if $(LIVE),$(BUILD)/deps-live)
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
 	  $(addprefix --only ,$(ONLY))
+	$(BUILD)/assay golden render --noise --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
+	  $(addprefix --only ,$(ONLY))
 	$(BUILD)/assay golden approve --all --new --golden golden --from $(BUILD)/golden-candidate $(ONLY)
 
 # tools/RESULTS.md from the last `make validate` (and assay converge -o $(BUILD)/converge).

@@ -1,6 +1,8 @@
 /* assay golden render | status | approve: from rendering a reference to storing it. */
 #include "renderer/base/cli.h"
 #include "tools/golden/approve.h"
+#include "tools/golden/noise_record.h"
+#include "tools/validate/noise_ladder.h"
 #include "tools/results/results.h"
 #include "commands.h"
 
@@ -33,7 +35,7 @@ static const struct cli_option options[] = {
      .usage =
          "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
          "       assay golden status [options]          what is stored, and what is wrong with it\n"
-         "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE] ...\n"},
+         "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"},
     {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 
 /* A reference of the suite that an engine renders, counted over scenes and engines; NULL past the last. */
@@ -68,6 +70,21 @@ static bool is_selected(const struct settings *s, const struct suite_scene *scen
     return s->num_names == 0;
 }
 
+static bool is_named_noise(const char *name, const struct suite_scene *scene)
+{
+    size_t n = strlen(scene->name);
+    return strncmp(name, scene->name, n) == 0 &&
+           (name[n] == '\0' || strcmp(name + n, "/noise") == 0);
+}
+
+static bool is_selected_noise(const struct settings *s, const struct suite_scene *scene)
+{
+    for (int i = 0; i < s->num_names; i++)
+        if (is_named_noise(s->names[i], scene))
+            return true;
+    return s->num_names == 0;
+}
+
 /* Every name has to be that of a reference. */
 static bool check_names(const struct settings *s, const struct suite *suite, struct err *e)
 {
@@ -79,6 +96,8 @@ static bool check_names(const struct settings *s, const struct suite *suite, str
         bool found = false;
         for (int i = 0; !found && (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
             found = is_named(s->names[n], scene, ref);
+        for (int i = 0; !found && i < suite->num_scenes; i++)
+            found = is_named_noise(s->names[n], &suite->scene[i]);
         if (!found)
             return err_set(e, "%s: the suite in %s has no such reference", s->names[n],
                            s->suite_dir);
@@ -138,6 +157,10 @@ static int status(const struct settings *s, const struct suite *suite, struct er
         bad += !current;
         golden_free(&g);
     }
+    bool noise = noise_ladder_is_kept(s->opt.golden_dir, suite);
+    for (int i = 0; noise && i < suite->num_scenes; i++)
+        if (strcmp(suite->scene[i].references_of, suite->scene[i].name) == 0)
+            bad += noise_record_status(s->opt.golden_dir, &suite->scene[i], stdout);
     json_t *names;
     const char *first;
     if (!print_orphans(s->opt.golden_dir, suite, &orphans, &first, &names, e))
@@ -186,6 +209,9 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
             *e = why;
         count[done]++;
     }
+    for (int i = 0; i < suite->num_scenes; i++)
+        if (is_selected_noise(s, &suite->scene[i]))
+            noise_record_approve(&opt, &suite->scene[i], stdout, count, e);
     json_t *names = NULL;
     const char *first = "";
     size_t orphans = 0;

@@ -1,10 +1,13 @@
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
+#include "tools/base/data_dirs.h"
+#include "tools/golden/noise_record.h"
 #include "tools/golden/reference_options.h"
 #include "tools/results/results.h"
 #include "commands.h"
 
 #include <stdio.h>
+#include <time.h>
 
 static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
                      struct err *e)
@@ -51,6 +54,20 @@ static bool make_images(const struct reference_command *c, struct err *e)
            reference_render_part(one.scene, one.ref, &c->opt, c->first, c->last, c->out, e);
 }
 
+static bool make_noise(const struct reference_command *c, struct err *e)
+{
+    const struct data_dirs at = data_dirs_find();
+    char made[32];
+    time_t now = time(NULL);
+    struct tm utc;
+    strftime(made, sizeof made, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
+    bool ok = true;
+    for (int i = 0; ok && i < c->suite.num_scenes; i++)
+        if (reference_options_selects(c, &c->suite.scene[i]))
+            ok = noise_record_render(c, &c->suite.scene[i], at.pathtracer.s, made, e);
+    return ok;
+}
+
 int command_reference(int argc, char **argv, struct err *e)
 {
     struct reference_command c;
@@ -62,6 +79,7 @@ int command_reference(int argc, char **argv, struct err *e)
         code = slurm_command(NULL, argc, argv, NULL, e);
         argv[0] = word;
     } else if (ok && (c.help || (c.last > 0 ? make_images(&c, e)
+                                 : c.noise  ? make_noise(&c, e)
                                             : reference_options_each(&c, make_one, &c, e)))) {
         code = 0;
     }

@@ -1,6 +1,7 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/github_annotations.h"
+#include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/convergence_matrix.h"
@@ -58,6 +59,7 @@ static bool print_markdown(FILE *f, const char *path, bool headline, struct err 
     if (has_claims)
         results_table_print(f, results, true);
     stated_error_print(f, json_object_get(results, "consistency"), true);
+    noise_results_print(f, json_object_get(results, "noise"), true);
     if (has_claims && convergence != NULL)
         putc('\n', f);
     if (convergence != NULL)

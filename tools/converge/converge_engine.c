@@ -119,7 +119,7 @@ static bool render_reference(const struct converge_job *job, enum converge_engin
         return true;
     free(*version);
     *version = NULL;
-    return err_set(e, "%s, %s: no noise at all: there is nothing that could converge",
+    return err_set(e, "%s, %s: " CONVERGE_NO_NOISE ": there is nothing that could converge",
                    job->scene->name, ref.engine);
 }
 

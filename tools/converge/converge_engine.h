@@ -36,6 +36,9 @@ struct converge_progress {
     double before, each, total; /* work done before this rung, of one image, in all */
 };
 
+/* In the line of an engine whose answer has no noise. */
+#define CONVERGE_NO_NOISE "no noise at all"
+
 /* Fills images (replicates x width x height x 3 floats, one replicate after the other) with images
  * whose seeds are a function of (seed, engine, rung, replicate) and differ from one another. *cpu_s is
  * the CPU time of one replicate, its share of the engine's start included. *version (NULL where the

@@ -11,8 +11,15 @@
 static const struct cli_option options[] = {
     {0, "only", "SCENE", "only this scene; may be given again",
      CLI_TO_LIST(struct reference_command, only, num_only), .noun = "scenes"},
-    {0, "engine", "NAME", "only one engine's, of" ENGINES_WITH_GOLDENS(ENGINE_TEXT), TO(engine),
-     .names = engine_names},
+    {0, "engine", "NAME",
+     "only one engine's, of" ENGINES_WITH_GOLDENS(
+         ENGINE_TEXT) ";\n"
+                      "with --noise also pathtracer, pathtracer-sobol",
+     TO(engine)},
+    {0, "noise", "",
+     "not the images, but how noisy each engine is, ours too: the\n"
+     "variance of a sample, and its fall over 1, 4, 16, 64 samples",
+     TO(noise)},
     {'o', "out", "DIR", "where they go (build/golden-candidate)", TO(out)},
     {0, "golden", "DIR", "leave out what is stored there and up to date", TO(golden)},
     {0, "fresh", "", "render also what is there and up to date", TO(fresh)},
@@ -43,6 +50,11 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
         return false;
     if (c->help)
         return true;
+    bool ours = c->noise && c->engine != NULL && strncmp(c->engine, "pathtracer", 10) == 0;
+    if (c->engine != NULL && engine_with_goldens(c->engine) == NULL && !ours)
+        return err_set(e, "--engine: '%s' is none of" ENGINES_WITH_GOLDENS(ENGINE_TEXT), c->engine);
+    if (c->noise && (c->last > 0 || c->slurm))
+        return err_set(e, "--noise goes with neither --pictures nor --slurm");
     if (c->last > 0 && (c->slurm || c->fresh || c->golden != NULL))
         return err_set(e, "--pictures goes with none of --slurm, --fresh, --golden");
     if (c->opt.threads == 0)
@@ -62,7 +74,7 @@ void reference_options_free(struct reference_command *c)
     suite_free(&c->suite);
 }
 
-static bool is_selected(const struct reference_command *c, const struct suite_scene *scene)
+bool reference_options_selects(const struct reference_command *c, const struct suite_scene *scene)
 {
     if (strcmp(scene->references_of, scene->name) != 0)
         return false;
@@ -80,7 +92,7 @@ bool reference_options_each(const struct reference_command *c,
     int num = 0;
     for (int i = 0; i < c->suite.num_scenes; i++) {
         const struct suite_scene *scene = &c->suite.scene[i];
-        for (int k = 0; is_selected(c, scene) && k < scene->num_references; k++) {
+        for (int k = 0; reference_options_selects(c, scene) && k < scene->num_references; k++) {
             const struct suite_reference *ref = &scene->reference[k];
             if (strcmp(ref->engine, "truth") == 0 ||
                 (c->engine != NULL && strcmp(c->engine, ref->engine) != 0))

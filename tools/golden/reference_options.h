@@ -13,7 +13,7 @@ struct reference_command {
     struct reference_options opt;
     int seed;        /* negative: none was given */
     int first, last; /* --pictures; last 0: all */
-    bool fresh, slurm, help;
+    bool fresh, noise, slurm, help;
     struct suite suite;
 };
 
@@ -23,6 +23,8 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
     __attribute__((warn_unused_result));
 void reference_options_free(struct reference_command *c);
 
+/* Is the scene asked for, and has references of its own? */
+bool reference_options_selects(const struct reference_command *c, const struct suite_scene *scene);
 /* Calls one() for each reference that is asked for, in the order of the suite, as long as it returns true. Fails if there is
  * none. */
 bool reference_options_each(const struct reference_command *c,

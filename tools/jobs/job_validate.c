@@ -131,7 +131,8 @@ static void add_new(json_t *all, json_t *more)
 static bool add_results(const struct plan *p, int k, const char *out, json_t *results,
                         struct err *e)
 {
-    static const char *const lists[] = {"claims", "not_expressible", "loader", "consistency"};
+    static const char *const lists[] = {"claims", "not_expressible", "loader", "consistency",
+                                        "noise"};
     char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
     json_t *part;
     job_run_artefact(p, k, "results.json", path);

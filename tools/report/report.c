@@ -2,6 +2,7 @@
 
 #include "renderer/base/fs.h"
 #include "report_similarity.h"
+#include "report_noise.h"
 #include "report_stated_error.h"
 #include "report_cost.h"
 #include "report_convergence.h"
@@ -120,6 +121,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
     if (num > 0)
         write_verdict(f, root, claim, num);
     report_stated_error_headline(f, json_object_get(root, "consistency"));
+    report_noise_headline(f, json_object_get(root, "noise"));
     report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
     fprintf(f,
             "<p class=\"lede\">The chance that noise alone makes any claim of this page "
@@ -214,6 +216,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     if (!plot_rays(f, json_object_get(root, "claims"), e))
         return false;
     report_stated_error(f, json_object_get(root, "consistency"));
+    report_noise(f, json_object_get(root, "noise"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
     fputs("</main>\n", f);

@@ -1,5 +1,6 @@
 #include "github_annotations.h"
 
+#include "noise_results.h"
 #include "stated_error_results.h"
 #include "convergence_results.h"
 #include "results.h"
@@ -81,6 +82,9 @@ static struct tally tally_of(const json_t *results)
     }
     for (size_t i = 0; i < json_array_size(consistency); i++)
         count(&t, stated_error_outcome(json_array_get(consistency, i)), false);
+    const json_t *noise = json_object_get(results, "noise");
+    for (size_t i = 0; i < json_array_size(noise); i++)
+        count(&t, noise_results_outcome(json_array_get(noise, i)), false);
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
         for (size_t k = 0; k < json_array_size(engines); k++)
@@ -123,6 +127,11 @@ void github_annotations_print(FILE *f, const json_t *results)
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         const json_t *c = json_array_get(consistency, i);
         print_other(f, "stated errors", c, stated_error_outcome(c), member_text(c, "scene"));
+    }
+    const json_t *noise = json_object_get(results, "noise");
+    for (size_t i = 0; i < json_array_size(noise); i++) {
+        const json_t *c = json_array_get(noise, i);
+        print_other(f, "noise", c, noise_results_outcome(c), member_text(c, "scene"));
     }
     for (size_t i = 0; i < json_array_size(convergence); i++) {
         const json_t *scene = json_array_get(convergence, i),

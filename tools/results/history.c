@@ -1,5 +1,6 @@
 #include "history.h"
 
+#include "noise_results.h"
 #include "results.h"
 
 #include <dirent.h>
@@ -120,6 +121,20 @@ static struct history_series *series_of(struct history *h, const json_t *claim, 
     return NULL;
 }
 
+/* Claims about means, then those about noise, which hang on the results as long as these are there. */
+static const json_t *list_of(const struct history *h, size_t run, int list)
+{
+    json_t *root = h->run[run].results;
+    if (list == 0)
+        return json_object_get(root, "claims");
+    if (json_object_get(root, "noise_claims") == NULL)
+        json_object_set_new(root, "noise_claims",
+                            noise_results_claims(json_object_get(root, "noise")));
+    return json_object_get(root, "noise_claims");
+}
+
+enum { LISTS = 2 };
+
 static double std_error(const struct history_point *p, double alpha)
 {
     return (p->high - p->low) / 2 / gsl_cdf_ugaussian_Qinv(fmin(alpha, 0.4));
@@ -129,11 +144,13 @@ static double std_error(const struct history_point *p, double alpha)
 static double alpha_of(const struct history *h, const struct history_series *s,
                        const struct history_point *p)
 {
-    const json_t *claims = json_object_get(h->run[p->run].results, "claims");
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const json_t *c = json_array_get(claims, i);
-        if (is_of(s, c))
-            return member_number(c, "alpha");
+    for (int list = 0; list < LISTS; list++) {
+        const json_t *claims = list_of(h, p->run, list);
+        for (size_t i = 0; i < json_array_size(claims); i++) {
+            const json_t *c = json_array_get(claims, i);
+            if (is_of(s, c))
+                return member_number(c, "alpha");
+        }
     }
     return member_number(h->run[p->run].results, "alpha");
 }
@@ -172,11 +189,12 @@ static int compare_series(const void *a, const void *b)
 
 static bool gather(struct history *h, struct err *e)
 {
-    for (size_t r = 0; r < h->num_runs; r++) {
-        const json_t *claims = json_object_get(h->run[r].results, "claims");
+    for (size_t n = 0; n < LISTS * h->num_runs; n++) {
+        size_t r = n / LISTS;
+        const json_t *claims = list_of(h, r, (int)(n % LISTS));
         for (size_t i = 0; i < json_array_size(claims); i++) {
             const json_t *c = json_array_get(claims, i);
-            if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED)
+            if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED || json_object_get(c, "ci") == NULL)
                 continue;
             struct history_series *s = series_of(h, c, e);
             if (s == NULL)

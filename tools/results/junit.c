@@ -1,4 +1,4 @@
-#include "results.h"
+#include "noise_results.h"
 
 #include "reference/base/xml_errors.h"
 #include "tools/compare/region.h"
@@ -52,8 +52,11 @@ static bool write_text(xmlTextWriter *w, const char *value)
     return ok;
 }
 
+/* Of noise its reason has them. */
 static bool write_numbers(xmlTextWriter *w, const json_t *claim)
 {
+    if (json_object_get(claim, "mdb_global") == NULL)
+        return write_text(w, member_text(claim, "reason"));
     const json_t *ci = json_object_get(claim, "ci");
     char text[512], mdb[32];
     snprintf(
@@ -100,9 +103,8 @@ static bool write_testcase(xmlTextWriter *w, const json_t *claim)
            write_verdict(w, claim, results_claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
 }
 
-static bool write_testsuite(xmlTextWriter *w, const json_t *results)
+static bool write_testsuite(xmlTextWriter *w, const json_t *results, const json_t *claims)
 {
-    const json_t *claims = json_object_get(results, "claims");
     size_t num = json_array_size(claims), count[4] = {0};
     for (size_t i = 0; i < num; i++)
         count[results_claim_outcome(json_array_get(claims, i))]++;
@@ -126,7 +128,12 @@ bool junit_write(const char *path, const json_t *results, struct err *e)
     xml_errors_to(&failed);
     xmlBuffer *buffer = xmlBufferCreate();
     xmlTextWriter *writer = buffer != NULL ? xmlNewTextWriterMemory(buffer, 0) : NULL;
-    bool ok = writer != NULL && write_testsuite(writer, results);
+    json_t *claims = json_copy(json_object_get(results, "claims")),
+           *noise = noise_results_claims(json_object_get(results, "noise"));
+    bool ok = writer != NULL && claims != NULL && noise != NULL &&
+              json_array_extend(claims, noise) == 0 && write_testsuite(writer, results, claims);
+    json_decref(claims);
+    json_decref(noise);
     xmlFreeTextWriter(writer);
     ok = ok && !failed;
     xml_errors_to(NULL);

@@ -1,5 +1,6 @@
 #include "plain_words.h"
 
+#include "noise_results.h"
 #include "stated_error_results.h"
 
 #include <math.h>
@@ -148,7 +149,8 @@ static size_t num_scenes(const json_t *claims)
     return num;
 }
 
-static void print_failures(FILE *f, const json_t *claims, const json_t *stated, size_t bad)
+static void print_failures(FILE *f, const json_t *claims, const json_t *stated, const json_t *noise,
+                           size_t bad)
 {
     size_t said = 0, covered = 0;
     for (int k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
@@ -168,6 +170,15 @@ static void print_failures(FILE *f, const json_t *claims, const json_t *stated, 
                 said++ == 0 ? ": " : "; ", member_or_empty(c, "scene"));
         covered++;
     }
+    for (size_t i = 0; i < json_array_size(noise) && said < MOST_FAILURES; i++) {
+        const json_t *c = json_array_get(noise, i);
+        if (noise_results_outcome(c) == OUTCOME_AS_EXPECTED)
+            continue;
+        const char *why = member_or_empty(c, member_text(c, "error") != NULL ? "error" : "reason");
+        fprintf(f, "%snoise of %s in %s: %s", said++ == 0 ? ": " : "; ",
+                member_or_empty(c, "engine"), member_or_empty(c, "scene"), why);
+        covered++;
+    }
     if (bad > covered)
         fprintf(f, "; and %zu more", bad - covered);
 }
@@ -175,9 +186,10 @@ static void print_failures(FILE *f, const json_t *claims, const json_t *stated, 
 void plain_words_print(FILE *f, const json_t *results, const char *page)
 {
     const json_t *claims = json_object_get(results, "claims"),
-                 *stated = json_object_get(results, "consistency");
+                 *stated = json_object_get(results, "consistency"),
+                 *noise = json_object_get(results, "noise");
     const size_t num = json_array_size(claims), num_stated = json_array_size(stated);
-    size_t good = 0, good_stated = 0, mistakes = 0;
+    size_t good = 0, good_stated = 0, mistakes = 0, good_noise = 0;
     for (size_t i = 0; i < num; i++) {
         const json_t *claim = json_array_get(claims, i);
         const bool expected = results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
@@ -186,13 +198,19 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
     }
     for (size_t i = 0; i < num_stated; i++)
         good_stated += stated_error_outcome(json_array_get(stated, i)) == OUTCOME_AS_EXPECTED;
-    const size_t bad = num + num_stated - good - good_stated, scenes = num_scenes(claims);
+    for (size_t i = 0; i < json_array_size(noise); i++)
+        good_noise += noise_results_outcome(json_array_get(noise, i)) == OUTCOME_AS_EXPECTED;
+    const size_t all = num + num_stated + json_array_size(noise),
+                 bad = all - good - good_stated - good_noise, scenes = num_scenes(claims),
+                 noisy = num_scenes(noise);
     fprintf(f, "\njudged: %s on %zu scene%s against %s: %zu comparison%s",
             names(claims, "a", "programs").s, scenes, scenes == 1 ? "" : "s",
             names(claims, "b", "references").s, num, num == 1 ? "" : "s");
     if (num_stated > 0)
         fprintf(f, ", and the stated errors of %zu scene%s", num_stated,
                 num_stated == 1 ? "" : "s");
+    if (noisy > 0)
+        fprintf(f, ", and the noise of %zu scene%s", noisy, noisy == 1 ? "" : "s");
     if (bad == 0) {
         fputs("\nresult: all as it should be", f);
         if (num > mistakes)
@@ -200,8 +218,8 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
         if (mistakes > 0)
             fprintf(f, ", %zu deliberate mistake%s found", mistakes, mistakes == 1 ? "" : "s");
     } else {
-        fprintf(f, "\nresult: %zu of %zu not as it should be", bad, num + num_stated);
-        print_failures(f, claims, stated, bad);
+        fprintf(f, "\nresult: %zu of %zu not as it should be", bad, all);
+        print_failures(f, claims, stated, noise, bad);
     }
     fprintf(f, "\nlook:   %s\n", page);
 }

@@ -59,6 +59,12 @@ int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
         if (e != NULL)
             e->ours_s += member_number(c, "seconds");
     }
+    json_array_foreach(json_object_get(results, "noise"), i, c)
+    {
+        struct scene_cost *e = entry(out, &num, member_text(c, "scene"));
+        if (e != NULL)
+            e->ours_s += member_number(c, "seconds");
+    }
     qsort(out, (size_t)num, sizeof *out, by_total);
     return num;
 }

@@ -4,6 +4,7 @@
 #include "reference/suite/suite.h"
 #include "stated_error_results.h"
 #include "convergence_results.h"
+#include "noise_results.h"
 
 #include <assert.h>
 #include <string.h>
@@ -300,8 +301,11 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
     const json_t *consistency = json_object_get(root, "consistency");
     if (consistency != NULL && !stated_error_check(consistency, path, e))
         return false;
-    if (!json_is_array(claims) ||
-        (json_array_size(claims) == 0 && convergence == NULL && json_array_size(consistency) == 0))
+    const json_t *noise = json_object_get(root, "noise");
+    if (noise != NULL && !noise_results_check(noise, path, e))
+        return false;
+    if (!json_is_array(claims) || (json_array_size(claims) == 0 && convergence == NULL &&
+                                   json_array_size(consistency) + json_array_size(noise) == 0))
         return err_set(e, "%s: 'claims' is not an array with at least one claim", path);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const json_t *claim = json_array_get(claims, i);
@@ -382,7 +386,8 @@ static bool any_lacks_time(const json_t *list)
 bool results_lack_time(const json_t *results)
 {
     return any_lacks_time(json_object_get(results, "claims")) ||
-           any_lacks_time(json_object_get(results, "consistency"));
+           any_lacks_time(json_object_get(results, "consistency")) ||
+           any_lacks_time(json_object_get(results, "noise"));
 }
 
 int results_exit_code(const json_t *results)
@@ -402,7 +407,11 @@ int results_exit_code(const json_t *results)
     const json_t *consistency = json_object_get(results, "consistency");
     for (size_t i = 0; i < json_array_size(consistency); i++)
         count[stated_error_outcome(json_array_get(consistency, i))]++;
-    if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) ==
+    const json_t *noise = json_object_get(results, "noise");
+    for (size_t i = 0; i < json_array_size(noise); i++)
+        count[noise_results_outcome(json_array_get(noise, i))]++;
+    if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) +
+                json_array_size(noise) ==
             0 ||
         count[OUTCOME_NOT_JUDGED] > 0)
         return EXIT_NOT_JUDGED;

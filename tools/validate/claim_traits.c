@@ -3,6 +3,7 @@
 #include "reference/suite/features.h"
 #include "reference/suite/suite.h"
 #include "renderer/shading/light.h"
+#include "tools/results/noise_results.h"
 #include "tools/results/results.h"
 
 #include <stdio.h>
@@ -177,7 +178,7 @@ static bool is_wrongly_different(const json_t *claim)
            is_verdict(claim, "verdict", VERDICT_DIFFERENT);
 }
 
-/* With those of consistency, if any of them differs, as ones of a side of their own. */
+/* With those of consistency and of noise, if any of these differs, as ones of sides of their own. */
 static json_t *all_claims(const json_t *results)
 {
     json_t *all = json_array(), *more = json_array();
@@ -197,6 +198,22 @@ static json_t *all_claims(const json_t *results)
     }
     if (differs)
         json_array_extend(all, more);
+    json_array_clear(more);
+    differs = false;
+    json_t *noise = noise_results_claims(json_object_get(results, "noise"));
+    json_array_foreach(noise, i, c)
+    {
+        char side[160];
+        snprintf(side, sizeof side, "%s-noise", member_text(c, "a"));
+        differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
+        json_array_append_new(more,
+                              json_pack("{ss,ss,ss,ss*}", "scene", member_text(c, "scene"), "a",
+                                        side, "expected", verdict_name(VERDICT_EQUIVALENT),
+                                        "verdict", member_text(c, "verdict")));
+    }
+    if (differs)
+        json_array_extend(all, more);
+    json_decref(noise);
     json_decref(more);
     return all;
 }

@@ -3,6 +3,7 @@
 
 #include "tools/compare/hint.h"
 #include "tools/results/claim_result.h"
+#include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
 
@@ -123,10 +124,19 @@ static void add_looks(json_t *claim, const struct validation *v, const struct cl
     json_object_set_new(claim, "cost_s", json_pack("{sf,sf}", "a", t->cpu_a, "b", t->cpu_b));
 }
 
+/* Of several rows the first that did not pass, else the first. */
+static const json_t *row_to_tell(const json_t *result)
+{
+    for (size_t i = 0; i < json_array_size(result); i++)
+        if (!json_is_true(json_object_get(json_array_get(result, i), "passed")))
+            return json_array_get(result, i);
+    return json_is_array(result) ? json_array_get(result, 0) : result;
+}
+
 static void announce(struct validation *v, struct claim_run *t)
 {
-    const char *verdict = member_text(t->result, "verdict"),
-               *error = member_text(t->result, "error");
+    const json_t *told = row_to_tell(t->result);
+    const char *verdict = member_text(told, "verdict"), *error = member_text(told, "error");
     char line[1024];
     v->done++;
     for (int i = 0; error != NULL && i < v->num_tasks; i++) {
@@ -139,7 +149,8 @@ static void announce(struct validation *v, struct claim_run *t)
         snprintf(line, sizeof line, "%s against %s: %s", t->a->name, t->ref.engine,
                  error != NULL ? error : verdict);
     else
-        snprintf(line, sizeof line, "stated errors: %s", error != NULL ? error : verdict);
+        snprintf(line, sizeof line, "%s: %s", t->of_noise ? "noise" : "stated errors",
+                 error != NULL ? error : verdict);
     validate_log(v, t->scene->name, line);
     if (t->a != NULL) {
         release(t->a);
@@ -275,6 +286,14 @@ static void look(struct validation *v, struct claim_run *t)
         finish(v, t, "the noise left is that of the stored reference");
 }
 
+/* What renders for itself. */
+static void judge_alone(struct validation *v, struct claim_run *t, double deadline)
+{
+    t->result = t->of_noise ? noise_claims_run(v->opt, t->scene, v->alpha, deadline)
+                            : stated_error_run(v->opt, t->scene, v->alpha, deadline);
+    announce(v, t);
+}
+
 void claim_run_look(struct validation *v, struct claim_run *t)
 {
     if (t->a != NULL) {
@@ -282,16 +301,13 @@ void claim_run_look(struct validation *v, struct claim_run *t)
         return;
     }
     validate_log(v, t->scene->name, "rendering with seeds of their own");
-    t->result = stated_error_run(v->opt, t->scene, v->alpha, v->deadline);
-    announce(v, t);
+    judge_alone(v, t, v->deadline);
 }
 
 void claim_run_give_up(struct validation *v, struct claim_run *t, const char *why)
 {
     if (t->a == NULL)
-        t->result = stated_error_run(v->opt, t->scene, v->alpha, 0);
-    if (t->a == NULL)
-        announce(v, t);
+        judge_alone(v, t, 0);
     else if (t->seen[0] != NULL)
         finish(v, t, why);
     else
@@ -301,6 +317,11 @@ void claim_run_give_up(struct validation *v, struct claim_run *t, const char *wh
 bool claim_run_differs(const struct claim_run *t)
 {
     if (t->result == NULL)
+        return false;
+    for (size_t i = 0; i < json_array_size(t->result); i++)
+        if (noise_results_outcome(json_array_get(t->result, i)) == OUTCOME_OPPOSITE)
+            return true;
+    if (t->of_noise)
         return false;
     if (t->a == NULL)
         return stated_error_outcome(t->result) == OUTCOME_OPPOSITE;

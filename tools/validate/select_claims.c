@@ -1,3 +1,4 @@
+#include "noise_ladder.h"
 #include "validate_internal.h"
 
 #include <math.h>
@@ -31,7 +32,7 @@ bool scene_is_selected_whole(const struct validate_options *o, const char *name)
 void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME])
 {
     if (t->a == NULL)
-        snprintf(name, CLAIM_NAME, "%s/consistency", t->scene->name);
+        snprintf(name, CLAIM_NAME, "%s/%s", t->scene->name, t->of_noise ? "noise" : "consistency");
     else if (t->a->kind == SIDE_OURS)
         snprintf(name, CLAIM_NAME, "%s/%s", t->scene->name,
                  t->a->variant != NULL ? t->a->name : t->ref.engine);
@@ -192,8 +193,9 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
 
 /* In the order of the results: ours against each reference; each engine against the closed form, where
  * there is one: the probes that show the engine to be set up right; a further engine against all of
- * these and ours; variants; consistency. */
-static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can)
+ * these and ours; variants; consistency; noise. */
+static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can,
+                      bool of_noise)
 {
     struct scene_sides *own = &v->sides[s - v->suite.scene];
     struct side *from =
@@ -225,6 +227,9 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     if (s->consistency.renders > 0)
         v->task[v->num_tasks++] =
             (struct claim_run){.scene = s, .looks = &alpha_spending_single, .next = LOOK_DECLARED};
+    if (of_noise && strcmp(s->references_of, s->name) == 0)
+        v->task[v->num_tasks++] = (struct claim_run){
+            .scene = s, .of_noise = true, .looks = &alpha_spending_single, .next = LOOK_DECLARED};
 }
 
 bool select_claims(struct validation *v, json_t *cannot, struct err *e)
@@ -246,9 +251,10 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
         most += scene_is_selected(v->opt, v->suite.scene[i].name) ? MAX_CLAIMS : 0;
     v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
     ok = ok && (v->task != NULL || err_set(e, "out of memory"));
+    bool of_noise = noise_ladder_is_kept(v->opt->golden_dir, &v->suite);
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
         if (scene_is_selected(v->opt, v->suite.scene[i].name))
-            add_scene(v, &v->suite.scene[i], can[i]);
+            add_scene(v, &v->suite.scene[i], can[i], of_noise);
     free(can);
     ok = ok && check_claims(v, e);
     if (ok)

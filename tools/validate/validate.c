@@ -5,6 +5,7 @@
 #include "renderer/base/progress.h"
 #include "tools/results/claim_result.h"
 #include "tools/results/results.h"
+#include "noise_ladder.h"
 #include "validate_internal.h"
 
 #include <math.h>
@@ -20,7 +21,10 @@ static double cost(const struct claim_run *t)
 {
     const struct suite_scene *s = t->scene;
     double samples, starts = 1;
-    if (t->a == NULL) {
+    if (t->of_noise) {
+        samples = noise_claims_samples(s);
+        starts = 2.0 * NOISE_RUNGS * NOISE_REPLICATES;
+    } else if (t->a == NULL) {
         samples = (double)s->width * s->height * s->consistency.renders * s->consistency.spp;
         starts = s->consistency.renders + (s->consistency.batch > 0);
     } else {
@@ -72,12 +76,17 @@ static void tell_round(const struct validation *v, const struct claim_run *t)
 /* Claims that --until-different did not look at are not in the results. */
 static void collect(const struct validation *v, json_t *root)
 {
-    json_t *consistency = json_array();
+    json_t *consistency = json_array(), *noise = json_array();
     json_object_set_new(root, "consistency", consistency);
-    for (int i = 0; i < v->num_tasks; i++)
-        if (v->task[i].result != NULL)
-            json_array_append(v->task[i].a != NULL ? json_object_get(root, "claims") : consistency,
-                              v->task[i].result);
+    json_object_set_new(root, "noise", noise);
+    for (int i = 0; i < v->num_tasks; i++) {
+        const struct claim_run *t = &v->task[i];
+        if (t->of_noise)
+            json_array_extend(noise, t->result);
+        else if (t->result != NULL)
+            json_array_append(t->a != NULL ? json_object_get(root, "claims") : consistency,
+                              t->result);
+    }
     json_object_set_new(root, "seconds", json_real(now_seconds() - v->start));
 }
 

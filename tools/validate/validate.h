@@ -14,7 +14,7 @@ struct validate_options {
     const char *suite_dir, *golden_dir, *out_dir, *share_dir;
     const char *pathtracer; /* the program under test */
     /* SCENE, all claims of it, or SCENE/CLAIM, where CLAIM is the reference's name for pathtracer against it, the name of a
-     * variant of ours, "consistency", or A:B for any other pair; none: all. */
+     * variant of ours, "consistency", "noise", or A:B for any other pair; none: all. */
     const char *only[MAX_ONLY];
     int num_only;
     bool live;     /* render the references now instead of reading the goldens */
@@ -47,7 +47,7 @@ struct validate_options {
 };
 
 /* What cannot be looked at in parts is judged once, at its declared size: adaptive variants, the further
- * engine (rendered once), and the claims of consistency. Goldens and closed forms do not grow; ours grows
+ * engine (rendered once), and the claims of consistency and noise. Goldens and closed forms do not grow; ours grows
  * by ranges of sample numbers, with --live engines by further replicates.
  *
  * A claim that the budget left undecided is INCONCLUSIVE, with what its last look saw. One that had no look

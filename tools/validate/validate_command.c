@@ -6,6 +6,7 @@
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
 #include "tools/results/results_table.h"
+#include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "import_result.h"
 #include "shared_features.h"
@@ -28,7 +29,7 @@ static const struct cli_option options[] = {
     {0, "only", "SCENE[/CLAIM]",
      "judge only this scene, or of it only this claim: the name of the\n"
      "reference that ours is held against, of a variant of ours, A:B\n"
-     "of any other pair, or consistency; may be given again",
+     "of any other pair, consistency, or noise; may be given again",
      CLI_TO_LIST(struct validate_command, opt.only, opt.num_only), .noun = "scenes and claims"},
     {0, "alpha", "A",
      "chance of any wrong verdict in the whole run, for wrong\n"
@@ -130,6 +131,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     if (json_array_size(json_object_get(results, "claims")) > 0)
         results_table_print(stdout, results, false);
     stated_error_print(stdout, json_object_get(results, "consistency"), false);
+    noise_results_print(stdout, json_object_get(results, "noise"), false);
     if (member_text(results, "located") != NULL)
         printf("\n%s\n", member_text(results, "located"));
     const json_t *loader = json_object_get(results, "loader");
@@ -164,6 +166,14 @@ static void tell_not_judged(const json_t *results, struct err *e)
         if (stated_error_outcome(c) == OUTCOME_NOT_JUDGED) {
             err_set(e, "%s, its stated errors: %s", member_text(c, "scene"),
                     member_text(c, "error"));
+            return;
+        }
+    }
+    const json_t *noise = json_object_get(results, "noise");
+    for (size_t i = 0; first == NULL && i < json_array_size(noise); i++) {
+        const json_t *c = json_array_get(noise, i);
+        if (noise_results_outcome(c) == OUTCOME_NOT_JUDGED) {
+            err_set(e, "%s, its noise: %s", member_text(c, "scene"), member_text(c, "error"));
             return;
         }
     }

@@ -9,8 +9,9 @@
 #include "validate.h"
 
 enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
-/* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants, consistency. */
-enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 2 };
+/* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants,
+ * consistency, noise. */
+enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 3 };
 
 enum side_kind {
     SIDE_OURS,   /* the program under test, or a variant of it */
@@ -52,7 +53,8 @@ struct scene_sides {
 /* One claim on its way. */
 struct claim_run {
     const struct suite_scene *scene;
-    struct side *a, *b;         /* NULL: the claim of consistency */
+    struct side *a, *b; /* NULL: the claim of consistency, or of noise */
+    bool of_noise;
     struct suite_reference ref; /* b's name and class; the claim's margins */
     enum verdict expected;
     const struct alpha_spending *looks;
@@ -65,7 +67,7 @@ struct claim_run {
     struct comparison c;
     json_t *history; /* "looks" of the results */
     double cpu_a, cpu_b;
-    json_t *result; /* the finished claim */
+    json_t *result; /* the finished claim; of noise: all rows of the scene */
 };
 
 struct validation {
@@ -129,6 +131,14 @@ void claim_run_free(struct claim_run *t);
  * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
  * an "error" that says so. */
 json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline);
+
+/* Paths that the claim about a scene's noise costs; every scene has one where goldens hold the noise of any
+ * (noise_ladder_is_kept()). */
+double noise_claims_samples(const struct suite_scene *s);
+/* Renders the ladders of ours below out_dir and judges them; rows of "noise" (noise_results.h), those of other engines as
+ * they are stored behind ours. A new reference; NULL only out of memory. deadline as above. */
+json_t *noise_claims_run(const struct validate_options *opt, const struct suite_scene *s,
                          double alpha, double deadline);
 
 #endif

@@ -1,0 +1,369 @@
+#include "noise_record.h"
+
+#include "reference/base/json_node.h"
+#include "reference/suite/engine_table.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "renderer/base/version.h"
+#include "tools/converge/converge_engine.h"
+#include "tools/results/claim_result.h"
+#include "tools/validate/noise_ladder.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const double least_margin = 0.1;
+
+/* k-th of a scene: ours with both samplers, then the engines that it has references of; NULL past the last. */
+static const char *engine_of(const struct suite_scene *scene, int k)
+{
+    for (int i = 0; converge_engine_names[i] != NULL; i++) {
+        const char *name = converge_engine_names[i];
+        if ((i < CONVERGE_REFERENCES || suite_reference_of(scene, name) != NULL) && k-- == 0)
+            return name;
+    }
+    return NULL;
+}
+
+static int number_of(const char *engine)
+{
+    int i = 0;
+    while (strcmp(converge_engine_names[i], engine) != 0)
+        i++;
+    return i;
+}
+
+static bool is_halved(const struct suite_scene *s, const char *engine)
+{
+    return engine_with_goldens(engine) != NULL && s->width % 2 == 0 && s->height % 2 == 0 &&
+           s->tile % 2 == 0;
+}
+
+static bool climb(const struct converge_job *job, const char *engine, int rung,
+                  const struct converge_reference *unit, int tile, float *images,
+                  struct noise_ladder *l, char **version, struct err *e)
+{
+    double cpu_s;
+    free(*version);
+    return converge_render(job, (enum converge_engine)number_of(engine), rung,
+                           noise_ladder_spp[rung], images, &cpu_s, version, NULL, e) &&
+           noise_ladder_add(l, images, noise_ladder_spp[rung], cpu_s, unit, job->scene->width, tile,
+                            e);
+}
+
+/* An engine whose answer has no noise says so; then its ladder has one rung of nothing. */
+static bool render_reference(const struct reference_command *c, const struct suite_scene *scene,
+                             const char *engine, const struct converge_reference *unit, int shrink,
+                             struct noise_ladder *l, char **version, struct err *e)
+{
+    struct suite_scene small = *scene;
+    small.width /= shrink;
+    small.height /= shrink;
+    const struct converge_job job = {.scene = &small,
+                                     .dir = c->work,
+                                     .share_dir = c->opt.share_dir,
+                                     .seed = c->opt.seed,
+                                     .threads = c->opt.threads,
+                                     .timeout_s = c->opt.timeout_s,
+                                     .replicates = NOISE_REPLICATES};
+    float *images = calloc((size_t)job.replicates * unit->size, sizeof *images);
+    *l = (struct noise_ladder){.replicates = job.replicates};
+    bool ok = images != NULL || err_set(e, "out of memory");
+    for (int rung = 0; ok && rung < NOISE_RUNGS; rung++) {
+        ok = climb(&job, engine, rung, unit, scene->tile / shrink, images, l, version, e);
+        if (!ok && rung == 0 && strstr(e->msg, CONVERGE_NO_NOISE) != NULL) {
+            e->msg[0] = '\0';
+            ok = noise_ladder_add(l, images, 1, 0, unit, small.width, scene->tile / shrink, e);
+            break;
+        }
+    }
+    free(images);
+    if (!ok)
+        noise_ladder_free(l);
+    return ok;
+}
+
+static bool render_ours(const struct reference_command *c, const struct suite_scene *scene,
+                        const char *engine, const char *pathtracer,
+                        const struct converge_reference *unit, struct noise_ladder *l,
+                        struct err *e)
+{
+    const struct noise_job job = {.scene = scene,
+                                  .unit = unit,
+                                  .pathtracer = pathtracer,
+                                  .dir = c->work,
+                                  .sobol = number_of(engine) == CONVERGE_SOBOL,
+                                  .replicates = NOISE_RECORD_REPLICATES,
+                                  .threads = c->opt.threads,
+                                  .seed = c->opt.seed,
+                                  .timeout_s = c->opt.timeout_s,
+                                  .deadline = INFINITY};
+    return noise_ladder_render(&job, l, e);
+}
+
+/* Adds where it comes from; made: see the header. */
+static bool describe(json_t *entry, const struct suite_scene *s, const char *version,
+                     const char *made, uint32_t seed, int shrink)
+{
+    json_t *more =
+        json_pack("{ss,ss,ss,si,si,si,si,sI,si}", "version", version, "made", made, "scene_sha256",
+                  s->sha256, "width", s->width, "height", s->height, "depth", s->depth, "tile",
+                  s->tile, "seed", (json_int_t)seed, "shrink", shrink);
+    bool ok = more != NULL && entry != NULL && json_object_update(entry, more) == 0;
+    json_decref(more);
+    return ok;
+}
+
+static bool render_one(const struct reference_command *c, const struct suite_scene *scene,
+                       const char *engine, const char *pathtracer, const char *made, json_t **entry,
+                       struct err *e)
+{
+    int shrink = is_halved(scene, engine) ? 2 : 1;
+    bool is_ours = number_of(engine) < CONVERGE_REFERENCES;
+    struct converge_reference unit;
+    struct noise_ladder l = {0};
+    char *version = NULL;
+    if ((c->golden == NULL || !noise_ladder_unit(c->golden, scene, shrink, &unit, e)) &&
+        !noise_ladder_unit(c->out, scene, shrink, &unit, e))
+        return false;
+    bool ok = is_ours ? render_ours(c, scene, engine, pathtracer, &unit, &l, e)
+                      : render_reference(c, scene, engine, &unit, shrink, &l, &version, e);
+    *entry = ok ? noise_ladder_json(&l) : NULL;
+    ok = ok && (describe(*entry, scene,
+                         is_ours           ? assay_version
+                         : version != NULL ? version
+                                           : "?",
+                         made, c->opt.seed, shrink) ||
+                err_set(e, "out of memory"));
+    convergence_rate_reference_free(&unit);
+    noise_ladder_free(&l);
+    free(version);
+    return ok;
+}
+
+/* Whole, and of this scene and these settings. */
+static bool is_current(const json_t *entry, const struct suite_scene *scene, struct err *e)
+{
+    struct noise_ladder l;
+    if (entry == NULL)
+        return err_set(e, "not stored: `make golden` makes it");
+    bool ok = noise_ladder_parse(entry, scene, &l, e);
+    if (ok)
+        noise_ladder_free(&l);
+    return ok;
+}
+
+static bool is_there(const char *dir, const struct suite_scene *scene, const char *engine)
+{
+    struct err ignored;
+    json_t *all = dir != NULL ? noise_ladder_load(dir, scene->name, &ignored) : NULL;
+    bool there = is_current(json_object_get(all, engine), scene, &ignored);
+    json_decref(all);
+    return there;
+}
+
+bool noise_record_render(const struct reference_command *c, const struct suite_scene *scene,
+                         const char *pathtracer, const char *made, struct err *e)
+{
+    const char *engine;
+    for (int k = 0; (engine = engine_of(scene, k)) != NULL; k++) {
+        double start = now_seconds();
+        if ((c->engine != NULL && strcmp(c->engine, engine) != 0) ||
+            (!c->fresh && (is_there(c->golden, scene, engine) || is_there(c->out, scene, engine))))
+            continue;
+        fprintf(stderr, "%s: the noise of %s\n", scene->name, engine);
+        json_t *entry = NULL, *all = noise_ladder_load(c->out, scene->name, e);
+        bool ok = all != NULL && render_one(c, scene, engine, pathtracer, made, &entry, e) &&
+                  (json_object_set(all, engine, entry) == 0 || err_set(e, "out of memory")) &&
+                  noise_ladder_store(c->out, scene->name, all, e);
+        json_decref(entry);
+        json_decref(all);
+        if (!ok)
+            return err_prefix(e, "%s, %s", scene->name, engine);
+        printf("%s/%s/noise.json: %s, %.0f s\n", c->out, scene->name, engine,
+               now_seconds() - start);
+    }
+    return true;
+}
+
+/* Whatever scene file it was made of. */
+static bool parse_any(const json_t *entry, const struct suite_scene *scene,
+                      struct noise_ladder *out, struct err *e)
+{
+    struct suite_scene was = *scene;
+    const char *sha = member_text(entry, "scene_sha256");
+    if (sha != NULL)
+        snprintf(was.sha256, sizeof was.sha256, "%s", sha);
+    return noise_ladder_parse(entry, &was, out, e);
+}
+
+static enum verdict worse(enum verdict a, enum verdict b)
+{
+    if (a == VERDICT_DIFFERENT || b == VERDICT_DIFFERENT)
+        return VERDICT_DIFFERENT;
+    return a == VERDICT_INCONCLUSIVE ? a : b;
+}
+
+static struct variance_claim judge(const char *what, struct estimate v, struct estimate was,
+                                   double share, bool both, double alpha, FILE *out)
+{
+    double margin = variance_ladder_margin(was, share, least_margin);
+    struct variance_claim c = variance_ladder_judge(v, was, margin, both, alpha / 2);
+    fprintf(out, "  %s: %s, %.4g [%.4g, %.4g] times that stored, margin %.3g\n", what,
+            verdict_name(c.verdict), c.ratio, c.lo, c.hi, c.margin);
+    return c;
+}
+
+/* verdict: also where the two cannot be compared, then "NOT COMPARABLE". */
+static json_t *compare(const json_t *entry, const json_t *was, const struct suite_scene *scene,
+                       bool both, double alpha, FILE *out, enum verdict *verdict)
+{
+    struct noise_ladder a, b;
+    struct err e;
+    *verdict = VERDICT_DIFFERENT;
+    if (!parse_any(was, scene, &b, &e)) {
+        fprintf(out, "  NOT COMPARABLE: what is stored: %s\n", e.msg);
+        return json_pack("{ss}", "verdict", "NOT COMPARABLE");
+    }
+    if (!noise_ladder_parse(entry, scene, &a, &e)) {
+        noise_ladder_free(&b);
+        return NULL;
+    }
+    struct variance_claim sample =
+        judge("variance of a sample", a.sample.image, b.sample.image, a.n / b.n, both, alpha, out);
+    struct variance_claim top =
+        judge("variance of the last rung", a.rung[a.num - 1].variance, b.rung[b.num - 1].variance,
+              (double)a.replicates / b.replicates, both, alpha, out);
+    *verdict = worse(sample.verdict, top.verdict);
+    noise_ladder_free(&a);
+    noise_ladder_free(&b);
+    return json_pack("{ss,sf,sf,sf}", "verdict", verdict_name(*verdict), "sample", sample.ratio,
+                     "last_rung", top.ratio, "alpha", alpha);
+}
+
+static bool put(const struct approve_options *opt, const struct suite_scene *scene,
+                const char *engine, const json_t *entry, json_t *change, json_t *all, struct err *e)
+{
+    char date[32];
+    time_t now = time(NULL);
+    struct tm utc;
+    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
+    const json_t *was = json_object_get(all, engine);
+    json_t *old = json_object_get(was, "changes"), *mine = json_copy((json_t *)entry);
+    json_t *changes = old != NULL ? json_copy(old) : json_array();
+    bool ok = mine != NULL && changes != NULL && change != NULL &&
+              json_object_set_new(change, "date", json_string(date)) == 0;
+    if (ok && was != NULL)
+        ok = json_object_set(change, "was", json_object_get(was, "version")) == 0;
+    if (ok && opt->why != NULL)
+        ok = json_object_set_new(change, "why", json_string(opt->why)) == 0;
+    ok = ok && json_array_append(changes, change) == 0 &&
+         json_object_set(mine, "changes", changes) == 0 && json_object_set(all, engine, mine) == 0;
+    ok =
+        ok ? noise_ladder_store(opt->golden_dir, scene->name, all, e) : err_set(e, "out of memory");
+    json_decref(changes);
+    json_decref(mine);
+    return ok;
+}
+
+static bool is_same(const json_t *entry, const json_t *was)
+{
+    json_t *a = json_copy((json_t *)was);
+    json_object_del(a, "changes");
+    bool same = json_equal(a, entry);
+    json_decref(a);
+    return same;
+}
+
+static enum approval approve_one(const struct approve_options *opt, const struct suite_scene *scene,
+                                 const char *engine, const json_t *entry, json_t *all, FILE *out,
+                                 struct err *e)
+{
+    const json_t *was = json_object_get(all, engine);
+    enum verdict verdict = VERDICT_EQUIVALENT;
+    json_t *change;
+    fprintf(out, "%s/noise, %s\n", scene->name, engine);
+    if (!is_current(entry, scene, e)) {
+        err_prefix(e, "%s/noise, %s: candidate", scene->name, engine);
+        return APPROVE_IMPOSSIBLE;
+    }
+    if (was == NULL && !opt->accept_new) {
+        err_set(e, "%s/noise, %s: nothing is stored: approve it with --new", scene->name, engine);
+        return APPROVE_IMPOSSIBLE;
+    }
+    if (was != NULL && is_same(entry, was)) {
+        fprintf(out, "  IDENTICAL\n");
+        return APPROVE_UNCHANGED;
+    }
+    if (was == NULL) {
+        fprintf(out, "  NEW: nothing is stored\n");
+        change = json_pack("{ss}", "verdict", "NEW");
+    } else {
+        bool both = engine_with_goldens(engine) != NULL;
+        change = compare(entry, was, scene, both, opt->alpha, out, &verdict);
+    }
+    enum approval done = APPROVE_ACCEPTED;
+    if (verdict == VERDICT_DIFFERENT && opt->why == NULL) {
+        fprintf(out, "  refused: give --accept-difference \"why\"\n");
+        done = APPROVE_DIFFERENT;
+    } else if (verdict == VERDICT_INCONCLUSIVE) {
+        fprintf(out, "  refused: render it again with another --seed\n");
+        done = APPROVE_INCONCLUSIVE;
+    } else if (!put(opt, scene, engine, entry, change, all, e)) {
+        done = APPROVE_IMPOSSIBLE;
+    } else {
+        fprintf(out, "  approved\n");
+    }
+    json_decref(change);
+    return done;
+}
+
+void noise_record_approve(const struct approve_options *opt, const struct suite_scene *scene,
+                          FILE *out, int count[APPROVE_IMPOSSIBLE + 1], struct err *why)
+{
+    struct err e = {""};
+    json_t *candidate = noise_ladder_load(opt->from_dir, scene->name, &e);
+    json_t *all = noise_ladder_load(opt->golden_dir, scene->name, &e);
+    const char *engine;
+    bool ok = candidate != NULL && all != NULL;
+    for (int k = 0; ok && (engine = engine_of(scene, k)) != NULL; k++) {
+        const json_t *entry = json_object_get(candidate, engine);
+        if (entry == NULL)
+            continue;
+        enum approval done = approve_one(opt, scene, engine, entry, all, out, &e);
+        if (done == APPROVE_IMPOSSIBLE)
+            fprintf(out, "  refused: %s\n", e.msg);
+        if (done == APPROVE_IMPOSSIBLE && count[done] == 0)
+            *why = e;
+        count[done]++;
+    }
+    if (!ok && count[APPROVE_IMPOSSIBLE]++ == 0)
+        *why = e;
+    json_decref(candidate);
+    json_decref(all);
+}
+
+size_t noise_record_status(const char *golden_dir, const struct suite_scene *scene, FILE *out)
+{
+    struct err e = {""};
+    json_t *all = noise_ladder_load(golden_dir, scene->name, &e);
+    const char *engine;
+    size_t bad = 0;
+    for (int k = 0; (engine = engine_of(scene, k)) != NULL; k++) {
+        const json_t *entry = json_object_get(all, engine);
+        bool current = all != NULL && is_current(entry, scene, &e);
+        fprintf(out, "%-8s %s/noise, %s%s%s\n",
+                current                                         ? "current"
+                : all == NULL                                   ? "damaged"
+                : entry == NULL                                 ? "missing"
+                : strncmp(e.msg, "stale", strlen("stale")) == 0 ? "stale"
+                                                                : "damaged",
+                scene->name, engine, current ? "" : ": ", current ? "" : e.msg);
+        bad += !current && (entry != NULL || number_of(engine) < CONVERGE_REFERENCES);
+    }
+    json_decref(all);
+    return bad;
+}

@@ -1,0 +1,284 @@
+#include "noise_results.h"
+
+#include "reference/suite/suite.h"
+
+#include <string.h>
+
+static const char measured[] = "MEASURED";
+
+static bool is_interval(const json_t *v)
+{
+    return json_array_size(v) == 2 && json_is_number(json_array_get(v, 0)) &&
+           json_is_number(json_array_get(v, 1)) &&
+           json_number_value(json_array_get(v, 0)) <= json_number_value(json_array_get(v, 1));
+}
+
+/* A number and, with the ending "_ci", its interval, which a run may not know. */
+static bool check_estimate(const json_t *j, const char *name, bool required, const char *where,
+                           struct err *e)
+{
+    char ci[32];
+    const json_t *v = json_object_get(j, name);
+    snprintf(ci, sizeof ci, "%s_ci", name);
+    const json_t *i = json_object_get(j, ci);
+    if (v == NULL && !required)
+        return true;
+    if (!json_is_number(v))
+        return err_set(e, "%s: '%s' is not a number", where, name);
+    return json_is_null(i) || is_interval(i) ||
+           err_set(e, "%s: '%s' is neither an interval nor null", where, ci);
+}
+
+static bool check_place(const json_t *tile, const char *where, struct err *e)
+{
+    return (json_is_integer(json_object_get(tile, "x")) &&
+            json_is_integer(json_object_get(tile, "y"))) ||
+           err_set(e, "%s: a tile has no whole 'x' and 'y'", where);
+}
+
+/* The margin is null where none can be had. */
+static bool check_claim(const json_t *j, const char *where, struct err *e)
+{
+    enum verdict v;
+    const json_t *margin = json_object_get(j, "margin");
+    const char *verdict = member_text(j, "ratio_verdict");
+    if (!check_estimate(j, "ratio", true, where, e))
+        return false;
+    if (!json_is_number(margin) && !json_is_null(margin))
+        return err_set(e, "%s: 'margin' is neither a number nor null", where);
+    return (verdict != NULL && verdict_parse(verdict, &v)) ||
+           err_set(e, "%s: 'ratio_verdict' is not a verdict", where);
+}
+
+static bool check_measured(const json_t *j, const char *where, struct err *e)
+{
+    const json_t *tile = json_object_get(j, "worst_tile"), *rungs = json_object_get(j, "rungs");
+    if (!check_estimate(j, "variance", true, where, e) || !check_place(tile, where, e) ||
+        !check_estimate(tile, "variance", true, where, e) ||
+        !check_estimate(j, "slope", false, where, e) ||
+        (json_object_get(j, "slope_margin") != NULL &&
+         !json_is_number(json_object_get(j, "slope_margin"))) ||
+        !check_estimate(j, "efficiency", false, where, e))
+        return false;
+    if (json_array_size(rungs) == 0)
+        return err_set(e, "%s: 'rungs' is not an array of at least one", where);
+    for (size_t i = 0; i < json_array_size(rungs); i++) {
+        const json_t *g = json_array_get(rungs, i);
+        if (!json_is_integer(json_object_get(g, "spp")))
+            return err_set(e, "%s: 'spp' of a rung is not a whole number", where);
+        if (!check_estimate(g, "variance", true, where, e))
+            return false;
+    }
+    return true;
+}
+
+static bool check_judged(const json_t *j, const char *where, struct err *e)
+{
+    enum verdict v;
+    const char *verdict = member_text(j, "verdict");
+    const json_t *tile = json_object_get(j, "tile_claim"), *stated = json_object_get(j, "stated");
+    if (member_text(j, "against") == NULL || member_text(j, "reason") == NULL ||
+        !json_is_number(json_object_get(j, "seconds")))
+        return err_set(e, "%s: 'against', 'reason' or 'seconds' is missing", where);
+    if (!check_claim(j, where, e) || (stated != NULL && !check_claim(stated, where, e)) ||
+        (tile != NULL && (!check_place(tile, where, e) || !check_claim(tile, where, e))))
+        return false;
+    return (verdict_parse(verdict, &v) &&
+            json_is_true(json_object_get(j, "passed")) == (v == VERDICT_EQUIVALENT)) ||
+           err_set(e, "%s: 'verdict' is unknown or 'passed' contradicts it", where);
+}
+
+static bool check_one(const json_t *j, const char *where, struct err *e)
+{
+    const char *verdict = member_text(j, "verdict");
+    bool passed = json_is_true(json_object_get(j, "passed"));
+    if (member_text(j, "scene") == NULL || member_text(j, "engine") == NULL)
+        return err_set(e, "%s: 'scene' or 'engine' is missing", where);
+    if (member_text(j, "error") != NULL)
+        return (!passed &&
+                (verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0)) ||
+               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
+    if (member_text(j, "not_stored") != NULL)
+        return (passed && verdict == NULL) ||
+               err_set(e, "%s: is not stored and yet has a 'verdict'", where);
+    if (verdict == NULL || !json_is_number(json_object_get(j, "alpha")))
+        return err_set(e, "%s: 'verdict' or 'alpha' is missing", where);
+    if (!check_measured(j, where, e))
+        return false;
+    if (strcmp(verdict, measured) == 0)
+        return passed || err_set(e, "%s: is MEASURED and yet not 'passed'", where);
+    return check_judged(j, where, e);
+}
+
+bool noise_results_check(const json_t *noise, const char *path, struct err *e)
+{
+    if (!json_is_array(noise))
+        return err_set(e, "%s: 'noise' is not an array", path);
+    for (size_t i = 0; i < json_array_size(noise); i++) {
+        char where[512];
+        snprintf(where, sizeof where, "%.400s: noise %zu", path, i + 1);
+        if (!check_one(json_array_get(noise, i), where, e))
+            return false;
+    }
+    return true;
+}
+
+enum outcome noise_results_outcome(const json_t *row)
+{
+    enum verdict v;
+    const char *verdict = member_text(row, "verdict");
+    if (json_is_true(json_object_get(row, "passed")))
+        return OUTCOME_AS_EXPECTED;
+    if (verdict == NULL || !verdict_parse(verdict, &v))
+        return OUTCOME_NOT_JUDGED;
+    return v == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE : OUTCOME_UNDECIDED;
+}
+
+json_t *noise_results_claims(const json_t *noise)
+{
+    json_t *claims = json_array();
+    for (size_t i = 0; i < json_array_size(noise); i++) {
+        const json_t *row = json_array_get(noise, i);
+        const char *against = member_text(row, "against");
+        if (against == NULL && member_text(row, "error") == NULL)
+            continue;
+        json_t *c =
+            json_pack("{ss,ss,ss,ss,ss,sO,ss*,ss*,ss*,sf}", "scene", member_text(row, "scene"), "a",
+                      member_text(row, "engine"), "b", against != NULL ? against : "record",
+                      "quantity", "variance", "expected", verdict_name(VERDICT_EQUIVALENT),
+                      "passed", json_object_get(row, "passed"), "verdict",
+                      member_text(row, "verdict"), "reason", member_text(row, "reason"), "error",
+                      member_text(row, "error"), "seconds_a", member_number(row, "seconds"));
+        if (json_array_size(json_object_get(row, "ratio_ci")) == 2) {
+            json_object_set_new(c, "difference", json_real(member_number(row, "ratio") - 1));
+            json_object_set_new(c, "ci",
+                                json_pack("[f,f]", member_end(row, "ratio_ci", 0) - 1,
+                                          member_end(row, "ratio_ci", 1) - 1));
+            json_object_set(c, "alpha", json_object_get(row, "alpha"));
+        }
+        json_array_append_new(claims, c);
+    }
+    return claims;
+}
+
+const char *const noise_results_headings[NOISE_COLUMNS] = {
+    "scene",        "engine", "variance of a sample", "of the noisiest tile",
+    "over that of", "slope",  "efficiency",           "verdict"};
+
+static void print_estimate(char text[NOISE_CELL], const json_t *j, const char *name,
+                           const char *format, const char *format_ci)
+{
+    char ci[32];
+    snprintf(ci, sizeof ci, "%s_ci", name);
+    if (json_object_get(j, name) == NULL)
+        return;
+    size_t n = strlen(text);
+    n += (size_t)snprintf(text + n, NOISE_CELL - n, format, member_number(j, name));
+    if (json_array_size(json_object_get(j, ci)) == 2)
+        snprintf(text + n, NOISE_CELL - n, format_ci, member_end(j, ci, 0), member_end(j, ci, 1));
+}
+
+static void print_variance(char text[NOISE_CELL], const json_t *j)
+{
+    if (member_number(j, "variance") > 0 && json_is_null(json_object_get(j, "variance_ci")))
+        snprintf(text, NOISE_CELL, "%.2g", member_number(j, "variance"));
+    else
+        print_estimate(text, j, "variance", "%.4g", " [%.4g, %.4g]");
+}
+
+/* "record: 1.002 [0.97, 1.03], margin 0.1; tile 48,16: ...", the tile where it differs. */
+static void print_against(char text[NOISE_CELL], const json_t *row)
+{
+    const json_t *tile = json_object_get(row, "tile_claim"), *of[2] = {row, tile};
+    if (member_text(row, "against") == NULL)
+        return;
+    bool differs = tile != NULL &&
+                   strcmp(member_text(tile, "ratio_verdict"), verdict_name(VERDICT_DIFFERENT)) == 0;
+    for (int i = 0; i < 1 + differs; i++) {
+        size_t n = strlen(text);
+        if (i == 0)
+            snprintf(text, NOISE_CELL, "%s: ", member_text(row, "against"));
+        else
+            snprintf(text + n, NOISE_CELL - n, "; tile %.0f,%.0f: ", member_number(tile, "x"),
+                     member_number(tile, "y"));
+        print_estimate(text, of[i], "ratio", "%.3g", " [%.3g, %.3g]");
+        n = strlen(text);
+        if (json_is_number(json_object_get(of[i], "margin")))
+            snprintf(text + n, NOISE_CELL - n, ", margin %.3g", member_number(of[i], "margin"));
+        else
+            snprintf(text + n, NOISE_CELL - n, ", no margin can be had");
+    }
+}
+
+void noise_results_cell(const json_t *row, int column, char text[NOISE_CELL])
+{
+    const char *verdict = member_text(row, "verdict"), *error = member_text(row, "error");
+    text[0] = '\0';
+    switch (column) {
+    case 0: snprintf(text, NOISE_CELL, "%s", member_text(row, "scene")); break;
+    case 1: snprintf(text, NOISE_CELL, "%s", member_text(row, "engine")); break;
+    case 2:
+        if (json_object_get(row, "variance") != NULL)
+            print_variance(text, row);
+        break;
+    case 3:
+        if (json_object_get(row, "worst_tile") != NULL)
+            print_variance(text, json_object_get(row, "worst_tile"));
+        break;
+    case 4: print_against(text, row); break;
+    case 5: print_estimate(text, row, "slope", "%.3f", " [%.3f, %.3f]"); break;
+    case 6: print_estimate(text, row, "efficiency", "%.3g", " [%.3g, %.3g]"); break;
+    default:
+        if (member_text(row, "not_stored") != NULL)
+            snprintf(text, NOISE_CELL, "%s", member_text(row, "not_stored"));
+        else if (error != NULL)
+            snprintf(text, NOISE_CELL, "%s: %s", verdict != NULL ? verdict : "NOT JUDGED", error);
+        else
+            snprintf(text, NOISE_CELL, "%s", verdict);
+        break;
+    }
+}
+
+/* The reason, of what did not pass. */
+static void print_reasons(FILE *f, const json_t *noise)
+{
+    for (size_t i = 0; i < json_array_size(noise); i++) {
+        const json_t *row = json_array_get(noise, i);
+        if (!json_is_true(json_object_get(row, "passed")) && member_text(row, "reason") != NULL)
+            fprintf(f, "\n%s, noise of %s: %s\n", member_text(row, "scene"),
+                    member_text(row, "engine"), member_text(row, "reason"));
+    }
+}
+
+void noise_results_print(FILE *f, const json_t *noise, bool markdown)
+{
+    size_t width[NOISE_COLUMNS], rows = json_array_size(noise);
+    char text[NOISE_CELL];
+    if (rows == 0)
+        return;
+    for (int c = 0; c < NOISE_COLUMNS; c++) {
+        width[c] = strlen(noise_results_headings[c]);
+        for (size_t i = 0; i < rows; i++) {
+            noise_results_cell(json_array_get(noise, i), c, text);
+            width[c] = strlen(text) > width[c] ? strlen(text) : width[c];
+        }
+    }
+    fputc('\n', f);
+    for (size_t i = 0; i < rows + 1; i++) {
+        for (int c = 0; c < NOISE_COLUMNS; c++) {
+            if (i == 0)
+                snprintf(text, sizeof text, "%s", noise_results_headings[c]);
+            else
+                noise_results_cell(json_array_get(noise, i - 1), c, text);
+            if (markdown)
+                fprintf(f, "| %s ", text);
+            else
+                fprintf(f, "%-*s%s", c == NOISE_COLUMNS - 1 ? 0 : (int)width[c], text,
+                        c == NOISE_COLUMNS - 1 ? "" : "  ");
+        }
+        fputs(markdown ? "|\n" : "\n", f);
+        for (int c = 0; markdown && i == 0 && c < NOISE_COLUMNS; c++)
+            fputs(c == NOISE_COLUMNS - 1 ? "|---|\n" : "|---", f);
+    }
+    print_reasons(f, noise);
+}

@@ -1,0 +1,29 @@
+/* "noise" in results.json (tools/docs/formats/results.md): of each scene and engine the variance of a sample, its fall with
+ * the number of samples, and, of ours, what both were judged by (tools/validate/noise_claims.c). An engine that is not
+ * judged is "MEASURED", one of which nothing is stored has "not_stored"; both pass. */
+#ifndef ASSAY_NOISE_RESULTS_H
+#define ASSAY_NOISE_RESULTS_H
+
+#include "results.h"
+
+#include <stdio.h>
+
+/* Checks all that the functions below rely on; a failure is a line with file, scene, engine and member. */
+bool noise_results_check(const json_t *noise, const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+
+enum outcome noise_results_outcome(const json_t *row);
+
+/* The rows of ours, for whoever lists claims: scene, "a" (the engine), "b" (what it is held against), "quantity" ("variance"),
+ * expected, passed, verdict or error, reason; where the ratio has an interval, "difference" (ratio - 1), "ci" and "alpha". A new
+ * reference, NULL out of memory. */
+json_t *noise_results_claims(const json_t *noise);
+
+/* The table, for terminal, Markdown and page. A cell is empty where there is nothing to say. */
+enum { NOISE_COLUMNS = 8, NOISE_CELL = 320 };
+extern const char *const noise_results_headings[NOISE_COLUMNS];
+void noise_results_cell(const json_t *row, int column, char text[NOISE_CELL]);
+/* Nothing where there is none. */
+void noise_results_print(FILE *f, const json_t *noise, bool markdown);
+
+#endif

@@ -1,0 +1,428 @@
+#include "validate_internal.h"
+
+#include "noise_ladder.h"
+#include "reference/suite/engine_table.h"
+#include "reference/truth/truth_noise.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "tools/results/results.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Margins where a record says that they can be had: of the variance, of what is stated; half widths of slopes, and from
+ * where on a slope is not asked for. */
+static const double least_margin = 0.1, stated_margin = 0.05, slope_margin = 0.1, most_slope = 0.5;
+/* Shares of the scene's alpha. A claim of two sides has its share on each. */
+static const double image_share = 0.25, tile_share = 0.25, other_share = 0.125;
+/* Seeds of replicates that no other claim of the scene has. */
+enum { FIRST_SEED = 1 << 20 };
+
+/* What a row says, most of it known of some engines alone. */
+struct row {
+    const struct suite_scene *scene;
+    const char *engine;
+    double alpha;     /* of the scene */
+    const char *what; /* is judged */
+    const struct noise_ladder *ladder;
+    bool timed; /* in this run, on this machine */
+    const char *against;
+    struct variance_claim image, tile, stated;
+    int worst; /* tile of the claim */
+    struct estimate slope;
+    double slope_margin; /* 0: not judged */
+    bool has_slope, has_stated;
+    enum verdict slope_verdict;
+};
+
+static json_t *number(double v)
+{
+    return isfinite(v) ? json_real(v) : json_null();
+}
+
+static json_t *pair(double lo, double hi)
+{
+    return isfinite(lo) && isfinite(hi) ? json_pack("[f,f]", lo, hi) : json_null();
+}
+
+/* Of V: of its logarithm where it has one. */
+static json_t *variance_ci(struct estimate v, double alpha)
+{
+    if (v.value <= variance_ladder_none)
+        return json_null();
+    struct interval i = estimate_interval(variance_ladder_log(v), alpha);
+    return i.hi - i.lo < 20 ? pair(exp(i.lo), exp(i.hi)) : json_null();
+}
+
+static int tile_of_most(const struct variance_map *m)
+{
+    int most = 0;
+    for (int i = 1; i < m->tiles_x * m->tiles_y; i++)
+        if (m->tile[i].value > m->tile[most].value)
+            most = i;
+    return most;
+}
+
+static json_t *tile_json(const struct row *r, int tile, json_t *more)
+{
+    int x = r->ladder->sample.tiles_x;
+    json_t *j =
+        json_pack("{si,si}", "x", tile % x * r->scene->tile, "y", tile / x * r->scene->tile);
+    json_object_update(j, more);
+    json_decref(more);
+    return j;
+}
+
+static json_t *claim_json(const struct variance_claim *c)
+{
+    return json_pack("{so,so,so,ss}", "ratio", number(c->ratio), "ratio_ci", pair(c->lo, c->hi),
+                     "margin", number(c->margin), "ratio_verdict", verdict_name(c->verdict));
+}
+
+static void add_measured(json_t *j, const struct row *r)
+{
+    const struct noise_ladder *l = r->ladder;
+    int most = tile_of_most(&l->sample);
+    struct estimate eff;
+    json_t *rungs = json_array();
+    for (int i = 0; i < l->num; i++)
+        json_array_append_new(rungs,
+                              json_pack("{si,sf,so}", "spp", l->rung[i].spp, "variance",
+                                        l->rung[i].variance.value, "variance_ci",
+                                        variance_ci(l->rung[i].variance, r->alpha * other_share)));
+    json_object_set_new(j, "rungs", rungs);
+    json_object_set_new(j, "replicates", json_integer(l->replicates));
+    json_object_set_new(j, "observations", json_real(l->n));
+    json_object_set_new(j, "variance", json_real(l->sample.image.value));
+    json_object_set_new(j, "variance_ci", variance_ci(l->sample.image, r->alpha * image_share));
+    json_object_set_new(
+        j, "worst_tile",
+        tile_json(r, most,
+                  json_pack("{sf,so}", "variance", l->sample.tile[most].value, "variance_ci",
+                            variance_ci(l->sample.tile[most], r->alpha * tile_share))));
+    if (r->has_slope) {
+        struct interval i = estimate_interval(r->slope, r->alpha * other_share);
+        json_object_set_new(j, "slope", json_real(r->slope.value));
+        json_object_set_new(j, "slope_ci", pair(i.lo, i.hi));
+    }
+    if (r->timed && noise_ladder_efficiency(l, &eff)) {
+        struct interval i = estimate_interval(eff, r->alpha * other_share);
+        json_object_set_new(j, "efficiency", json_real(exp(eff.value)));
+        json_object_set_new(j, "efficiency_ci",
+                            i.hi - i.lo < 5 ? pair(exp(i.lo), exp(i.hi)) : json_null());
+    }
+}
+
+/* The first that differs, else the first that is undecided, and why. */
+static enum verdict overall(const struct row *r, char reason[256])
+{
+    char of_tile[64];
+    snprintf(of_tile, sizeof of_tile, "the variance of the tile at %d,%d",
+             r->worst % r->ladder->sample.tiles_x * r->scene->tile,
+             r->worst / r->ladder->sample.tiles_x * r->scene->tile);
+    const struct {
+        const struct variance_claim *c;
+        const char *what, *of;
+    } all[] = {
+        {&r->image, r->what, r->against},
+        {&r->tile, of_tile, r->against},
+        {r->has_stated ? &r->stated : NULL, "the variance between renders", "one that they state"}};
+    for (int v = 0; v < 2; v++) {
+        enum verdict wanted = v == 0 ? VERDICT_DIFFERENT : VERDICT_INCONCLUSIVE;
+        for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+            if (all[i].c != NULL && all[i].of != NULL && all[i].c->verdict == wanted &&
+                (wanted == VERDICT_DIFFERENT || all[i].c != &r->tile)) {
+                snprintf(reason, 256, "%s is %.4g [%.4g, %.4g] times that of the %s, margin %.3g",
+                         all[i].what, all[i].c->ratio, all[i].c->lo, all[i].c->hi, all[i].of,
+                         all[i].c->margin);
+                return wanted;
+            }
+        if (r->slope_margin > 0 && r->slope_verdict == wanted) {
+            struct interval i = estimate_interval(r->slope, r->alpha * other_share);
+            snprintf(reason, 256, "the error falls with slope %.4f [%.4f, %.4f], not %s-1/2",
+                     r->slope.value, i.lo, i.hi, r->has_stated ? "" : "at most ");
+            return wanted;
+        }
+    }
+    if (r->against != NULL)
+        snprintf(reason, 256, "%s is %.4g [%.4g, %.4g] times that of the %s, margin %.3g", r->what,
+                 r->image.ratio, r->image.lo, r->image.hi, r->against, r->image.margin);
+    return VERDICT_EQUIVALENT;
+}
+
+static json_t *judged_row(const struct row *r)
+{
+    char reason[256] = "";
+    enum verdict v = overall(r, reason);
+    json_t *j = json_pack("{ss,ss,sf,ss,sb,ss}", "scene", r->scene->name, "engine", r->engine,
+                          "alpha", r->alpha, "verdict", verdict_name(v), "passed",
+                          v == VERDICT_EQUIVALENT, "reason", reason);
+    if (j == NULL)
+        return NULL;
+    add_measured(j, r);
+    json_object_set_new(j, "seconds", json_real(r->ladder->cpu_s));
+    json_t *image = claim_json(&r->image), *stated = claim_json(&r->stated);
+    json_object_set_new(j, "against", json_string(r->against));
+    json_object_update(j, image);
+    if (r->tile.verdict != VERDICT_NOTHING_FOUND)
+        json_object_set_new(j, "tile_claim", tile_json(r, r->worst, claim_json(&r->tile)));
+    if (r->has_stated)
+        json_object_set(j, "stated", stated);
+    if (r->slope_margin > 0) {
+        json_object_set_new(j, "slope_verdict", json_string(verdict_name(r->slope_verdict)));
+        json_object_set_new(j, "slope_margin", json_real(r->slope_margin));
+    }
+    json_decref(image);
+    json_decref(stated);
+    return j;
+}
+
+/* One that cannot be judged; `not_stored`: nothing depends on it. */
+static json_t *bare_row(const struct suite_scene *s, const char *engine, const char *why,
+                        bool not_stored)
+{
+    return json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", engine, "passed", not_stored,
+                     not_stored ? "not_stored" : "error", why);
+}
+
+/* Every tile of which something can be said; keeps the one furthest out. A tile can be found to differ, no more: its few
+ * pixels may know their own uncertainty too badly to say anything else. */
+static void judge_tiles(const struct noise_ladder *run, const struct variance_map *wanted,
+                        const struct variance_map *record, double share, bool both, double alpha,
+                        struct row *r)
+{
+    int num = run->sample.tiles_x * run->sample.tiles_y, tested = 0;
+    double furthest = -INFINITY;
+    r->tile = (struct variance_claim){.verdict = VERDICT_NOTHING_FOUND};
+    for (int i = 0; i < num; i++)
+        tested += isfinite(variance_ladder_margin(record->tile[i], share, least_margin));
+    for (int i = 0; i < num; i++) {
+        double margin = variance_ladder_margin(record->tile[i], share, least_margin);
+        if (!isfinite(margin))
+            continue;
+        struct variance_claim c = variance_ladder_judge(run->sample.tile[i], wanted->tile[i],
+                                                        margin, both, alpha / tested);
+        double out = c.ratio / (1 + c.margin) + (c.verdict == VERDICT_DIFFERENT ? 1e9 : 0);
+        if (out > furthest) {
+            furthest = out;
+            r->tile = c;
+            r->worst = i;
+        }
+    }
+}
+
+/* The variance between renders of n samples over that within, over n: all rungs, weighted as for a slope. */
+static struct estimate stated_error(const struct noise_ladder *l)
+{
+    double mean = 0, sw = 0, sum = 0, var = 0, dof = INFINITY;
+    for (int i = 0; i < l->num; i++)
+        mean += pow(l->rung[i].variance.se / l->rung[i].variance.value, 2) / l->num;
+    for (int i = 0; i < l->num; i++) {
+        struct estimate v = l->rung[i].variance;
+        double se = v.se / v.value, w = 1 / (se * se + mean);
+        sw += w;
+        sum += w * log(v.value * l->rung[i].spp);
+        var += w * w * se * se;
+        dof = fmin(dof, v.dof);
+    }
+    double value = exp(sum / sw);
+    return (struct estimate){value, value * sqrt(var) / sw, dof};
+}
+
+/* The slope, and the half width that the record says can be had. */
+static void judge_slope(const struct noise_ladder *run, const struct noise_ladder *record,
+                        struct row *r)
+{
+    struct estimate was;
+    double share = (double)run->replicates / record->replicates;
+    r->has_slope = noise_ladder_slope(run, &r->slope);
+    if (!r->has_slope || !noise_ladder_slope(record, &was))
+        return;
+    double half = fmax(slope_margin, variance_ladder_reach(was, share));
+    r->slope_margin = half <= most_slope ? half : 0;
+}
+
+/* By the record, or by a closed form, where the record only says which margins can be had. */
+static void judge_independent(const struct noise_ladder *run, const struct variance_map *wanted,
+                              const struct noise_ladder *record, bool both, struct row *r)
+{
+    double a = r->alpha, each = image_share / (both ? 2 : 1), share = run->n / record->n;
+    double margin = variance_ladder_margin(record->sample.image, share, least_margin);
+    r->image = variance_ladder_judge(run->sample.image, wanted->image, margin, both, a * each);
+    judge_tiles(run, wanted, &record->sample, share, both, a * tile_share / (both ? 2 : 1), r);
+    if (noise_ladder_is_silent(run))
+        return;
+    judge_slope(run, record, r);
+    if (r->slope_margin > 0)
+        r->slope_verdict =
+            convergence_rate_slope_verdict(r->slope, a * other_share, r->slope_margin);
+    margin = variance_ladder_margin(stated_error(record), share, stated_margin);
+    r->has_stated = isfinite(margin);
+    r->stated = variance_ladder_judge(stated_error(run), run->sample.image, margin, true,
+                                      a * other_share / 2);
+}
+
+/* Of stratified samples: the last rung against that of the record, and a slope of -1/2 at most. */
+static void judge_sobol(const struct noise_ladder *run, const struct noise_ladder *record,
+                        struct row *r)
+{
+    struct estimate top = run->rung[run->num - 1].variance,
+                    was = record->rung[record->num - 1].variance;
+    double a = r->alpha * other_share, share = (double)run->replicates / record->replicates;
+    r->tile.verdict = VERDICT_NOTHING_FOUND;
+    r->image =
+        variance_ladder_judge(top, was, variance_ladder_margin(was, share, least_margin), false, a);
+    judge_slope(run, record, r);
+    if (r->slope_margin <= 0)
+        return;
+    struct interval i = estimate_interval(r->slope, 2 * a);
+    r->slope_verdict = i.lo > -0.5                      ? VERDICT_DIFFERENT
+                       : i.hi <= -0.5 + r->slope_margin ? VERDICT_EQUIVALENT
+                                                        : VERDICT_INCONCLUSIVE;
+}
+
+/* The closed form as something without error. *has: there is one. */
+static bool closed_form(const struct suite_scene *s, const struct converge_reference *unit,
+                        const struct variance_map *like, struct variance_map *out, bool *has,
+                        struct err *e)
+{
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
+    double *variance = NULL;
+    *has = truth != NULL && s->depth == 1 && suite_noise_is_known(truth->kind);
+    if (!*has)
+        return true;
+    size_t tiles = (size_t)like->tiles_x * (size_t)like->tiles_y;
+    double *count = calloc(tiles, sizeof *count);
+    *out = (struct variance_map){.tiles_x = like->tiles_x, .tiles_y = like->tiles_y};
+    out->tile = calloc(tiles, sizeof *out->tile);
+    bool ok = (count != NULL && out->tile != NULL) || err_set(e, "out of memory");
+    ok = ok && truth_noise(s, truth, &variance, e);
+    for (size_t i = 0; ok && i < unit->size; i++) {
+        int p = (int)(i / 3), t = variance_map_tile(like, p % s->width, p / s->width, s->tile);
+        double v = variance[i] / (unit->unit[i] * unit->unit[i]);
+        out->tile[t].value += v;
+        out->image.value += v / (double)unit->size;
+        count[t]++;
+    }
+    out->image.dof = 1;
+    for (size_t t = 0; ok && t < tiles; t++) {
+        out->tile[t].value /= count[t];
+        out->tile[t].dof = 1;
+    }
+    free(count);
+    free(variance);
+    if (!ok)
+        variance_map_free(out);
+    return ok;
+}
+
+static const char *const ours[2] = {"pathtracer", "pathtracer-sobol"};
+
+/* Renders with one sampler and judges it by its record. */
+static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha,
+                       json_t *rows, struct err *e)
+{
+    struct row r = {.scene = job->scene, .engine = ours[job->sobol], .alpha = alpha, .timed = true};
+    struct noise_ladder run = {0}, record = {0};
+    struct variance_map form = {0};
+    bool has_form = false;
+    const json_t *entry = json_object_get(stored, r.engine);
+    bool ok =
+        entry != NULL || err_set(e, "no record of its noise is stored: `make golden` makes it");
+    ok = ok && noise_ladder_parse(entry, job->scene, &record, e) &&
+         noise_ladder_render(job, &run, e);
+    if (ok && (run.sample.tiles_x != record.sample.tiles_x ||
+               run.sample.tiles_y != record.sample.tiles_y))
+        ok = err_set(e, "damaged: its tiles are not those of the scene");
+    ok = ok && (job->sobol || closed_form(job->scene, job->unit, &run.sample, &form, &has_form, e));
+    if (ok) {
+        r.ladder = &run;
+        r.what = job->sobol ? "the variance of the last rung" : "the variance of a sample";
+        r.against = has_form ? "closed form" : "record";
+        if (job->sobol)
+            judge_sobol(&run, &record, &r);
+        else
+            judge_independent(&run, has_form ? &form : &record.sample, &record, has_form, &r);
+        ok = json_array_append_new(rows, judged_row(&r)) == 0 || err_set(e, "out of memory");
+    }
+    noise_ladder_free(&run);
+    noise_ladder_free(&record);
+    variance_map_free(&form);
+    return ok || err_prefix(e, "%s", r.engine);
+}
+
+/* What is stored of another engine: measured, and judged by nothing. Its time counts where that of ours was taken in the
+ * same run. */
+static json_t *stored_row(const struct suite_scene *s, const char *engine, const json_t *stored,
+                          double alpha)
+{
+    const json_t *entry = json_object_get(stored, engine);
+    const json_t *made = json_object_get(json_object_get(stored, ours[0]), "made");
+    struct noise_ladder l;
+    struct err e;
+    if (entry == NULL)
+        return bare_row(s, engine, "not stored: `make golden` makes it", true);
+    if (!noise_ladder_parse(entry, s, &l, &e))
+        return bare_row(s, engine, e.msg, true);
+    struct row r = {.scene = s,
+                    .engine = engine,
+                    .alpha = alpha,
+                    .ladder = &l,
+                    .timed = made != NULL && json_equal(made, json_object_get(entry, "made"))};
+    r.has_slope = noise_ladder_slope(&l, &r.slope);
+    json_t *j = json_pack("{ss,ss,sf,ss,sb}", "scene", s->name, "engine", engine, "alpha", alpha,
+                          "verdict", "MEASURED", "passed", 1);
+    if (j != NULL)
+        add_measured(j, &r);
+    noise_ladder_free(&l);
+    return j;
+}
+
+double noise_claims_samples(const struct suite_scene *s)
+{
+    double sum = 0;
+    for (int i = 0; i < NOISE_RUNGS; i++)
+        sum += 2.0 * NOISE_REPLICATES * noise_ladder_spp[i];
+    return sum * s->width * s->height;
+}
+
+json_t *noise_claims_run(const struct validate_options *opt, const struct suite_scene *s,
+                         double alpha, double deadline)
+{
+    const struct path dir = fs_path("%s/data/%s", opt->out_dir, s->name);
+    struct converge_reference unit = {0};
+    struct err e = {""};
+    json_t *rows = json_array(), *stored = noise_ladder_load(opt->golden_dir, s->name, &e);
+    struct noise_job job = {.scene = s,
+                            .unit = &unit,
+                            .pathtracer = opt->pathtracer,
+                            .dir = dir.s,
+                            .replicates = NOISE_REPLICATES,
+                            .threads = opt->threads,
+                            .seed = (uint32_t)opt->seed,
+                            .first = FIRST_SEED,
+                            .timeout_s = opt->timeout_s,
+                            .deadline = deadline};
+    bool ok = stored != NULL && fs_make_dirs(dir.s, &e) &&
+              noise_ladder_unit(opt->golden_dir, s, 1, &unit, &e);
+    for (int sampler = 0; ok && sampler < 2; sampler++) {
+        job.sobol = sampler == 1;
+        ok = judge_ours(&job, stored, alpha, rows, &e);
+    }
+    if (!ok) {
+        json_array_clear(rows);
+        bool late = now_seconds() >= deadline;
+        json_t *row = bare_row(s, ours[0],
+                               late ? BUDGET_SPENT " before its renders were done" : e.msg, false);
+        if (late)
+            json_object_set_new(row, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
+        json_array_append_new(rows, row);
+    }
+    for (int k = 0; stored != NULL && engine_names[k] != NULL; k++)
+        if (suite_reference_of(s, engine_names[k]) != NULL)
+            json_array_append_new(rows, stored_row(s, engine_names[k], stored, alpha));
+    convergence_rate_reference_free(&unit);
+    json_decref(stored);
+    return rows;
+}

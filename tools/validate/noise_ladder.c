@@ -1,0 +1,319 @@
+#include "noise_ladder.h"
+
+#include "reference/base/json_file.h"
+#include "reference/store/reference_render.h"
+#include "reference/truth/truth.h"
+#include "renderer/base/fs.h"
+#include "renderer/base/progress.h"
+#include "run_pathtracer.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+const int noise_ladder_spp[NOISE_RUNGS] = {1, 4, 16, NOISE_TOP};
+
+void noise_ladder_free(struct noise_ladder *l)
+{
+    variance_map_free(&l->sample);
+    *l = (struct noise_ladder){0};
+}
+
+bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene, int shrink,
+                       struct converge_reference *out, struct err *e)
+{
+    const struct suite_reference *truth = suite_reference_of(scene, "truth");
+    struct moments m;
+    json_t *manifest = NULL;
+    if (truth != NULL ? !truth_render(scene, truth, &m, e)
+                      : !golden_read(golden_dir, scene, &scene->reference[0], &m, &manifest, e))
+        return false;
+    json_decref(manifest);
+    bool ok = convergence_rate_reference_init(out, &m, shrink, e);
+    moments_free(&m);
+    return ok || err_prefix(e, "%s", scene->name);
+}
+
+bool noise_ladder_add(struct noise_ladder *l, const float *images, int spp, double cpu_s,
+                      const struct converge_reference *unit, int width, int tile, struct err *e)
+{
+    struct variance_map map;
+    assert(l->num < NOISE_RUNGS);
+    if (!variance_ladder_between(images, l->replicates, unit, width, tile, &map, e))
+        return false;
+    l->rung[l->num] = (struct noise_rung){.spp = spp, .variance = map.image, .cpu_s = cpu_s};
+    l->cpu_s += cpu_s * l->replicates;
+    if (l->num++ == 0) {
+        l->sample = map;
+        l->n = l->replicates;
+    } else {
+        variance_map_free(&map);
+    }
+    return true;
+}
+
+static bool render_one(const struct noise_job *job, int rung, int k, struct moments *out,
+                       double *cpu_s, struct err *e)
+{
+    static const char *const sobol[] = {"--sampler", "sobol", NULL};
+    double left = job->deadline - now_seconds();
+    if (left <= 0)
+        return err_set(e, "the budget is spent");
+    const struct path image = fs_path("%s/noise.exr", job->dir);
+    const struct path log = fs_path("%s/noise.log", job->dir);
+    int number = (job->sobol * NOISE_RUNGS + rung) * job->replicates + k;
+    const struct pathtracer_job ours = {.program = job->pathtracer,
+                                        .scene = job->scene,
+                                        .spp = noise_ladder_spp[rung],
+                                        .options = job->sobol ? sobol : NULL,
+                                        .seed = replicate_seed(job->seed, (int)job->first + number),
+                                        .threads = job->threads,
+                                        .timeout_s = fmin(left, job->timeout_s),
+                                        .image = image.s,
+                                        .log = log.s};
+    if (!run_pathtracer(&ours, out, cpu_s, NULL, e))
+        return false;
+    unlink(image.s);
+    unlink(log.s);
+    return true;
+}
+
+/* One rung of ours, of which the last also tells the variance of a sample. */
+static bool climb(const struct noise_job *job, int rung, float *images, struct moments *render,
+                  struct noise_ladder *l, struct err *e)
+{
+    size_t size = job->unit->size;
+    int done = 0;
+    double total = 0, cpu_s;
+    bool ok = true;
+    for (; ok && done < job->replicates; done += ok) {
+        ok = render_one(job, rung, done, &render[done], &cpu_s, e);
+        for (size_t i = 0; ok && i < size; i++)
+            images[(size_t)done * size + i] = (float)render[done].mean[i];
+        total += ok ? cpu_s : 0;
+    }
+    ok = ok && noise_ladder_add(l, images, noise_ladder_spp[rung], total / job->replicates,
+                                job->unit, job->scene->width, job->scene->tile, e);
+    if (ok && !job->sobol && rung == NOISE_RUNGS - 1) {
+        variance_map_free(&l->sample);
+        l->n = (double)job->replicates * NOISE_TOP;
+        ok = variance_ladder_within(render, job->replicates, job->unit, job->scene->tile,
+                                    &l->sample, e);
+    }
+    for (int k = 0; k < done; k++)
+        moments_free(&render[k]);
+    return ok;
+}
+
+bool noise_ladder_render(const struct noise_job *job, struct noise_ladder *out, struct err *e)
+{
+    *out = (struct noise_ladder){.replicates = job->replicates};
+    float *images = malloc((size_t)job->replicates * job->unit->size * sizeof *images);
+    struct moments *render = calloc((size_t)job->replicates, sizeof *render);
+    bool ok = (images != NULL && render != NULL) || err_set(e, "out of memory");
+    for (int rung = 0; ok && rung < NOISE_RUNGS; rung++)
+        ok = climb(job, rung, images, render, out, e);
+    free(images);
+    free(render);
+    if (!ok)
+        noise_ladder_free(out);
+    return ok;
+}
+
+static bool has_noise(struct estimate v)
+{
+    return v.value > variance_ladder_none;
+}
+
+bool noise_ladder_is_silent(const struct noise_ladder *l)
+{
+    for (int i = 0; i < l->num; i++)
+        if (has_noise(l->rung[i].variance))
+            return false;
+    return true;
+}
+
+/* As convergence_rate.h has rungs, of those with noise; its slope is that of whatever stands for the squared error. */
+static int as_rungs(const struct noise_ladder *l, struct rung out[NOISE_RUNGS])
+{
+    int num = 0;
+    for (int i = 0; i < l->num; i++) {
+        const struct noise_rung *g = &l->rung[i];
+        if (!has_noise(g->variance))
+            continue;
+        struct estimate v = variance_ladder_log(g->variance);
+        out[num++] = (struct rung){.spp = g->spp,
+                                   .replicates = l->replicates,
+                                   .cpu_s = g->cpu_s,
+                                   .log_mse = v,
+                                   .log_variance = v};
+    }
+    return num;
+}
+
+bool noise_ladder_slope(const struct noise_ladder *l, struct estimate *slope)
+{
+    struct rung rung[NOISE_RUNGS];
+    int num = as_rungs(l, rung);
+    if (num >= 2) {
+        *slope = convergence_rate_slope(rung, num);
+        slope->dof = fmax(convergence_rate_slope_dof(rung, num), 1);
+    }
+    return num >= 2;
+}
+
+bool noise_ladder_efficiency(const struct noise_ladder *l, struct estimate *log_efficiency)
+{
+    struct rung rung[NOISE_RUNGS];
+    int num = as_rungs(l, rung);
+    for (int i = 0; i < num; i++)
+        if (!(rung[i].cpu_s > 0))
+            return false;
+    if (num < 3)
+        return false;
+    struct cost cost = convergence_rate_cost(rung, num);
+    *log_efficiency = convergence_rate_log_efficiency(&rung[num - 1], &cost);
+    return isfinite(log_efficiency->value);
+}
+
+/* Five digits: more would be noise, and take room. */
+static json_t *short_number(double v)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%.5g", v);
+    return json_real(strtod(text, NULL));
+}
+
+static json_t *estimate_json(struct estimate v)
+{
+    return json_pack("[o,o,o]", short_number(v.value), short_number(v.se), short_number(v.dof));
+}
+
+json_t *noise_ladder_json(const struct noise_ladder *l)
+{
+    json_t *rungs = json_array(), *tiles = json_array();
+    for (int i = 0; i < l->num; i++)
+        json_array_append_new(rungs, json_pack("{si,so,so}", "spp", l->rung[i].spp, "variance",
+                                               estimate_json(l->rung[i].variance), "cpu_s",
+                                               short_number(l->rung[i].cpu_s)));
+    for (int i = 0; i < l->sample.tiles_x * l->sample.tiles_y; i++)
+        json_array_append_new(tiles, estimate_json(l->sample.tile[i]));
+    return json_pack("{si,so,sf,s{sf,si,si,so,so}}", "replicates", l->replicates, "rungs", rungs,
+                     "cpu_s", l->cpu_s, "sample", "n", l->n, "tiles_x", l->sample.tiles_x,
+                     "tiles_y", l->sample.tiles_y, "variance", estimate_json(l->sample.image),
+                     "tile", tiles);
+}
+
+static bool parse_estimate(const json_t *v, struct estimate *out)
+{
+    double x[3];
+    if (json_array_size(v) != 3)
+        return false;
+    for (size_t i = 0; i < 3; i++) {
+        if (!json_is_number(json_array_get(v, i)))
+            return false;
+        x[i] = json_number_value(json_array_get(v, i));
+    }
+    *out = (struct estimate){x[0], x[1], x[2]};
+    return x[0] >= 0 && x[1] >= 0 && x[2] > 0;
+}
+
+static bool parse_sample(const json_t *sample, struct noise_ladder *out)
+{
+    struct variance_map *m = &out->sample;
+    const json_t *tile = json_object_get(sample, "tile");
+    json_int_t x = json_integer_value(json_object_get(sample, "tiles_x"));
+    json_int_t y = json_integer_value(json_object_get(sample, "tiles_y"));
+    size_t num = json_array_size(tile);
+    out->n = json_number_value(json_object_get(sample, "n"));
+    if (!(out->n > 0) || x < 1 || y < 1 || x > 4096 || y > 4096 || num != (size_t)(x * y) ||
+        !parse_estimate(json_object_get(sample, "variance"), &m->image))
+        return false;
+    m->tiles_x = (int)x;
+    m->tiles_y = (int)y;
+    m->tile = calloc(num, sizeof *m->tile);
+    for (size_t i = 0; i < num; i++)
+        if (m->tile == NULL || !parse_estimate(json_array_get(tile, i), &m->tile[i]))
+            return false;
+    return true;
+}
+
+static bool parse_rungs(const json_t *rungs, struct noise_ladder *out)
+{
+    out->num = (int)json_array_size(rungs);
+    if (out->num < 1 || out->num > NOISE_RUNGS)
+        return false;
+    for (int i = 0; i < out->num; i++) {
+        const json_t *g = json_array_get(rungs, (size_t)i);
+        json_int_t spp = json_integer_value(json_object_get(g, "spp"));
+        if (spp < 1 || spp > INT32_MAX ||
+            !parse_estimate(json_object_get(g, "variance"), &out->rung[i].variance))
+            return false;
+        out->rung[i].spp = (int)spp;
+        out->rung[i].cpu_s = json_number_value(json_object_get(g, "cpu_s"));
+    }
+    return true;
+}
+
+bool noise_ladder_parse(const json_t *entry, const struct suite_scene *scene,
+                        struct noise_ladder *out, struct err *e)
+{
+    const char *sha = json_string_value(json_object_get(entry, "scene_sha256"));
+    const struct {
+        const char *key;
+        int value;
+    } same[] = {{"width", scene->width},
+                {"height", scene->height},
+                {"depth", scene->depth},
+                {"tile", scene->tile}};
+    *out = (struct noise_ladder){.replicates =
+                                     (int)json_integer_value(json_object_get(entry, "replicates")),
+                                 .cpu_s = json_number_value(json_object_get(entry, "cpu_s"))};
+    if (sha == NULL || strcmp(sha, scene->sha256) != 0)
+        return err_set(e, "stale: the scene file has changed since: make it again");
+    for (size_t i = 0; i < sizeof same / sizeof *same; i++)
+        if (json_integer_value(json_object_get(entry, same[i].key)) != same[i].value)
+            return err_set(e, "stale: its %s is not that of the suite: make it again", same[i].key);
+    if (out->replicates >= 3 && parse_rungs(json_object_get(entry, "rungs"), out) &&
+        parse_sample(json_object_get(entry, "sample"), out))
+        return true;
+    noise_ladder_free(out);
+    return err_set(e, "damaged: a number is missing or out of its range");
+}
+
+static struct path place(const char *golden_dir, const char *scene)
+{
+    return fs_path("%s/%s/noise.json", golden_dir, scene);
+}
+
+bool noise_ladder_is_kept(const char *golden_dir, const struct suite *suite)
+{
+    for (int i = 0; i < suite->num_scenes; i++)
+        if (access(place(golden_dir, suite->scene[i].name).s, F_OK) == 0)
+            return true;
+    return false;
+}
+
+json_t *noise_ladder_load(const char *golden_dir, const char *scene, struct err *e)
+{
+    const struct path path = place(golden_dir, scene);
+    json_error_t je;
+    if (access(path.s, F_OK) != 0)
+        return json_object();
+    json_t *all = json_read(path.s, JSON_REJECT_DUPLICATES, &je);
+    if (json_is_object(all))
+        return all;
+    err_set(e, "%s:%d: %s", path.s, je.line, all == NULL ? je.text : "not a JSON object");
+    json_decref(all);
+    return NULL;
+}
+
+bool noise_ladder_store(const char *golden_dir, const char *scene, const json_t *all, struct err *e)
+{
+    const struct path path = place(golden_dir, scene);
+    return fs_make_parent_dirs(path.s, e) &&
+           json_write_as(path.s, all, JSON_COMPACT | JSON_REAL_PRECISION(6), e);
+}
