@@ -14,6 +14,7 @@ MAKEFLAGS += --jobs=$(shell nproc)
 # Debian packages: to build and validate, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
   nettle-dev zlib1g-dev libdeflate-dev bubblewrap unzip
+DEPS_DEB  := dpkg-dev
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -95,7 +96,7 @@ install: all library
 	cp -R reference/scenes reference/engines golden tools/rubrics $(share)
 
 # Debian packages into BUILD/deb.
-deb: all library
+deb: all library $(BUILD)/deps-deb
 	tools/packaging/deb.sh $(BUILD) $(VERSION) $(BUILD)/deb
 
 format:
@@ -215,6 +216,8 @@ define install_missing
 endef
 $(BUILD)/deps:
 	$(call install_missing,$(DEPS))
+$(BUILD)/deps-deb: | $(BUILD)/deps
+	$(call install_missing,$(DEPS_DEB))
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 

@@ -28,6 +28,27 @@ else
 fi
 expect "did you mean" 3 "did you mean validate?" "$build/assay" valdiate
 
+# Each step of the workflow, in a repository as it asks for, whose renderer is right, and then is not.
+mkdir "$tmp/repository" "$tmp/bin"
+ln -s "$PWD" "$tmp/repository/assay"
+printf '#!/bin/sh\n' | tee "$tmp/repository/build.sh" >"$tmp/bin/apt-get" # installs nothing here
+chmod +x "$tmp/repository/build.sh" "$tmp/bin/apt-get"
+cp reference/engines/mine.json "$tmp/repository"
+workflow() { # its commands, one by one, to the last; what fails is told
+    sed -n 's/^ *run: //p' tools/packaging/github-workflow.yml | while IFS= read -r line; do
+        (cd "$tmp/repository" && PATH=$tmp/bin:$(dirname "$build/pathtracer"):$PATH bash -ec "$line" </dev/null) >"$tmp/step.out" 2>&1 ||
+            echo "$line: status $?: $(tail -n 2 "$tmp/step.out" | tr '\n' ' ')"
+        cat "$tmp/step.out" >>"$tmp/workflow.out"
+    done
+}
+sed "s,^PATH=.*,PATH=$build:\$PATH," reference/engines/mine.sh >"$tmp/repository/mine.sh"
+chmod +x "$tmp/repository/mine.sh"
+tell "the workflow is green where the renderer is right" "$(workflow)"
+sed -i 's/-m "$5"/-m 0/' "$tmp/repository/mine.sh" # it leaves out all light that was reflected
+rm "$tmp/workflow.out"
+tell "control: red, with an annotation, where it is wrong" "$(workflow | grep -q '^assay/build/assay validate.*status 1: .*' &&
+    grep -q '^::error.*12_point_plane' "$tmp/workflow.out" || echo "it is not: $(tail -n 3 "$tmp/workflow.out")")"
+
 if ! command -v dpkg-shlibdeps >/dev/null; then
     echo "skip packaging: Debian packages (no dpkg-dev)"
     exit $((failures > 0))

@@ -45,7 +45,7 @@ needs() {
 package() {
     local name=$1 doc=$1/usr/share/doc/$1
     mkdir -p "$doc" "$name/DEBIAN"
-    printf 'assay (%s) unstable; urgency=medium\n\n  * This version; see CHANGELOG.md of the sources.\n\n -- %s  %s\n' \
+    printf 'assay (%s) unstable; urgency=medium\n\n  * This version; see tools/CHANGELOG.md of the sources.\n\n -- %s  %s\n' \
         "$version" "$maker" "$date" | gzip -9n >"$doc/changelog.gz"
     printf 'Copyright (C) 2026 the Assay authors\n\nLicense: GPL-3.0-or-later. The text is in /usr/share/common-licenses/GPL-3.\n' >"$doc/copyright"
     cat >"$name/DEBIAN/control" <<END
