@@ -50,6 +50,7 @@ struct suite_scene {
     char sha256[65]; /* lower-case hex: of the .dae; with an environment or a lens, of a text that
                         holds that, the environment's and the lens */
     char title[128], detects[512], blind_to[512];
+    char convention[512]; /* where correct renderers may differ; empty: nowhere */
     int width, height;
     int depth; /* -m: largest number of bounces */
     int spp;   /* of our render */

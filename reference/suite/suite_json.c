@@ -229,12 +229,15 @@ static bool read_not_expressible(const struct json_node *n, struct suite_scene *
 
 bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
 {
-    static const char *const keys[] = {
-        "title",      "detects",         "blind_to",    "width",
-        "height",     "depth",           "spp",         "tile",
-        "expect",     "environment",     "lens_radius", "focal_distance",
-        "references", "not_expressible", "variants",    "consistency",
-        NULL};
+    static const char *const keys[] = {"title",       "detects",
+                                       "blind_to",    "width",
+                                       "height",      "depth",
+                                       "spp",         "tile",
+                                       "expect",      "environment",
+                                       "lens_radius", "focal_distance",
+                                       "references",  "not_expressible",
+                                       "variants",    "consistency",
+                                       "convention",  NULL};
     static const char *const keys_9x[] = {
         "title", "detects", "blind_to",    "width",       "height",         "depth",         "spp",
         "tile",  "expect",  "environment", "lens_radius", "focal_distance", "references_of", NULL};
@@ -247,6 +250,8 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
         !json_get_text(&n, "title", s->title, sizeof s->title, e) ||
         !json_get_text(&n, "detects", s->detects, sizeof s->detects, e) ||
         !json_get_text(&n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
+        (json_object_get(s->json, "convention") != NULL &&
+         !json_get_text(&n, "convention", s->convention, sizeof s->convention, e)) ||
         !json_get_int(&n, "width", 1, 16384, &s->width, e) ||
         !json_get_int(&n, "height", 1, 16384, &s->height, e) ||
         !json_get_int(&n, "depth", 0, 100, &s->depth, e) ||

@@ -203,9 +203,12 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
     const size_t all = num + num_stated + json_array_size(noise),
                  bad = all - good - good_stated - good_noise, scenes = num_scenes(claims),
                  noisy = num_scenes(noise);
-    fprintf(f, "\njudged: %s on %zu scene%s against %s: %zu comparison%s",
-            names(claims, "a", "programs").s, scenes, scenes == 1 ? "" : "s",
-            names(claims, "b", "references").s, num, num == 1 ? "" : "s");
+    if (num > 0)
+        fprintf(f, "\njudged: %s on %zu scene%s against %s: %zu comparison%s",
+                names(claims, "a", "programs").s, scenes, scenes == 1 ? "" : "s",
+                names(claims, "b", "references").s, num, num == 1 ? "" : "s");
+    else
+        fputs("\njudged: no means", f);
     if (num_stated > 0)
         fprintf(f, ", and the stated errors of %zu scene%s", num_stated,
                 num_stated == 1 ? "" : "s");

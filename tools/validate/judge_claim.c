@@ -175,6 +175,13 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
             snprintf(reason, sizeof reason, "%s; %s", why, t->c.reason);
             json_object_set_new(t->result, "reason", json_string(reason));
         }
+        if (t->a->kind == SIDE_ENGINE && t->scene->convention[0] != '\0') {
+            char more[1200];
+            snprintf(more, sizeof more, "%s; a convention, not an error, if this is all: %s",
+                     member_text(t->result, "reason"), t->scene->convention);
+            if (t->c.verdict == VERDICT_DIFFERENT)
+                json_object_set_new(t->result, "reason", json_string(more));
+        }
     } else {
         t->result = claim_result_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
     }
