@@ -1,3 +1,4 @@
+#define _GNU_SOURCE
 #include "html.h"
 
 #include "page_assets.h"
@@ -6,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <nettle/base64.h>
 #include <nettle/sha2.h>
@@ -125,6 +127,27 @@ struct number_text html_number(double v)
     return with_sign(text);
 }
 
+struct number_text html_date(const char *utc)
+{
+    struct number_text text = {""};
+    struct tm t = {0}, local;
+    char end;
+    if (utc == NULL)
+        return text;
+    snprintf(text.s, sizeof text.s, "%s", utc);
+    if (sscanf(utc, "%d-%d-%dT%d:%d:%d%c", &t.tm_year, &t.tm_mon, &t.tm_mday, &t.tm_hour, &t.tm_min,
+               &t.tm_sec, &end) != 7 ||
+        end != 'Z')
+        return text;
+    t.tm_year -= 1900;
+    t.tm_mon -= 1;
+    const time_t when = timegm(&t);
+    if (localtime_r(&when, &local) == NULL ||
+        strftime(text.s, sizeof text.s, "%Y-%m-%d %H:%M %Z", &local) == 0)
+        snprintf(text.s, sizeof text.s, "%s", utc);
+    return text;
+}
+
 struct number_text html_duration(double seconds)
 {
     struct number_text out;
@@ -202,8 +225,8 @@ void html_page_close(FILE *f)
 
 void html_table_open(FILE *f, const char *id, const char *label, const char *headings)
 {
-    fprintf(f, "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"%s\">\n<table",
-            label);
+    html_print(f, "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"%s\">\n<table",
+               label);
     if (id != NULL)
         fprintf(f, " id=\"%s\"", id);
     fputs("><thead><tr>", f);

@@ -35,6 +35,9 @@ struct number_text html_number(double v);
 /* "0.5 s", "12 s", "3 min 5 s", "2 h 3 min". */
 struct number_text html_duration(double seconds);
 
+/* "2026-11-23T04:42:12Z" as "2026-11-23 05:42 CET", in the time zone of this machine; any other text as it stands. */
+struct number_text html_date(const char *utc);
+
 /* 0.0123, or 10 to the power of what is smaller. */
 void html_p_value(FILE *f, double log10_p);
 
@@ -46,7 +49,7 @@ void html_page_open(FILE *f, const char *title, const char *script, double refre
 void html_page_close(FILE *f);
 
 /* A table that scrolls by itself where it is too wide, up to <tbody>. id may be NULL. label says to those who do not
- * see it what it is; headings are divided by '|', that of a column of numbers begins with '>'. All are ours. */
+ * see it what it is; headings are divided by '|', that of a column of numbers begins with '>'; they are ours. */
 void html_table_open(FILE *f, const char *id, const char *label, const char *headings);
 void html_table_close(FILE *f);
 /* The row's head, a red row if `bad`. */

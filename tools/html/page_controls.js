@@ -73,7 +73,7 @@ function buildControls(scene) {
   scene.stageCaption = make("figcaption", {});
   scene.stageText = make("div", { className: "beside" }, scene.stageLegend, scene.stageCaption);
   scene.stage = make("figure", { className: "stage" }, scene.stagePane.frame, scene.stageText);
-  scene.probe = make("div", { className: "probe" });
+  scene.probe = make("div", { className: "probe", tabIndex: 0 });
   scene.box.style.setProperty("--aspect", String(scene.width / scene.height));
   scene.box.replaceChildren(...rows, scene.side, scene.stage, scene.probe);
 }

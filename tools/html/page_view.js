@@ -39,7 +39,7 @@ class Pane {
     this.source = source;
     this.visible = false;
     this.tile = null; // outlined while the scene has none marked
-    this.canvas = make("canvas", { role: "img" });
+    this.canvas = make("canvas", { role: "img", "aria-label": "drawn when it comes in sight" });
     this.frame = make("div", { className: "frame", tabIndex: 0 }, this.canvas);
     this.frame.style.aspectRatio = scene.width + " / " + scene.height;
     this.frame.pane = this;

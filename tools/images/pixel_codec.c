@@ -18,6 +18,7 @@ struct coder {
     int *noise[3];    /* S */
     uint8_t *plane;   /* where the next plane goes */
     bool slope;
+    int coarser; /* octaves, on top of 1/16 of the standard error */
 };
 
 static unsigned zigzag(int i)
@@ -67,10 +68,10 @@ static void encode_noise(struct coder *c)
 }
 
 /* e of one value: the largest that is exact enough. */
-static int exponent(double value, int noise)
+static int exponent(double value, int noise, int coarser)
 {
     int by_value = value != 0 ? ilogb(value) - 19 : -128;
-    int by_noise = noise != 0 ? floor_div(noise - OFFSET, STEPS) - 3 : -128;
+    int by_noise = noise != 0 ? floor_div(noise - OFFSET, STEPS) - 3 + coarser : -128;
     int e = by_value > by_noise ? by_value : by_noise;
     return e < -128 ? -128 : e > 127 ? 127 : e;
 }
@@ -114,7 +115,7 @@ static void encode_values(struct coder *c)
             double v = c->m->mean[3 * i + (size_t)k];
             int noise = c->noise[k][i];
             int base = noise != 0 ? floor_div(noise - OFFSET, STEPS) - 3 : -128;
-            int e = exponent(v, noise);
+            int e = exponent(v, noise, c->coarser);
             uint8_t d = (uint8_t)(e - base);
             if (i % w == 0)
                 left = 0;
@@ -175,10 +176,10 @@ static bool encode(struct coder *c, uint8_t *raw, bool slope, bool uniform_n, ui
     return pack(raw, (size_t)(c->plane - raw), bytes, size, e);
 }
 
-bool pixel_codec_encode(const struct moments *m, uint8_t **bytes, size_t *size, bool *uniform_n,
-                        struct err *e)
+bool pixel_codec_encode(const struct moments *m, int coarser, uint8_t **bytes, size_t *size,
+                        bool *uniform_n, struct err *e)
 {
-    struct coder c = {.m = m, .pixels = (size_t)m->width * (size_t)m->height};
+    struct coder c = {.m = m, .pixels = (size_t)m->width * (size_t)m->height, .coarser = coarser};
     uint8_t *raw = malloc(1 + 22 * c.pixels), *other = NULL;
     double *value = malloc(3 * c.pixels * sizeof *value);
     int *noise = malloc(3 * c.pixels * sizeof *noise);

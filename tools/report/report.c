@@ -9,7 +9,9 @@
 #include "tools/html/html.h"
 #include "tools/html/page_assets.h"
 #include "report_internal.h"
+#include "report_matrix.h"
 #include "tools/plots/plot_rays.h"
+#include "tools/results/plain_words.h"
 #include "report_table.h"
 
 #include <math.h>
@@ -35,19 +37,29 @@ static void write_claim_list(FILE *f, const json_t *claims, const struct claim_r
         size_t same = judged ? 1 : results_num_with_error(claims, claim[i].index);
         if (same == 0)
             continue;
-        html_print(f, "<li><a href=\"#claim-%zu\">%s against ", claim[i].index,
-                   member_text(c, "scene"));
-        report_reference(f, &claim[i]);
-        fputs("</a>", f);
+        html_print(f, "<li><a href=\"#claim-%zu\">%s</a>", claim[i].index, plain_words_claim(c).s);
         if (same > 1)
-            fprintf(f, " and %zu more", same - 1);
-        if (!judged)
-            html_print(f, " could not be judged: %s</li>\n", member_text(c, "error"));
-        else
-            html_print(f, " is %s, not %s</li>\n", member_text(c, "verdict"),
-                       member_text(c, "expected"));
+            fprintf(f, ", and %zu more", same - 1);
+        fputs("</li>\n", f);
     }
     fputs("</ul>\n", f);
+}
+
+/* Of two files, of which nobody said beforehand what should come out. */
+static bool is_comparison(const struct claim_ref *claim, size_t num)
+{
+    return num == 1 && strcmp(member_text(claim->json, "scene"), "files") == 0;
+}
+
+static void write_comparison(FILE *f, const struct claim_ref *claim)
+{
+    const json_t *c = claim->json;
+    const char *title = member_text(c, "title");
+    if (title != NULL)
+        html_print(f, "<p class=\"lede\"><b>%s</b></p>\n", title);
+    html_print(f, "<h1 class=\"%s\">%s</h1>\n<p class=\"lede\"><b>%s</b>: %s</p>\n",
+               claim->outcome == OUTCOME_AS_EXPECTED ? "good" : "bad", plain_words_claim(c).s,
+               member_text(c, "verdict"), member_text(c, "reason"));
 }
 
 /* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
@@ -73,6 +85,10 @@ static void write_verdict(FILE *f, const json_t *root, const struct claim_ref *c
     size_t good = count[OUTCOME_AS_EXPECTED], bad = num - good, kinds = 0, said = 0;
     for (int k = 0; k < OUTCOME_AS_EXPECTED; k++)
         kinds += count[k] > 0;
+    if (is_comparison(claim, num) && count[OUTCOME_NOT_JUDGED] == 0) {
+        write_comparison(f, claim);
+        return;
+    }
     fprintf(f, "<h1 class=\"%s\">%s", bad > 0 ? "bad" : "good", left > 0 ? "So far " : "");
     if (kinds > 1)
         fprintf(f, "%s %zu claims, ", left > 0 ? "of" : "Of", num);
@@ -129,7 +145,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
             "EQUIVALENT.</p>\n",
             member_number(root, "alpha"));
     fputs("<dl class=\"facts\">\n", f);
-    write_fact(f, "Date", member_text(root, "date"));
+    write_fact(f, "Date", html_date(member_text(root, "date")).s);
     write_fact(f, "Version", member_text(root, "version"));
     write_fact(f, "Machine", member_text(root, "machine"));
     if (json_object_get(root, "seconds") != NULL)
@@ -201,8 +217,9 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     snprintf(title, sizeof title, "Assay report, %.64s", member_text(root, "date"));
     html_page_open(f, title, page_js, member_number(root, "page_every_s"));
     write_header(f, root, claim, num);
+    report_matrix(p, claim, num);
     if (num > 0)
-        report_table(f, claim, num);
+        report_table(f, claim, num, p->folded);
     if (num > 0)
         write_keys(f);
     for (size_t done = 0; done < num;) {
@@ -219,9 +236,8 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     report_noise(f, json_object_get(root, "noise"));
     report_convergence(f, json_object_get(root, "convergence"));
     report_cost(f, root);
-    fputs("</main>\n", f);
     report_pixel_data_write(p);
-    fprintf(f, "<script>%s</script>\n</body>\n</html>\n", page_js);
+    fprintf(f, "</main>\n<script>%s</script>\n</body>\n</html>\n", page_js);
     return true;
 }
 

@@ -7,6 +7,7 @@
 #include "tools/plots/plot_interval.h"
 #include "tools/plots/plot_power.h"
 #include "report_tiles.h"
+#include "tools/results/plain_words.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -50,9 +51,12 @@ static void write_histogram(FILE *f, const json_t *claim)
     fprintf(
         f,
         "<figcaption><b>p-values of the %d tiles.</b> If both have the same mean the bars stay near the dashed line "
-        "(%.3g tiles), each in the band 99 times of 100; a pile at the left is a real difference. Here %d tiles are "
-        "below 0.05, where chance alone would put %.1f. ",
-        h.num_tiles, h.expected, h.below_5_percent, 0.05 * h.num_tiles);
+        "(%.3g tiles), each in the band 99 times of 100; a pile at the left is a real difference%s. Here %d "
+        "tiles are below 0.05, where chance alone would put %.1f. ",
+        h.num_tiles, h.expected,
+        strcmp(member_text(claim, "verdict"), "EQUIVALENT") == 0 ? ", here one inside the margin"
+                                                                 : "",
+        h.below_5_percent, 0.05 * h.num_tiles);
     struct csv csv = csv_link_open(f, "p_values.csv", "p_from,p_to,tiles");
     for (int b = 0; b < h.bins; b++) {
         csv_link_number(&csv, (double)b / h.bins);
@@ -104,18 +108,30 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
     write_list(f, "data-tile-t", json_object_get(json, "tile_t"));
     html_print(f, " data-name=\"%s against ", member_text(json, "a"));
     report_reference(f, claim);
-    bool expected = claim->outcome == OUTCOME_AS_EXPECTED;
+    const bool expected = claim->outcome == OUTCOME_AS_EXPECTED,
+               is_comparison = strcmp(member_text(json, "scene"), "files") == 0;
     fprintf(f, "\">\n<details class=\"evidence\"%s>\n", expected && p->folded ? "" : " open");
     html_print(f, "<summary><h3>%s against ", member_text(json, "a"));
     report_reference(f, claim);
     fputs(" ", f);
     report_badge(f, claim);
     html_print(f, " <small>%s%s</small></h3><span class=\"reason\">%s</span></summary>\n",
-               expected ? "as expected" : "expected ",
-               expected ? "" : member_text(json, "expected"), member_text(json, "reason"));
+               is_comparison ? ""
+               : expected    ? "as expected"
+                             : "expected ",
+               expected || is_comparison ? "" : member_text(json, "expected"),
+               member_text(json, "reason"));
+    if (strcmp(member_text(json, "verdict"), "DIFFERENT") == 0)
+        html_print(f, "<p>%s.</p>\n", plain_words_claim(json).s);
     write_notes(f, json);
     if (!report_similarity(p, claim, a->m, b->m, white, e))
         return false;
+    if (expected && p->folded) {
+        fputs("<div class=\"maps\"></div>\n", f); /* for the script's maps */
+        report_evidence(f, json, false);
+        fputs("</details>\n</article>\n", f);
+        return true;
+    }
     fputs("<div class=\"maps\">\n", f);
     write_histogram(f, json);
     if (!plot_qq(f, json, e))

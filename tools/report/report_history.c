@@ -132,7 +132,7 @@ static void write_table(FILE *f, const struct history *h)
     fputs("<section><h2>The claims</h2>\n", f);
     html_table_open(
         f, "series", "Table of claims",
-        "|Scene|Tested|Against|>z|>difference, %|>variance ratio|>time, s|>efficiency, paths/s");
+        "Moved|Scene|Tested|Against|>z|>difference, %|>variance ratio|>time, s|>efficiency, paths/s");
     for (size_t i = 0; i < h->num_series; i++)
         write_series(f, h, &h->series[i]);
     html_table_close(f);
@@ -150,6 +150,15 @@ static void write_table(FILE *f, const struct history *h)
     fputs("</p></section>\n", f);
 }
 
+static size_t num_wrong(const struct history_run *run)
+{
+    const json_t *claims = json_object_get(run->results, "claims");
+    size_t wrong = 0;
+    for (size_t i = 0; i < json_array_size(claims); i++)
+        wrong += results_claim_outcome(json_array_get(claims, i)) != OUTCOME_AS_EXPECTED;
+    return wrong;
+}
+
 static void write_runs(FILE *f, const struct history *h)
 {
     fputs("<section><h2>The runs</h2>\n", f);
@@ -157,12 +166,10 @@ static void write_runs(FILE *f, const struct history *h)
                     "Date|Commit|Machine|>Claims|>As expected|>Time|File");
     for (size_t r = h->num_runs; r-- > 0;) {
         const json_t *root = h->run[r].results, *claims = json_object_get(root, "claims");
-        size_t good = 0, num = json_array_size(claims);
+        const size_t num = json_array_size(claims), good = num - num_wrong(&h->run[r]);
         char commit[128];
         history_commit(&h->run[r], commit, sizeof commit);
-        for (size_t i = 0; i < num; i++)
-            good += results_claim_outcome(json_array_get(claims, i)) == OUTCOME_AS_EXPECTED;
-        html_row_open(f, good < num, member_text(root, "date"));
+        html_row_open(f, good < num, html_date(member_text(root, "date")).s);
         html_print(f,
                    "<td>%s</td><td>%s</td><td class=\"num\">%zu</td><td class=\"num\">%zu</td>"
                    "<td class=\"num\">%s</td><td>%s</td></tr>\n",
@@ -184,7 +191,14 @@ bool report_history(const struct history *h, const char *path, struct err *e)
     FILE *f = out.f;
     html_page_open(f, "Assay history", NULL, 0);
     fputs("<header>\n<p class=\"kicker\">Assay history</p>\n", f);
-    if (h->moved == 0)
+    const size_t wrong = num_wrong(&h->run[h->num_runs - 1]);
+    if (h->moved == 0 && wrong > 0)
+        fprintf(
+            f,
+            "<h1 class=\"bad\">Nothing has moved in the last of %zu runs, but %zu of its claims "
+            "%s not as it should be.</h1>\n",
+            h->num_runs, wrong, wrong == 1 ? "is" : "are");
+    else if (h->moved == 0)
         fprintf(f, "<h1 class=\"good\">Nothing has moved in the last of %zu runs.</h1>\n",
                 h->num_runs);
     else

@@ -43,7 +43,9 @@ struct page {
     struct page_layer *layer;
     struct page_alike *alike;
     size_t num_layers, num_alike, num_scenes;
-    bool folded; /* many claims: the evidence of those that came out as expected is folded */
+    bool
+        folded; /* many claims: the evidence of those that came out as expected is folded and without
+                    plots and FLIP maps, and images are stored to 1/4 of their standard errors */
 };
 
 /* The number on the page of the layer of m, which was read from path; the same path has one. */

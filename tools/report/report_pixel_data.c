@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The page of a suite stays below 5 MB: what is left after the text goes to the numbers behind the
+/* The page of a suite stays below 3 MB: what is left after the text goes to the numbers behind the
  * images. The page of one scene has them whatever their size. */
-enum { PAGE_LIMIT = 5000000, PAGE_RESERVE = 100000 };
+enum { PAGE_LIMIT = 3000000, PAGE_RESERVE = 100000 };
 
 bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
                            struct err *e)
@@ -27,7 +27,7 @@ bool report_pixel_data_add(struct page *p, const char *path, const struct moment
     if (l->path == NULL)
         return err_set(e, "out of memory for the report");
     memcpy(l->unit, m->unit, sizeof l->unit);
-    if (!pixel_codec_encode(m, &l->bytes, &l->size, &uniform, e)) {
+    if (!pixel_codec_encode(m, p->folded ? 2 : 0, &l->bytes, &l->size, &uniform, e)) {
         free(l->path);
         return false;
     }
@@ -93,12 +93,12 @@ void report_pixel_data_write(struct page *p)
     if (left_out > 0)
         fprintf(
             p->f,
-            "<p class=\"caption\">To stay below 5 MB this page leaves out the numbers of %zu of "
+            "<p class=\"caption\">To stay below 3 MB this page leaves out the numbers of %zu of "
             "its %zu images, and with them the images.</p>\n",
             left_out, p->num_layers);
     if (maps_left_out > 0)
         fprintf(p->f,
-                "<p class=\"caption\">To stay below 5 MB this page leaves out %zu of its %zu FLIP "
+                "<p class=\"caption\">To stay below 3 MB this page leaves out %zu of its %zu FLIP "
                 "maps.</p>\n",
                 maps_left_out, maps);
 }

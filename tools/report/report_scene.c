@@ -163,10 +163,10 @@ static void write_images(struct page *p, const struct scene *s)
     fputs(s->white_capped ? ", because something much brighter fills more than 1 % of the image)"
                           : " is shown at 80 % of white)",
           p->f);
-    fputs(
-        ", then the sRGB curve. A frame smaller than its image shows means. Values are exact to 1/16 of their own "
-        "standard error or a millionth of themselves.</p>\n",
-        p->f);
+    fputs(", then the sRGB curve. A frame smaller than its image shows means. Values are exact to ",
+          p->f);
+    fprintf(p->f, "1/%d of their own standard error or a millionth of themselves.</p>\n",
+            p->folded ? 4 : 16);
 }
 
 static void write_purpose(FILE *f, const json_t *claim)

@@ -20,7 +20,8 @@ bool report_similarity_measure(const struct moments *a, const struct moments *b,
                                struct similarity *out, float *map, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The claim's line, and its place in the table; the map goes into the page as the claim's, for its script. */
+/* The claim's line, and its place in the table; the map goes into the page as the claim's, for its script, but
+ * for a claim as expected on a page of many. */
 bool report_similarity(struct page *p, const struct claim_ref *claim, const struct moments *a,
                        const struct moments *b, double white, struct err *e)
     __attribute__((warn_unused_result));

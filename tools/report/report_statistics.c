@@ -45,7 +45,11 @@ void report_statistics(FILE *f, const json_t *claim)
     const json_t *hint = json_object_get(claim, "hint");
     const json_t *ratio = json_object_get(claim, "variance_ratio");
     fputs("<h4>Which statistic looked</h4>\n", f);
-    html_table_open(f, NULL, "Table of statistics",
+    char label[160];
+    snprintf(label, sizeof label, "Statistics of %.40s against %.40s on %.40s",
+             member_or_empty(claim, "a"), member_or_empty(claim, "b"),
+             member_or_empty(claim, "scene"));
+    html_table_open(f, NULL, label,
                     "Statistic|>Part of alpha|>Tests|>Smallest p × tests|Found|Where or what");
     for (size_t i = 0; i < json_array_size(all); i++)
         write_row(f, json_array_get(all, i), member_number(claim, "alpha"));

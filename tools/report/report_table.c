@@ -7,6 +7,7 @@
 #include "tools/results/results_table.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 void report_reference(FILE *f, const struct claim_ref *claim)
@@ -62,6 +63,10 @@ static void write_cell(FILE *f, const struct column *column, const struct claim_
     case COLUMN_PLOT:
         fputs("<td>", f);
         plot_interval(f, c);
+        if (strcmp(member_text(c, "verdict"), "DIFFERENT") == 0 &&
+            fabs(member_end(c, "ci", 0)) < member_number(c, "margin_global") &&
+            fabs(member_end(c, "ci", 1)) < member_number(c, "margin_global"))
+            fputs("<small>because of a part of it</small>", f);
         break;
     case COLUMN_DIFFERENCE:
         open_cell(f, column, "num");
@@ -152,11 +157,13 @@ static void write_csv(FILE *f, const struct claim_ref *claim, size_t num)
     csv_link_close(&csv);
 }
 
-void report_table(FILE *f, const struct claim_ref *claim, size_t num)
+void report_table(FILE *f, const struct claim_ref *claim, size_t num, bool folded)
 {
     char header[512];
-    fputs("<section id=\"table\">\n<h2>The claims</h2>\n"
-          "<details class=\"help\"><summary>What the columns mean</summary>\n<p class=\"caption\">",
+    fputs("<section id=\"table\">\n<h2>The claims</h2>\n", f);
+    if (folded)
+        fprintf(f, "<details class=\"rows\"><summary>All %zu, row by row</summary>\n", num);
+    fputs("<details class=\"help\"><summary>What the columns mean</summary>\n<p class=\"caption\">",
           f);
     for (size_t i = 0; i < results_num_columns; i++)
         if (results_columns[i].help != NULL)
@@ -170,5 +177,5 @@ void report_table(FILE *f, const struct claim_ref *claim, size_t num)
           "file: ",
           f);
     write_csv(f, claim, num);
-    fputs("</p>\n</section>\n", f);
+    fputs(folded ? "</p>\n</details>\n</section>\n" : "</p>\n</section>\n", f);
 }

@@ -5,6 +5,6 @@
 #include "report_internal.h"
 
 /* <section id="table"> of num claims in the order given; table#claims is what page_table.js finds and sorts. */
-void report_table(FILE *f, const struct claim_ref *claim, size_t num);
+void report_table(FILE *f, const struct claim_ref *claim, size_t num, bool folded);
 
 #endif

@@ -39,7 +39,7 @@ static size_t assert_round_trip(const struct moments *m)
     uint8_t *bytes;
     size_t size;
     bool uniform;
-    MUST(pixel_codec_encode(m, &bytes, &size, &uniform, &e));
+    MUST(pixel_codec_encode(m, 0, &bytes, &size, &uniform, &e));
     struct layer_numbers l = layer_read(bytes, size, m->width, m->height);
     size_t pixels = (size_t)m->width * (size_t)m->height;
     assert_int_equal(uniform, l.n == NULL);
