@@ -22,8 +22,10 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         err_set(e, "Cycles: a lens that focuses at distance %g", (double)c->focal_distance);
         return NULL;
     }
+    double near, far;
     /* Blender keeps a rotation, not a matrix. */
-    if (!features_check_camera("Cycles", s, c, e))
+    if (!features_check_axes("Cycles", c, e) ||
+        !features_clip_depths("Cycles", s, c, &near, &far, e))
         return NULL;
     double tan_h = c->tan_h, lens = 18 / tan_h, square = tan_h * c->height / c->width;
     if (!(lens >= LENS_MIN && lens <= LENS_MAX)) {
@@ -36,13 +38,16 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
     features_distances(s, c->eye, &nearest, &furthest);
     nearest -= (double)c->lens_radius; /* where a ray may start */
     furthest += (double)c->lens_radius;
-    /* Cycles clips by depth, we by distance: take planes that clip nothing in either. */
+    /* Cycles clips by depth, we by distance: take planes that clip nothing in either, or the same. */
     double corner = sqrt(1 + tan_h * tan_h + square * square);
+    if (near == 0)
+        near = 0.5 * nearest / corner;
+    if (isinf(far))
+        far = 2 * furthest;
     return json_pack("{so,so,so,so,sf,s[ff],sf,sf}", "right", cycles_vec3(c->right), "up",
                      cycles_vec3(c->up), "backward", cycles_vec3(c->backward), "eye",
-                     cycles_vec3(c->eye), "tan_h", tan_h, "clip", 0.5 * nearest / corner,
-                     2 * furthest, "lens_radius", (double)c->lens_radius, "focal_distance",
-                     (double)c->focal_distance);
+                     cycles_vec3(c->eye), "tan_h", tan_h, "clip", near, far, "lens_radius",
+                     (double)c->lens_radius, "focal_distance", (double)c->focal_distance);
 }
 
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,

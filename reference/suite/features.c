@@ -54,17 +54,23 @@ static double gap(float p, float a, float b, float c)
     return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
 }
 
+/* No more than that of the nearest point. */
+static double triangle_distance(const vec3 *p, vec3 eye)
+{
+    double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(eye), wide(p[0]))));
+    double box =
+        d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
+                     gap(eye.z, p[0].z, p[1].z, p[2].z)));
+    return fmax(plane, box);
+}
+
 void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
 {
     *nearest = INFINITY;
     *furthest = 0;
     for (uint32_t i = 0; i < s->num_triangles; i++) {
         const vec3 *p = s->position + 3 * (size_t)i;
-        double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(eye), wide(p[0]))));
-        double box =
-            d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
-                         gap(eye.z, p[0].z, p[1].z, p[2].z)));
-        *nearest = fmin(*nearest, fmax(plane, box));
+        *nearest = fmin(*nearest, triangle_distance(p, eye));
         for (int k = 0; k < 3; k++)
             *furthest = fmax(*furthest, d3_length(d3_sub(wide(p[k]), wide(eye))));
     }
@@ -153,8 +159,77 @@ bool features_check_clipping(const char *engine, const struct scene *s, const st
                    engine, (double)c->near, (double)c->far, nearest, furthest);
 }
 
-bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
-                           struct err *e)
+/* Of one primitive: distances from the lens, depths along the view. */
+struct reach {
+    double distance[2], depth[2];
+};
+
+/* What lies before the near plane, between, and beyond the far one. */
+struct layers {
+    double before, seen[2], beyond; /* largest depth, smallest and largest, smallest */
+    bool is_mixed;
+};
+
+static void sort_reach(const struct reach *r, const struct camera *c, struct layers *l)
+{
+    double lens = (double)c->lens_radius;
+    if (!(r->depth[1] > 0))
+        return; /* behind the camera */
+    if (r->distance[1] + lens < (double)c->near) {
+        l->before = fmax(l->before, r->depth[1]);
+    } else if (r->distance[0] - lens > (double)c->far) {
+        l->beyond = fmin(l->beyond, r->depth[0]);
+    } else {
+        l->is_mixed |=
+            !(r->distance[0] - lens > (double)c->near && r->distance[1] + lens < (double)c->far);
+        l->seen[0] = fmin(l->seen[0], r->depth[0]);
+        l->seen[1] = fmax(l->seen[1], r->depth[1]);
+    }
+}
+
+static struct layers find_layers(const struct scene *s, const struct camera *c)
+{
+    struct layers l = {.seen = {INFINITY, 0}, .beyond = INFINITY};
+    for (uint32_t i = 0; i < s->num_triangles; i++) {
+        const vec3 *p = s->position + 3 * (size_t)i;
+        struct reach r = {{triangle_distance(p, c->eye), 0}, {INFINITY, -INFINITY}};
+        for (int k = 0; k < 3; k++) {
+            dvec3 to = d3_sub(wide(p[k]), wide(c->eye));
+            double depth = -d3_dot(to, wide(c->backward));
+            r.distance[1] = fmax(r.distance[1], d3_length(to));
+            r.depth[0] = fmin(r.depth[0], depth);
+            r.depth[1] = fmax(r.depth[1], depth);
+        }
+        sort_reach(&r, c, &l);
+    }
+    for (uint32_t i = 0; i < s->num_spheres; i++) {
+        dvec3 to = d3_sub(wide(s->spheres[i].centre), wide(c->eye));
+        double d = d3_length(to), radius = (double)s->spheres[i].radius;
+        double depth = -d3_dot(to, wide(c->backward));
+        struct reach r = {{fabs(d - radius), d + radius}, {depth - radius, depth + radius}};
+        sort_reach(&r, c, &l);
+    }
+    return l;
+}
+
+bool features_clip_depths(const char *engine, const struct scene *s, const struct camera *c,
+                          double *near, double *far, struct err *e)
+{
+    *near = 0;
+    *far = INFINITY;
+    if (!may_be_cut(s, c))
+        return true;
+    struct layers l = find_layers(s, c);
+    if (l.is_mixed || !(l.before < l.seen[0] && l.seen[1] < l.beyond))
+        return features_check_clipping(engine, s, c, e);
+    if (l.before > 0)
+        *near = (l.before + l.seen[0]) / 2;
+    if (isfinite(l.beyond))
+        *far = (l.seen[1] + l.beyond) / 2;
+    return true;
+}
+
+bool features_check_axes(const char *engine, const struct camera *c, struct err *e)
 {
     double square = (double)c->tan_h * c->height / c->width;
     dvec3 right = wide(c->right), up = wide(c->up), back = wide(c->backward);
@@ -163,7 +238,13 @@ bool features_check_camera(const char *engine, const struct scene *s, const stru
                        engine, (double)c->tan_h, (double)c->tan_v, c->width, c->height);
     if (!(d3_length(d3_sub(d3_cross(right, up), back)) < 1e-5 && fabs(d3_dot(right, up)) < 1e-5))
         return err_set(e, "%s: the camera's axes are not orthogonal", engine);
-    return features_check_clipping(engine, s, c, e);
+    return true;
+}
+
+bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
+                           struct err *e)
+{
+    return features_check_axes(engine, c, e) && features_check_clipping(engine, s, c, e);
 }
 
 bool features_check_normals(const char *engine, const struct scene *s, struct err *e)

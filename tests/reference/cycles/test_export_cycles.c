@@ -266,6 +266,33 @@ TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
     assert_refused(f, 1, "geometry, at distance 0 to");
 }
 
+/* Squares at depths 1, 4 and 9, with sides of 1, 2 and 2: distances 1 to 1.22, 4 to 4.24, 9 to 9.11. A plane between two
+ * by distance is put half way between them by depth; one that cuts through the first is refused. */
+TEST_WITH(planes_between_whole_surfaces_clip_by_depth, setup, teardown)
+{
+    struct fixture *f = *state;
+    scene_free(&f->s);
+    f->s = build_scene();
+    uint32_t grey_material = build_material(&f->s, grey(.5f), grey(0));
+    build_quad(&f->s, v3(-.5f, -.5f, -1), v3(1, 0, 0), v3(0, 1, 0), grey_material);
+    build_quad(&f->s, v3(-1, -1, -4), v3(2, 0, 0), v3(0, 2, 0), grey_material);
+    build_quad(&f->s, v3(-1, -1, -9), v3(2, 0, 0), v3(0, 2, 0), grey_material);
+    build_camera(&f->s, v3(0, 0, 0), 90);
+    f->c = build_finish(&f->s, 40, 30);
+    f->c.near = 2;
+    f->c.far = 7;
+    expect_part(f, "\"clip\":[2.5,6.5]");
+    f->c.lens_radius =
+        .75f; /* rays may start 0.75 nearer or further: 1.22 + 0.75 is before 2, 9 - 0.75 beyond 7 */
+    f->c.focal_distance = 3;
+    expect_part(f, "\"clip\":[2.5,6.5]");
+    f->c.lens_radius = .8f;
+    assert_refused(f, 1, "the near plane is at 2");
+    f->c.lens_radius = 0;
+    f->c.near = 1.1f;
+    assert_refused(f, 1, "the near plane is at 1.1");
+}
+
 TEST_WITH(depth_is_limited_and_files_appear_whole, setup, teardown)
 {
     struct fixture *f = *state;
