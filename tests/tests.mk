@@ -168,6 +168,12 @@ large: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-test
 scale: $(BUILD)/tests/make_scale
 	$<
 
+#: make pairs      scenes 5x and 6x: each level switched off, other ways to the same images, and the page of both
+pairs: all
+	nice python3 reference/pairs/knockout.py $(BUILD) -o reference/pairs/knockout.json
+	nice python3 reference/pairs/runs.py $(BUILD) -o reference/pairs/runs.json
+	python3 reference/pairs/pairs_page.py
+
 #: make mutants    build each known bug into a renderer and see the suite find it (many minutes; ONLY="NAME ...")
 mutants: all $(BUILD)/libassay.a
 	tests/mutants/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
@@ -220,5 +226,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint order threads tsan faults slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
+.PHONY: check lint order threads tsan faults pairs slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table rubric-bugs pictures print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

@@ -17,7 +17,7 @@
 /* "NN_name": a family digit, a digit, an underscore, then a-z, 0-9 and underscores. */
 static bool is_scene_name(const char *s)
 {
-    if (strchr("12349", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' || s[2] != '_' ||
+    if (strchr("1234569", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' || s[2] != '_' ||
         s[3] == '\0')
         return false;
     return s[3 + strspn(s + 3, "abcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
@@ -52,7 +52,7 @@ static bool note_file(struct stems *s, const char *dir, const char *file, struct
         memcpy(new.name, file, length);
     if (!is_scene_name(new.name))
         return err_set(e,
-                       "%s/%s: not named NN_name (families 1x, 2x, 3x, 4x, 9x; a-z, 0-9, _; "
+                       "%s/%s: not named NN_name (families 1x to 6x, 9x; a-z, 0-9, _; "
                        "at most 63 bytes)",
                        dir, file);
     for (size_t i = 0; i < s->num; i++)

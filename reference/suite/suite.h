@@ -1,7 +1,7 @@
 /* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which references, inside
  * which margins, what must come out: tools/docs/formats/suite.md) and NN_name.md (what it can detect, what it is blind
  * to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF, 3x light, 4x whole scene,
- * 9x must differ. An unknown key, a missing key, a value out of range is an error with file and reason. */
+ * 5x and 6x pairs of features, 9x must differ. An unknown key, a missing key, a value out of range is an error with file and reason. */
 #ifndef ASSAY_SUITE_H
 #define ASSAY_SUITE_H
 

@@ -416,7 +416,7 @@ static const struct listing {
     {{"42_good.json"}, "/42_good.json: no 42_good.dae beside it"},
     {{"42_good.json", "42_good.dae", "43_more.dae"}, "/43_more.dae: no 43_more.json"},
     {{"good.dae"}, "/good.dae: not named NN_name"},
-    {{"52_good.dae"}, "/52_good.dae: not named NN_name"},
+    {{"72_good.dae"}, "/72_good.dae: not named NN_name"},
     {{"4_good.dae"}, "/4_good.dae: not named NN_name"},
     {{"42_Good.dae"}, "/42_Good.dae: not named NN_name"},
     {{"42_.json"}, "/42_.json: not named NN_name"},

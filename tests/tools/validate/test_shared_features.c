@@ -24,8 +24,9 @@ static void add_claim(json_t *claims, const struct suite_scene *s, const char *a
 }
 
 /* One claim for each scene that should be EQUIVALENT, DIFFERENT where `differs` says so; and one of the reference, which
- * agrees with another. The sentence into text. */
-static int tell(bool (*differs)(const struct suite_scene *s), const char *a, char *text,
+ * agrees with another; without the scenes 5x and 6x, each of which has many features, unless `pairs`. The sentence into
+ * text. */
+static int tell(bool (*differs)(const struct suite_scene *s), const char *a, bool pairs, char *text,
                 size_t size)
 {
     json_t *claims = json_array(), *results = json_pack("{so}", "claims", claims);
@@ -34,6 +35,8 @@ static int tell(bool (*differs)(const struct suite_scene *s), const char *a, cha
     for (int i = 0; i < suite_shipped()->num_scenes; i++) {
         const struct suite_scene *s = &suite_shipped()->scene[i];
         bool is = s->expect == VERDICT_EQUIVALENT && differs(s);
+        if (!pairs && (s->name[0] == '5' || s->name[0] == '6'))
+            continue;
         num += is;
         add_claim(claims, s, is ? a : "pathtracer", "cycles", is);
         add_claim(claims, s, "cycles", "truth", false);
@@ -114,12 +117,12 @@ TEST(what_the_claims_that_differ_share_is_told)
         {has_mirror_and_spheres, "pathtracer", "a mirror with spheres"},
         {cornell_alone, "pathtracer-hemisphere", "the side pathtracer-hemisphere; none"},
         {is_specular, "pathtracer", "have a mirror, glass or refraction; none"},
-        {is_of_odd_size, "pathtracer", "has sides that are no multiple of 16; none"},
+        {is_of_odd_size, "pathtracer", "have sides that are no multiple of 16; none"},
         {has_sky_image, "pathtracer", "have an image of the sky; none"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char text[1024];
-        assert_true(tell(cases[i].differs, cases[i].a, text, sizeof text) > 0);
+        assert_true(tell(cases[i].differs, cases[i].a, true, text, sizeof text) > 0);
         assert_non_null(strstr(text, cases[i].told));
     }
 }
@@ -128,11 +131,11 @@ TEST(what_the_claims_that_differ_share_is_told)
 TEST(what_they_do_not_share_is_not)
 {
     char text[1024];
-    tell(every_third, "pathtracer", text, sizeof text);
+    tell(every_third, "pathtracer", true, text, sizeof text);
     assert_non_null(strstr(text, "nothing in common"));
-    tell(all, "pathtracer", text, sizeof text);
+    tell(all, "pathtracer", true, text, sizeof text);
     assert_non_null(strstr(text, "Every claim differs"));
-    tell(none, "pathtracer", text, sizeof text);
+    tell(none, "pathtracer", true, text, sizeof text);
     assert_string_equal(text, "");
 }
 
@@ -151,11 +154,11 @@ static bool has_shading_normals(const struct suite_scene *s)
 TEST(a_tie_is_told_as_one)
 {
     char text[1024];
-    tell(is_of_both, "pathtracer", text, sizeof text);
+    tell(is_of_both, "pathtracer", false, text, sizeof text);
     assert_non_null(strstr(text, "a directional light"));
     assert_non_null(strstr(text, "shading normals"));
     assert_non_null(strstr(text, "Nearly as likely"));
-    tell(has_shading_normals, "pathtracer", text, sizeof text);
+    tell(has_shading_normals, "pathtracer", false, text, sizeof text);
     assert_non_null(strstr(text, "have shading normals; none"));
     assert_null(strstr(text, "a directional light"));
 }
