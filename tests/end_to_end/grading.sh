@@ -1,6 +1,6 @@
 #!/bin/bash
-# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and two
-# more students, one with ada's program under another name and one with a seed of her own: points, the same noise, the same again on one processor
+# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and three
+# more students, one with ada's program under another name, one with a seed of her own, and one who hands in our reference with something added: points, whose noise it is, the same again on one processor
 # and two, and after an interruption. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/grading.sh BUILD}")
@@ -25,6 +25,7 @@ mkdir -p "$tmp/submissions/ada" && cp "$build/pathtracer" "$tmp/submissions/ada/
 student bob --only direct
 student cyd -t 2
 student eve --seed 77
+student mal -s 1300 --seed 11400714819323198485 # the reference (its seed can be read in answer_key.c) with 276 samples more
 rubric=tools/rubrics/template.rubric
 grade() { "$build/assay" grade -q "$@" "$rubric" "$tmp/submissions"/*; }
 # What is the same in every run: all but times.
@@ -42,6 +43,9 @@ check "eve has all points" points eve 10.00
 tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The same noise//p' | sed 's,</ul>.*,,' >"$tmp/alike"
 check "ada and cyd have the same noise" grep -q '>ada</a>, <a href="cyd/staff.html">cyd</a></li>' "$tmp/alike"
 check "eve has her own" bash -c "! grep -q eve '$tmp/alike'"
+tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The noise of the reference//p' | sed 's,</ul>.*,,' >"$tmp/copied"
+check "mal has the reference's noise" grep -q '>mal</a>: cornell' "$tmp/copied"
+check "nobody else has" test "$(grep -o '<li>' "$tmp/copied" | wc -l)" -eq 1
 check "on one processor" grade -o "$tmp/one" -j 1
 check "the same points and reasons on one and on two" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
 rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"

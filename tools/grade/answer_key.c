@@ -17,6 +17,7 @@ enum { MAX_ARGS = 96, TEXT = 8192, MAX_PATH = 8192 };
 
 /* Far from the seeds that submissions get. */
 static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
+static const char twin_seed[] = "--seed 14057662040733408311";
 
 /* Our command for an image: that of the assignment, which our renderer understands, in the directory in which
  * "scene" is staged. */
@@ -164,6 +165,17 @@ bool answer_key_render(const struct rubric *r, int image, bool as_asked, const c
     return render_ours(r, &ours, all, opt, out, e);
 }
 
+static bool twin_of(const struct rubric *r, int image, const struct answer_options *opt,
+                    struct moments *out, struct err *e)
+{
+    bool needed = false;
+    for (int i = 0; i < r->num_checks; i++)
+        needed |= r->check[i].kind == CHECK_EQUAL && r->check[i].images[0] == image;
+    return !needed || r->image[image].reference != REFERENCE_OURS ||
+           answer_key_render(r, image, false, twin_seed, r->image[image].reference_spp, opt, out,
+                             e);
+}
+
 /* How many samples each pixel takes, where a check wants to know. */
 static bool as_asked(const struct rubric *r, int image, const char *words,
                      const struct answer_options *opt, struct moments *out, struct err *e)
@@ -225,7 +237,8 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
         const struct rubric_image *p = &r->image[i];
         struct answer *a = &out->of[0][i];
         ok = p->reference == REFERENCE_NONE || reference_of(r, p, opt, &a->m, e);
-        ok = ok && noise_of(r, p, opt, &a->noise, e) && as_asked(r, i, "", opt, &a->as_asked, e);
+        ok = ok && noise_of(r, p, opt, &a->noise, e) && twin_of(r, i, opt, &a->twin, e) &&
+             as_asked(r, i, "", opt, &a->as_asked, e);
         for (int k = 1; ok && k < r->num_sets; k++)
             ok = deviating(r, &r->set[k], i, opt, &out->of[k][i], e);
     }
@@ -239,6 +252,7 @@ void answer_key_free(struct answer_key *a)
     for (int k = 0; k < RUBRIC_SETS; k++)
         for (int i = 0; i < RUBRIC_IMAGES; i++) {
             moments_free(&a->of[k][i].m);
+            moments_free(&a->of[k][i].twin);
             moments_free(&a->of[k][i].noise);
             moments_free(&a->of[k][i].as_asked);
         }

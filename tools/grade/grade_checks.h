@@ -9,6 +9,9 @@
 struct answer {
     struct moments m; /* of the reference; width 0: none */
     struct moments
+        twin; /* where m is a render of ours for a check of kind equal: another, of a seed of its own, by which
+                 copies of m are told (same_noise.h); else width 0 */
+    struct moments
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments
         as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */

@@ -307,7 +307,34 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
     fputs("</li>\n", f);
 }
 
-/* same_noise.h */
+/* same_noise.h: who has the noise of the reference. */
+static void show_copies(FILE *f, const json_t *grades)
+{
+    bool any = false;
+    size_t i;
+    json_t *g;
+    json_array_foreach(grades, i, g)
+    {
+        const json_t *first = json_array_get(json_object_get(g, "copied"), 0);
+        if (first == NULL)
+            continue;
+        if (!any)
+            fputs(
+                "<h2>The noise of the reference</h2><p>Images in which the reference's own errors are found, with or without other "
+                "noise on top: a program that draws its own numbers has them once in a thousand classes. Look at where these "
+                "images come from.</p><ul>\n",
+                f);
+        any = true;
+        fputs("<li>", f);
+        link_to(f, member_or_empty(g, "id"), "staff.html", member_or_empty(g, "id"));
+        html_print(f, ": %s</li>\n",
+                   member_text(first, "picture") != NULL ? member_text(first, "picture")
+                                                         : "all images together");
+    }
+    fputs(any ? "</ul>\n" : "", f);
+}
+
+/* The same, of each other. */
 static void show_same_noise(FILE *f, const json_t *grades, int *group)
 {
     int number = 0;
@@ -350,6 +377,7 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
         common_bugs(f, grades, t);
         slowest(f, grades, t);
         look_alikes(f, grades);
+        show_copies(f, grades);
         show_same_noise(f, grades, group);
         fputs("</div>\n", f);
         html_page_close(f);

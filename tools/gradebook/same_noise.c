@@ -32,6 +32,14 @@ static bool is_usable(const struct submitted_image *s, const struct moments *m,
     return true;
 }
 
+/* Of a block of 2 x 2 values the three differences that are orthogonal to its mean. */
+static void details_of(const double value[4], double out[DETAILS])
+{
+    out[0] = (value[0] - value[1] + value[2] - value[3]) / 2;
+    out[1] = (value[0] + value[1] - value[2] - value[3]) / 2;
+    out[2] = (value[0] - value[1] - value[2] + value[3]) / 2;
+}
+
 bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
                    struct noise_print *out, struct err *e)
 {
@@ -58,13 +66,14 @@ bool same_noise_of(const struct submitted_image *s, const struct moments *m, dou
             reference += n > 1 ? m->m2[i] / (n * (n - 1)) / 4 : 0;
         }
         float *detail = out->detail + DETAILS * b;
+        double three[DETAILS];
         if (!is_usable(s, m, pixel, spp)) {
             detail[0] = NAN;
             continue;
         }
-        detail[0] = (float)((d[0] - d[1] + d[2] - d[3]) / 2);
-        detail[1] = (float)((d[0] + d[1] - d[2] - d[3]) / 2);
-        detail[2] = (float)((d[0] - d[1] - d[2] + d[3]) / 2);
+        details_of(d, three);
+        for (int k = 0; k < DETAILS; k++)
+            detail[k] = (float)three[k];
         out->shared[b] = (float)(DETAILS * reference);
         for (int k = 0; k < DETAILS; k++)
             found += (double)detail[k] * (double)detail[k];
@@ -91,6 +100,35 @@ double same_noise_t(const struct noise_print *a, const struct noise_print *b)
         used++;
     }
     return used >= SAME_NOISE_FEWEST && squares > 0 ? sum / sqrt(squares) : NAN;
+}
+
+double same_noise_copy_t(const struct submitted_image *s, const struct moments *m,
+                         const struct moments *twin)
+{
+    double sum = 0, squares = 0;
+    int used = 0;
+    for (int y = 0; y + 1 < s->height; y += 2)
+        for (int x = 0; x + 1 < s->width; x += 2) {
+            double rest[4], ours[4], d[DETAILS], e[DETAILS], p = 0;
+            bool clipped = false;
+            for (int k = 0; k < 4; k++) {
+                size_t i =
+                    3 * ((size_t)(y + k / 2) * (size_t)s->width + (size_t)(x + k % 2)) + GREEN;
+                rest[k] = s->mean[i] - (m->mean[i] + twin->mean[i]) / 2;
+                ours[k] = m->mean[i] - twin->mean[i];
+                clipped |= s->clipped[i] != 0;
+            }
+            details_of(rest, d);
+            details_of(ours, e);
+            for (int k = 0; k < DETAILS; k++)
+                p += d[k] * e[k];
+            if (clipped || p == 0)
+                continue;
+            sum += p;
+            squares += p * p;
+            used++;
+        }
+    return used >= SAME_NOISE_FEWEST ? sum / sqrt(squares) : NAN;
 }
 
 double same_noise_bound(double tests, double alpha)
@@ -124,9 +162,33 @@ static bool is_right(const json_t *grade, const char *image)
     return asked;
 }
 
-/* Images that cannot be read any more are left out; for want of memory none is. */
+static json_t *list_of(json_t *grade, const char *name)
+{
+    json_t *list = json_object_get(grade, name);
+    if (list == NULL) {
+        list = json_array();
+        json_object_set_new(grade, name, list);
+    }
+    return list;
+}
+
+/* Of a submission's images so far. */
+struct copy {
+    double sum, bound; /* of T */
+    int images;
+};
+
+/* image NULL: all together. */
+static void add_copied(json_t *grade, const char *image, double t, double bound)
+{
+    if (t > bound)
+        json_array_append_new(list_of(grade, "copied"),
+                              json_pack("{ss*, sf, sf}", "picture", image, "t", t, "bound", bound));
+}
+
+/* What is told of one image, if it cost no points. Images that cannot be read any more are left out; for want of memory none is. */
 static bool read_noise(const char *out, const struct rubric *r, const struct answer_key *a, int i,
-                       const json_t *grade, struct noise_print *noise, struct err *e)
+                       json_t *grade, struct copy *copy, struct noise_print *noise, struct err *e)
 {
     const json_t *made = json_array_get(json_object_get(grade, "pictures"), (size_t)i);
     const struct rubric_image *p = &r->image[i];
@@ -140,17 +202,20 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     bool ok = same_noise_of(&s, answer_key_image(a, set_of(r, grade), i), p->spp, noise, e);
+    const struct answer *plain = &a->of[0][i];
+    double t = plain->twin.width > 0 ? same_noise_copy_t(&s, &plain->m, &plain->twin) : NAN;
+    if (isfinite(t)) {
+        copy->sum += t;
+        copy->images++;
+    }
+    add_copied(grade, p->name, t, copy->bound);
     submitted_image_free(&s);
     return ok;
 }
 
 static void add_like(json_t *grade, const json_t *other, const char *image, double t, double bound)
 {
-    json_t *list = json_object_get(grade, "alike");
-    if (list == NULL) {
-        list = json_array();
-        json_object_set_new(grade, "alike", list);
-    }
+    json_t *list = list_of(grade, "alike");
     size_t last = json_array_size(list);
     const char *id = member_or_empty(other, "id");
     for (size_t i = 0; i < last; i++)
@@ -167,11 +232,14 @@ bool same_noise(const char *out, const struct rubric *r, const struct answer_key
     struct noise_print *noise = calloc(num + 1, sizeof *noise);
     double bound =
         same_noise_bound((double)num * ((double)num - 1) / 2 * r->num_images, SAME_NOISE_ALPHA);
-    bool ok = noise != NULL || err_set(e, "out of memory");
+    struct copy *copy = calloc(num + 1, sizeof *copy);
+    bool ok = (noise != NULL && copy != NULL) || err_set(e, "out of memory");
+    for (size_t k = 0; ok && k < num; k++)
+        copy[k].bound = same_noise_bound((double)num * (r->num_images + 1), SAME_NOISE_ALPHA);
     for (int i = 0; ok && i < r->num_images; i++) {
         for (size_t k = 0; ok && k < num; k++)
             ok = a->of[0][i].m.width == 0 ||
-                 read_noise(out, r, a, i, json_array_get(grades, k), &noise[k], e);
+                 read_noise(out, r, a, i, json_array_get(grades, k), &copy[k], &noise[k], e);
         for (size_t k = 0; ok && k < num; k++)
             for (size_t j = 0; noise[k].blocks > 0 && j < k; j++) {
                 double t = same_noise_t(&noise[k], &noise[j]); /* NAN: not told */
@@ -184,6 +252,11 @@ bool same_noise(const char *out, const struct rubric *r, const struct answer_key
         for (size_t k = 0; noise != NULL && k < num; k++)
             same_noise_free(&noise[k]);
     }
+    for (size_t k = 0; ok && k < num; k++)
+        if (copy[k].images > 1)
+            add_copied(json_array_get(grades, k), NULL, copy[k].sum / sqrt(copy[k].images),
+                       copy[k].bound);
+    free(copy);
     free(noise);
     return ok;
 }

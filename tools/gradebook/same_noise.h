@@ -30,14 +30,23 @@ bool same_noise_of(const struct submitted_image *s, const struct moments *m, dou
                    struct noise_print *out, struct err *e) __attribute__((warn_unused_result));
 void same_noise_free(struct noise_print *n);
 
+/* T of "the reference m is in this image", with whatever noise added. twin: a render like m of another seed. In the same
+ * details, P = sum of (s - (m + twin)/2) times (m - twin): whatever s is, if it was made without m, exchanging m and twin
+ * changes only the sign of P, in each block by itself, so that the bound below is exact; with m in s, E[P] is the variance
+ * of its details. NAN where fewer than SAME_NOISE_FEWEST blocks have noise that is not clipped. */
+double same_noise_copy_t(const struct submitted_image *s, const struct moments *m,
+                         const struct moments *twin);
+
 /* T, NAN where fewer than SAME_NOISE_FEWEST blocks are used in both. */
 double same_noise_t(const struct noise_print *a, const struct noise_print *b);
 /* What T has to exceed for a chance of alpha over `tests` of them. */
 double same_noise_bound(double tests, double alpha);
 
-/* Compares every pair of a class by the images in out/ID that cost neither of them points in an `equal` check (a bug that both
+/* Compares with the reference, and every pair of a class, by the images in out/ID that cost neither of them points in an `equal` check (a bug that both
  * have would not be noise), at most ALPHA false alarms in a class on average. Each grade that has a like gets
- * "alike": [{"id": , "picture": , "t": , "bound": }]. */
+ * "alike": [{"id": , "picture": , "t": , "bound": }], each that has the reference's own "copied": [{"picture": , "t": ,
+ * "bound": }], also without "picture" for all its images together (T over the root of their number, which the same bound
+ * holds for); ALPHA is for each of the two. */
 #define SAME_NOISE_ALPHA 1e-3
 bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a, json_t *grades,
                 struct err *e) __attribute__((warn_unused_result));

@@ -131,6 +131,82 @@ TEST(noise_of_others)
     assert_true(least > bound && half > bound);
 }
 
+/* An image of this noise, in codes: what is submitted. In arrays of one's own. */
+static struct submitted_image image_of(const double *mean_of)
+{
+    static double mean[3 * PIXELS], tolerance[3 * PIXELS];
+    static unsigned char clipped[3 * PIXELS];
+    struct curve curve;
+    struct err e;
+    double lo, hi;
+    MUST(tone_curve_parse("cgl", &curve, &e));
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        int code = tone_map(TONE_CGL, mean_of[i / 3]);
+        tone_curve_bin(&curve, code, 255, &lo, &hi);
+        clipped[i] = code == 255;
+        mean[i] = (lo + hi) / 2;
+        tolerance[i] = (hi - lo) / 2;
+    }
+    return (struct submitted_image){
+        .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
+}
+
+/* H0: 300 programs with noise of their own, right or 20 % too bright on one half: T above 2.33 in about 1 % (normal law), so at
+ * most 12 of 300 (P < 1e-4), none above the bound of a class of 300 with 20 images (P < 1e-3). Then 20 of each: the
+ * reference as it is, with the noise of 64 samples on top, 2 % brighter, half of it, and a render that was made longer: all but
+ * the last have its noise. With a sixteenth of the noise that is added its T is about 6 in one image, so that about half are
+ * found by themselves; five images together, as T over the root of 5 obeys the same bound, every time. */
+TEST(copies_of_the_reference)
+{
+    enum { OWN, BRIGHT_HALF, COPY, WITH_NOISE, RETOUCHED, HALF_OF_IT, LONGER, KINDS };
+    static double factor[PIXELS], image[PIXELS];
+    struct moments twin;
+    struct err e;
+    double bound = same_noise_bound(300 * 20.0, SAME_NOISE_ALPHA), least[KINDS], most[KINDS];
+    int high = 0, found[KINDS] = {0};
+    MUST(moments_alloc(&twin, WIDTH, HEIGHT, &e));
+    draw(factor, REFERENCE);
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        twin.mean[i] = truth(i / 3) * factor[i / 3];
+    for (int kind = 0; kind < KINDS; kind++) {
+        least[kind] = INFINITY;
+        most[kind] = -INFINITY;
+        double five = 0;
+        for (int k = 0; k < (kind <= BRIGHT_HALF ? 150 : 20); k++) {
+            draw(factor, kind == LONGER ? 1e5 : SPP);
+            for (size_t p = 0; p < PIXELS; p++) {
+                double copy = reference.mean[3 * p], own = truth(p) * factor[p];
+                switch (kind) {
+                case OWN:
+                case LONGER: image[p] = own; break;
+                case BRIGHT_HALF: image[p] = own * (p % WIDTH < WIDTH / 2 ? 1.2 : 1); break;
+                case COPY: image[p] = copy; break;
+                case WITH_NOISE: image[p] = copy * factor[p]; break;
+                case RETOUCHED: image[p] = 1.02 * copy * factor[p]; break;
+                case HALF_OF_IT: image[p] = (copy + own) / 2; break;
+                }
+            }
+            struct submitted_image s = image_of(image);
+            double t = same_noise_copy_t(&s, &reference, &twin);
+            found[kind] += t > bound;
+            five += t / sqrt(5);
+            if (k % 5 == 4) {
+                least[kind] = fmin(least[kind], five);
+                five = 0;
+            }
+            most[kind] = fmax(most[kind], t);
+            high += kind <= BRIGHT_HALF && t > 2.33;
+        }
+        printf("kind %d: T at most %.1f, %d found; of five at least %.1f, bound %.1f\n", kind,
+               most[kind], found[kind], least[kind], bound);
+    }
+    assert_true(high <= 12);
+    assert_true(most[OWN] < bound && most[BRIGHT_HALF] < bound && most[LONGER] < bound);
+    for (int kind = COPY; kind <= HALF_OF_IT; kind++)
+        assert_true(least[kind] > bound && found[kind] >= 5);
+    moments_free(&twin);
+}
+
 /* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of images without noise. */
 TEST(too_fine_to_tell)
 {
