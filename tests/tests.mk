@@ -212,6 +212,10 @@ rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubr
 	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)
 	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRICS)
 
+#: make writeup    the figures and tables of the course's write-up in one page (BUILD/writeup; SHRINK=4: smaller images;
+#:                 VERDICTS=1: two scenes against Blender and POV-Ray too)
+writeup: $(BUILD)/assay $(BUILD)/pathtracer
+	VERDICTS=$(VERDICTS) tests/studies/writeup/writeup.sh $(BUILD) $(SHRINK)
 #: make pictures   the two images that README shows (tools/docs/images)
 pictures: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
 	$(BUILD)/assay validate -q --out $(BUILD)/pictures --only 12_point_plane --only 41_cornell --only 42_cornell_glass --only 46_sky --only 95_one_bounce_less
@@ -227,4 +231,4 @@ print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 .PHONY: check lint order threads tsan faults pairs slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table rubric-bugs pictures print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
+  bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
