@@ -532,9 +532,28 @@ fake() {
 }
 command='"./fake.sh", "{scene}", "{spp}", "{seed}", "{out}"'
 engine "$command"
+# "A<tab>B<tab>VERDICT<tab>COMMAND" of claims that have one; the verdict of one.
+claims_of() { python3 -c 'import json, sys
+for c in json.load(open(sys.argv[1]))["claims"]:
+    if "rerun" in c: print(c["a"], c["b"], c.get("verdict"), c["rerun"], sep="\t")' "$1"; }
+jq_claim() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 == b { print $3; exit }'; }
 fake 'exec student_tracer "$@" 1.05'
 expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
     env PATH="$engine_path" $student --engine "$tmp/fake.json"
+# The commands that the results print for each claim, of a suite and an engine whose names a shell has to be told: each judges that claim
+# again, with the verdict that it had.
+mkdir "$tmp/my suite" "$tmp/my engine"
+cp reference/scenes/12_point_plane.* "$tmp/my suite"
+cp "$tmp/fake.json" "$tmp/fake.sh" "$tmp/my engine"
+env PATH="$engine_path" $student --out "$out/first" --suite "$tmp/my suite" --engine "$tmp/my engine/fake.json" >/dev/null 2>&1
+reruns=0 differ=""
+while IFS=$'\t' read -r a b verdict command; do
+    (cd "$tmp" && env PATH="$engine_path" sh -c "$command -q --out '$out/again'") >/dev/null 2>&1
+    again=$(jq_claim "$out/again/results.json" "$a" "$b")
+    [ "$again" = "$verdict" ] || differ="$differ $a/$b: $verdict, again '$again' by: $command"
+    reruns=$((reruns + 1))
+done < <(claims_of "$out/first/results.json")
+tell "the $reruns printed commands judge their claims again" "$([ "$reruns" -ge 3 ] && echo "$differ" || echo "no commands")"
 bad_engine() { # NAME PATTERN SCRIPT
     fake "$3"
     expect "a renderer that $1 is not judged" 3 "$2" $student --engine "$tmp/fake.json" --timeout 15

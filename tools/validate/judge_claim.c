@@ -1,5 +1,7 @@
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
+#include "renderer/base/shell_quote.h"
+#include "tools/base/data_dirs.h"
 
 #include "tools/compare/hint.h"
 #include "tools/results/claim_result.h"
@@ -7,34 +9,77 @@
 #include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
 
+#include <assert.h>
+#include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-/* The command that judges this claim alone, and yet with the same alpha. */
-static void rerun_command(const struct validation *v, const struct claim_run *t, char *out,
-                          size_t size)
+struct words {
+    const char *word[40];
+    char number[12][32];
+    int num, numbers;
+};
+
+static void add_word(struct words *w, const char *option, const char *value)
 {
-    char live[64] = "", engine[4300] = "", how[96] = "", spp[32] = "", replicates[40] = "";
+    assert(w->num + 3 <= (int)(sizeof w->word / sizeof *w->word));
+    w->word[w->num++] = option;
+    if (value != NULL)
+        w->word[w->num++] = value;
+}
+
+__attribute__((format(printf, 3, 4))) static void add_number(struct words *w, const char *option,
+                                                             const char *format, ...)
+{
+    char *text = w->number[w->numbers++];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof *w->number, format, args);
+    va_end(args);
+    add_word(w, option, text);
+}
+
+/* Where it is not the one that is found without being named. */
+static void add_place(struct words *w, const char *option, const char *place, struct path found)
+{
+    if (place != NULL && strcmp(place, found.s) != 0)
+        add_word(w, option, place);
+}
+
+/* The command that judges this claim alone, and yet with the same alpha; to free(). NULL: out of memory. */
+static char *rerun_command(const struct validation *v, const struct claim_run *t)
+{
     const struct validate_options *o = v->opt;
-    if (o->live)
-        snprintf(live, sizeof live, " --live --reference-seed %u", o->reference_seed);
-    if (o->engine != NULL && !o->live)
-        snprintf(live, sizeof live, " --reference-seed %u", o->reference_seed);
-    if (o->engine_spp > 0)
-        snprintf(spp, sizeof spp, " --engine-spp %d", o->engine_spp);
-    if (o->engine_replicates > 0)
-        snprintf(replicates, sizeof replicates, " --engine-replicates %d", o->engine_replicates);
-    if (o->engine != NULL)
-        snprintf(engine, sizeof engine, " --engine %s%s%s", o->engine->file, spp, replicates);
-    if (o->budget_s > 0)
-        snprintf(how, sizeof how, " --budget %gs", o->budget_s);
-    else if (v->sequence != &alpha_spending_single)
-        snprintf(how, sizeof how, " --until-different");
+    const struct data_dirs at = data_dirs_find();
+    struct words w = {.num = 0};
     char name[CLAIM_NAME];
     claim_run_name(t, name);
+    add_word(&w, "validate", NULL);
+    add_word(&w, "--only", name);
+    add_number(&w, "--alpha", "%.6g", v->alpha);
     /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
-    snprintf(out, size, "assay validate --only %s --alpha %.6g --stages %d --seed %llu%s%s%s", name,
-             v->alpha, v->stages, (unsigned long long)o->seed, live, engine, how);
+    add_number(&w, "--stages", "%d", v->stages);
+    add_number(&w, "--seed", "%llu", (unsigned long long)o->seed);
+    if (o->live)
+        add_word(&w, "--live", NULL);
+    if (o->live || o->engine != NULL)
+        add_number(&w, "--reference-seed", "%u", o->reference_seed);
+    if (o->engine != NULL)
+        add_word(&w, "--engine", o->engine->file);
+    if (o->engine_spp > 0)
+        add_number(&w, "--engine-spp", "%d", o->engine_spp);
+    if (o->engine_replicates > 0)
+        add_number(&w, "--engine-replicates", "%d", o->engine_replicates);
+    if (o->budget_s > 0)
+        add_number(&w, "--budget", "%gs", o->budget_s);
+    else if (v->sequence != &alpha_spending_single)
+        add_word(&w, "--until-different", NULL);
+    add_place(&w, "--suite", o->suite_dir, at.suite);
+    add_place(&w, "--golden", o->golden_dir, at.golden);
+    add_place(&w, "--share", o->share_dir, at.share);
+    add_place(&w, "--pathtracer", o->pathtracer, at.pathtracer);
+    return shell_quote_join("assay", w.word);
 }
 
 static struct claim_context context(const struct validation *v, const struct claim_run *t,
@@ -161,9 +206,8 @@ static void announce(struct validation *v, struct claim_run *t)
 /* The claim is what the last look said; why, if not NULL, comes before its reason. */
 static void finish(struct validation *v, struct claim_run *t, const char *why)
 {
-    char rerun[8192], reason[512];
+    char *rerun = rerun_command(v, t), reason[512];
     struct err e = {""};
-    rerun_command(v, t, rerun, sizeof rerun);
     struct claim_context c = context(v, t, rerun);
     json_t *files = files_of(v, t, &e);
     if (files != NULL)
@@ -186,6 +230,7 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
         t->result = claim_result_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
     }
     json_decref(files);
+    free(rerun);
     add_looks(t->result, v, t);
     announce(v, t);
 }
@@ -193,12 +238,12 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
 static void finish_unseen(struct validation *v, struct claim_run *t, const char *error,
                           bool no_time)
 {
-    char rerun[8192];
-    rerun_command(v, t, rerun, sizeof rerun);
+    char *rerun = rerun_command(v, t);
     struct claim_context c = context(v, t, rerun);
     t->result = claim_result_not_judged(&c, error);
     if (no_time)
         json_object_set_new(t->result, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
+    free(rerun);
     add_looks(t->result, v, t);
     announce(v, t);
 }
