@@ -220,7 +220,10 @@ writeup: $(BUILD)/assay $(BUILD)/pathtracer
 pictures: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
 	$(BUILD)/assay validate -q --out $(BUILD)/pictures --only 12_point_plane --only 41_cornell --only 42_cornell_glass --only 46_sky --only 95_one_bounce_less
 	$(BUILD)/pathtracer -q -r 360x360 -s 1024 -f $(BUILD)/pictures/render.png reference/scenes/42_cornell_glass.dae
-	node tests/browser/pictures.mjs $(BUILD)/browser $(BUILD)/pictures/index.html $(BUILD)/pictures/render.png tools/docs/images
+	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 1 -f $(BUILD)/pictures/1.exr reference/scenes/41_cornell.dae
+	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 2 -m 2 -f $(BUILD)/pictures/2.exr reference/scenes/41_cornell.dae
+	$(BUILD)/assay compare -q --margin 0.01 --report $(BUILD)/pictures/compared.html $(BUILD)/pictures/1.exr $(BUILD)/pictures/2.exr || test $$? = 1
+	node tests/browser/pictures.mjs $(BUILD)/browser $(BUILD)/pictures/index.html $(BUILD)/pictures/compared.html $(BUILD)/pictures/render.png tools/docs/images
 
 # For tests/mutants/mutants.sh.
 print-compile:
