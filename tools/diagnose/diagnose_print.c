@@ -55,9 +55,14 @@ static void print_bugs(FILE *f, const struct catalogue *c, const struct diagnosi
                 best->t);
     else
         fprintf(f, "explains %.1f %% of the difference", 100 * best->explained);
-    if (d->num_candidates > d->num_named)
-        fprintf(f, "; 10^%.1f times likelier than the next",
-                log10_of(best->log_likelihood - d->candidate[d->num_named].log_likelihood));
+    if (d->num_candidates > d->num_named) {
+        const double orders =
+            log10_of(best->log_likelihood - d->candidate[d->num_named].log_likelihood);
+        if (orders > 6)
+            fputs("; more than a million times likelier than the next", f);
+        else
+            fprintf(f, "; %.2g times likelier than the next", pow(10, orders));
+    }
     fputc('\n', f);
 }
 

@@ -101,8 +101,15 @@ static void write_series(FILE *f, const struct history *h, const struct history_
     fputs("</tr>\n", f);
 }
 
+/* A table of all points of hundreds of runs would be most of the page: those of the last runs go into it. */
+enum { MOST_ROWS = 4000 };
+
 static void write_csv(FILE *f, const struct history *h)
 {
+    const size_t runs = MOST_ROWS / (h->num_series > 0 ? h->num_series : 1),
+                 from = h->num_runs > runs ? h->num_runs - runs : 0;
+    if (from > 0)
+        fprintf(f, "The last %zu runs: ", runs);
     struct csv csv = csv_link_open(f, "history.csv",
                                    "scene,tested,against,commit,date,difference,low,high,"
                                    "variance_ratio,seconds,efficiency");
@@ -111,6 +118,8 @@ static void write_csv(FILE *f, const struct history *h)
         for (size_t k = 0; k < s->num; k++) {
             const struct history_point *p = &s->point[k];
             char commit[128];
+            if (p->run < from)
+                continue;
             history_commit(&h->run[p->run], commit, sizeof commit);
             csv_link_text(&csv, s->scene);
             csv_link_text(&csv, s->a);
