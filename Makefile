@@ -93,6 +93,7 @@ install: all library
 	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(DESTDIR)$(PREFIX)/lib/pkgconfig/assay.pc
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
+	install -m 644 tools/docs/formats/*.schema.json $(share)
 	cp -R reference/scenes reference/engines golden tools/rubrics $(share)
 
 # Debian packages into BUILD/deb.

@@ -117,6 +117,26 @@ else
     tell "keys of grades" "$(differ keys $formats/grades.md)"
 fi
 
+# JSON Schemas: those of the pages, and valid is what programs write.
+for page in results grades; do
+    tell "the schema of $page is its page's" "$(python3 "$top/tools/packaging/schemas.py" $formats/$page.md | diff - $formats/$page.schema.json | head -n 3)"
+done
+cat >valid.py <<'END'
+import json, sys, jsonschema
+schema = json.load(open(sys.argv[1]))
+jsonschema.Draft202012Validator.check_schema(schema)
+for path in sys.argv[2:]:
+    for e in list(jsonschema.Draft202012Validator(schema).iter_errors(json.load(open(path))))[:3]:
+        print(path, "/".join(map(str, e.absolute_path)), e.message[:200])
+END
+has_schemas=$(/usr/bin/python3 -c 'import jsonschema; print(jsonschema.Draft202012Validator is not None)' 2>/dev/null)
+valid() { # SCHEMA FILE...: what is wrong with them
+    if [ -z "$has_schemas" ]; then return; fi
+    /usr/bin/python3 valid.py "$formats/$1.schema.json" "${@:2}" 2>&1
+}
+[ -n "$has_schemas" ] || echo "skip docs: schemas (no python3-jsonschema)"
+[ ! -d grades ] || tell "grades are valid by their schema" "$(valid grades grades/*/grade.json)"
+
 # The other guides and the doors of the README, each in a folder that is empty but for the checkout's names.
 cp reference/scenes/41_cornell.dae scene.dae
 cp "$top/README.md" .
@@ -145,6 +165,11 @@ for seed in 1 2; do build/pathtracer -q -r 16 16 -s 16 --seed $seed -f $seed.exr
 build/assay compare -q --tile 16 --margin 0.5 --json compare.json 1.exr 2.exr
 build/assay validate -q --only 12_point_plane -o validated >out 2>&1
 build/assay converge -q --shrink 4 -k 4 --ladder 1,4,16 --engine pathtracer --engine pathtracer-sobol -o converged 13_square_patch >out 2>&1
+build/assay compare -q --same-program --accept-mdb 0.5 --json same.json 1.exr 2.exr
+tell "results are valid by their schema" "$(valid results compare.json same.json validated/results.json converged/results.json)"
+sed 's/"tile": [0-9]*/"tile": "16"/; s/"reason"/"raeson"/' compare.json >wrong.json
+[ -z "$has_schemas" ] || tell "control: a number as text and a key that is not there are seen" "$(valid results wrong.json |
+    grep -c "is not of type\|raeson\|required" | grep -vx 3)"
 json_keys compare.json validated/results.json converged/results.json >keys
 tell "keys of results" "$(differ keys $formats/results.md)"
 
