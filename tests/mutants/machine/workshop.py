@@ -10,7 +10,7 @@ from collections import Counter, defaultdict
 from pool import pool
 
 SMOKE_SPP, POOL_SPP = 8, 16
-STRICT = ["-w", "-Werror=int-conversion", "-Werror=incompatible-pointer-types", "-Werror=implicit-function-declaration"]
+STRICT = ["-Werror=int-conversion", "-Werror=incompatible-pointer-types", "-Werror=implicit-function-declaration"]
 
 
 def cpu_now():

@@ -172,6 +172,36 @@ TEST(bad_files)
     REFUSES(moments_read(path, &m, NULL, &e), "No such file");
 }
 
+/* Zeros are moments: no sample, no variance. Of the last pixel of 3 x 2 each channel is looked at. */
+TEST(every_channel_of_the_last_pixel)
+{
+    static const char *const names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
+                                          "M2.B", "M3.R", "M3.G", "M3.B", "n"};
+    static const char *const units[] = {"sample", "replicate", "exact", "stratified", "picture"};
+    static const float values[] = {0, NAN, INFINITY, -1, 0.5f};
+    const char *path = test_path("last.exr");
+    struct err e = {0};
+    for (int c = 0; c < 10; c++)
+        for (size_t v = 0; v < COUNT(values); v++) {
+            bool is_m2 = c >= 3 && c < 6, is_n = c == 9;
+            bool good = isfinite(values[v]) && !((is_m2 || is_n) && values[v] < 0) &&
+                        !(is_n && values[v] == 0.5f);
+            struct moments m;
+            struct image im;
+            assert_true(image_alloc(&im, 3, 2, 10, names, &e));
+            im.data[5 * 10 + c] = values[v];
+            assert_true(image_set_attr(&im, "assay:spp", "0", &e));
+            assert_true(image_set_attr(&im, "assay:unit", units[(size_t)c % COUNT(units)], &e));
+            assert_true(image_write_exr(path, &im, &e));
+            assert_int_equal(moments_read(path, &m, NULL, &e), good);
+            if (good)
+                moments_free(&m);
+            else if (strstr(e.msg, "pixel (2, 1)") == NULL)
+                fail_msg("'%s' names another pixel", e.msg);
+            image_free(&im);
+        }
+}
+
 /* Nothing appears where a write fails, and no temporary stays. */
 TEST(failed_write_leaves_nothing)
 {
