@@ -178,7 +178,7 @@ pairs: all
 mutants: all $(BUILD)/libassay.a
 	tests/mutants/mutants.sh $(if $(ONLY),,--table tests/mutants/README.md) $(BUILD) $(ONLY)
 #: make machine-mutants  the next mutants of a sample drawn by machine (SAMPLE=1; SECONDS_EACH=60: for so long)
-MUTANT_TESTS = $(call program,$(BUILD),$(wildcard tests/renderer/*/test_*.c tests/reference/*/test_*.c)) $(BUILD)/tests/image_change
+MUTANT_TESTS = $(foreach b,$(BUILD) $(BUILD)/san,$(call program,$(b),$(wildcard tests/renderer/*/test_*.c tests/reference/*/test_*.c))) $(BUILD)/tests/image_change
 machine-mutants: all $(BUILD)/libassay.a $(BUILD)/deps-test
 	$(MAKE) -k WERROR= $(MUTANT_TESTS)
 	tests/mutants/machine/run.py --build $(BUILD) prepare
@@ -225,13 +225,17 @@ pictures: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
 	$(BUILD)/assay compare -q --margin 0.01 --report $(BUILD)/pictures/compared.html $(BUILD)/pictures/1.exr $(BUILD)/pictures/2.exr || test $$? = 1
 	node tests/browser/pictures.mjs $(BUILD)/browser $(BUILD)/pictures/index.html $(BUILD)/pictures/compared.html $(BUILD)/pictures/render.png tools/docs/images
 
-# For tests/mutants/mutants.sh.
+# For tests/mutants.
 print-compile:
 	@echo $(CC) $(filter-out -g,$(cflags))
+print-sanitize:
+	@echo $(SANITIZE)
+print-sanitized:
+	@echo $(notdir $(filter $(BUILD)/san/%,$(CHECKED)))
 print-libs:
 	@echo $(LIBS)
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
 .PHONY: check lint order threads tsan faults pairs slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
+  bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

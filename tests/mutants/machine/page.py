@@ -26,9 +26,10 @@ shows is used to make tests better; sample 2 is for the report alone.
 - A mutant is **equivalent** if every object file, of all instruction sets, comes out the same, or if
   [equivalent.tsv](equivalent.tsv) gives a reason. One that the compiler refuses is none. Every other one that nothing
   finds is a **survivor**.
-- **Unit tests** find it if one of them fails, dies, or takes three times as long as without. They are built without
-  sanitizers, and those that never run the line are not asked; those that take more than a second only where nothing
-  quicker finds it. Tests that take more than 10 s are left out, and so are the end-to-end tests.
+- **Unit tests** find it if one of them fails, dies, or takes three times as long as without. Those that never run the
+  line are not asked; those that take more than a second only where nothing quicker finds it, and more than 10 s
+  never; nor are the end-to-end tests. They are built without sanitizers; what none finds is asked once more of the
+  quick ones as `make check` builds them.
 - **`assay validate`** finds it if a claim comes out DIFFERENT, or the renderer dies or does not end. It judges the
   scenes that run the line and whose image changes, as among all claims of the suite, on the default instruction set,
   for at most 25 CPU s. What is undecided by then, INCONCLUSIVE, or without effect on images of 8 samples counts as

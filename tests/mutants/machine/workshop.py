@@ -66,6 +66,8 @@ class Workshop:
             os.makedirs(d, exist_ok=True)
         self.cc = [w for w in make_says(build, "print-compile").split()]
         self.libs = make_says(build, "print-libs").split()
+        self.sanitize = make_says(build, "print-sanitize").split()
+        self.sanitized = set(make_says(build, "print-sanitized").split())  # tests that `make check` runs so
         self.kernels = {}  # object's name without .o: (source, flags)
         for line in make_says(build, "print-kernels").splitlines():
             words = line.rstrip(";").split()
@@ -130,7 +132,8 @@ class Workshop:
         return changed
 
     def link(self, out, objects, archives, more=()):
-        return run(["g++"] + self.gold + ["-o", out] + objects + [os.path.join(self.build, a) for a in archives] + self.libs + list(more), 60) == 0
+        return run(["g++"] + self.gold + list(more) + ["-o", out] + objects + [os.path.join(self.build, a) for a in archives] + self.libs + ["-lcmocka"],
+                   60) == 0
 
     # What there is to run.
 
@@ -175,4 +178,4 @@ class Workshop:
         spp = [] if "-s" in args else ["-s", str(64 if "-a" in args else spp)]
         if os.path.exists(out):
             os.unlink(out)
-        return run([program, "-q", "-t", "1"] + spp + args + ([] if "-f" in args else ["-f", out]), 1)
+        return run([program, "-q", "-t", "1"] + spp + args + ([] if "-f" in args else ["-f", out]), 5)

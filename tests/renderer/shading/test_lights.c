@@ -359,6 +359,45 @@ TEST(spot_light)
 }
 
 /* A lamp of every kind, with their powers; R is half the diagonal of the bounds. */
+/* A lamp of forty triangles, one after the other along x, of heights 1 to 13 and so of uneven areas. Numbers in equal
+ * steps find each in proportion to its area, to one step at either end, and the density is that of a point of the whole:
+ * d^2 / (cos area), with cos = 1/d at a distance of 1. */
+TEST(triangles_of_a_mesh_lamp_by_area)
+{
+    enum { N = 40, STEPS = 20000 };
+    struct err e;
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0), grey(1));
+    double height[N], all = 0;
+    for (int k = 0; k < N; k++) {
+        const float x = (float)k, z = (float)(1 + 7 * k % 13);
+        build_triangle(&s, v3(x, 1, 0), v3(x + 1, 1, 0), v3(x, 1, z), m);
+        s.tri_object[k] = 0;
+        all += height[k] = (double)z;
+    }
+    s.num_objects = 1;
+    s.objects[0].num_triangles = N;
+    build_camera(&s, v3(0, 0, 0), 40);
+    check_finish(&s);
+    assert_int_equal(s.num_lights, 1);
+    struct light_table *t = light_table_build(&s, &e);
+    assert_non_null(t);
+    int count[N] = {0};
+    for (int i = 0; i < STEPS; i++) {
+        const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
+        struct light_sample l = light_sample_direction(t, 0, v3(20, 0, 0), u);
+        int k = (int)floorf(20 + l.wi.x * l.distance);
+        assert_in_range(k, 0, N - 1);
+        count[k]++;
+        double d = (double)l.distance;
+        assert_near(l.pdf_w * (all / 2) / (d * d * d), 1, 1e-5);
+    }
+    for (int k = 0; k < N; k++)
+        assert_near(count[k], STEPS * height[k] / all, 1.5);
+    light_table_free(t);
+    scene_free(&s);
+}
+
 TEST(choice_is_by_power)
 {
     struct err e;
