@@ -6,7 +6,6 @@
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"
 #include "tools/plots/plot_power.h"
-#include "report_tiles.h"
 #include "tools/results/plain_words.h"
 
 #include <stdlib.h>
@@ -138,7 +137,7 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
         return false;
     plot_power(f, json);
     fputs("</div>\n", f);
-    report_tiles(f, json);
+    report_evidence_tiles(f, json);
     report_evidence(f, json, !expected);
     fputs("</details>\n</article>\n", f);
     return true;

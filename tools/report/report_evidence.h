@@ -11,4 +11,9 @@
 /* <details> of a judged claim of results.json, unfolded if `open`. */
 void report_evidence(FILE *f, const json_t *claim, bool open);
 
+/* The reporting tiles of smallest p as buttons (data-x, data-y: their corner, pixels) that mark the tile
+ * in the images, and an empty line for what the page's script reads there. Nothing if no tile has
+ * noise. */
+void report_evidence_tiles(FILE *f, const json_t *claim);
+
 #endif
