@@ -36,16 +36,14 @@ static bool check_place(const json_t *tile, const char *where, struct err *e)
            err_set(e, "%s: a tile has no whole 'x' and 'y'", where);
 }
 
-/* The margin is null where none can be had. */
 static bool check_claim(const json_t *j, const char *where, struct err *e)
 {
     enum verdict v;
-    const json_t *margin = json_object_get(j, "margin");
     const char *verdict = member_text(j, "ratio_verdict");
     if (!check_estimate(j, "ratio", true, where, e))
         return false;
-    if (!json_is_number(margin) && !json_is_null(margin))
-        return err_set(e, "%s: 'margin' is neither a number nor null", where);
+    if (!json_is_number(json_object_get(j, "margin")))
+        return err_set(e, "%s: 'margin' is not a number", where);
     return (verdict != NULL && verdict_parse(verdict, &v)) ||
            err_set(e, "%s: 'ratio_verdict' is not a verdict", where);
 }
@@ -203,10 +201,7 @@ static void print_against(char text[NOISE_CELL], const json_t *row)
                      member_number(tile, "y"));
         print_estimate(text, of[i], "ratio", "%.3g", " [%.3g, %.3g]");
         n = strlen(text);
-        if (json_is_number(json_object_get(of[i], "margin")))
-            snprintf(text + n, NOISE_CELL - n, ", margin %.3g", member_number(of[i], "margin"));
-        else
-            snprintf(text + n, NOISE_CELL - n, ", no margin can be had");
+        snprintf(text + n, NOISE_CELL - n, ", margin %.3g", member_number(of[i], "margin"));
     }
 }
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 const double variance_ladder_none = 1e-6;
+static const double largest_margin = 3;
 
 void variance_map_free(struct variance_map *m)
 {
@@ -192,11 +193,10 @@ double variance_ladder_reach(struct estimate record, double share)
 
 double variance_ladder_margin(struct estimate record, double share, double least)
 {
-    static const double most = 3;
     if (record.value <= variance_ladder_none)
         return variance_ladder_none;
     double x = variance_ladder_reach(variance_ladder_log(record), share);
-    return x > log1p(most) ? INFINITY : fmax(expm1(x), least);
+    return fmin(fmax(expm1(x), least), largest_margin);
 }
 
 struct variance_claim variance_ladder_judge(struct estimate v, struct estimate wanted,
@@ -229,6 +229,9 @@ struct variance_claim variance_ladder_judge(struct estimate v, struct estimate w
         outside = i.lo > log1p(margin) || (both && i.hi < -log1p(margin));
         inside = i.hi <= log1p(margin) && (!both || i.lo >= -log1p(margin));
     }
-    c.verdict = outside ? VERDICT_DIFFERENT : inside ? VERDICT_EQUIVALENT : VERDICT_INCONCLUSIVE;
+    c.verdict = outside                      ? VERDICT_DIFFERENT
+                : inside                     ? VERDICT_EQUIVALENT
+                : c.margin >= largest_margin ? VERDICT_NOTHING_FOUND
+                                             : VERDICT_INCONCLUSIVE;
     return c;
 }

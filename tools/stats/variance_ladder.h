@@ -51,12 +51,11 @@ struct variance_claim {
 /* Half width of the interval of a difference to a record that was estimated like this, when `share` (0 to 1) of its
  * observations are taken again, at an alpha of 1e-6, and how far chance moves that in 1 of 1e4 runs. */
 double variance_ladder_reach(struct estimate record, double share);
-/* The margin that can be had against a record of this V: `least`, or what it reaches; INFINITY above 300 %: nothing can be
- * said. */
+/* The margin that can be had against a record of this V: `least`, or what it reaches, at most 300 %. */
 double variance_ladder_margin(struct estimate record, double share, double least);
 /* Two one-sided tests at alpha of V / wanted <= 1 + margin; if `both`, of >= 1/(1 + margin) too. DIFFERENT if the
- * interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE. A `wanted` without noise wants none: then ratio is
- * V itself, the margin variance_ladder_none. */
+ * interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE, or, at the largest margin, NO DIFFERENCE FOUND: more could
+ * not be promised. A `wanted` without noise wants none: then ratio is V itself, the margin variance_ladder_none. */
 struct variance_claim variance_ladder_judge(struct estimate v, struct estimate wanted,
                                             double margin, bool both, double alpha);
 

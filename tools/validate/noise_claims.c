@@ -32,7 +32,7 @@ struct row {
     int worst; /* tile of the claim */
     struct estimate slope;
     double slope_margin; /* 0: not judged */
-    bool has_slope, has_stated;
+    bool has_slope, has_stated, has_tiles;
     enum verdict slope_verdict;
 };
 
@@ -77,7 +77,7 @@ static json_t *tile_json(const struct row *r, int tile, json_t *more)
 static json_t *claim_json(const struct variance_claim *c)
 {
     return json_pack("{so,so,so,ss}", "ratio", number(c->ratio), "ratio_ci", pair(c->lo, c->hi),
-                     "margin", number(c->margin), "ratio_verdict", verdict_name(c->verdict));
+                     "margin", json_real(c->margin), "ratio_verdict", verdict_name(c->verdict));
 }
 
 static void add_measured(json_t *j, const struct row *r)
@@ -165,7 +165,7 @@ static json_t *judged_row(const struct row *r)
     json_t *image = claim_json(&r->image), *stated = claim_json(&r->stated);
     json_object_set_new(j, "against", json_string(r->against));
     json_object_update(j, image);
-    if (r->tile.verdict != VERDICT_NOTHING_FOUND)
+    if (r->has_tiles)
         json_object_set_new(j, "tile_claim", tile_json(r, r->worst, claim_json(&r->tile)));
     if (r->has_stated)
         json_object_set(j, "stated", stated);
@@ -192,17 +192,13 @@ static void judge_tiles(const struct noise_ladder *run, const struct variance_ma
                         const struct variance_map *record, double share, bool both, double alpha,
                         struct row *r)
 {
-    int num = run->sample.tiles_x * run->sample.tiles_y, tested = 0;
+    int num = run->sample.tiles_x * run->sample.tiles_y;
     double furthest = -INFINITY;
-    r->tile = (struct variance_claim){.verdict = VERDICT_NOTHING_FOUND};
-    for (int i = 0; i < num; i++)
-        tested += isfinite(variance_ladder_margin(record->tile[i], share, least_margin));
+    r->has_tiles = true;
     for (int i = 0; i < num; i++) {
         double margin = variance_ladder_margin(record->tile[i], share, least_margin);
-        if (!isfinite(margin))
-            continue;
-        struct variance_claim c = variance_ladder_judge(run->sample.tile[i], wanted->tile[i],
-                                                        margin, both, alpha / tested);
+        struct variance_claim c =
+            variance_ladder_judge(run->sample.tile[i], wanted->tile[i], margin, both, alpha / num);
         double out = c.ratio / (1 + c.margin) + (c.verdict == VERDICT_DIFFERENT ? 1e9 : 0);
         if (out > furthest) {
             furthest = out;
@@ -258,7 +254,7 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
         r->slope_verdict =
             convergence_rate_slope_verdict(r->slope, a * other_share, r->slope_margin);
     margin = variance_ladder_margin(stated_error(record), share, stated_margin);
-    r->has_stated = isfinite(margin);
+    r->has_stated = true;
     r->stated = variance_ladder_judge(stated_error(run), run->sample.image, margin, true,
                                       a * other_share / 2);
 }
@@ -270,7 +266,6 @@ static void judge_sobol(const struct noise_ladder *run, const struct noise_ladde
     struct estimate top = run->rung[run->num - 1].variance,
                     was = record->rung[record->num - 1].variance;
     double a = r->alpha * other_share, share = (double)run->replicates / record->replicates;
-    r->tile.verdict = VERDICT_NOTHING_FOUND;
     r->image =
         variance_ladder_judge(top, was, variance_ladder_margin(was, share, least_margin), false, a);
     judge_slope(run, record, r);

@@ -8,7 +8,7 @@ static const char good[] =
     "  'ratio_verdict': 'DIFFERENT', 'variance': 0.9, 'variance_ci': [0.8, 1.0],"
     "  'worst_tile': {'x': 16, 'y': 0, 'variance': 3, 'variance_ci': null}, 'slope': -0.5, 'slope_ci': [-0.51, -0.49],"
     "  'slope_verdict': 'EQUIVALENT', 'slope_margin': 0.1, 'rungs': [{'spp': 1, 'variance': 0.9, 'variance_ci': null}],"
-    "  'tile_claim': {'x': 0, 'y': 32, 'ratio': 2, 'ratio_ci': [1.7, 2.4], 'margin': null, 'ratio_verdict': 'DIFFERENT'}},"
+    "  'tile_claim': {'x': 0, 'y': 32, 'ratio': 2, 'ratio_ci': [1.7, 2.4], 'margin': 0.3, 'ratio_verdict': 'DIFFERENT'}},"
     " {'scene': '41_cornell', 'engine': 'cycles', 'alpha': 1e-6, 'verdict': 'MEASURED', 'passed': true, 'variance': 0.7,"
     "  'variance_ci': [0.5, 0.9], 'worst_tile': {'x': 0, 'y': 0, 'variance': 1, 'variance_ci': null},"
     "  'rungs': [{'spp': 1, 'variance': 0.7, 'variance_ci': null}]},"
@@ -46,8 +46,8 @@ TEST(rows_come_out_as_they_say)
     for (size_t i = 0; i < COUNT(outcome); i++)
         assert_int_equal(noise_results_outcome(json_array_get(noise, i)), outcome[i]);
     noise_results_cell(json_array_get(noise, 0), 4, text);
-    assert_string_equal(
-        text, "record: 1.5 [1.4, 1.6], margin 0.1; tile 0,32: 2 [1.7, 2.4], no margin can be had");
+    assert_string_equal(text,
+                        "record: 1.5 [1.4, 1.6], margin 0.1; tile 0,32: 2 [1.7, 2.4], margin 0.3");
     noise_results_cell(json_array_get(noise, 2), NOISE_COLUMNS - 1, text);
     assert_string_equal(text, "not stored");
     /* Ours alone are claims. */
@@ -72,7 +72,7 @@ TEST(what_is_broken_is_refused)
         {"'variance_ci': [0.8, 1.0]", "'variance_ci': [1.0, 0.8]", "'variance_ci' is neither"},
         {"'x': 16", "'x': 1.5", "no whole 'x'"},
         {"'ratio': 1.5,", "", "'ratio' is not a number"},
-        {"'margin': 0.1", "'margin': 'much'", "'margin' is neither"},
+        {"'margin': 0.1", "'margin': 'much'", "'margin' is not"},
         {"'rungs': [{'spp': 1, 'variance': 0.9, 'variance_ci': null}]", "'rungs': []",
          "'rungs' is not"},
         {"'against': 'record',", "", "'against', 'reason' or 'seconds'"},
