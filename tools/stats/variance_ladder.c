@@ -185,7 +185,7 @@ struct estimate variance_ladder_log(struct estimate v)
 
 double variance_ladder_reach(struct estimate record, double share)
 {
-    static const double alpha = 1e-6, missed = 1e-4;
+    static const double alpha = 1e-6, missed = 1e-6;
     double dof = fmax(record.dof * share, 1);
     return (stats_t_quantile(alpha, dof) + stats_t_quantile(missed, dof)) * record.se *
            sqrt(1 + 1 / share);
@@ -197,6 +197,12 @@ double variance_ladder_margin(struct estimate record, double share, double least
         return variance_ladder_none;
     double x = variance_ladder_reach(variance_ladder_log(record), share);
     return fmin(fmax(expm1(x), least), largest_margin);
+}
+
+struct estimate variance_ladder_expect(struct estimate run, struct estimate record, double share)
+{
+    run.dof = fmax(run.dof, record.dof * share);
+    return run;
 }
 
 struct variance_claim variance_ladder_judge(struct estimate v, struct estimate wanted,

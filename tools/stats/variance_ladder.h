@@ -49,10 +49,14 @@ struct variance_claim {
     double margin;
 };
 /* Half width of the interval of a difference to a record that was estimated like this, when `share` (0 to 1) of its
- * observations are taken again, at an alpha of 1e-6, and how far chance moves that in 1 of 1e4 runs. */
+ * observations are taken again, at an alpha of 1e-6, and how far chance moves that in 1 of 1e6 runs. */
 double variance_ladder_reach(struct estimate record, double share);
 /* The margin that can be had against a record of this V: `least`, or what it reaches, at most 300 %. */
 double variance_ladder_margin(struct estimate record, double share, double least);
+/* An estimate of a run of the same engine: with the degrees of freedom that the record makes expect, if they are more. One
+ * firefly in a run makes its standard error large and its own degrees of freedom few, one too often of the two. */
+struct estimate variance_ladder_expect(struct estimate run, struct estimate record, double share);
+
 /* Two one-sided tests at alpha of V / wanted <= 1 + margin; if `both`, of >= 1/(1 + margin) too. DIFFERENT if the
  * interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE, or, at the largest margin, NO DIFFERENCE FOUND: more could
  * not be promised. A `wanted` without noise wants none: then ratio is V itself, the margin variance_ladder_none. */

@@ -197,8 +197,9 @@ static void judge_tiles(const struct noise_ladder *run, const struct variance_ma
     r->has_tiles = true;
     for (int i = 0; i < num; i++) {
         double margin = variance_ladder_margin(record->tile[i], share, least_margin);
+        struct estimate v = variance_ladder_expect(run->sample.tile[i], record->tile[i], share);
         struct variance_claim c =
-            variance_ladder_judge(run->sample.tile[i], wanted->tile[i], margin, both, alpha / num);
+            variance_ladder_judge(v, wanted->tile[i], margin, both, alpha / num);
         double out = c.ratio / (1 + c.margin) + (c.verdict == VERDICT_DIFFERENT ? 1e9 : 0);
         if (out > furthest) {
             furthest = out;
@@ -237,6 +238,7 @@ static void judge_slope(const struct noise_ladder *run, const struct noise_ladde
         return;
     double half = fmax(slope_margin, variance_ladder_reach(was, share));
     r->slope_margin = half <= most_slope ? half : 0;
+    r->slope = variance_ladder_expect(r->slope, was, share);
 }
 
 /* By the record, or by a closed form, where the record only says which margins can be had. */
@@ -245,7 +247,8 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
 {
     double a = r->alpha, each = image_share / (both ? 2 : 1), share = run->n / record->n;
     double margin = variance_ladder_margin(record->sample.image, share, least_margin);
-    r->image = variance_ladder_judge(run->sample.image, wanted->image, margin, both, a * each);
+    struct estimate v = variance_ladder_expect(run->sample.image, record->sample.image, share);
+    r->image = variance_ladder_judge(v, wanted->image, margin, both, a * each);
     judge_tiles(run, wanted, &record->sample, share, both, a * tile_share / (both ? 2 : 1), r);
     if (noise_ladder_is_silent(run))
         return;
@@ -253,10 +256,11 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
     if (r->slope_margin > 0)
         r->slope_verdict =
             convergence_rate_slope_verdict(r->slope, a * other_share, r->slope_margin);
-    margin = variance_ladder_margin(stated_error(record), share, stated_margin);
+    struct estimate was = stated_error(record),
+                    is = variance_ladder_expect(stated_error(run), was, share);
+    margin = variance_ladder_margin(was, share, stated_margin);
     r->has_stated = true;
-    r->stated = variance_ladder_judge(stated_error(run), run->sample.image, margin, true,
-                                      a * other_share / 2);
+    r->stated = variance_ladder_judge(is, v, margin, true, a * other_share / 2);
 }
 
 /* Of stratified samples: the last rung against that of the record, and a slope of -1/2 at most. */
@@ -266,6 +270,7 @@ static void judge_sobol(const struct noise_ladder *run, const struct noise_ladde
     struct estimate top = run->rung[run->num - 1].variance,
                     was = record->rung[record->num - 1].variance;
     double a = r->alpha * other_share, share = (double)run->replicates / record->replicates;
+    top = variance_ladder_expect(top, was, share);
     r->image =
         variance_ladder_judge(top, was, variance_ladder_margin(was, share, least_margin), false, a);
     judge_slope(run, record, r);

@@ -159,8 +159,9 @@ static void check_rates(enum law law, unsigned long seed)
         MUST(variance_ladder_within(r.m, K, &unit, TILE, &run, &e));
         MUST(variance_ladder_within(s.m, K, &unit, TILE, &record, &e));
         MUST(variance_ladder_between(s.images, K, &unit, WIDTH, TILE, &between, &e));
-        enum verdict v =
-            variance_ladder_judge(run.image, record.image, margin, false, alpha).verdict;
+        enum verdict v = variance_ladder_judge(variance_ladder_expect(run.image, record.image, 1),
+                                               record.image, margin, false, alpha)
+                             .verdict;
         different += v == VERDICT_DIFFERENT;
         equivalent += v == VERDICT_EQUIVALENT;
         struct interval one = estimate_interval(variance_ladder_log(record.image), alpha),
