@@ -20,6 +20,7 @@ shows is used to make tests better; sample 2 is for the report alone.
     tests/mutants/machine/mutate.py                      # how many there are, by file; --list, --show ID
     tests/mutants/machine/run.py prepare                 # once for a state of renderer/: times, lines that tests run
     tests/mutants/machine/run.py go 1 --seconds 3600     # the next mutants of sample 1; may be killed, and goes on
+    tests/mutants/machine/run.py go 1 --again            # its survivors too, by the tests as they are now
     tests/mutants/machine/run.py one ID                  # one mutant
     tests/mutants/machine/run.py page                    # stores the results here and makes this page
 
@@ -73,7 +74,8 @@ def read(path):
     if not os.path.exists(path):
         return []
     with open(path) as f:
-        return [dict(zip(COLUMNS, line.split("\t"))) for line in f.read().splitlines()[1:]]
+        rows = [dict(zip(COLUMNS, line.split("\t"))) for line in f.read().splitlines()[1:]]
+    return list({r["id"]: r for r in rows}.values())  # the last word on each
 
 
 def by_unit(r):
@@ -130,7 +132,8 @@ def write_page(folder):
         page.append("| %s | %d | %d | %d | %d | %d | %d | %d |" % (
             f[len("renderer/"):], len(rows), sum(a and b for a, b in zip(u, v)), sum(a and not b for a, b in zip(u, v)),
             sum(b and not a for a, b in zip(u, v)), sum(not a and not b for a, b in zip(u, v)), len(seen), sum(map(by_validate, seen))))
-    page += ["", "## Survivors of sample 1", "", "| mutant | place | operator | before | after | changes an image | why `validate` did not find it |",
+    page += ["", "## Survivors of sample 1", "", "Lines are those of the state that was measured; `mutate.py --show ID` finds a mutant as long as its line stands.",
+             "", "| mutant | place | operator | before | after | changes an image | why `validate` did not find it |",
              "|---|---|---|---|---|---|---|"]
     for r in samples[0]:
         if r["kind"] == "mutant" and not by_unit(r) and not by_validate(r):

@@ -2,8 +2,9 @@
 """Builds mutants (mutate.py), and sees who finds them: the unit tests, `assay validate`, both, or none.
 
     tests/mutants/machine/run.py [--build DIR] prepare                    once for a state of renderer/: ten CPU minutes
-    tests/mutants/machine/run.py [--build DIR] go SAMPLE [--seconds S] [--shard I/N]
-                                                 the next mutants of sample 1 or 2; may be killed, and goes on; shards run side by side
+    tests/mutants/machine/run.py [--build DIR] go SAMPLE [--seconds S] [--shard I/N] [--again]
+                                                 the next mutants of sample 1 or 2; may be killed, and goes on; shards run side by side;
+                                                 --again: the survivors once more, by the tests as they are now
     tests/mutants/machine/run.py [--build DIR] one ID...                  these mutants, to the screen
     tests/mutants/machine/run.py [--build DIR] page                       README.md from the results, which it stores beside it
 
@@ -21,7 +22,7 @@ import time
 
 sys.dont_write_bytecode = True  # nothing is written beside the sources
 import mutate
-from page import COLUMNS, write_page
+from page import COLUMNS, by_unit, by_validate, write_page
 from prepare import Preparation
 from workshop import POOL_SPP, SMOKE_SPP, Workshop, cpu_now, limited, run
 
@@ -255,7 +256,7 @@ class Runner(Workshop):
 
     # Many.
 
-    def go(self, number, seconds):
+    def go(self, number, seconds, again=False):
         path = os.path.join(self.dir, "sample%d.tsv" % number)
         stored = os.path.join(HERE, "sample%d.tsv" % number)
         if not os.path.exists(path) and os.path.exists(stored):
@@ -266,6 +267,8 @@ class Runner(Workshop):
                 for line in f.read().splitlines()[1:]:
                     r = dict(zip(COLUMNS, line.split("\t")))
                     done.add(r["id"])
+                    if again and r["kind"] == "mutant" and not (by_unit(r) or by_validate(r)):
+                        done.remove(r["id"])
                     if r["unit"].startswith("test_"):
                         self.kills[(r["file"], r["unit"])] += 1
                         self.kills[r["unit"]] += 1
@@ -292,6 +295,7 @@ def main():
     p.add_argument("more", nargs="*")
     p.add_argument("--seconds", type=float, default=1e9)
     p.add_argument("--shard", default="1/1")
+    p.add_argument("--again", action="store_true", help="survivors too, by the tests as they are now")
     a = p.parse_args()
     if a.what == "page":
         for n in (1, 2):
@@ -306,7 +310,7 @@ def main():
         return
     r = Runner(a.build, shard=(shard - 1, shards))
     if a.what == "go":
-        r.go(int(a.more[0]), a.seconds)
+        r.go(int(a.more[0]), a.seconds, a.again)
     else:
         r.load()
         for m in mutate.all_mutants():
