@@ -141,6 +141,16 @@ bool variance_ladder_between(const float *images, int count, const struct conver
     return ok;
 }
 
+/* No samples below 0 have E[x^3] E[x] < E[x^2]^2 [Cauchy-Schwarz]; equal where all are 0 or one value. */
+static bool check_third(const struct moments *m, size_t i, struct err *e)
+{
+    static const double rounding = 1e-3;
+    double n = m->n[i / 3], mean = m->mean[i], m2 = m->m2[i] / n, m3 = m->m3[i] / n;
+    double second = m2 + mean * mean, third = m3 + 3 * mean * m2 + mean * mean * mean;
+    return third * mean >= second * second * (1 - rounding) ||
+           err_set(e, "pixel %zu: an M3 that no samples of radiance have", i / 3);
+}
+
 bool variance_ladder_within(const struct moments *render, int count,
                             const struct converge_reference *unit, int tile,
                             struct variance_map *out, struct err *e)
@@ -161,8 +171,10 @@ bool variance_ladder_within(const struct moments *render, int count,
         for (int k = 0; ok && k < count; k++) {
             const struct moments *m = &render[k];
             ok = m->n[p] >= 2 || err_set(e, "pixel %zu has %g samples", p, m->n[p]);
-            for (size_t i = 3 * p; ok && i < 3 * p + 3; i++)
+            for (size_t i = 3 * p; ok && i < 3 * p + 3; i++) {
                 d[k] += m->m2[i] / ((m->n[p] - 1) * unit->unit[i] * unit->unit[i]);
+                ok = check_third(m, i, e);
+            }
         }
         double mean, sum = scatter(d, count, &mean);
         areas_add(&a, out, p, mean / 3, sum / (9 * K * (K - 1)));

@@ -33,7 +33,7 @@ int variance_map_tile(const struct variance_map *m, int x, int y, int side);
 bool variance_ladder_between(const float *images, int count, const struct converge_reference *unit,
                              int width, int tile, struct variance_map *out, struct err *e)
     __attribute__((warn_unused_result));
-/* K renders of unit "sample"; fails where a pixel holds fewer than two. */
+/* K renders of unit "sample"; fails where a pixel holds fewer than two, or an M3 that no samples of 0 and more can have. */
 bool variance_ladder_within(const struct moments *render, int count,
                             const struct converge_reference *unit, int tile,
                             struct variance_map *out, struct err *e)

@@ -50,14 +50,14 @@ static struct converge_reference make_unit(void)
     return r;
 }
 
-/* One render of SPP samples; scale: of the noise. Channels are the same, the worst case for the interval. */
+/* One render of SPP samples; scale: of the samples. Channels are the same, the worst case for the interval. */
 static void render(gsl_rng *rng, enum law law, double scale, struct moments *m)
 {
     struct err e;
     MUST(moments_alloc(m, WIDTH, HEIGHT, &e));
     for (size_t p = 0; p < SIZE / 3; p++)
         for (int s = 0; s < SPP; s++) {
-            double x = truth(3 * p) * (1 + scale * (draw(rng, law) - 1));
+            double x = truth(3 * p) * scale * draw(rng, law);
             moments_add(m, p, (double[]){x, x, x});
         }
 }
@@ -280,6 +280,26 @@ TEST(no_noise_is_asserted)
     assert_int_equal(variance_ladder_judge(none, some, 0.1, false, 1e-6).verdict,
                      VERDICT_EQUIVALENT);
     assert_int_equal(variance_ladder_judge(none, some, 0.1, true, 1e-6).verdict, VERDICT_DIFFERENT);
+}
+
+/* Of mostly black noise, whose skewness is 6.5: the sign of M3 turned, and half of M3. */
+TEST(third_moments_that_cannot_be_are_an_error)
+{
+    gsl_rng *rng = new_rng(7);
+    struct converge_reference unit = make_unit();
+    static struct renders r;
+    struct variance_map map;
+    struct err e;
+    render_all(rng, BLACK, 1, &r);
+    for (size_t i = 0; i < SIZE; i++)
+        r.m[3].m3[i] *= -1;
+    REFUSES(variance_ladder_within(r.m, K, &unit, TILE, &map, &e), "no samples of radiance have");
+    for (size_t i = 0; i < SIZE; i++)
+        r.m[3].m3[i] *= -0.5;
+    REFUSES(variance_ladder_within(r.m, K, &unit, TILE, &map, &e), "no samples of radiance have");
+    renders_free(&r);
+    convergence_rate_reference_free(&unit);
+    gsl_rng_free(rng);
 }
 
 /* Replicates of which two are the same, with others that are not. */
