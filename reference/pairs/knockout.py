@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""knockout.py BUILD [-o FILE] [SCENE ...] [--levels LEVEL ...]: switches each level of each scene off in turn, renders what is left with
+"""knockout.py BUILD [SCENE ...] [-o FILE] [--levels LEVEL ...]: switches each level of each scene off in turn, renders what is left with
 BUILD/pathtracer, and holds it against the scene's golden with BUILD/assay. Prints a line for each; FILE gets all as JSON. A
 level without which the image is not DIFFERENT, by more than the smallest bias that could have been missed there, is there
 in name only: exit code 1."""

@@ -7,8 +7,8 @@ import sys
 
 from pairs import CAMERA_LEVELS, LIGHT_LEVELS, Scene, rows
 from pairs_cover import FACTORS, cover, triples
-from pairs_text import MARGIN_GLOBAL, MARGIN_TILE, wrap
-from runs import FACTORS as RUN_FACTORS, SAMPLES, SEEDS, is_possible, table
+from pairs_text import MARGIN_GLOBAL, MARGIN_GLOBAL_DARK, MARGIN_TILE, wrap
+from runs import FACTORS as RUN_FACTORS, SEEDS, table
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -77,7 +77,7 @@ def main():
         out.append(f"| {s.name} | {', '.join(LIGHT_LEVELS[s.lights])} | {s.world} | {', '.join(CAMERA_LEVELS[s.camera])} | "
                    f"{size['width']} x {size['height']} | {s.depth} | {'yes' if s.mosaic else ''} |")
     out += ["", "## What each level is"] + LEVELS.rstrip().split("\n")
-    out += ["", f"Truth: Cycles, {100 * MARGIN_GLOBAL:g} % of the image, {100 * MARGIN_TILE:g} % of a tile. POV-Ray has no rough metals, and each scene has one.",
+    out += ["", f"Truth: Cycles, {100 * MARGIN_GLOBAL:g} % of the image ({100 * MARGIN_GLOBAL_DARK:g} % where no sky shines), {100 * MARGIN_TILE:g} % of a tile. POV-Ray has no rough metals, and each scene has one.",
             "Not in the array: textures, which the loader does not have, and 1e6 triangles, whose dump for Cycles alone is 100 MB.",
             "", f"## Which scene holds which pair: {len(pairs) - len(missing)} of {len(pairs)}", ""]
     out += ["In no scene: " + "; ".join(f"{a} with {b}" for _, a, _, b in missing) + ".",
@@ -99,8 +99,8 @@ def main():
                 f"{effect[s.name, level]:.3g}" if (s.name, level) in effect else "" for s in scenes) + " |")
     if ran["runs"]:
         out += ["", f"## Other ways to the same images: {len(table())} runs", "",
-                f"All pairs of {', '.join(RUN_FACTORS)}, that can be (adaptive sampling needs independent samples), over scenes by turns,",
-                f"{SAMPLES} samples ({SEEDS} images of seeds of their own with Sobol's), against the same references. Shares are of three ranges of sample",
+                f"All pairs of {', '.join(RUN_FACTORS)}, that can be (adaptive sampling needs independent samples, shares",
+                f"that stopped by themselves do not add up, and to a pilot no samples can be added), over scenes by turns, with their samples ({SEEDS} images of seeds of their own with Sobol's), against the same references. Shares are of three ranges of sample",
                 "numbers, cells four rectangles of odd sizes (`-p`); both are merged. A PNG has to show the means of the EXR beside it,",
                 f"within rounding. Measured {ran['date']}.", "",
                 "| run | scene | " + " | ".join(RUN_FACTORS) + " | verdict | difference % |", "|---|---|" + "---|" * len(RUN_FACTORS) + "---|--:|"]

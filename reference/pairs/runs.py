@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""runs.py BUILD [-o FILE] [RUN ...]: renders scenes of the suite's pairs in other ways (estimator, -l, roulette, sampler, adaptive
+"""runs.py BUILD [RUN ...] [-o FILE]: renders scenes of the suite's pairs in other ways (estimator, -l, roulette, sampler, adaptive
 sampling, in shares, in cells, resumed, as PNG; all pairs of these) and holds each image against the scene's golden with
 BUILD/assay. A line for each; exit code 1 if one is not EQUIVALENT. FILE gets all as JSON; --list: the table."""
 import argparse
@@ -26,13 +26,15 @@ SCENES = {"mis": ("62_points_here", "55_many_far", "51_image_far", "60_ambient_s
           "light": ("53_image_large", "56_many_small", "65_points_large", "58_ambient_here"),
           "bsdf": ("64_points_small", "59_ambient_far", "52_image_small", "59_ambient_far"),
           "hemisphere": ("59_ambient_far", "64_points_small", "59_ambient_far", "64_points_small")}
-SAMPLES = 1024
 SEEDS = 16  # of Sobol's: its samples depend on each other, images of seeds of their own do not
 ALPHA = "5e-6"  # of a claim of the suite, about
 
 
 def is_possible(run):
-    return run["sampler"] == "independent" or run["adaptive"] == "no"
+    """Adaptive sampling needs independent samples; shares that each stopped by its own samples do not add up; and a pilot
+    has the number of samples to choose from beforehand, so that none can be added."""
+    bad = {"no": (), "rule": ("merged",), "unbiased": ("resumed",)}[run["adaptive"]]
+    return run["parts"] not in bad and (run["adaptive"] == "no" or run["sampler"] == "independent")
 
 
 def table():
@@ -115,10 +117,10 @@ class Runner:
             os.makedirs(a)
             for seed in range(SEEDS):
                 one = f"{self.folder}/one_{seed}.exr"
-                self.image(one, max(64, SAMPLES // SEEDS), str(seed + 1))
+                self.image(one, max(64, self.s["spp"] // SEEDS), str(seed + 1))
                 shutil.copy(one, f"{a}/{seed}.exr")
         else:
-            self.image(a, SAMPLES, "1")
+            self.image(a, self.s["spp"], "1")
         tile = str(self.s["tile"])
         subprocess.run([f"{self.build}/assay", "compare", "-q", "--alpha", ALPHA, "--margin",
                         str(margins["margin_global"]), "--margin-tile", str(margins["margin_tile"]), "--tile", tile,
