@@ -13,6 +13,7 @@ import sys
 import tempfile
 
 from pairs import Scene, rows, write, write_sky
+from pairs_cover import is_seen
 
 ALPHA = "5e-6"  # of a claim of the suite, about
 SHARE = 4  # a quarter of the scene's samples first, then all: most move the image so much that it needs no more
@@ -53,12 +54,8 @@ def knock(build, folder, scene, off, whole, share=SHARE):
     claim = judge(build, folder, image, golden, s)
     if whole is None:
         return claim
-    return {"scene": scene.name, "level": off, "verdict": claim["verdict"], "effect": round(max(
+    return {"scene": scene.name, "level": off, "depth": scene.depth, "verdict": claim["verdict"], "effect": round(max(
         abs(claim["difference"]) / whole["mdb_global"], abs(claim["worst"]["difference"]) / region_mdb(claim)), 1)}
-
-
-def is_seen(k):
-    return k["verdict"] == "DIFFERENT" and k["effect"] > 1
 
 
 def region_mdb(claim):

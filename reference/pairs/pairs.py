@@ -252,7 +252,7 @@ class Scene:
               across[0] * along[1] - across[1] * along[0]]
         plates = max(1, round(0.5 / gap))
         self.material("plate", tag("profile_COMMON", tag("technique", tag("lambert", tag("diffuse", tag(
-            "color", "0 0 0 1"))), sid="c")) + extra(tag("mirror", tag("reflectance", "0.97 0.97 0.97"))))
+            "color", "0 0 0 1"))), sid="c")) + extra(tag("mirror", tag("reflectance", "1 1 1"))))
         dark = 0.3 if self.lights in WITHOUT_BECKMANN else 1
         self.glow("sheet", [dark * c for c in (1.6, 1.3, 1.0)], 1)
         half = [f - 0.5 * plates * gap * a - 0.5 * height * u for f, a, u in zip(front, across, up)]

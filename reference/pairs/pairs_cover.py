@@ -1,5 +1,9 @@
-"""Which scene holds which pair of levels."""
+#!/usr/bin/env python3
+"""pairs_cover.py: how many pairs of levels there are, and which no scene holds. A level that a scene does not see
+(knockout.json) does not count there."""
 import itertools
+import json
+import os
 
 from pairs import CAMERA_LEVELS, LIGHT_LEVELS, LIGHTS, CAMERAS, DEPTHS, GEOMETRIES, MATERIALS, TRANSFORMS, WORLDS, Scene, rows
 
@@ -17,6 +21,26 @@ def triples(scene):
     for material, geometry, transform in scene.levels["objects"]:
         for m in scene.materials if geometry == "mosaic" else [material]:
             yield m, geometry, transform
+
+
+def read(name, otherwise):
+    """What was measured, from beside this; `otherwise` where nothing was."""
+    path = os.path.join(os.path.dirname(os.path.abspath(__file__)), name)
+    if not os.path.exists(path):
+        return otherwise
+    with open(path, encoding="utf-8") as f:
+        return json.load(f)
+
+
+def is_seen(knocked):
+    """A level was switched off: is the image DIFFERENT, by more than the smallest bias that could have been missed?"""
+    return knocked["verdict"] == "DIFFERENT" and knocked["effect"] > 1
+
+
+def unseen():
+    """{(scene, level)}"""
+    return {(k["scene"], k["level"].replace("depth", f"depth {k.get('depth')}")) for k in
+            read("knockout.json", {"levels": []})["levels"] if not is_seen(k)}
 
 
 def pairs_of(scene):
@@ -37,9 +61,12 @@ def pairs_of(scene):
 def cover():
     """{pair: [numbers of scenes]}, with all pairs that could be."""
     found = {(f, a, g, b): [] for f, g in itertools.combinations(FACTORS, 2) for a in FACTORS[f] for b in FACTORS[g]}
+    without = unseen()
     for row in rows():
-        for pair in set(pairs_of(Scene(row))):
-            found[pair].append(row[0])
+        scene = Scene(row)
+        for pair in set(pairs_of(scene)):
+            if not {(scene.name, pair[1]), (scene.name, pair[3])} & without:
+                found[pair].append(row[0])
     return found
 
 

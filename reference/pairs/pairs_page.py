@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
 """pairs_page.py [FILE]: writes reference/docs/pairs.md, or FILE, from the table, the list of runs and what knockout.py and runs.py said
 (knockout.json, runs.json beside this)."""
-import json
 import os
 import sys
 
 from pairs import CAMERA_LEVELS, LIGHT_LEVELS, Scene, rows
-from pairs_cover import FACTORS, cover, triples
+from pairs_cover import FACTORS, cover, is_seen, read
 from pairs_text import MARGIN_GLOBAL, MARGIN_GLOBAL_DARK, MARGIN_TILE, wrap
 from runs import FACTORS as RUN_FACTORS, SEEDS, table
 
@@ -38,23 +37,6 @@ def numbers(scenes):
     return " ".join(str(n) for n in sorted(scenes))
 
 
-def level_of(scene):
-    """{level: True} of what can be switched off in a scene, by its names in the array."""
-    found = set()
-    for m, g, t in triples(scene):
-        found |= {m, g, t}
-    return found | set(LIGHT_LEVELS[scene.lights]) | set(CAMERA_LEVELS[scene.camera]) | {f"depth {scene.depth}"}
-
-
-def read(name, otherwise):
-    """What was measured, if it was."""
-    path = os.path.join(HERE, name)
-    if not os.path.exists(path):
-        return otherwise
-    with open(path, encoding="utf-8") as f:
-        return json.load(f)
-
-
 def main():
     knocked, ran = read("knockout.json", {"levels": []}), read("runs.json", {"runs": []})
     scenes = [Scene(row) for row in rows()]
@@ -78,11 +60,13 @@ def main():
                    f"{size['width']} x {size['height']} | {s.depth} | {'yes' if s.mosaic else ''} |")
     out += ["", "## What each level is"] + LEVELS.rstrip().split("\n")
     out += ["", f"Truth: Cycles, {100 * MARGIN_GLOBAL:g} % of the image ({100 * MARGIN_GLOBAL_DARK:g} % where no sky shines), {100 * MARGIN_TILE:g} % of a tile. POV-Ray has no rough metals, and each scene has one.",
+            "The mirrors of the depth meter reflect all light: no path ends by roulette there, so that a pixel has no noise.",
             "Not in the array: textures, which the loader does not have, and 1e6 triangles, whose dump for Cycles alone is 100 MB.",
             "", f"## Which scene holds which pair: {len(pairs) - len(missing)} of {len(pairs)}", ""]
     out += ["In no scene: " + "; ".join(f"{a} with {b}" for _, a, _, b in missing) + ".",
             "A sphere scaled unevenly is no sphere, and refused. Cycles cannot light its random facets, of which Beckmann's are made,",
-            "by lights without area or by the hidden ambient one ([why](../cycles/README.md)).", ""]
+            "by lights without area or by the hidden ambient one ([why](../cycles/README.md)). The others a scene has, but does not see:",
+            "what is in brackets below does not count. Mostly it is the normals of a torus a few pixels wide.", ""]
     out += ["The numbers of the scenes; of each pair of factors a table.", ""]
     for f, g in dict.fromkeys((k[0], k[2]) for k in pairs):
         out += [f"### {f} and {g}", "", "| | " + " | ".join(FACTORS[g]) + " |", "|---|" + "---|" * len(FACTORS[g])]
@@ -91,12 +75,14 @@ def main():
     if knocked["levels"]:
         out += ["## What each scene sees", "",
                 f"How far the image moves when the level is switched off, in MDBs: of the region that moves most, over the smallest",
-                f"difference that would have been found there with 95 %. All are DIFFERENT. Measured {knocked['date']}.", ""]
+                f"difference that would have been found there with 95 %. In brackets: not seen, and not counted above. Measured",
+                f"{knocked['date']}.", ""]
+        mark = {(k["scene"], k["level"]): "{:.3g}" if is_seen(k) else "({:.3g})" for k in knocked["levels"]}
         columns = list(dict.fromkeys(k["level"] for k in knocked["levels"]))
         out += ["| level | " + " | ".join(str(s.number) for s in scenes) + " |", "|---|" + "--:|" * len(scenes)]
         for level in columns:
             out.append(f"| {level} | " + " | ".join(
-                f"{effect[s.name, level]:.3g}" if (s.name, level) in effect else "" for s in scenes) + " |")
+                mark[s.name, level].format(effect[s.name, level]) if (s.name, level) in effect else "" for s in scenes) + " |")
     if ran["runs"]:
         out += ["", f"## Other ways to the same images: {len(table())} runs", "",
                 f"All pairs of {', '.join(RUN_FACTORS)}, that can be (adaptive sampling needs independent samples, shares",
@@ -107,7 +93,7 @@ def main():
         for run in ran["runs"]:
             out.append(f"| {run['name'][4:]} | {run['scene']} | " + " | ".join(str(run[f]) for f in RUN_FACTORS) +
                        f" | {run['verdict']} | {100 * run['difference']:+.2f} |")
-    out = [line if line.startswith(("|", "    ")) else wrap(line) for line in out]
+    out = [line if line.startswith(("|", "    ", "#")) else wrap(line) for line in out]
     with open(sys.argv[1] if len(sys.argv) > 1 else os.path.join(HERE, "../docs/pairs.md"), "w", encoding="utf-8") as f:
         f.write("\n".join(out) + "\n")
 
