@@ -33,7 +33,12 @@ VALIDATE_CPU = 25  # seconds that a mutant may spend with validate, after which 
 
 class Runner(Workshop):
     def load(self):
-        with open(os.path.join(self.dir, "info.json")) as f:
+        path = os.path.join(self.dir, "info.json")
+        if not os.path.exists(path):
+            raise SystemExit("run.py: `run.py prepare` comes first")
+        if not self.pool_runs():
+            print("run.py: no scenes in %s (ASSAY_CS184): whether a mutant changes an image stays unknown" % self.cs184, file=sys.stderr)
+        with open(path) as f:
             self.info = json.load(f)
         if self.info["sources"] != self.sources:
             raise SystemExit("run.py: the renderer has changed since `run.py prepare`")
