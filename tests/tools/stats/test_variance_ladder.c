@@ -102,7 +102,7 @@ TEST(estimates_are_their_definitions)
         size_t x = p % WIDTH, y = p / WIDTH;
         if (x < 16 || y < 8)
             continue; /* the tile at 16,8 */
-        double without[K], mean = 0, squares = 0, all = 0;
+        double without[K] = {0}, mean = 0, squares = 0, all = 0;
         for (int out = 0; out <= K; out++) {
             double sum = 0, m = 0;
             int kept = out < K ? K - 1 : K;
@@ -311,7 +311,8 @@ TEST(a_seed_without_effect_is_an_error)
     struct variance_map map;
     struct err e;
     render_all(rng, EXPONENTIAL, 1, &r);
-    memcpy(r.images + SIZE, r.images, SIZE * sizeof *r.images);
+    for (size_t i = 0; i < SIZE; i++)
+        r.images[SIZE + i] = r.images[i];
     assert_false(variance_ladder_between(r.images, K, &unit, WIDTH, TILE, &map, &e));
     assert_string_equal(e.msg, "replicates with seeds of their own are the same image");
     renders_free(&r);
