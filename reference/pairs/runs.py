@@ -23,7 +23,7 @@ FACTORS = {"estimator": ("mis", "light", "bsdf", "hemisphere"),
            "output": ("exr", "png")}
 # Scenes by turns; estimators that seldom find a lamp have a sky or point lights alone.
 SCENES = {"mis": ("62_points_here", "55_many_far", "51_image_far", "60_ambient_small"),
-          "light": ("53_image_large", "56_many_small", "65_points_large", "58_ambient_here"),
+          "light": ("53_image_large", "56_many_small", "65_points_large", "57_many_large"),
           "bsdf": ("64_points_small", "59_ambient_far", "52_image_small", "59_ambient_far"),
           "hemisphere": ("59_ambient_far", "64_points_small", "59_ambient_far", "64_points_small")}
 SEEDS = 16  # of Sobol's: its samples depend on each other, images of seeds of their own do not

@@ -758,7 +758,7 @@ part tests/end_to_end/limits.sh "$build"
 
 # Verbs, and ways through them, that nothing above takes.
 part tests/end_to_end/verbs.sh "$build"
-part tests/end_to_end/pairs.sh "$build"
+part tests/end_to_end/pairs.sh "$plain"
 
 # The same work in jobs.
 part tests/studies/scale/scale.sh "$build"
