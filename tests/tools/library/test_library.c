@@ -239,7 +239,8 @@ TEST(test_refusals)
     s.name = "nightly";
     a[VALUES + 7] = NAN;
     refuses(&s, &good, &o, "nightly: pixel 2,0 of image 1 is not a number");
-    memcpy(a + VALUES, a, VALUES * sizeof *a);
+    for (size_t i = 0; i < VALUES; i++)
+        a[VALUES + i] = a[i];
     refuses(&s, &good, &o, "images 0 and 1 are the same");
     make_replicates(a, 4, 1);
     o.margin = NAN;
