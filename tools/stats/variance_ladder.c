@@ -141,13 +141,14 @@ bool variance_ladder_between(const float *images, int count, const struct conver
     return ok;
 }
 
-/* No samples below 0 have E[x^3] E[x] < E[x^2]^2 [Cauchy-Schwarz]; equal where all are 0 or one value. */
+/* No samples below 0 have E[x^3] E[x] < E[x^2]^2 [Cauchy-Schwarz]; equal where all are 0 or one value. Files hold 32-bit floats,
+ * in which the cubes of what is darker than 1e-12 are 0. */
 static bool check_third(const struct moments *m, size_t i, struct err *e)
 {
-    static const double rounding = 1e-3;
+    static const double rounding = 1e-3, darkest = 1e-24;
     double n = m->n[i / 3], mean = m->mean[i], m2 = m->m2[i] / n, m3 = m->m3[i] / n;
     double second = m2 + mean * mean, third = m3 + 3 * mean * m2 + mean * mean * mean;
-    return third * mean >= second * second * (1 - rounding) ||
+    return second < darkest || third * mean >= second * second * (1 - rounding) ||
            err_set(e, "pixel %zu: an M3 that no samples of radiance have", i / 3);
 }
 
