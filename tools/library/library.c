@@ -175,7 +175,7 @@ static bool told(bool ok, const struct err *e, char error[ASSAY_ERROR_SIZE])
 static bool run(struct assay_comparison *c, const struct assay_side *const side[4], struct err *e)
 {
     static const char *const name[4] = {"A", "B", "A2", "B2"};
-    struct library_side in[4] = {{NULL}};
+    struct library_side in[4] = {{.name = NULL}};
     bool ok = true;
     for (int i = 0; ok && i < 4 && side[i] != NULL; i++) {
         ok = library_side_open(&in[i], side[i], name[i], e);

@@ -126,5 +126,5 @@ void library_side_close(struct library_side *s)
         free(s->memory.renders.rgb[k]);
     free(s->memory.renders.rgb);
     moments_free(&s->moments);
-    *s = (struct library_side){NULL};
+    *s = (struct library_side){.name = NULL};
 }
