@@ -74,13 +74,13 @@ tell "Python: without the library it says what to set" "$(PYTHONPATH=$PWD/tools/
 
 # By pip, into an environment of its own, from a copy: what it makes is not to lie beside the sources.
 if $python -c 'import venv, ensurepip, setuptools, wheel' 2>/dev/null && $python -m venv --system-site-packages "$tmp/venv" >"$tmp/pip.log" 2>&1; then
-    before=$(git status --porcelain --ignored -- tools)
+    git status --porcelain --ignored -- tools >"$tmp/before"
     "$tmp/venv/bin/pip" install --no-build-isolation --no-index tools/python >>"$tmp/pip.log" 2>&1
     expect "pip installs it, library and all" 0 "^$tmp/venv/.* EQUIVALENT" env -C "$tmp" venv/bin/python -c "
 import assay, numpy
 r = [numpy.random.default_rng(s).gamma(4, .25, (8, 32, 32, 3)) for s in (1, 2)]
 print(assay.__file__, assay.compare(*r, margin=.05).verdict)"
-    tell "pip leaves nothing beside the sources" "$(diff <(echo "$before") <(git status --porcelain --ignored -- tools))"
+    tell "pip leaves nothing beside the sources" "$(diff "$tmp/before" <(git status --porcelain --ignored -- tools))"
 else
     echo "skip library: pip (no python3-venv, python3-pip, python3-setuptools or python3-wheel)"
 fi
