@@ -167,7 +167,7 @@ else
 fi
 
 # The suite: two scenes that take no time, of one of them only the claim of consistency, in jobs by scenes and by claims.
-wanted=(--only 12_point_plane/consistency --only 38_spot_edge)
+wanted=(--only 12_point_plane/consistency --only 38_spot_edge/truth --only 38_spot_edge/cycles --only 38_spot_edge/cycles:truth)
 "$assay" validate -q "${wanted[@]}" --out "$tmp/v1" >"$tmp/table1" 2>"$tmp/err"
 one=$?
 validation() { # NAME scene|claim JOBS
@@ -189,6 +189,19 @@ validation() { # NAME scene|claim JOBS
 }
 validation "a validation" scene 2
 validation "a validation by claims" claim 4
+# Noise, whose efficiency is a time: the same numbers but for those.
+noise() { # RESULTS
+    python3 -c 'import json, sys
+def without(x):
+    if isinstance(x, dict): return {k: without(v) for k, v in x.items() if k not in ("seconds", "cpu_s", "efficiency", "efficiency_ci")}
+    return [without(v) for v in x] if isinstance(x, list) else x
+print(json.dumps(without(json.load(open(sys.argv[1]))["noise"]), indent=1))' "$1"
+}
+"$assay" validate -q --only 38_spot_edge/noise --out "$tmp/n1" >"$tmp/out" 2>&1
+why=$("$assay" plan --plan "$tmp/nplan" --by claim validate -q --only 38_spot_edge/noise --out "$tmp/n2" 2>&1 >"$tmp/jobs") &&
+    "$assay" run-job "$tmp/nplan" 0 >"$tmp/out" 2>&1 && "$assay" gather "$tmp/nplan" >"$tmp/out" 2>&1 || why="$why $(cat "$tmp/out")"
+tell "the noise of a scene" "$why$(diff <(noise "$tmp/n1/results.json") <(noise "$tmp/n2/results.json") | head -n 6)$(noise "$tmp/n1/results.json" |
+    grep '"verdict": "EQUIVALENT"' >/dev/null || echo " no verdict")"
 rerun=$(sed -n 's/.*"rerun": "assay \(validate --only 38_spot_edge[^"]*\)".*/\1/p' "$tmp/v1/results.json" | head -n 1)
 why=$("$assay" $rerun -q --out "$tmp/v3" 2>&1 >"$tmp/out") && [ "$(grep -c '"expected"' "$tmp/v3/results.json")" -eq 1 ] &&
     cmp -s <(sed -n 2p "$tmp/table1" | tr -s ' ') <(sed -n 2p "$tmp/out" | tr -s ' ') || why="$rerun: $why"
