@@ -115,7 +115,7 @@ kill_golden() {
         killed $most "$assay" golden approve --from "$tmp/candidates" --golden "$store" $names
         [ $? -eq 0 ] && rm -rf "$store" && cp -r "$tmp/first" "$store"
         k=$((k + 1))
-        "$assay" golden status --golden "$store" >"$tmp/status" 2>/dev/null
+        "$assay" golden status --golden "$store" 2>/dev/null | grep -v '/noise, ' >"$tmp/status" # noise is not what is updated
         for name in $names; do
             grep -q "damaged.*$name/\|missing.*$name/\|stale.*$name/" "$tmp/status" && why="kill $k: $(grep " $name/" "$tmp/status" | head -n 2)"
         done
