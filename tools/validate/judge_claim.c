@@ -210,7 +210,7 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
     struct err e = {""};
     struct claim_context c = context(v, t, rerun);
     json_t *files = files_of(v, t, &e);
-    if (files != NULL)
+    if (files != NULL && rerun != NULL)
         t->result = claim_result_judged(&c, &t->c);
     if (t->result != NULL) {
         json_object_set(t->result, "files", files);
@@ -240,7 +240,7 @@ static void finish_unseen(struct validation *v, struct claim_run *t, const char 
 {
     char *rerun = rerun_command(v, t);
     struct claim_context c = context(v, t, rerun);
-    t->result = claim_result_not_judged(&c, error);
+    t->result = claim_result_not_judged(&c, rerun != NULL ? error : "out of memory");
     if (no_time)
         json_object_set_new(t->result, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
     free(rerun);
