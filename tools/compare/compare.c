@@ -64,16 +64,17 @@ static void scan(struct judge *j, const struct pyramid *p, int channel, struct w
             if (!region_testable(j, &m))
                 continue;
             tested++;
-            /* An exact p only for what may be the smallest: noise-free regions and those whose
-             * normal equivalent, good to 3 %, comes near the largest. */
+            /* An exact p only for what may be the smallest: regions without noise on a side and those
+             * whose normal equivalent, good to 3 %, comes near the largest. */
             struct worst *worst = &worst_of[m.statistic];
-            double z = m.noise_free ? INFINITY : region_rank(j, &m);
-            if (!m.noise_free && (z <= 0 || z < 0.94 * worst->z))
+            bool is_ranked = !m.noise_free && !m.silent;
+            double z = is_ranked ? region_rank(j, &m) : INFINITY;
+            if (is_ranked && (z <= 0 || z < 0.94 * worst->z))
                 continue;
             double log10_p = region_log10_p(j, &m, channel);
             if (log10_p < worst->log10_p) {
                 *worst = (struct worst){level->cell[i], r, channel, log10_p,
-                                        m.noise_free ? worst->z : fmax(z, worst->z)};
+                                        is_ranked ? fmax(z, worst->z) : worst->z};
             }
         }
         j->num_tests[l == p->num_levels - 1 ? STATISTIC_IMAGE : STATISTIC_PYRAMID] += tested;

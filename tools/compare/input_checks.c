@@ -125,6 +125,8 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
         return false;
     *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
     j->is_pooled = is_image(a);
+    j->exact[0] = strcmp(a->unit, "exact") == 0;
+    j->exact[1] = strcmp(b->unit, "exact") == 0;
     set_shares(a, b, j);
     if (!check_side(a, j, e))
         return err_prefix(e, "A");

@@ -74,6 +74,9 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
                 margin_of(j, r), is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID);
     if (is_image(j, r) || j->is_pooled)
         m.skew_around = m.skew;
+    double least = pow(float_tolerance * fmax(cell->a, cell->b), 2);
+    m.silent = !m.noise_free && !j->is_pooled &&
+               ((cell->va <= least && !j->exact[0]) || (cell->vb <= least && !j->exact[1]));
     return m;
 }
 
@@ -107,14 +110,19 @@ static bool is_within(const struct judge *j, const struct measured *m, double sk
     return skew_factor(skew, t) <= limit && skew * t <= gx;
 }
 
-bool region_is_normal(const struct judge *j, const struct measured *m)
+static bool is_unskewed(const struct judge *j, const struct measured *m)
 {
     return m->noise_free || is_within(j, m, m->skew, skew_limit, INFINITY);
 }
 
+bool region_is_normal(const struct judge *j, const struct measured *m)
+{
+    return !m->silent && is_unskewed(j, m);
+}
+
 bool region_testable(const struct judge *j, const struct measured *m)
 {
-    return region_is_normal(j, m) ||
+    return is_unskewed(j, m) ||
            is_within(j, m, fmax(m->skew, m->skew_around), skew_limit_raised, largest_gx);
 }
 
@@ -153,7 +161,7 @@ static double skew_at(double skew, double t)
 /* By which p is raised; 0 where it is trusted as it is. */
 static double skew_of_p(const struct judge *j, const struct measured *m)
 {
-    return region_is_normal(j, m) ? 0 : fmax(m->skew, m->skew_around);
+    return is_unskewed(j, m) ? 0 : fmax(m->skew, m->skew_around);
 }
 
 static double raised_log10_p(const struct measured *m, double t, double skew)
@@ -164,9 +172,11 @@ static double raised_log10_p(const struct measured *m, double t, double skew)
 
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
 {
+    double excess = fabs(m->d) - m->margin * m->unit - m->tolerance;
     if (m->noise_free)
-        return log10_p_noise_free(j, m, fabs(m->d) - m->margin * m->unit - m->tolerance, channel);
-    return raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
+        return log10_p_noise_free(j, m, excess, channel);
+    double log10_p = raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
+    return m->silent ? fmax(log10_p, log10_p_missed(j, excess, channel)) : log10_p;
 }
 
 double region_rank(const struct judge *j, const struct measured *m)
@@ -212,6 +222,8 @@ double region_mdb(const struct judge *j, const struct measured *m, int channel)
     } else {
         raised_quantile(skew_of_p(j, m), level / 2, m->dof, 2 * skew_limit_raised, &x);
         reach = sqrt(m->v_margin) * (x + stats_t_quantile(0.05, m->dof));
+        if (m->silent)
+            reach = fmax(reach, j->event[channel] / j->n_min * -log(level));
     }
     return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
 }

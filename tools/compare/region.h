@@ -13,6 +13,7 @@ struct judge {
     double floor;                 /* lower bound of the unit of relative quantities, radiance */
     double event[NUM_CHANNELS];   /* brightness of the brightest kind of single observation seen */
     bool is_pooled;               /* third cumulants are those of the whole image in each pixel */
+    bool exact[2];                /* A, B are closed forms */
     double n_min;                 /* fewest observations of any pixel; INFINITY if both are exact */
     double share[NUM_STATISTICS]; /* of alpha */
     /* Per statistic: */
@@ -33,8 +34,11 @@ struct measured {
     double skew;       /* of d: |g| plus one standard error */
     double skew_around; /* the same as what lies around has it; INFINITY: not asked */
     double log10_alike; /* of the cell */
-    bool noise_free;    /* the standard error is within that of float32 arithmetic */
-    int statistic;      /* by which it is tested */
+    bool
+        silent; /* one side, which is no closed form, shows no noise where the other does: its few samples may all have been
+                    alike, as where roulette ends one path in twenty, and lie off for that */
+    bool noise_free; /* the standard error is within that of float32 arithmetic */
+    int statistic;   /* by which it is tested */
 };
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
@@ -48,7 +52,7 @@ struct measured region_measure_weighted(const struct judge *j, const struct cell
  * few samples look harmless may be so by luck, and lie off for that. The image needs none. */
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
-/* Skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass 4 and |g| x <= 0.3, for which p makes up,
+/* Not silent, and the skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass 4 and |g| x <= 0.3, for which p makes up,
  * where the surroundings say no more than that, too. */
 bool region_is_normal(const struct judge *j, const struct measured *m);
 bool region_testable(const struct judge *j, const struct measured *m);
@@ -56,7 +60,8 @@ bool region_testable(const struct judge *j, const struct measured *m);
 /* How far |d| lies beyond margin and tolerance, in standard errors; at most 0 if it does not. */
 double region_excess_t(const struct measured *m);
 
-/* Two-sided log10 p of "|bias| <= margin", raised by the skew factor unless region_is_normal(). */
+/* Two-sided log10 p of "|bias| <= margin", raised by the skew factor where the guard asks for it, and of a silent region to the
+ * chance that what makes the difference has been missed. */
 double region_log10_p(const struct judge *j, const struct measured *m, int channel);
 
 /* About the normal equivalent of that p, good to 3 %, of a region with noise: for ranking only. */

@@ -417,6 +417,65 @@ TEST(test_harmless_by_luck)
     }
 }
 
+/* n observations a pixel of 1/0.95 with 0.95, else 0, as a path that roulette ends once in twenty; by `bright`. */
+static struct moments survivors(int n, double bright, uint64_t *seed)
+{
+    struct moments m = new_moments(32, 32, "sample");
+    for (size_t p = 0; p < 32 * 32; p++)
+        for (int k = 0; k < n; k++) {
+            double x = uniform(seed) < 0.95 ? bright / 0.95 : 0;
+            moments_add(&m, p, (double[]){x, x, x});
+        }
+    return m;
+}
+
+/* 1024 replicates a pixel of another program, which ends no path: normal, mean 1, standard deviation 1 %. */
+static struct moments others(uint64_t *seed)
+{
+    struct moments m = new_moments(32, 32, "replicate");
+    for (size_t p = 0; p < 32 * 32; p++)
+        for (int k = 0; k < 1024; k++) {
+            double x = 1 + 0.01 * draw_normal(uniform(seed), seed);
+            moments_add(&m, p, (double[]){x, x, x});
+        }
+    return m;
+}
+
+/* 16 samples against replicates of the same mean (H0): in 0.95^16 = 44 % of the pixels all are alike, so that A has no noise there
+ * and is 5 % too bright, 160 standard errors of B's. None of 10 pairs at alpha 1e-3 is DIFFERENT (P of one 1 %; all were before such
+ * regions were told). A as a closed form, 1/0.95 everywhere, has no such excuse; 5 % more light, 28 standard errors of the
+ * image's mean, is found. */
+TEST(test_all_alike_by_luck)
+{
+    uint64_t seed = 11;
+    struct comparison c;
+    struct compare_options o = {.alpha = 1e-3, .tile = 16};
+    struct err e;
+    int alarms = 0;
+    for (int i = 0; i < 10; i++) {
+        struct moments a = survivors(16, 1, &seed), b = others(&seed);
+        MUST(compare_moments(&a, &b, &o, &c, &e));
+        alarms += c.verdict == VERDICT_DIFFERENT;
+        comparison_free(&c);
+        if (i == 0) {
+            struct moments bright = survivors(16, 1.05, &seed);
+            MUST(compare_moments(&bright, &b, &o, &c, &e));
+            assert_int_equal(c.verdict, VERDICT_DIFFERENT);
+            comparison_free(&c);
+            moments_free(&bright);
+            struct moments exact = new_moments(32, 32, "exact");
+            constant(&exact, 1 / 0.95, 1);
+            MUST(compare_moments(&exact, &b, &o, &c, &e));
+            assert_int_equal(c.verdict, VERDICT_DIFFERENT);
+            comparison_free(&c);
+            moments_free(&exact);
+        }
+        moments_free(&a);
+        moments_free(&b);
+    }
+    assert_int_equal(alarms, 0);
+}
+
 /* A tile that is too skewed is judged within what is around it: its MDB is that of the image times
  * their ratio of radiance. And a moderately skewed interval is widened, never narrowed. */
 TEST(test_skewed_tile)
