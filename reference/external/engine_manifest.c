@@ -4,6 +4,7 @@
 
 #include "reference/replicates/engine_driver.h"
 #include "reference/base/process.h"
+#include "reference/base/utc_date.h"
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
@@ -13,7 +14,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static bool find_program(const struct engine *en, const char *argv0, char *path, size_t size,
@@ -119,11 +119,8 @@ static char *command_line(const json_t *args)
 bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
                      json_t **manifest, struct err *e)
 {
-    char version[256], binary[65], description[65], date[32];
+    char version[256], binary[65], description[65];
     json_t *files = json_object();
-    time_t now = time(NULL);
-    struct tm tm;
-    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
     char *command = command_line(json_object_get(j->en->json, "command"));
     bool ok = (command != NULL || err_set(e, "out of memory")) && read_version(j, version, e) &&
               sha256_file(j->program, binary, e) && sha256_file(j->en->file, description, e) &&
@@ -132,10 +129,10 @@ bool engine_describe(const struct engine_job *j, const struct moments *m, double
         !ok ? NULL
             : json_pack("{ss,ss,ss,ss,ss,sf,si,si,si,si,si,sf,sf,ss,ss,ss,ss,sO,s{sO,sb},so}",
                         "scene", j->suite->name, "scene_sha256", j->suite->sha256, "engine",
-                        j->en->name, "date", date, "unit", m->unit, "spp_of_unit", m->spp, "width",
-                        m->width, "height", m->height, "depth", j->suite->depth, "replicates",
-                        j->replicates, "spp", j->spp, "cpu_s", j->cpu_s, "wall_s", wall_s,
-                        "version", version, "binary_sha256", binary, "description_sha256",
+                        j->en->name, "date", utc_date_now().s, "unit", m->unit, "spp_of_unit",
+                        m->spp, "width", m->width, "height", m->height, "depth", j->suite->depth,
+                        "replicates", j->replicates, "spp", j->spp, "cpu_s", j->cpu_s, "wall_s",
+                        wall_s, "version", version, "binary_sha256", binary, "description_sha256",
                         description, "command", command, "files", files, "settings", "description",
                         j->en->json, "half_floats", j->half, "seeds", seeds_of(j));
     json_decref(files);

@@ -1,6 +1,9 @@
 #include "engine_driver.h"
 
+#include "reference/base/utc_date.h"
+
 #include <assert.h>
+#include <stdio.h>
 #include <sys/resource.h>
 #include <time.h>
 
@@ -50,9 +53,7 @@ static double cpu_s(void)
 struct timing timing_start(void)
 {
     struct timing t = {.wall_s = clock_s(CLOCK_MONOTONIC), .cpu_s = cpu_s()};
-    time_t now = time(NULL);
-    struct tm tm;
-    strftime(t.date, sizeof t.date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
+    snprintf(t.date, sizeof t.date, "%s", utc_date_now().s);
     return t;
 }
 

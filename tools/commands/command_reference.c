@@ -1,3 +1,4 @@
+#include "reference/base/utc_date.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "tools/base/data_dirs.h"
@@ -7,7 +8,6 @@
 #include "commands.h"
 
 #include <stdio.h>
-#include <time.h>
 
 static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
                      struct err *e)
@@ -57,14 +57,11 @@ static bool make_images(const struct reference_command *c, struct err *e)
 static bool make_noise(const struct reference_command *c, struct err *e)
 {
     const struct data_dirs at = data_dirs_find();
-    char made[32];
-    time_t now = time(NULL);
-    struct tm utc;
-    strftime(made, sizeof made, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
+    const struct utc_date made = utc_date_now();
     bool ok = true;
     for (int i = 0; ok && i < c->suite.num_scenes; i++)
         if (reference_options_selects(c, &c->suite.scene[i]))
-            ok = noise_record_render(c, &c->suite.scene[i], at.pathtracer.s, made, e);
+            ok = noise_record_render(c, &c->suite.scene[i], at.pathtracer.s, made.s, e);
     return ok;
 }
 

@@ -1,10 +1,10 @@
 #include "approve.h"
 
+#include "reference/base/utc_date.h"
 #include "tools/compare/region.h"
 #include "tools/compare/verdict.h"
 
 #include <string.h>
-#include <time.h>
 
 static const char *text_of(const json_t *entry, const char *key)
 {
@@ -38,15 +38,11 @@ static bool store(const struct approve_options *opt, const struct suite_scene *s
                   const struct suite_reference *ref, const struct golden *candidate,
                   const struct golden *stored, const char *verdict, json_t *change, struct err *e)
 {
-    char date[32];
-    time_t now = time(NULL);
-    struct tm utc;
-    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
     json_t *entry = json_copy(candidate->manifest);
     json_t *old = json_object_get(stored->manifest, "changes");
     json_t *changes = old != NULL ? json_copy(old) : json_array();
     bool ok = entry != NULL && changes != NULL && change != NULL &&
-              json_object_set_new(change, "date", json_string(date)) == 0 &&
+              json_object_set_new(change, "date", json_string(utc_date_now().s)) == 0 &&
               json_object_set_new(change, "verdict", json_string(verdict)) == 0;
     if (ok && stored->manifest != NULL) {
         json_t *was = json_object();

@@ -1,6 +1,7 @@
 #include "noise_record.h"
 
 #include "reference/base/json_node.h"
+#include "reference/base/utc_date.h"
 #include "reference/suite/engine_table.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
@@ -12,10 +13,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
-
-static const double least_margin = 0.1;
 
 /* k-th of a scene: ours with both samplers, then the engines that it has references of; NULL past the last. */
 static const char *engine_of(const struct suite_scene *scene, int k)
@@ -210,7 +208,7 @@ static enum verdict worse(enum verdict a, enum verdict b)
 static struct variance_claim judge(const char *what, struct estimate v, struct estimate was,
                                    double share, bool both, double alpha, FILE *out)
 {
-    double margin = variance_ladder_margin(was, share, least_margin);
+    double margin = variance_ladder_margin(was, share, noise_ladder_least_margin);
     struct variance_claim c = variance_ladder_judge(v, was, margin, both, alpha / 2);
     fprintf(out, "  %s: %s, %.4g [%.4g, %.4g] times that stored, margin %.3g\n", what,
             verdict_name(c.verdict), c.ratio, c.lo, c.hi, c.margin);
@@ -247,15 +245,11 @@ static json_t *compare(const json_t *entry, const json_t *was, const struct suit
 static bool put(const struct approve_options *opt, const struct suite_scene *scene,
                 const char *engine, const json_t *entry, json_t *change, json_t *all, struct err *e)
 {
-    char date[32];
-    time_t now = time(NULL);
-    struct tm utc;
-    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &utc));
     const json_t *was = json_object_get(all, engine);
     json_t *old = json_object_get(was, "changes"), *mine = json_copy((json_t *)entry);
     json_t *changes = old != NULL ? json_copy(old) : json_array();
     bool ok = mine != NULL && changes != NULL && change != NULL &&
-              json_object_set_new(change, "date", json_string(date)) == 0;
+              json_object_set_new(change, "date", json_string(utc_date_now().s)) == 0;
     if (ok && was != NULL)
         ok = json_object_set(change, "was", json_object_get(was, "version")) == 0;
     if (ok && opt->why != NULL)

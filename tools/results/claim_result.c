@@ -1,5 +1,6 @@
 #include "claim_result.h"
 
+#include "reference/base/utc_date.h"
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
 
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static json_t *region_json(const struct region *r)
@@ -154,7 +154,7 @@ static void describe_machine(char *text, size_t size)
 
 json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e)
 {
-    char date[32], machine[192];
+    char machine[192];
     assert(argv[argc] == NULL);
     for (int i = 0; i < argc; i++) {
         json_t *text = json_string(argv[i]);
@@ -169,14 +169,10 @@ json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err
         err_set(e, "out of memory");
         return NULL;
     }
-    time_t now = time(NULL);
-    struct tm utc;
-    gmtime_r(&now, &utc);
-    strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
     describe_machine(machine, sizeof machine);
-    json_t *root =
-        json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command, "version",
-                  assay_version, "date", date, "machine", machine, "alpha", alpha, "claims");
+    json_t *root = json_pack("{s:i, s:s, s:s, s:s, s:s, s:f, s:[]}", "assay", 1, "command", command,
+                             "version", assay_version, "date", utc_date_now().s, "machine", machine,
+                             "alpha", alpha, "claims");
     free(command);
     if (root == NULL)
         err_set(e, "out of memory");
