@@ -35,6 +35,20 @@ void moments_free(struct moments *m)
     *m = (struct moments){0};
 }
 
+bool moments_copy(const struct moments *from, struct moments *to, struct err *e)
+{
+    size_t pixels = (size_t)from->width * (size_t)from->height;
+    if (!moments_alloc(to, from->width, from->height, e))
+        return false;
+    memcpy(to->n, from->n, pixels * sizeof *to->n);
+    memcpy(to->mean, from->mean, 3 * pixels * sizeof *to->mean);
+    memcpy(to->m2, from->m2, 3 * pixels * sizeof *to->m2);
+    memcpy(to->m3, from->m3, 3 * pixels * sizeof *to->m3);
+    memcpy(to->unit, from->unit, sizeof to->unit);
+    to->spp = from->spp;
+    return true;
+}
+
 /* One-observation case of [Pebay08 eq. 2.1-2.2], M3 before M2 because it needs the old M2. */
 void moments_add(struct moments *m, size_t pixel, const double x[3])
 {

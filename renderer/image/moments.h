@@ -30,6 +30,9 @@ struct moments {
 bool moments_alloc(struct moments *m, int width, int height, struct err *e)
     __attribute__((warn_unused_result));
 void moments_free(struct moments *m);
+/* The same observations in memory of its own, without a tolerance. */
+bool moments_copy(const struct moments *from, struct moments *to, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* One more observation of one pixel. */
 void moments_add(struct moments *m, size_t pixel, const double x[3]);

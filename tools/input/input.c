@@ -107,20 +107,6 @@ bool input_read(const char *path, char side, const struct input_options *opt, st
     return ok;
 }
 
-static bool copy_moments(const struct moments *from, struct moments *to, struct err *e)
-{
-    size_t pixels = (size_t)from->width * (size_t)from->height;
-    if (!moments_alloc(to, from->width, from->height, e))
-        return false;
-    memcpy(to->n, from->n, pixels * sizeof *to->n);
-    memcpy(to->mean, from->mean, 3 * pixels * sizeof *to->mean);
-    memcpy(to->m2, from->m2, 3 * pixels * sizeof *to->m2);
-    memcpy(to->m3, from->m3, 3 * pixels * sizeof *to->m3);
-    memcpy(to->unit, from->unit, sizeof to->unit);
-    to->spp = from->spp;
-    return true;
-}
-
 bool input_take(const struct input_memory *memory, const char *name, char side,
                 const struct input_options *opt, struct input *out, struct notes *notes,
                 struct err *e)
@@ -134,7 +120,7 @@ bool input_take(const struct input_memory *memory, const char *name, char side,
         ok = err_set(e, "%s: how many samples it has is known", name);
     } else if (memory->moments != NULL) {
         out->kind = memory->has_m3 ? INPUT_MOMENTS : INPUT_VARIANCE;
-        ok = copy_moments(memory->moments, &out->m, e);
+        ok = moments_copy(memory->moments, &out->m, e);
     } else if (r->num > 1) {
         ok = r->num >= 3
                  ? take_replicates(name, r, out, notes, e)

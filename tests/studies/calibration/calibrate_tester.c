@@ -43,20 +43,6 @@ static bool run(const struct moments *a, const struct moments *b, const struct c
     return true;
 }
 
-static bool copy_of(const struct moments *src, struct moments *dst, struct err *e)
-{
-    if (!moments_alloc(dst, src->width, src->height, e))
-        return false;
-    size_t pixels = (size_t)src->width * (size_t)src->height;
-    memcpy(dst->n, src->n, pixels * sizeof *dst->n);
-    memcpy(dst->mean, src->mean, 3 * pixels * sizeof *dst->mean);
-    memcpy(dst->m2, src->m2, 3 * pixels * sizeof *dst->m2);
-    memcpy(dst->m3, src->m3, 3 * pixels * sizeof *dst->m3);
-    memcpy(dst->unit, src->unit, sizeof dst->unit);
-    dst->spp = src->spp;
-    return true;
-}
-
 static void weaken(enum weakness weakness, struct moments *m, bool is_b)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -107,7 +93,7 @@ bool tester_run(enum weakness weakness, const struct moments *a, const struct mo
         return true;
     }
     struct moments wa = {0}, wb = {0};
-    bool ok = copy_of(a, &wa, e) && copy_of(b, &wb, e);
+    bool ok = moments_copy(a, &wa, e) && moments_copy(b, &wb, e);
     if (ok) {
         weaken(weakness, &wa, false);
         weaken(weakness, &wb, true);
