@@ -1,6 +1,6 @@
 #include "assay.h"
 
-#include "library_side.h"
+#include "library_internal.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/version.h"
 #include "tools/base/temp_dir.h"
@@ -164,14 +164,6 @@ static void fill_result(struct assay_comparison *c)
         c->note[i] = c->c.notes.line[i];
 }
 
-/* The line for the caller, who may not want it. */
-static bool told(bool ok, const struct err *e, char error[ASSAY_ERROR_SIZE])
-{
-    if (error != NULL)
-        snprintf(error, ASSAY_ERROR_SIZE, "%s", ok ? "" : e->msg);
-    return ok;
-}
-
 static bool run(struct assay_comparison *c, const struct assay_side *const side[4], struct err *e)
 {
     static const char *const name[4] = {"A", "B", "A2", "B2"};
@@ -213,7 +205,7 @@ bool assay_compare_again(const struct assay_side *a, const struct assay_side *b,
     if (!ok)
         assay_free(c);
     *out = ok ? c : NULL;
-    return told(ok, &e, error);
+    return library_told(ok, &e, error);
 }
 
 bool assay_compare(const struct assay_side *a, const struct assay_side *b,
@@ -255,7 +247,7 @@ bool assay_write_json(const struct assay_comparison *comparison, const char *pat
                       char error[ASSAY_ERROR_SIZE])
 {
     struct err e = {""};
-    return told(write_json(comparison, path, &e), &e, error);
+    return library_told(write_json(comparison, path, &e), &e, error);
 }
 
 bool assay_write_report(const struct assay_comparison *comparison, const char *path,
@@ -264,11 +256,11 @@ bool assay_write_report(const struct assay_comparison *comparison, const char *p
     struct err e = {""}, ignored;
     struct temp_dir dir;
     if (!temp_dir_open(&dir, "library", &e))
-        return told(false, &e, error);
+        return library_told(false, &e, error);
     const struct path results = fs_path("%s/results.json", dir.path);
     bool ok = write_json(comparison, results.s, &e) && report_write(results.s, path, &e);
     ok = temp_dir_close(&dir, ok ? &e : &ignored) && ok;
-    return told(ok, &e, error);
+    return library_told(ok, &e, error);
 }
 
 void assay_free(struct assay_comparison *comparison)

@@ -1,9 +1,8 @@
-#include "assay.h"
+#include "library_internal.h"
 
 #include "renderer/image/moments.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -54,25 +53,18 @@ bool assay_moments_add_image(struct assay_moments *moments, const float *light)
     return true;
 }
 
-static bool told(bool ok, const struct err *e, char error[ASSAY_ERROR_SIZE])
-{
-    if (error != NULL)
-        snprintf(error, ASSAY_ERROR_SIZE, "%s", ok ? "" : e->msg);
-    return ok;
-}
-
 bool assay_moments_merge(struct assay_moments *to, const struct assay_moments *from,
                          char error[ASSAY_ERROR_SIZE])
 {
     struct err e = {""};
-    return told(moments_merge(&to->m, &from->m, &e), &e, error);
+    return library_told(moments_merge(&to->m, &from->m, &e), &e, error);
 }
 
 bool assay_moments_write(const struct assay_moments *moments, const char *path,
                          char error[ASSAY_ERROR_SIZE])
 {
     struct err e = {""};
-    return told(moments_write(path, &moments->m, NULL, 0, &e), &e, error);
+    return library_told(moments_write(path, &moments->m, NULL, 0, &e), &e, error);
 }
 
 struct assay_side assay_moments_side(const struct assay_moments *moments)

@@ -1,7 +1,8 @@
-#include "library_side.h"
+#include "library_internal.h"
 
 #include <math.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -127,4 +128,11 @@ void library_side_close(struct library_side *s)
     free(s->memory.renders.rgb);
     moments_free(&s->moments);
     *s = (struct library_side){.name = NULL};
+}
+
+bool library_told(bool ok, const struct err *e, char error[ASSAY_ERROR_SIZE])
+{
+    if (error != NULL)
+        snprintf(error, ASSAY_ERROR_SIZE, "%s", ok ? "" : e->msg);
+    return ok;
 }
