@@ -55,11 +55,13 @@ const char *cli_nearest(const char *word, const char *(*next)(const void *list, 
     const char *nearest = NULL, *other;
     size_t length = strcspn(word, "=");
     int least = (int)length / 3 + 1;
-    for (size_t i = 0; (other = next(list, i)) != NULL; i++)
-        if (distance(word, length, other) < least) {
-            least = distance(word, length, other);
+    for (size_t i = 0; (other = next(list, i)) != NULL; i++) {
+        int d = distance(word, length, other);
+        if (d < least) {
+            least = d;
             nearest = other;
         }
+    }
     return nearest;
 }
 

@@ -537,7 +537,7 @@ engine "$command"
 claims_of() { python3 -c 'import json, sys
 for c in json.load(open(sys.argv[1]))["claims"]:
     if "rerun" in c: print(c["a"], c["b"], c.get("verdict"), c["rerun"], sep="\t")' "$1"; }
-jq_claim() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 == b { print $3; exit }'; }
+verdict_of() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 == b { print $3; exit }'; }
 fake 'exec student_tracer "$@" 1.05'
 expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
     env PATH="$engine_path" $student --engine "$tmp/fake.json"
@@ -550,7 +550,7 @@ env PATH="$engine_path" $student --out "$out/first" --suite "$tmp/my suite" --en
 reruns=0 differ=""
 while IFS=$'\t' read -r a b verdict again; do
     (cd "$tmp" && env PATH="$engine_path" sh -c "$again -q --out '$out/again'") >/dev/null 2>&1
-    found=$(jq_claim "$out/again/results.json" "$a" "$b")
+    found=$(verdict_of "$out/again/results.json" "$a" "$b")
     [ "$found" = "$verdict" ] || differ="$differ $a/$b: $verdict, '$found' by: $again"
     reruns=$((reruns + 1))
 done < <(claims_of "$out/first/results.json")

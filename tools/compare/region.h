@@ -34,9 +34,9 @@ struct measured {
     double skew;       /* of d: |g| plus one standard error */
     double skew_around; /* the same as what lies around has it; INFINITY: not asked */
     double log10_alike; /* of the cell */
-    bool
-        silent; /* one side, which is no closed form, shows no noise where the other does: its few samples may all have been
-                    alike, as where roulette ends one path in twenty, and lie off for that */
+    /* One side, which is no closed form, shows no noise where the other does: its few samples may all have
+     * been alike, as where roulette ends one path in twenty, and lie off for that. */
+    bool silent;
     bool noise_free; /* the standard error is within that of float32 arithmetic */
     int statistic;   /* by which it is tested */
 };
@@ -52,8 +52,8 @@ struct measured region_measure_weighted(const struct judge *j, const struct cell
  * few samples look harmless may be so by luck, and lie off for that. The image needs none. */
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
-/* Not silent, and the skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass 4 and |g| x <= 0.3, for which p makes up,
- * where the surroundings say no more than that, too. */
+/* Not silent, and the skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass silent ones, and 4 and
+ * |g| x <= 0.3 where the surroundings say no more than that, too: p makes up for both. */
 bool region_is_normal(const struct judge *j, const struct measured *m);
 bool region_testable(const struct judge *j, const struct measured *m);
 

@@ -110,14 +110,13 @@ static void write_row(struct page *p, const struct claim_ref *claim, size_t num,
                       size_t num_columns)
 {
     size_t others = 0, good = 0;
-    const struct claim_ref *link = first;
     fputs("<tr><td class=\"thumb\">", p->f);
     for (size_t i = 0; i < num; i++)
         if (is_same_scene(&claim[i], first) && claim[i].outcome != OUTCOME_NOT_JUDGED) {
             write_thumbnail(p, claim[i].json);
             break;
         }
-    fprintf(p->f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", link->index);
+    fprintf(p->f, "</td><th scope=\"row\"><a href=\"#claim-%zu\">", first->index);
     html_name(p->f, member_text(first->json, "scene"));
     fputs("</a></th>", p->f);
     for (size_t k = 0; k < num_columns; k++) {

@@ -178,43 +178,34 @@ static bool is_wrongly_different(const json_t *claim)
            is_verdict(claim, "verdict", VERDICT_DIFFERENT);
 }
 
-/* With those of consistency and of noise, if any of these differs, as ones of sides of their own. */
-static json_t *all_claims(const json_t *results)
+/* If any of these rows differs, all of them as claims of sides of their own: PROGRAM-KIND, the program in `key`. */
+static void add_sides(json_t *all, const json_t *rows, const char *key, const char *kind)
 {
-    json_t *all = json_array(), *more = json_array();
     const json_t *c;
     size_t i;
     bool differs = false;
+    json_array_foreach(rows, i, c) differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
+    if (!differs)
+        return;
+    json_array_foreach(rows, i, c)
+    {
+        char side[160];
+        snprintf(side, sizeof side, "%s-%s", member_text(c, key), kind);
+        json_array_append_new(all,
+                              json_pack("{ss,ss,ss,ss*}", "scene", member_text(c, "scene"), "a",
+                                        side, "expected", verdict_name(VERDICT_EQUIVALENT),
+                                        "verdict", member_text(c, "verdict")));
+    }
+}
+
+/* With those of consistency and of noise. */
+static json_t *all_claims(const json_t *results)
+{
+    json_t *all = json_array(), *noise = noise_results_claims(json_object_get(results, "noise"));
     json_array_extend(all, json_object_get(results, "claims"));
-    json_array_foreach(json_object_get(results, "consistency"), i, c)
-    {
-        char side[160];
-        snprintf(side, sizeof side, "%s-consistency", member_text(c, "engine"));
-        differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
-        json_array_append_new(more,
-                              json_pack("{ss,ss,ss,ss*}", "scene", member_text(c, "scene"), "a",
-                                        side, "expected", verdict_name(VERDICT_EQUIVALENT),
-                                        "verdict", member_text(c, "verdict")));
-    }
-    if (differs)
-        json_array_extend(all, more);
-    json_array_clear(more);
-    differs = false;
-    json_t *noise = noise_results_claims(json_object_get(results, "noise"));
-    json_array_foreach(noise, i, c)
-    {
-        char side[160];
-        snprintf(side, sizeof side, "%s-noise", member_text(c, "a"));
-        differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
-        json_array_append_new(more,
-                              json_pack("{ss,ss,ss,ss*}", "scene", member_text(c, "scene"), "a",
-                                        side, "expected", verdict_name(VERDICT_EQUIVALENT),
-                                        "verdict", member_text(c, "verdict")));
-    }
-    if (differs)
-        json_array_extend(all, more);
+    add_sides(all, json_object_get(results, "consistency"), "engine", "consistency");
+    add_sides(all, noise, "a", "noise");
     json_decref(noise);
-    json_decref(more);
     return all;
 }
 

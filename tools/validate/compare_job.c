@@ -87,10 +87,13 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
 {
     *p = (struct pair){0};
     bool ok = true;
-    for (int i = 0; ok && i < 2; i++)
-        ok = memory[i] != NULL
-                 ? input_take(memory[i], path[i], "ab"[i], &job -> input[i], &p -> in[i], notes, e)
-                 : input_read(path[i], "ab"[i], &job -> input[i], &p -> in[i], notes, e);
+    for (int i = 0; ok && i < 2; i++) {
+        const struct input_options *opt = &job->input[i];
+        if (memory[i] != NULL)
+            ok = input_take(memory[i], path[i], "ab"[i], opt, &p -> in[i], notes, e);
+        else
+            ok = input_read(path[i], "ab"[i], opt, &p -> in[i], notes, e);
+    }
     for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
              p->in[1].censored != NULL ||

@@ -11,9 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Margins where a record says that they can be had: of the variance, of what is stated; half widths of slopes, and from
- * where on a slope is not asked for. */
-static const double least_margin = 0.1, stated_margin = 0.05, slope_margin = 0.1, most_slope = 0.5;
+/* Where a record says that they can be had: the margin of what is stated; half widths of slopes, and from where on a slope is not
+ * asked for. */
+static const double stated_margin = 0.05, slope_margin = 0.1, most_slope = 0.5;
 /* Shares of the scene's alpha. A claim of two sides has its share on each. */
 static const double image_share = 0.25, tile_share = 0.25, other_share = 0.125;
 /* Seeds of replicates that no other claim of the scene has. */
@@ -196,7 +196,7 @@ static void judge_tiles(const struct noise_ladder *run, const struct variance_ma
     double furthest = -INFINITY;
     r->has_tiles = true;
     for (int i = 0; i < num; i++) {
-        double margin = variance_ladder_margin(record->tile[i], share, least_margin);
+        double margin = variance_ladder_margin(record->tile[i], share, noise_ladder_least_margin);
         struct estimate v = variance_ladder_expect(run->sample.tile[i], record->tile[i], share);
         struct variance_claim c =
             variance_ladder_judge(v, wanted->tile[i], margin, both, alpha / num);
@@ -246,7 +246,7 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
                               const struct noise_ladder *record, bool both, struct row *r)
 {
     double a = r->alpha, each = image_share / (both ? 2 : 1), share = run->n / record->n;
-    double margin = variance_ladder_margin(record->sample.image, share, least_margin);
+    double margin = variance_ladder_margin(record->sample.image, share, noise_ladder_least_margin);
     struct estimate v = variance_ladder_expect(run->sample.image, record->sample.image, share);
     r->image = variance_ladder_judge(v, wanted->image, margin, both, a * each);
     judge_tiles(run, wanted, &record->sample, share, both, a * tile_share / (both ? 2 : 1), r);
@@ -271,8 +271,8 @@ static void judge_sobol(const struct noise_ladder *run, const struct noise_ladde
                     was = record->rung[record->num - 1].variance;
     double a = r->alpha * other_share, share = (double)run->replicates / record->replicates;
     top = variance_ladder_expect(top, was, share);
-    r->image =
-        variance_ladder_judge(top, was, variance_ladder_margin(was, share, least_margin), false, a);
+    r->image = variance_ladder_judge(
+        top, was, variance_ladder_margin(was, share, noise_ladder_least_margin), false, a);
     judge_slope(run, record, r);
     if (r->slope_margin <= 0)
         return;

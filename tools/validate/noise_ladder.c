@@ -14,6 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
+const double noise_ladder_least_margin = 0.1;
 const int noise_ladder_spp[NOISE_RUNGS] = {1, 4, 16, NOISE_TOP};
 
 void noise_ladder_free(struct noise_ladder *l)

@@ -21,6 +21,8 @@ enum {
     NOISE_TOP = 64                /* samples of the last rung of ours */
 };
 extern const int noise_ladder_spp[NOISE_RUNGS]; /* 1, 4, 16, 64 */
+/* Of the variance against a record that says that it can be had. */
+extern const double noise_ladder_least_margin; /* 0.1 */
 
 struct noise_rung {
     int spp;
