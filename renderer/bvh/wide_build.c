@@ -260,11 +260,11 @@ static bool grow_on_threads(struct build *b, const struct wide_range *all, int t
     bool ok = parallel_divide(threads, &first, grow_range, &g);
     pthread_mutex_destroy(&g.lock);
     size_t num_cut = b->parts->num;
-    if (ok)
-        ok = join_branches(&g);
-    else
-        for (size_t k = 0; k < g.num; k++)
-            wide_build_free(&g.branch[k].parts);
+    /* Frees them one by one, or none of
+     * them if it fails. */
+    ok = ok && join_branches(&g);
+    for (size_t k = 0; !ok && k < g.num; k++)
+        wide_build_free(&g.branch[k].parts);
     free(g.branch);
     for (size_t i = num_cut; ok && i-- > 0;)
         if (b->parts->part[i].left != 0 && b->parts->part[i].left < num_cut)
