@@ -140,6 +140,7 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
         struct rays r;
         uint16_t lane[BATCH_LANES];
         static struct found want, exact, got[3], alone;
+        const float none = 0;
         for (uint32_t i = 0; i < BATCH_LANES; i++) {
             rays_set(&r, (int)i, make_ray(&s, &f, k % NUM_AIMS, k * BATCH_LANES + i));
             r.ignore[i] = NO_HIT;
@@ -170,9 +171,16 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
         }
         for (uint16_t i = 0; i < BATCH_LANES / 3; i++)
             lane[i] = (uint16_t)(3 * i);
-        trace(wide[0], &r, lane, BATCH_LANES / 3, &alone);
-        for (int i = 0; i < BATCH_LANES / 3; i++)
-            assert_same(&alone, &got[0], 3 * i);
+        for (int j = 0; j < n; j++) {
+            memset(&alone, 0, sizeof alone);
+            trace(wide[j], &r, lane, BATCH_LANES / 3, &alone);
+            for (int i = 0; i < BATCH_LANES / 3; i++)
+                assert_same(&alone, &got[0], 3 * i);
+            for (int i = 0; i < BATCH_LANES; i++) /* nothing of a lane that is not listed */
+                if (i % 3 != 0 || i / 3 >= BATCH_LANES / 3)
+                    assert_true(memcmp(&alone.h.t[i], &none, sizeof none) == 0 &&
+                                alone.h.prim[i] == 0 && !alone.occluded[i]);
+        }
     }
     print_message("%-10s %7u triangles: %u of %u hit, %u at the distance of another\n", name,
                   s.num_triangles, hits, batches * BATCH_LANES, ties);

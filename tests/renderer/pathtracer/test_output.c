@@ -5,6 +5,8 @@
 #include "renderer/pathtracer/output.h"
 #include "tests/support/test.h"
 
+#include <sys/stat.h>
+
 TEST(tone_curves)
 {
     static const struct {
@@ -311,4 +313,122 @@ TEST(summary_of_the_image)
     caught(stderr, STDERR_FILENO, output_print_how_to_resume, &r, &f,
            "pathtracer: interrupted after 3 of 16 samples per pixel; to go on:\npathtracer -s 4\n");
     film_free(&f);
+}
+
+static struct render_stats told_stats;
+
+static void told(const struct output *o, const struct film *f)
+{
+    output_print_summary(o, f, &told_stats);
+}
+
+/* 24 samples and 8 rays, of 20 boxes and 12 primitives: 2.5 and 1.5 per ray. Of each of six pixels luminance is 2 in the mean
+ * of four samples, and the variance of that mean 0.01: in the root mean square 0.1 of 2. */
+TEST(what_is_said_of_a_render)
+{
+    struct err e = {0};
+    struct render r;
+    struct film f;
+    set(&r, "x.exr", "folder/y.png");
+    r.opt.quiet = false;
+    must(film_alloc(&f, WIDTH, 2, false, &e), &e);
+    for (int p = 0; p < 6; p++) {
+        f.m.n[p] = 4;
+        f.s1[p] = 8;
+        f.s2[p] = 16 + 4 * 3 * 0.01;
+    }
+    f.num_samples = 3;
+    told_stats = (struct render_stats){.samples = 24,
+                                       .rays = {.rays = 8, .box_tests = 20, .primitive_tests = 12},
+                                       .wall_seconds = 1.5,
+                                       .cpu_seconds = 2.25,
+                                       .end = RENDER_TIME};
+    caught(
+        stderr, STDERR_FILENO, told, &r, &f,
+        "24 paths, 8 rays in 1.50 s (2.25 CPU s); per ray 2.5 box and 1.5 primitive tests; brute force\n"
+        "written: x.exr folder/y.png\n"
+        "stopped by --time after 3 samples per pixel, relative error 5 %\n");
+    r.opt.pilot_tolerance = 0; /* a tolerance, unlike -1 */
+    told_stats.end = RENDER_ERROR;
+    caught(
+        stderr, STDERR_FILENO, told, &r, &f,
+        "24 paths, 8 rays in 1.50 s (2.25 CPU s); per ray 2.5 box and 1.5 primitive tests; brute force\n"
+        "written: x.exr folder/y.png folder/y_rate.png\n"
+        "stopped by --error after 3 samples per pixel, relative error 5 %\n");
+    r.opt.pilot_tolerance = -1;
+    r.opt.adaptive_batch = 1;
+    told_stats = (struct render_stats){.samples = 1, .end = RENDER_ASKED};
+    caught(
+        stderr, STDERR_FILENO, told, &r, &f,
+        "1 paths, 0 rays in 0.00 s (0.00 CPU s); per ray 0.0 box and 0.0 primitive tests; brute force\n"
+        "written: x.exr folder/y.png folder/y_rate.png\n");
+    film_free(&f);
+}
+
+/* Where the images cannot be: beside them, if only their names cannot; else in TMPDIR, all under new names, and the line
+ * says so. */
+TEST(rescued_images)
+{
+    struct err e = {0};
+    struct render r;
+    struct film f;
+    char folder[600], tmp[600], words_said[1024], from[600];
+    snprintf(folder, sizeof folder, "%s", test_path("none/a.exr"));
+    snprintf(tmp, sizeof tmp, "%s", test_path("spare"));
+    assert_int_equal(mkdir(tmp, 0700), 0);
+    assert_non_null(getcwd(from, sizeof from));
+    fill(&f, 0, 2);
+    for (int beside = 0; beside < 2; beside++) {
+        set(&r, beside ? test_path("a.exr") : folder, "b.png");
+        r.opt.adaptive_batch = 4;
+        assert_int_equal(setenv("TMPDIR", tmp, 1), 0);
+        assert_int_equal(chdir("/proc"), 0); /* where no file can be made */
+        err_set(&e, "disk full");
+        assert_false(output_rescue(&r.out, &f, NULL, &e));
+        assert_int_equal(chdir(from), 0);
+        unsetenv("TMPDIR");
+        char name[600];
+        snprintf(name, sizeof name, "%srescued-%ld-", test_path(beside ? "" : "spare/"),
+                 (long)getpid());
+        snprintf(words_said, sizeof words_said, "disk full; the render is in %sa.exr instead",
+                 name);
+        assert_string_equal(e.msg, words_said);
+        size_t length = strlen(name);
+        snprintf(name + length, sizeof name - length, "a.exr");
+        check_moments(name, 2, NULL);
+        snprintf(name + length, sizeof name - length, "b.png");
+        check_picture(name, 2, false);
+        snprintf(name + length, sizeof name - length, "b_rate.png");
+        check_rates(name, 2);
+    }
+    set(&r, folder, NULL);
+    assert_int_equal(setenv("TMPDIR", folder, 1), 0);
+    assert_int_equal(chdir("/proc"), 0);
+    err_set(&e, "disk full");
+    assert_false(output_rescue(&r.out, &f, NULL, &e));
+    assert_int_equal(chdir(from), 0);
+    unsetenv("TMPDIR");
+    assert_string_equal(e.msg, "disk full");
+    film_free(&f);
+}
+
+/* A state and a rate map that cannot be are told before the render as images are. */
+TEST(what_cannot_be_written)
+{
+    char resumed[600], rate[600];
+    struct err e = {0};
+    struct render r;
+    snprintf(resumed, sizeof resumed, "%s", test_path("c.exr.state"));
+    snprintf(rate, sizeof rate, "%s", test_path("d_rate.png"));
+    set(&r, test_path("c.exr"), test_path("d.png"));
+    must(output_check(&r.out, &e), &e);
+    assert_int_equal(mkdir(rate, 0700), 0);
+    must(output_check(&r.out, &e), &e); /* not adaptive: no map */
+    r.opt.adaptive_batch = 4;
+    assert_false(output_check(&r.out, &e));
+    assert_int_equal(rmdir(rate), 0);
+    must(output_check(&r.out, &e), &e);
+    assert_int_equal(mkdir(resumed, 0700), 0);
+    assert_false(output_check(&r.out, &e));
+    assert_int_equal(rmdir(resumed), 0);
 }
