@@ -43,15 +43,16 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
     return true;
 }
 
-/* What the supervisor says it was; without a word of it, the clock or the machine. no_memory: the kernel has killed somebody. */
-static void read_report(const char *out, const struct sandbox_job *job, bool no_memory,
+/* What the supervisor says it was; without a word of it, the clock or the machine. What it says while it is killed with all around it is
+ * no word: by then the program may have failed for want of its log. no_memory: the kernel has killed somebody. */
+static void read_report(const char *out, const struct sandbox_job *job, bool killed, bool no_memory,
                         const struct err *last, struct sandbox_result *r)
 {
     char path[MAX_PATH], word[16] = "";
     snprintf(path, sizeof path, "%s/.report", out);
     FILE *f = fopen(path, "r");
     long ticks = 0;
-    bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2;
+    bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2 && !killed;
     if (ticks > 0)
         r->cpu_s = (double)ticks / (double)sysconf(_SC_CLK_TCK);
     if (f != NULL)
@@ -119,7 +120,7 @@ static bool run_boxed(const struct sandbox *s, const struct sandbox_job *job,
         out->wall_s = usage.wall_s;
         out->cpu_s = usage.cpu_s;
         if (ok)
-            read_report(job->out, job, no_memory, &last, out);
+            read_report(job->out, job, usage.exit_status < 0, no_memory, &last, out);
         drop_large(job->out, job);
     }
     free(l);

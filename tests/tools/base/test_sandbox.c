@@ -737,4 +737,28 @@ TEST(without_bubblewrap_it_refuses)
     assert_non_null(strstr(e.msg, "no sandbox for other people's programs on this machine: "));
 }
 
+/* A bwrap that is killed takes its machine with it only after a while, in which the program fails for want of its log (signal 13, SIGPIPE)
+ * and the supervisor reports that. It is not the program's fault. The control is a bwrap that ends by itself with the same report. */
+TEST(a_report_of_a_machine_that_is_killed_is_none)
+{
+    static const char *const end[] = {"exit 141", "kill -9 $$"};
+    char dir[700], name[800], text[1600], path[4096], with[5000];
+    struct err e;
+    snprintf(path, sizeof path, "%s", getenv("PATH"));
+    snprintf(dir, sizeof dir, "%s/killed", box.dir.path);
+    snprintf(name, sizeof name, "%s/bwrap", dir);
+    snprintf(with, sizeof with, "%s:%s", dir, path);
+    MUST(fs_make_dirs(dir, &e));
+    for (int i = 0; i < 2; i++) {
+        snprintf(text, sizeof text, "#!/bin/sh\necho '141 ended 0' >%s/.report\n%s\n", out_dir,
+                 end[i]);
+        test_write(name, text, strlen(text));
+        assert_int_equal(chmod(dir, 0755) + chmod(name, 0755), 0);
+        setenv("PATH", with, 1);
+        struct sandbox_result r = run("true");
+        setenv("PATH", path, 1);
+        assert_int_equal(r.end, i == 0 ? SANDBOX_FAILED : SANDBOX_LOST);
+    }
+}
+
 TEST_GROUP(open_sandbox, close_sandbox)
