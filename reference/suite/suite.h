@@ -64,6 +64,7 @@ struct suite_scene {
         int renders, spp;
         double margin;
         double noise_margin; /* 0: not asked */
+        int parts;           /* samples of the first of two shares; 0: not asked */
         int batch, most;     /* of one adaptive render; 0: not asked */
         double tolerance;
     } consistency;

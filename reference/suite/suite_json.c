@@ -171,8 +171,8 @@ static bool read_variants(const struct json_node *n, struct suite_scene *s, stru
 
 static bool read_consistency(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    static const char *const keys[] = {"renders",      "spp",      "margin",
-                                       "noise_margin", "adaptive", NULL};
+    static const char *const keys[] = {"renders", "spp",   "margin", "noise_margin",
+                                       "adaptive", "parts", NULL};
     static const char *const adaptive_keys[] = {"batch", "tolerance", "spp", NULL};
     struct json_node c = {n->file, "consistency.", NULL};
     struct json_node a = {n->file, "consistency.adaptive.", NULL};
@@ -185,6 +185,9 @@ static bool read_consistency(const struct json_node *n, struct suite_scene *s, s
         return false;
     if (json_object_get(c.object, "noise_margin") != NULL &&
         !json_get_number(&c, "noise_margin", 0, 10, &s->consistency.noise_margin, e))
+        return false;
+    if (json_object_get(c.object, "parts") != NULL &&
+        !json_get_int(&c, "parts", 1, s->consistency.spp - 1, &s->consistency.parts, e))
         return false;
     return json_object_get(c.object, "adaptive") == NULL ||
            (json_get_object(&c, "adaptive", &a.object, e) && json_only_keys(&a, adaptive_keys, e) &&

@@ -5,6 +5,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "tools/stats/stated_error.h"
+#include "tools/stats/same_samples.h"
 #include "tools/stats/sample_efficiency.h"
 #include "tools/sequential/adaptive_stop.h"
 #include "tools/results/results.h"
@@ -13,21 +14,39 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* Render k of the scene with those samples and further options; the image is removed. */
-static bool render_one(const struct validate_options *opt, const struct suite_scene *s, int k,
-                       int spp, const char *const *options, double deadline, struct moments *out,
+/* Pixels in which the same samples come to something else. */
+struct parts {
+    int merged, resumed, adaptive;
+    char reason[128]; /* of the first of them */
+};
+
+static struct path image_path(const struct validate_options *opt, const struct suite_scene *s)
+{
+    return fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
+}
+
+struct share {
+    int k, first, spp; /* samples first..spp-1 of render k */
+    const char *const *options;
+    bool keep; /* the image stays, for a resumed render */
+};
+
+/* One render of the scene; image, log and state are removed. */
+static bool render_one(const struct validate_options *opt, const struct suite_scene *s,
+                       const struct share *share, double deadline, struct moments *out,
                        double *seconds, struct err *e)
 {
     double left = deadline - now_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
-    const struct path image = fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
+    const struct path image = image_path(opt, s);
     const struct path log = fs_path("%s/data/%s/consistency.log", opt->out_dir, s->name);
     const struct pathtracer_job job = {.program = opt->pathtracer,
                                        .scene = s,
-                                       .spp = spp,
-                                       .options = options,
-                                       .seed = replicate_seed((uint32_t)opt->seed, k),
+                                       .first = share->first,
+                                       .spp = share->spp,
+                                       .options = share->options,
+                                       .seed = replicate_seed((uint32_t)opt->seed, share->k),
                                        .threads = opt->threads,
                                        .timeout_s = fmin(left, opt->timeout_s),
                                        .image = image.s,
@@ -36,16 +55,52 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     if (!fs_make_parent_dirs(image.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
-    unlink(image.s);
+    if (!share->keep) {
+        unlink(image.s);
+        unlink(fs_path("%s.state", image.s).s);
+    }
     unlink(log.s);
     return true;
 }
 
-/* What the three questions came to; the later ones are asked of some scenes. */
+/* The first render's samples again: in two shares that are merged, and with a pause between. */
+static bool judge_parts(const struct validate_options *opt, const struct suite_scene *s,
+                        const struct moments *whole, double deadline, struct parts *out,
+                        double *seconds, struct err *e)
+{
+    const int cut = s->consistency.parts, all = s->consistency.spp;
+    const struct path image = image_path(opt, s);
+    const char *const keep[] = {"--keep-state", NULL}, *const resume[] = {"--resume", image.s,
+                                                                          NULL};
+    struct moments first, rest;
+    if (!render_one(opt, s, &(struct share){0, 0, cut, keep, true}, deadline, &first, seconds, e))
+        return false;
+    bool ok =
+        render_one(opt, s, &(struct share){0, 0, all, resume, false}, deadline, &rest, seconds, e);
+    if (ok) {
+        out->resumed = same_samples_differing(whole, &rest, 0, out->reason);
+        moments_free(&rest);
+        ok = render_one(opt, s, &(struct share){0, cut, all, NULL, false}, deadline, &rest, seconds,
+                        e);
+    }
+    if (ok) {
+        char reason[128] = "";
+        ok = moments_merge(&first, &rest, e);
+        out->merged = ok ? same_samples_differing(whole, &first, 0, reason) : 0;
+        if (out->resumed == 0)
+            snprintf(out->reason, sizeof out->reason, "%s", reason);
+        moments_free(&rest);
+    }
+    moments_free(&first);
+    return ok;
+}
+
+/* What the four questions came to; the later ones are asked of some scenes. */
 struct findings {
     struct stated_error c;
     struct sample_efficiency noise;
     struct adaptive_stop stop;
+    struct parts parts;
 };
 
 static bool judge_noise(const struct suite_scene *s, const struct moments *render, double alpha,
@@ -61,21 +116,46 @@ static bool judge_noise(const struct suite_scene *s, const struct moments *rende
     return ok;
 }
 
-static bool judge_stop(const struct validate_options *opt, const struct suite_scene *s,
-                       double deadline, struct adaptive_stop *out, double *seconds, struct err *e)
+/* The number of samples, up to 64 batches, that most pixels have. */
+static int frequent_count(const struct moments *m, int batch)
 {
+    enum { BATCHES = 64 };
+    int pixels[BATCHES + 1] = {0}, best = 1;
+    for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++) {
+        double k = m->n[p] / batch;
+        if (k >= 1 && k <= BATCHES && k == floor(k))
+            pixels[(int)k]++;
+    }
+    for (int k = 2; k <= BATCHES; k++)
+        best = pixels[k] > pixels[best] ? k : best;
+    return best * batch;
+}
+
+static bool judge_stop(const struct validate_options *opt, const struct suite_scene *s,
+                       double deadline, struct findings *f, double *seconds, struct err *e)
+{
+    const int most = s->consistency.most;
     char batch[16], tolerance[32];
     snprintf(batch, sizeof batch, "%d", s->consistency.batch);
     snprintf(tolerance, sizeof tolerance, "%.17g", s->consistency.tolerance);
     const char *const options[] = {"-a", batch, tolerance, NULL};
     struct moments m;
-    if (!render_one(opt, s, s->consistency.renders, s->consistency.most, options, deadline, &m,
-                    seconds, e))
+    if (!render_one(opt, s, &(struct share){s->consistency.renders, 0, most, options, false},
+                    deadline, &m, seconds, e))
         return false;
-    *out = adaptive_stop_check(&m, s->consistency.batch, s->consistency.tolerance,
-                               s->consistency.most);
+    f->stop = adaptive_stop_check(&m, s->consistency.batch, s->consistency.tolerance, most);
+    struct moments plain;
+    const int n = frequent_count(&m, s->consistency.batch);
+    bool asks = s->consistency.parts > 0 && f->parts.merged + f->parts.resumed == 0, ok = true;
+    if (asks)
+        ok = render_one(opt, s, &(struct share){s->consistency.renders, 0, n, NULL, false},
+                        deadline, &plain, seconds, e);
+    if (asks && ok) {
+        f->parts.adaptive = same_samples_differing(&plain, &m, n, f->parts.reason);
+        moments_free(&plain);
+    }
     moments_free(&m);
-    return true;
+    return ok;
 }
 
 /* The first of them that differs, else the first that is undecided. */
@@ -86,6 +166,19 @@ static enum verdict overall(const struct suite_scene *s, const struct findings *
                  "adaptive sampling: %d pixels stop before their interval is inside the tolerance, "
                  "%d after it must have been",
                  f->stop.too_early, f->stop.too_late);
+        return VERDICT_DIFFERENT;
+    }
+    const struct parts *p = &f->parts;
+    if (p->merged + p->resumed + p->adaptive > 0 && f->c.verdict != VERDICT_DIFFERENT) {
+        snprintf(reason, 256,
+                 "%d pixels of %s are not those of one whole render of the same samples; %s",
+                 p->resumed > 0  ? p->resumed
+                 : p->merged > 0 ? p->merged
+                                 : p->adaptive,
+                 p->resumed > 0  ? "a resumed render"
+                 : p->merged > 0 ? "two merged shares"
+                                 : "an adaptive render",
+                 p->reason);
         return VERDICT_DIFFERENT;
     }
     bool noise = s->consistency.noise_margin > 0 && f->c.verdict != VERDICT_DIFFERENT &&
@@ -131,11 +224,13 @@ json_t *stated_error_run(const struct validate_options *opt, const struct suite_
     double seconds = 0;
     bool ok = render != NULL || err_set(&e, "out of memory");
     for (; ok && done < num; done += ok)
-        ok = render_one(opt, s, done, s->consistency.spp, NULL, deadline, &render[done], &seconds,
-                        &e);
+        ok = render_one(opt, s, &(struct share){done, 0, s->consistency.spp, NULL, false}, deadline,
+                        &render[done], &seconds, &e);
     ok = ok && stated_error_judge(render, num, s->consistency.margin, each, &f.c, &e) &&
          (!asks_noise || judge_noise(s, render, each, &f.noise, &e)) &&
-         (s->consistency.batch == 0 || judge_stop(opt, s, deadline, &f.stop, &seconds, &e));
+         (s->consistency.parts == 0 ||
+          judge_parts(opt, s, &render[0], deadline, &f.parts, &seconds, &e)) &&
+         (s->consistency.batch == 0 || judge_stop(opt, s, deadline, &f, &seconds, &e));
     for (int k = 0; k < done; k++)
         moments_free(&render[k]);
     free(render);

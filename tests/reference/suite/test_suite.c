@@ -344,6 +344,9 @@ static const struct fault {
      "\"noise_margin\": 0.1}",
      "42_good.json: 'consistency.noise_margin' needs a truth whose noise is known"},
     {false, "\"spp\": 16",
+     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, \"parts\": 4}",
+     "'consistency.parts' is 4, not in 1..3"},
+    {false, "\"spp\": 16",
      "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, "
      "\"adaptive\": {\"batch\": 1, \"tolerance\": 0.1, \"spp\": 64}}",
      "'consistency.adaptive.batch' is 1, not in 2.."},
