@@ -14,6 +14,7 @@ class Scene {
     this.claims = [...section.querySelectorAll(".claim[data-a]")].map((article) => {
       const claim = { article, a: nameOf(article.dataset.a), b: nameOf(article.dataset.b), tile: +article.dataset.tile };
       claim.name = article.dataset.name;
+      claim.equal = /EQUIVALENT/.test(article.querySelector(".badge").textContent);
       claim.p = JSON.parse(article.dataset.tileP || "[]");
       claim.t = JSON.parse(article.dataset.tileT || "[]");
       const worst = article.querySelector("button[data-x]");
@@ -61,7 +62,7 @@ class Scene {
   // The map's sentence, made once: it may count pixels.
   sentence(kind, claim) {
     const m = this.map(kind, claim);
-    if (m.sentence === undefined) m.sentence = mapKinds[kind].says(claim.a.name, claim.b.name, m.value);
+    if (m.sentence === undefined) m.sentence = mapKinds[kind].says(claim.a.name, claim.b.name, m.value, claim.equal);
     return m.sentence;
   }
 

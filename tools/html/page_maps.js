@@ -140,9 +140,9 @@ const mapKinds = {
   },
   t: {
     key: "t", name: "t map", diverging: true, range: () => [-4, 4], label: (v) => (v > 0 ? "+" : "") + digits(v),
-    says: (a, b, v) => "The same difference in units of its noise: one unit is what chance alone does. If both agree " +
+    says: (a, b, v, equal) => "The same difference in units of its noise: one unit is what chance alone does. If both agree " +
       "this is an even mix of pale red and blue, and about 5 of 100 pixels are beyond \u00b12" + beyondTwo(v) +
-      ". A shape that you recognise is a real difference.",
+      ". A shape that you recognise is a real difference" + (equal ? ", here one inside the margin." : "."),
   },
   error: {
     key: "e", name: "Error", diverging: false, range: (v) => [0, symmetric(v, 0.001, 1)[1]], label: percent,

@@ -16,13 +16,14 @@ function sortRows(body, column, order) {
 }
 
 // Each heading sorts: up, down, then as it was.
-function makeSortable(table) {
+function makeSortable(table, before = () => {}) {
   const body = table.tBodies[0], original = [...body.rows], heads = [...table.tHead.rows[0].cells];
   heads.forEach((head, column) => {
     const button = make("button", { type: "button" }, ...head.childNodes);
     head.append(button);
     button.addEventListener("click", () => {
       const next = { none: "ascending", ascending: "descending", descending: "none" }[head.getAttribute("aria-sort") || "none"];
+      before();
       heads.forEach((h) => h.removeAttribute("aria-sort"));
       body.append(...original);
       if (next === "none") return;
@@ -43,12 +44,38 @@ function filterRows(table, words) {
   return left;
 }
 
+// Rows of one scene that stand together and are as expected fold into the first of them, whose button says how many more there are.
+function foldScenes(table) {
+  const groups = [];
+  for (const row of table.tBodies[0].rows) {
+    const scene = row.querySelector("th").textContent, last = groups[groups.length - 1];
+    if (last && last.scene === scene && !row.classList.contains("bad") && !last.rows[0].classList.contains("bad")) last.rows.push(row);
+    else groups.push({ scene, rows: [row] });
+  }
+  const show = (group, open) => {
+    group.rows.slice(1).forEach((row) => row.classList.toggle("folded", !open));
+    group.button.setAttribute("aria-expanded", open);
+  };
+  const foldable = groups.filter((g) => g.rows.length > 1);
+  for (const group of foldable) {
+    group.button = make("button", { type: "button", className: "more" }, "+" + (group.rows.length - 1));
+    group.button.setAttribute("aria-label", group.rows.length - 1 + " more of " + group.scene);
+    group.button.addEventListener("click", () => show(group, group.button.getAttribute("aria-expanded") === "false"));
+    group.rows[0].querySelector("th").append(group.button);
+    show(group, false);
+  }
+  return (open) => foldable.forEach((group) => show(group, open));
+}
+
 const evidence = [...document.querySelectorAll("details.evidence")];
 const claims = document.getElementById("claims");
 if (claims && claims.tBodies[0].rows.length > 1) {
-  makeSortable(claims);
+  // Sorted or searched, rows of a scene no longer stand together.
+  const foldAll = claims.closest("details.rows") ? foldScenes(claims) : () => {};
+  makeSortable(claims, () => foldAll(true));
   const count = make("output", {}), find = make("input", { type: "search", placeholder: "cornell cycles" });
   find.addEventListener("input", () => {
+    foldAll(find.value.trim() !== "");
     const left = filterRows(claims, find.value);
     count.textContent = find.value.trim() ? left + " of " + claims.tBodies[0].rows.length : "";
   });

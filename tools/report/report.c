@@ -214,7 +214,7 @@ static bool write_page(struct page *p, const json_t *root, struct claim_ref *cla
     FILE *f = p->f;
     p->folded = num > FOLD_FROM;
     char title[128];
-    snprintf(title, sizeof title, "Assay report, %.64s", member_text(root, "date"));
+    snprintf(title, sizeof title, "Assay report, %.64s", html_date(member_text(root, "date")).s);
     html_page_open(f, title, page_js, member_number(root, "page_every_s"));
     write_header(f, root, claim, num);
     report_matrix(p, claim, num);

@@ -78,7 +78,7 @@ static void write_plot(FILE *f, const struct history *h, const struct history_se
             plot_segment(&plot, "line", run, 100 * p->low, run, 100 * p->high);
         history_commit(&h->run[p->run], commit, sizeof commit);
         plot_point(&plot, 0, run, v, "%s, %s: %s", commit,
-                   member_text(h->run[p->run].results, "date"), html_number(v).s);
+                   html_date(member_text(h->run[p->run].results, "date")).s, html_number(v).s);
     }
     plot_close(&plot);
     fprintf(f, "last %s</td>", html_number(value_of(&s->point[s->num - 1], q)).s);
