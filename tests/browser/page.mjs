@@ -1,13 +1,15 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS GOING|--values-only: the page of one scene of four images, in Debian's chromium, and
-// GOING, one of a run that has not ended.
+// node page.mjs MODULES PAGE RESULTS SHOTS GOING SUITE|--values-only: the page of one scene of four images, in Debian's chromium,
+// GOING, one of a run that has not ended, and SUITE, one of three scenes.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
 import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { readExr, pixelOf, grey, srgb } from "./files.mjs";
 
-const [modules, pagePath, resultsPath, shots, goingPath] = process.argv.slice(2);
-const { chromium } = createRequire(resolve(modules) + "/")("playwright-core");
+const [modules, pagePath, resultsPath, shots, goingPath, suitePath] = process.argv.slice(2);
+const require = createRequire(resolve(modules) + "/");
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 const results = JSON.parse(readFileSync(resultsPath, "utf8"));
 const directory = dirname(resultsPath) + "/", claims = results.claims.filter((c) => c.files);
 const fileOf = {};
@@ -250,6 +252,10 @@ const [download] = await Promise.all([page.waitForEvent("download"), article.loc
 const csv = readFileSync(await download.path(), "utf8").split("\r\n");
 check("a figure's numbers are saved as CSV", download.suggestedFilename() === "tiles.csv" && csv[0] === "x,y,t,log10_p" &&
   csv.length === tiles.length + 2 && Math.abs(csv[1].split(",")[3] - tiles[0]) < 1e-5, csv.slice(0, 2).join(" | "));
+const [plotFile] = await Promise.all([page.waitForEvent("download"), article.locator('a.csv[download="tiles.svg"]').first().click()]);
+const plot = readFileSync(await plotFile.path(), "utf8");
+check("a plot is saved as an SVG that stands alone", plot.startsWith("<svg") && !/var\(|class=|style=/.test(plot) && /<circle[^>]*fill="rgb/.test(plot) &&
+  await page.evaluate((text) => new DOMParser().parseFromString(text, "image/svg+xml").querySelector("parsererror") === null, plot), plot.slice(0, 300));
 const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
   !(f.querySelector("figcaption a.csv") && f.querySelector("figcaption b") && f.querySelectorAll("svg text").length > 3)).length`);
 check("every plot has a caption, labels and its numbers", bare === 0, bare + " have not");
@@ -333,6 +339,27 @@ await going.evaluate("window.stays = true");
 await going.waitForTimeout(2500);
 check("the last page does not reload", await going.evaluate("window.stays === true"));
 await going.context().close();
+// The table of a suite has a row for each scene, until its button, a search or a sort unfolds the others.
+const suite = await open(suitePath, 1280, 900, { bypassCSP: true }), rowsOf = suite.locator("#claims tbody tr");
+const visible = () => suite.locator("#claims tbody tr:visible").count();
+await suite.getByText(/^All \d+, row by row$/).click();
+const one = await suite.locator("#claims tbody tr").filter({ hasText: "12_point_plane" }).count();
+check("rows of one scene fold", await visible() === 3 && await rowsOf.count() > 8, await visible() + " of " + await rowsOf.count());
+await suite.getByRole("button", { name: "more of 12_point_plane" }).click();
+check("a button unfolds them", await visible() === 2 + one, await visible() + ", not " + (2 + one));
+await suite.getByRole("searchbox", { name: "Find" }).fill("povray");
+check("a search unfolds what it finds", await visible() === await rowsOf.filter({ hasText: "povray" }).count() && await visible() > 3, await visible());
+await suite.getByRole("searchbox", { name: "Find" }).fill("");
+check("they are folded again", await visible() === 3, await visible());
+for (const [path, scheme] of [[pagePath, "light"], [suitePath, "dark"]]) {
+  const looked = await open(path, 1280, 900, { bypassCSP: true, colorScheme: scheme });
+  await looked.evaluate(`document.querySelectorAll("details").forEach((d) => (d.open = true))`);
+  await looked.evaluate(axe);
+  const { violations } = await looked.evaluate("axe.run()");
+  check("axe finds nothing, " + scheme, violations.length === 0, violations.map((v) => v.id + " " + v.nodes[0].html.slice(0, 120)).join("; "));
+  await looked.context().close();
+}
+await suite.context().close();
 const pdf = await page.pdf({ path: shots + "/page.pdf", preferCSSPageSize: true });
 check("it prints", pdf.length > 20000, pdf.length + " bytes");
 const unnamed = await page.evaluate(`[...document.querySelectorAll("canvas, svg, button, select, input")].filter((e) =>

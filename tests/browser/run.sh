@@ -32,7 +32,7 @@ if [ $? = 0 ] && [ $seen = yes ] && ! grep -q 'The run goes on\|http-equiv="refr
     echo "ok page: it is there while the run goes on"; else
     echo "not ok page: it is there while the run goes on: seen $seen, $(ls "$tmp/going" | tr '\n' ' ')"; fi
 
-look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots" "$tmp/going.html"
+look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots" "$tmp/going.html" "$tmp/going/index.html"
 
 # Control: with two images exchanged nothing but the values is wrong, and that is found.
 sed 's/id="layer-0"/id="layer-x"/; s/id="layer-1"/id="layer-0"/; s/id="layer-x"/id="layer-1"/' "$tmp/report/index.html" >"$tmp/exchanged.html"

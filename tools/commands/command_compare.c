@@ -131,6 +131,18 @@ static double round_up(double x)
     return ceil(x / unit) * unit;
 }
 
+/* Which of two is noisier, where both sides say how noisy they are. */
+static void print_noise(const struct variance_ratio *v)
+{
+    if (v->valid)
+        printf("noise: the variance of one path of A is %.3g [%.3g, %.3g] times that of B\n",
+               v->ratio, v->lo, v->hi);
+    else if (v->ratio > 0)
+        printf("noise: the variance of one path of A is about %.2g times that of B; rare bright paths "
+               "leave no interval\n",
+               v->ratio);
+}
+
 static void print_result(const struct compare_job *job, const struct compared *c)
 {
     const struct comparison *r = &c->r;
@@ -150,6 +162,7 @@ static void print_result(const struct compare_job *job, const struct compared *c
         printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %s of the image, %s of a "
                "tile; %d tests\n",
                100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, image, tile, r->num_tests);
+    print_noise(&r->variance);
     if (r->extra_factor > 1) {
         verdict_more_samples(r->extra_factor, "samples", more);
         printf("%s\n", more);

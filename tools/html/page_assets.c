@@ -18,5 +18,6 @@ __asm__(".pushsection .rodata\n"
         ".incbin \"tools/html/page.js\"\n"
         ".incbin \"tools/html/page_keys.js\"\n"
         ".incbin \"tools/html/page_table.js\"\n"
+        ".incbin \"tools/html/page_save.js\"\n"
         ".byte 0\n"
         ".popsection\n");
