@@ -205,7 +205,7 @@ bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 #: make bvh-table  time the hierarchies and brute force on meshes in ASSAY_CS184 (minutes)
 bvh-table: $(BUILD)/pathtracer
 	tests/studies/bench/bvh_table.sh $(BUILD)
-#: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="FILES"
+#: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="[--variant N] FILES"
 rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-3-1*.rubric) --plain tools/rubrics/cs184-3-2.rubric
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)

@@ -1,7 +1,7 @@
 #!/bin/bash
 # tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and three
 # more students, one with ada's program under another name, one with a seed of her own, and one who hands in our reference with something added: points, whose noise it is, the same again on one processor
-# and two, and after an interruption. Prints "ok NAME" or "not ok NAME: why".
+# and two, and after an interruption; variants of a scene. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/grading.sh BUILD}")
 tmp=$(mktemp -d)
@@ -104,4 +104,31 @@ check "one image for two scenes is judged" one 2.00
 cp "$tmp/same/12_point_plane.png" "$tmp/same/11_furnace.png"
 check "one image for three scenes has no points" one 0.00
 check "and is told so" grep -q "the same image was handed in for 2 other scenes" "$tmp/one-image/same/grade.json"
+# Three variants of a scene, by the colour of the lamp. Images made beforehand of the second have all points there (control), and none in
+# another; a right program has all in each. What was drawn stays.
+for k in 1 2 3; do sed "s/10 10 10/$((4 + 3 * k)) 10 $((16 - 3 * k))/" reference/scenes/41_cornell.dae >"$tmp/walls_$k.dae"; done
+printf '%s\n' "rubric Walls" "curve srgb" "command {program} -q -s {spp} -m {bounces} -r {width} {height} --seed {seed} -f {out} {scene}" "variants 3" \
+    "image walls" "scene walls_{variant}.dae" "size 32 32" "spp 64" "bounces 3" "reference ours 256" \
+    "part 1 Light" "check walls 1 equal walls" "image 0.02 0.08" "tile 0.06 0.2" >"$tmp/walls.rubric"
+mkdir "$tmp/beforehand"
+"$build/pathtracer" -q -r 32 32 -s 64 -m 3 --seed 9 -f "$tmp/beforehand/walls.png" "$tmp/walls_2.dae" >/dev/null
+class() { "$build/assay" grade -q -o "$tmp/walls$1" "${@:2}" "$tmp/walls.rubric" "$tmp/submissions/ada" "$tmp/beforehand"; }
+points_of() { grep -q "^\"$2\",$3," "$tmp/walls$1/grades.csv"; } # CLASS ID POINTS
+check "variants: each is looked at" "$build/assay" grade --check-rubric "$tmp/walls.rubric"
+for k in 1 2 3; do
+    class $k --variant $k >/dev/null
+    check "variant $k: ada has all points" points_of $k ada 1.00
+    check "variant $k: images of variant 2" points_of $k beforehand "$([ $k = 2 ] && echo 1.00 || echo 0.00)"
+    check "variant $k is recorded" grep -q "\"variant\": $k" "$tmp/walls$k/ada/grade.json"
+done
+for n in a b c d; do "$build/assay" grade -q --prepare -o "$tmp/walls-$n" "$tmp/walls.rubric" && cat "$tmp/walls-$n/.references/variant"; done >"$tmp/drawn"
+check "one of three is drawn" bash -c "! grep -qv '^[123]$' '$tmp/drawn' && [ \$(wc -l <'$tmp/drawn') -eq 4 ]"
+check "graded again" bash -c "rm -r '$tmp/walls3/ada'; exec '$build/assay' grade -q -o '$tmp/walls3' '$tmp/walls.rubric' '$tmp/submissions/ada'"
+check "by the same variant" grep -q '"variant": 3' "$tmp/walls3/ada/grade.json"
+check "whose command says so" grep -q -- '--variant 3' "$tmp/walls3/ada/grade.json"
+expect "another variant than was drawn" 3 "variant 3 was drawn, not 1" class 3 --variant 1
+expect "a variant that there is not" 3 "has no variant 4" class 4 --variant 4
+expect "a rubric without variants" 3 "has no variants" "$build/assay" grade -o "$tmp/none" --variant 1 "$rubric" "$tmp/beforehand"
+rm "$tmp/walls_3.dae"
+expect "a variant whose scene is missing" 3 "variant 3: .*no file 'walls_3.dae'" "$build/assay" grade --check-rubric "$tmp/walls.rubric"
 [ $failures -eq 0 ]

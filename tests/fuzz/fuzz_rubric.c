@@ -50,7 +50,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         fuzz_require(r != NULL && m != NULL, "no memory");
     }
     const char *path = fuzz_file(data, size, ".rubric");
-    if (!rubric_read(path, &suite, r, m, &e))
+    if (!rubric_read(path, &suite, 0, r, m, &e))
         fuzz_check_line(&e, path);
     else if (m->num > 0)
         check_mistakes(m);

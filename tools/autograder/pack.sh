@@ -14,7 +14,7 @@ cp -R Makefile LICENSE renderer reference tools "$tmp/zip/assay"
 cp -R golden "$tmp/zip/assay"
 find "$(dirname "$rubric")" -maxdepth 1 -type f -exec cp {} "$tmp/zip/rubric" \;
 bugs=$(awk '$1 == "bugs" { print $2 }' "$rubric")
-[ -z "$bugs" ] || cp -R "$(dirname "$rubric")/$bugs" "$tmp/zip/rubric"
+[ -z "$bugs" ] || cp -R "$(dirname "$rubric")"/${bugs//"{variant}"/*} "$tmp/zip/rubric"
 basename "$rubric" >"$tmp/zip/rubric_name"
 echo "$commit" >"$tmp/zip/commit"
 echo "$@" $(awk '$1 == "packages" { $1 = ""; sub(/ #.*/, ""); print }' "$rubric") >"$tmp/zip/packages"

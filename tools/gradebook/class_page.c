@@ -370,6 +370,9 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
         html_page_open(f, "Grades", NULL, 0);
         html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n",
                    member_text(json_array_get(grades, 0), "rubric"));
+        if (json_object_get(json_array_get(grades, 0), "variant") != NULL)
+            html_print(f, "<p>Variant %g of the rubric's scenes was drawn for this class.</p>\n",
+                       member_number(json_array_get(grades, 0), "variant"));
         summary(f, sorted, num);
         changes(f, sorted, num);
         table(f, sorted, num);

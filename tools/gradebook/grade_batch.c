@@ -29,9 +29,9 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
         (job->bugs != NULL && !sha256_file(path, bugs, e)))
         return false;
     appeals_key(job->appeals, s->id, appeals);
-    snprintf(text, sizeof text, "%s %s %s %s %s %s %llu %.17g %d", assay_version, rubric, scenes,
+    snprintf(text, sizeof text, "%s %s %s %s %s %s %llu %.17g %d %d", assay_version, rubric, scenes,
              bugs, appeals, s->sha256, (unsigned long long)job->seed, job->alpha,
-             job->sandbox->unsafe);
+             job->sandbox->unsafe, job->rubric->variant);
     sha256_text(text, key);
     return true;
 }
@@ -216,10 +216,16 @@ static json_t *command_of(const struct grade_job *job, const char *path)
     int num = 0;
     while (job->word != NULL && job->word[num] != NULL)
         num++;
-    const char **word = num > 0 ? calloc((size_t)num + 2, sizeof *word) : NULL;
+    const char **word = num > 0 ? calloc((size_t)num + 4, sizeof *word) : NULL;
     if (word == NULL)
         return NULL;
     memcpy(word, job->word, (size_t)num * sizeof *word);
+    char variant[16];
+    snprintf(variant, sizeof variant, "%d", job->rubric->variant);
+    if (job->rubric->variant > 0) {
+        word[num++] = "--variant";
+        word[num++] = variant;
+    }
     word[num] = path;
     char *text = shell_quote_join("assay", word);
     json_t *command = text != NULL ? json_string(text) : NULL;
@@ -245,6 +251,8 @@ static bool grade_anew(const struct grade_job *job, const char *path, const char
                        assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
                        !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
                        "trouble");
+    if (job->rubric->variant > 0)
+        json_object_set_new(*grade, "variant", json_integer(job->rubric->variant));
     if (access(log.s, R_OK) == 0)
         json_object_set_new(*grade, "build_log", json_string(fs_base(log.s)));
     if (*grade != NULL && grade_made(job, s, work, out.s, *grade, e)) {

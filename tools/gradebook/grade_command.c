@@ -7,6 +7,7 @@
 #include "tools/results/results.h"
 #include "tools/base/data_dirs.h"
 #include "tools/base/dir_lock.h"
+#include "tools/submission/rubric_variant.h"
 #include "grade_batch.h"
 #include "grade_change.h"
 #include "grade_needs.h"
@@ -231,7 +232,8 @@ static bool open_box(const struct grade_settings *s, const struct rubric *r, con
 static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
                  int argc, char **argv, struct err *e)
 {
-    char cache[4400], pathtracer[PATH_MAX];
+    char pathtracer[PATH_MAX];
+    const struct path cache = grade_options_references(s);
     /* What every image would be said to be unreadable for. */
     if (image_oiio_version(e) == NULL)
         return EXIT_NOT_JUDGED;
@@ -244,27 +246,23 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
     }
     if (realpath(s->pathtracer, pathtracer) == NULL)
         snprintf(pathtracer, sizeof pathtracer, "%s", s->pathtracer);
-    snprintf(cache, sizeof cache, "%.4000s%s",
-             s->references != NULL ? s->references
-             : s->before != NULL   ? s->before
-                                   : s->out,
-             s->references != NULL ? "" : "/.references");
     const struct answer_options opt = {.golden_dir = s->golden,
                                        .pathtracer = pathtracer,
-                                       .cache = cache,
+                                       .cache = cache.s,
                                        .threads = cli_processors(),
                                        .timeout_s = 3600};
     if (s->prepare) {
-        code = fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
+        code =
+            fs_make_dirs(cache.s, e) && answer_key_make(r, &opt, answers, e) ? 0 : EXIT_NOT_JUDGED;
         if (code == 0 && !s->quiet)
-            printf("references of %s: %s\n", r->path, cache);
-    } else if (open_box(s, r, cache, pathtracer, &box, e)) {
+            printf("references of %s: %s\n", r->path, cache.s);
+    } else if (open_box(s, r, cache.s, pathtracer, &box, e)) {
         int num;
         char **word = grade_options_words(argc, argv, s, &num);
         bool ok = word != NULL || err_set(e, "out of memory");
         if (ok && s->fill)
             code = fill_cache(s, r, &box, e) ? 0 : EXIT_NOT_JUDGED;
-        else if (ok && fs_make_dirs(cache, e) && answer_key_make(r, &opt, answers, e))
+        else if (ok && fs_make_dirs(cache.s, e) && answer_key_make(r, &opt, answers, e))
             code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
         free(word);
         sandbox_close(&box);
@@ -276,6 +274,22 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
     return code;
 }
 
+/* Each of its variants. */
+static int check_rubric(const struct grade_settings *s, const struct suite *suite, struct rubric *r,
+                        struct err *e)
+{
+    struct rubric_mistakes m;
+    for (int variant = 2; variant <= r->variants; variant++)
+        if (!rubric_read(s->rubric, suite, variant, r, &m, e) || !print_mistakes(r, &m, e))
+            return err_prefix(e, "variant %d", variant), EXIT_NOT_JUDGED;
+    char variants[32] = "";
+    if (r->variants > 0)
+        snprintf(variants, sizeof variants, ", %d variants", r->variants);
+    printf("%s: %d checks in %d parts, %g points%s\n", r->path, r->num_checks, r->num_parts,
+           rubric_points(r), variants);
+    return 0;
+}
+
 int grade_command(const struct grade_settings *s, int argc, char **argv, struct err *e)
 {
     struct suite suite = {0};
@@ -285,15 +299,15 @@ int grade_command(const struct grade_settings *s, int argc, char **argv, struct 
     int code = EXIT_NOT_JUDGED;
     if (r == NULL) {
         err_set(e, "out of memory");
-    } else if (suite_load(s->suite, &suite, e) && rubric_read(s->rubric, &suite, r, &m, e) &&
+    } else if (suite_load(s->suite, &suite, e) && rubric_read(s->rubric, &suite, 0, r, &m, e) &&
                print_mistakes(r, &m, e)) {
         if (s->only_check)
-            printf("%s: %d checks in %d parts, %g points\n", r->path, r->num_checks, r->num_parts,
-                   rubric_points(r));
-        /* --fill-build-cache writes elsewhere */
-        if (s->only_check)
-            code = 0;
-        else if (s->fill || dir_lock_take(&lock, s->out, e))
+            code = check_rubric(s, &suite, r, e);
+        else if (s->fill || /* which writes elsewhere, and needs no images */
+                 (dir_lock_take(&lock, s->out, e) &&
+                  rubric_variant_read(grade_options_references(s).s, &suite, s->variant, r, &m,
+                                      e) &&
+                  print_mistakes(r, &m, e)))
             code = grade(s, r, &suite, argc, argv, e);
         dir_lock_release(&lock);
     }

@@ -34,6 +34,9 @@ static const struct cli_option options[] = {
     {'j', "jobs", "N", "submissions at a time; 0: as many as processors (1)", TO(jobs), 0, 64},
     {'t', "threads", "N", "{threads} of a program (1)", TO(threads), 1, 1024},
     {0, "seed", "N", "from which {seed} of each image is made (1)", TO(seed)},
+    {0, "variant", "N",
+     "of the rubric's, which the class gets (drawn when the references are made, and kept there)",
+     TO(variant), 1, 99},
     {0, "alpha", "A", "chance of a check that a right program loses points (1e-5)", TO(alpha),
      1e-12, 0.1},
     {0, "again", "", "grade also what has been graded, and run anew what has been run", TO(again)},
@@ -75,17 +78,10 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
 
 char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
 {
-    static const struct option_words how[] = {{"-o", 1},
-                                              {"--out", 1},
-                                              {"-j", 1},
-                                              {"--jobs", 1},
-                                              {"--references", 1},
-                                              {"--before", 1},
-                                              {"--slurm", 0},
-                                              {"-q", 0},
-                                              {"--quiet", 0},
-                                              {"--again", 0},
-                                              {0}};
+    static const struct option_words how[] = {
+        {"-o", 1},           {"--out", 1},     {"-j", 1},       {"--jobs", 1},
+        {"--references", 1}, {"--variant", 1}, {"--before", 1}, {"--slurm", 0},
+        {"-q", 0},           {"--quiet", 0},   {"--again", 0},  {0}};
     char **word = cli_apart(options, argc, argv);
     if (word == NULL)
         return NULL;
@@ -103,6 +99,13 @@ char **grade_options_words(int argc, char **argv, const struct grade_settings *s
     }
     word[*num] = NULL;
     return word;
+}
+
+struct path grade_options_references(const struct grade_settings *s)
+{
+    if (s->references != NULL)
+        return fs_path("%s", s->references);
+    return fs_path("%s/.references", s->before != NULL ? s->before : s->out);
 }
 
 void grade_options_help(void)

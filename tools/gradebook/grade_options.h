@@ -10,7 +10,7 @@ struct grade_settings {
     const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references, *build_cache,
         *before, *appeals;   /* NULL: out; none */
     const char **submission; /* num of them, words of the command */
-    int num, jobs, threads;
+    int num, jobs, threads, variant;
     uint64_t seed;
     double alpha;
     bool only_check, prepare, fill, again, unsafe, quiet, slurm, help;
@@ -21,11 +21,14 @@ struct grade_settings grade_options_default(int argc, struct data_dirs *at);
 /* On top of the defaults. */
 bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
     __attribute__((warn_unused_result));
-/* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go and how many at a
- * time: a NULL-terminated array of num words, to free(). NULL out of memory. */
+/* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go, how many at a
+ * time and the variant, which the references know: a NULL-terminated array of num words, to free(). NULL out of memory. */
 char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
     __attribute__((warn_unused_result));
 void grade_options_help(void);
+
+/* Where references are kept. */
+struct path grade_options_references(const struct grade_settings *s);
 
 /* What they ask for but --help and --slurm; argv: where they were read from. The exit code (results.h); with EXIT_NOT_JUDGED, e has
  * the line. */

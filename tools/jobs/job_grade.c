@@ -5,6 +5,7 @@
 #include "tools/gradebook/grade_options.h"
 #include "job_kinds.h"
 #include "tools/results/results.h"
+#include "tools/submission/rubric_variant.h"
 #include "tools/submission/submission.h"
 
 #include <errno.h>
@@ -30,13 +31,15 @@ static bool beside_rubric(struct plan *p, const struct rubric *r, const char *na
 }
 
 /* The rubric and what it names. */
-static bool rubric_inputs(struct plan *p, const struct grade_settings *s, struct err *e)
+static bool rubric_inputs(struct plan *p, const struct grade_settings *s, const char *references,
+                          struct err *e)
 {
     struct suite suite = {0};
     struct rubric *r = calloc(1, sizeof *r);
     struct rubric_mistakes m;
     bool ok = (r != NULL || err_set(e, "out of memory")) && suite_load(s->suite, &suite, e) &&
-              rubric_read(s->rubric, &suite, r, &m, e);
+              rubric_read(s->rubric, &suite, 0, r, &m, e) &&
+              rubric_variant_read(references, &suite, s->variant, r, &m, e);
     if (ok && m.num > 0)
         ok = err_set(e, "%s:%d: %s", s->rubric, m.at[0].line, m.at[0].text);
     for (int i = 0; ok && i < r->num_images; i++) {
@@ -72,7 +75,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
          plan_run_words(p, (const char *const *)words + 1, num - 1, true, e) &&
          plan_run_words(p, &(const char *){"{job}"}, 1, false, e) &&
          plan_input(p, references.s, e) && plan_input(p, s->pathtracer, e) &&
-         rubric_inputs(p, s, e);
+         rubric_inputs(p, s, references.s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
     plan_may_end(p, EXIT_NOT_JUDGED);   /* what a node has trouble with, the batch tries again */
     for (int k = 0; ok && k < s->num; k++)

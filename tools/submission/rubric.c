@@ -19,6 +19,7 @@ struct statement {
     char *rest;                 /* what has not been taken, without spaces around */
     struct rubric_image *image; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
+    bool varies; /* something with the number of the variant was read */
 };
 
 static char *take_word(struct statement *s)
@@ -347,12 +348,47 @@ static bool read_in_check(struct statement *s, const char *word)
     return true;
 }
 
+/* Once, before what depends on it. */
+static void read_variants(struct statement *s)
+{
+    struct rubric *r = s->r;
+    if (r->variants > 0)
+        rubric_mistake(s->m, s->line, "a second 'variants'");
+    take_int(s, "variants", 2, 99, &r->variants);
+    if (r->variant > r->variants)
+        rubric_mistake(s->m, s->line, "there is no variant %d", r->variant);
+    r->variant = r->variant > 0 ? r->variant : 1;
+}
+
+/* Puts the number in place of "{variant}" in what may differ; it is never longer. */
+static void fill_in_variant(struct statement *s, const char *word)
+{
+    static const char *const may[] = {"scene", "environment", "options", "bugs", "accept"};
+    static const char name[] = "{variant}";
+    bool here = false;
+    for (size_t i = 0; i < sizeof may / sizeof *may; i++)
+        here = here || strcmp(word, may[i]) == 0;
+    for (char *at = here ? strstr(s->rest, name) : NULL; at != NULL; at = strstr(at, name)) {
+        if (s->r->variants == 0) {
+            rubric_mistake(s->m, s->line, "'%s' without a line 'variants NUMBER' above", name);
+            return;
+        }
+        s->varies = true;
+        int n = sprintf(at, "%d", s->r->variant);
+        memmove(at + n, at + strlen(name), strlen(at + strlen(name)) + 1);
+        at += n;
+    }
+}
+
 static void read_statement(struct statement *s)
 {
     struct rubric *r = s->r;
     char *word = take_word(s);
+    fill_in_variant(s, word);
     if (strcmp(word, "rubric") == 0)
         take_text(s, word, r->title, sizeof r->title);
+    else if (strcmp(word, "variants") == 0)
+        read_variants(s);
     else if (strcmp(word, "curve") == 0)
         take_text(s, word, r->curve, sizeof r->curve);
     else if (strcmp(word, "command") == 0)
@@ -408,14 +444,15 @@ static int by_line(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-bool rubric_read(const char *path, const struct suite *suite, struct rubric *out,
+bool rubric_read(const char *path, const struct suite *suite, int variant, struct rubric *out,
                  struct rubric_mistakes *m, struct err *e)
 {
     char line[MAX_LINE];
     *out = (struct rubric){.limit = sandbox_default,
                            .build_s = 600,
                            .build_memory = sandbox_default.memory,
-                           .budget_s = 180};
+                           .budget_s = 180,
+                           .variant = variant};
     *m = (struct rubric_mistakes){0};
     const char *slash = strrchr(path, '/');
     snprintf(out->path, sizeof out->path, "%s", path);
@@ -450,6 +487,9 @@ bool rubric_read(const char *path, const struct suite *suite, struct rubric *out
             read_statement(&s);
     }
     bool failed = ferror(f) != 0;
+    out->variant = out->variants > 0 ? out->variant : 0;
+    if (out->variants > 0 && !s.varies)
+        rubric_mistake(m, s.line, "'variants', and no '{variant}' to be one");
     fclose(f);
     if (failed || read > MAX_FILE)
         return err_set(e, "%s: %s", path, failed ? "cannot read" : "more than 1 MiB");

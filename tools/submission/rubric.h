@@ -104,7 +104,8 @@ struct rubric {
     struct rubric_image image[RUBRIC_IMAGES];
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_images, num_checks;
-    int old_word_line; /* the first that says "picture" for "image"; 0: none does */
+    int variants, variant; /* how many there are, and which one this is, from 1; 0: none */
+    int old_word_line;     /* the first that says "picture" for "image"; 0: none does */
 };
 
 struct rubric_mistakes {
@@ -116,9 +117,9 @@ struct rubric_mistakes {
 };
 
 /* Reads the file and looks for mistakes, all of them; *m is sorted by line. Scenes named are looked up in the
- * suite, which has to outlive the rubric. Fails only if the file cannot be read or is longer than 1 MiB; a
+ * suite, which has to outlive the rubric. variant: what "{variant}" stands for where the rubric has variants; 0: the first. Fails only if the file cannot be read or is longer than 1 MiB; a
  * rubric with mistakes is not to be used. *out is large: not for the stack. */
-bool rubric_read(const char *path, const struct suite *suite, struct rubric *out,
+bool rubric_read(const char *path, const struct suite *suite, int variant, struct rubric *out,
                  struct rubric_mistakes *m, struct err *e) __attribute__((warn_unused_result));
 
 /* The number after an option of an image, or the k-th further one: `-a BATCH TOLERANCE`; 0: it has none. */

@@ -1,6 +1,6 @@
-/* make_rubric_bugs BUILD PATCHES RUBRIC... [--plain RUBRIC...]: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
+/* make_rubric_bugs BUILD PATCHES [--variant N] RUBRIC... [--plain RUBRIC...]: writes the catalogue of known bugs that the rubrics' line `bugs` names, beside them
  * (tools/grade/rubric_bugs.h): one for all, as they have images in common. Every bug of PATCHES, and of `bugs` beside this file, has been built as BUILD/mutants/NAME/pathtracer
- * (tests/mutants/mutants.sh --build-only), the correct renderer is BUILD/pathtracer. The latter are mistakes as they stand in
+ * (tests/mutants/mutants.sh --build-only), the correct renderer is BUILD/pathtracer. --variant: of rubrics that have several. The latter are mistakes as they stand in
  * the assignment's code, which has a function for each way to sample light and gives direct light whatever the depth.
  *
  * The correct images are the references, without deviations and with each of those accepted by words (after --plain: without). Of each view, each bug and
@@ -11,6 +11,7 @@
  * image what they do to one without adaptive sampling. A bug that changes no pixel of an image of one sample has no effect on it; an
  * effect within its noise is stored as none. Images are kept in BUILD/rubric-bugs: a run that was stopped goes on; effects that
  * the catalogue has of a bug that has not changed, on an image that has not, are kept: remove it to make all anew. */
+#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
 #include "tests/mutants/bug_effect.h"
@@ -317,7 +318,7 @@ static bool make(struct maker *m, const char *patches, struct err *e)
 }
 
 /* That the directory of the catalogue is not there is a mistake: it is made before. */
-static bool read_course(struct maker *m, const char *path, bool plain, struct err *e)
+static bool read_course(struct maker *m, const char *path, int variant, bool plain, struct err *e)
 {
     struct rubric_mistakes mistakes = {0};
     char dir[2 * PATH_MAX];
@@ -326,12 +327,12 @@ static bool read_course(struct maker *m, const char *path, bool plain, struct er
         return err_set(e, "out of memory");
     m->course[m->num++] = c;
     c->plain = plain;
-    if (!rubric_read(path, &m->suite, &c->rubric, &mistakes, e))
+    if (!rubric_read(path, &m->suite, variant, &c->rubric, &mistakes, e))
         return false;
     if (c->rubric.bugs[0] == '\0')
         return err_set(e, "%s: no line 'bugs DIR'", path);
     snprintf(dir, sizeof dir, "%s/%s", c->rubric.dir, c->rubric.bugs);
-    if (!fs_make_dirs(dir, e) || !rubric_read(path, &m->suite, &c->rubric, &mistakes, e))
+    if (!fs_make_dirs(dir, e) || !rubric_read(path, &m->suite, variant, &c->rubric, &mistakes, e))
         return false;
     return mistakes.num == 0 ||
            err_set(e, "%s:%d: %s", path, mistakes.at[0].line, mistakes.at[0].text);
@@ -341,17 +342,22 @@ int main(int argc, char **argv)
 {
     struct err e = {""};
     static struct maker m = {.lock = PTHREAD_MUTEX_INITIALIZER};
-    if (argc < 4 || argc > 4 + MOST_RUBRICS) {
-        fprintf(stderr, "usage: make_rubric_bugs BUILD PATCHES RUBRIC... [--plain RUBRIC...]\n");
+    if (argc < 4 || argc > 6 + MOST_RUBRICS) {
+        fprintf(
+            stderr,
+            "usage: make_rubric_bugs BUILD PATCHES [--variant N] RUBRIC... [--plain RUBRIC...]\n");
         return 3;
     }
     bool ok = realpath(argv[1], m.build) != NULL && suite_load("reference/scenes", &m.suite, &e);
     bool plain = false;
+    int variant = 0;
     for (int i = 3; ok && i < argc; i++)
         if (strcmp(argv[i], "--plain") == 0)
             plain = true;
+        else if (strcmp(argv[i], "--variant") == 0 && i + 1 < argc)
+            ok = cli_int("--variant", argv[++i], 1, 99, &variant, &e);
         else
-            ok = read_course(&m, argv[i], plain, &e);
+            ok = read_course(&m, argv[i], variant, plain, &e);
     ok = ok && make(&m, argv[2], &e);
     if (!ok)
         fprintf(stderr, "make_rubric_bugs: %s\n", e.msg);

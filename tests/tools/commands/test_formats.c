@@ -345,7 +345,7 @@ static bool rubric_says(const char *text, const char *words)
     static struct rubric_mistakes m;
     struct err e;
     bool says = false;
-    MUST(rubric_read(write_text("a.rubric", text), suite_shipped(), rubric, &m, &e));
+    MUST(rubric_read(write_text("a.rubric", text), suite_shipped(), 0, rubric, &m, &e));
     for (int i = 0; i < m.num; i++)
         says |= strstr(m.at[i].text, words) != NULL;
     return says;
@@ -386,7 +386,7 @@ TEST(rubrics_are_as_their_page_says)
     struct rubric_mistakes m;
     struct err e;
     read_block("rubric.md", "rubric", 0, text);
-    MUST(rubric_read(write_text("example.rubric", text), suite_shipped(), rubric, &m, &e));
+    MUST(rubric_read(write_text("example.rubric", text), suite_shipped(), 0, rubric, &m, &e));
     if (m.num > 0)
         fail_msg("rubric.md: line %d of the example: %s", m.at[0].line, m.at[0].text);
     assert_true(rubric_points(rubric) == 10);

@@ -60,7 +60,7 @@ bool bug_images_start(struct bug_images *b, const char *rubric)
                              .answers = calloc(1, sizeof *b->answers)};
     gsl_rng_set(b->rng, 20261121);
     if (b->rubric == NULL || b->answers == NULL || !suite_load("reference/scenes", &b->suite, &e) ||
-        !rubric_read(rubric, &b->suite, b->rubric, &mistakes, &e) || mistakes.num > 0 ||
+        !rubric_read(rubric, &b->suite, 0, b->rubric, &mistakes, &e) || mistakes.num > 0 ||
         !catalogue_read(fs_path("%s/%s", b->rubric->dir, b->rubric->bugs).s, &c, &e))
         return false;
     bool ok = true;

@@ -1,7 +1,8 @@
 /* Rubrics: what is read, and that every mistake is named with its line. Each text below has one mistake (or those
  * that are listed), put in by hand. */
 
-#include "tools/submission/rubric.h"
+#include "renderer/base/fs.h"
+#include "tools/submission/rubric_variant.h"
 #include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 
@@ -12,7 +13,7 @@ static void read_text(const char *text)
 {
     struct err e;
     test_write(test_path("rubric"), text, strlen(text));
-    MUST(rubric_read(test_path("rubric"), suite_shipped(), rubric, &mistakes, &e));
+    MUST(rubric_read(test_path("rubric"), suite_shipped(), 0, rubric, &mistakes, &e));
 }
 
 static const char head[] = "rubric A course\n"           /* 1 */
@@ -140,7 +141,7 @@ TEST(the_shipped_ones_are_right)
     static const int sets[] = {2, 2, 4, 1, 8};
     struct err e;
     for (int i = 0; i < 5; i++) {
-        assert_true(rubric_read(paths[i], suite_shipped(), rubric, &mistakes, &e));
+        assert_true(rubric_read(paths[i], suite_shipped(), 0, rubric, &mistakes, &e));
         if (mistakes.num > 0)
             fail_msg("%s:%d: %s", paths[i], mistakes.at[0].line, mistakes.at[0].text);
         assert_true(rubric_points(rubric) == points[i]);
@@ -150,7 +151,7 @@ TEST(the_shipped_ones_are_right)
     assert_string_equal(rubric->set[0].name, "");
     assert_string_equal(rubric->set[5].name, "light_pdf, camera_crop");
     assert_string_equal(rubric->set[5].words, "--starter light-pdf --frame crop");
-    REFUSES(rubric_read("/nowhere.rubric", suite_shipped(), rubric, &mistakes, &e),
+    REFUSES(rubric_read("/nowhere.rubric", suite_shipped(), 0, rubric, &mistakes, &e),
             "/nowhere.rubric: cannot read");
 }
 
@@ -178,6 +179,10 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 2, "rubric a\nlimit build-memory 1", "limit memory"},
         {1, 2, "rubric a\nbuild", "needs a text"},
         {1, 2, "rubric a\nrubric b", "second"},
+        {1, 2, "rubric a\nvariants 1", "variants"},
+        {1, 3, "rubric a\nvariants 2\nvariants 3", "a second 'variants'"},
+        {3, 3, " scene x_{variant}.dae", "without a line 'variants NUMBER' above"},
+        {1, 2, "rubric a\ncommand ./x {scene} {out} {variant}", "{variant}"},
         {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
         {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
         {1, 2, "rubric a\naccept slow", "needs a text"},
@@ -232,6 +237,61 @@ TEST(each_mistake_is_named_with_its_line)
     expect(7, "'referense'", with(7, " referense truth\n reference truth"));
     expect(12, "already in line 9",
            with(11, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2"));
+}
+
+static bool is_told(const char *words)
+{
+    bool told = false;
+    for (int i = 0; i < mistakes.num; i++)
+        told = told || strstr(mistakes.at[i].text, words) != NULL;
+    return told;
+}
+
+/* Several are named on one line and each stands for the same; nothing else of the line changes. */
+TEST(a_variant_is_what_its_number_says)
+{
+    struct err e;
+    read_text("rubric a\nvariants 12\nimage p\n options -a {variant} {variant}{variant}\n");
+    for (int variant = 0; variant <= 12; variant++) {
+        char options[32];
+        int is = variant > 0 ? variant : 1;
+        snprintf(options, sizeof options, "-a %d %d%d", is, is, is);
+        assert_true(
+            rubric_read(test_path("rubric"), suite_shipped(), variant, rubric, &mistakes, &e));
+        assert_string_equal(rubric->image[0].options, options);
+        assert_true(rubric->variants == 12 && rubric->variant == is);
+    }
+    assert_true(rubric_read(test_path("rubric"), suite_shipped(), 13, rubric, &mistakes, &e));
+    assert_true(is_told("no variant 13"));
+    read_text("rubric a\nvariants 3\n");
+    assert_true(is_told("no '{variant}'"));
+}
+
+/* A drawn one stays; each of 5 is drawn in 200 drawings but with chance 5 (4/5)^200 < 1e-18. */
+TEST(one_variant_is_drawn)
+{
+    struct err e, ignored;
+    int variant, again, count[6] = {0};
+    *rubric = (struct rubric){.path = "a", .variants = 5};
+    for (int i = 0; i < 200; i++) {
+        assert_true(fs_remove_tree(test_path("references"), &ignored));
+        MUST(rubric_variant_draw(test_path("references"), rubric, 0, &variant, &e));
+        MUST(rubric_variant_draw(test_path("references"), rubric, 0, &again, &e));
+        assert_int_equal(variant, again);
+        count[variant]++;
+    }
+    for (int k = 1; k <= 5; k++)
+        assert_true(count[k] > 0);
+    MUST(rubric_variant_draw(test_path("references"), rubric, variant, &again, &e));
+    REFUSES(rubric_variant_draw(test_path("references"), rubric, variant % 5 + 1, &again, &e),
+            "was drawn, not");
+    REFUSES(rubric_variant_draw(test_path("references"), rubric, 6, &again, &e), "no variant 6");
+    rubric->variants = variant - 1;
+    if (variant > 1) /* else it has none */
+        REFUSES(rubric_variant_draw(test_path("references"), rubric, 0, &again, &e), "was drawn");
+    rubric->variants = 5;
+    test_write(test_path("references/variant"), "two\n", 4);
+    REFUSES(rubric_variant_draw(test_path("references"), rubric, 0, &again, &e), "not the number");
 }
 
 TEST(all_mistakes_are_found_at_once)
