@@ -353,8 +353,8 @@ TEST(same_on_any_threads)
         struct err e = {0};
         struct wide *one = wide_build(s, ISA_AUTO, 1, &e);
         assert_non_null(one);
-        static const int threads[] = {2, 3, 16};
-        for (int k = 0; k < 3; k++) {
+        static const int threads[] = {2, 3, 16, 40};
+        for (size_t k = 0; k < COUNT(threads); k++) {
             struct wide *w = wide_build(s, ISA_AUTO, threads[k], &e);
             assert_non_null(w);
             assert_true(w->used == one->used && w->num_leaves == one->num_leaves);
